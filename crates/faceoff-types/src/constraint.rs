@@ -1,0 +1,31 @@
+use serde::{Deserialize, Serialize};
+
+/// A constraint whose violation costs penalty points (RULES, "Constraints and penalty points").
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Constraint {
+    /// End-effector position: over the table and at its height.
+    Ee,
+    /// Height of elbow (link 4) and wrist (link 7).
+    Link,
+    /// Joint positions within 95 % of their limits.
+    JointPos,
+    /// Filtered joint velocities within 95 % of their limits.
+    JointVel,
+    /// Time that the agent takes to answer.
+    ComputationTime,
+}
+
+/// Which constraints the robot's motion broke at least once in an episode. Computation time is
+/// judged from [`ComputationTime`](crate::ComputationTime), not here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+pub struct Violations {
+    /// End-effector position.
+    pub ee: bool,
+    /// Elbow and wrist height.
+    pub link: bool,
+    /// Joint position.
+    pub joint_pos: bool,
+    /// Joint velocity.
+    pub joint_vel: bool,
+}

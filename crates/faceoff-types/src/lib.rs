@@ -1,0 +1,31 @@
+//! The vocabulary of Faceoff: ids, names, tasks, profiles, seeds, tiers, faults and scores.
+//!
+//! Everything here parses once, at a boundary (serde, command line, SQL), and is trusted afterwards.
+//! This crate does no I/O, reads no clock and holds no policy: rules live in `faceoff-scoring`,
+//! physics in `faceoff-sim`.
+
+mod computation_time;
+mod constraint;
+mod fault;
+mod ids;
+mod outcome;
+mod profile;
+mod result;
+mod ruleset;
+mod seed;
+mod task;
+mod team_name;
+mod tier;
+
+pub use computation_time::ComputationTime;
+pub use constraint::{Constraint, Violations};
+pub use fault::{AgentFault, AgentFaultKind};
+pub use ids::{EvaluationId, ParseIdError, ShardId, SubmissionId, TeamId};
+pub use outcome::{EpisodeEnd, EpisodeOutcome};
+pub use profile::{Factor, Factors, ParseProfileError, Profile};
+pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult, ViolationCounts};
+pub use ruleset::RULESET;
+pub use seed::{ParseSeedError, Seed};
+pub use task::{ParseTaskError, Task};
+pub use team_name::{InvalidTeamName, TeamName};
+pub use tier::Tier;

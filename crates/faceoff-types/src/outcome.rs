@@ -1,0 +1,41 @@
+use crate::{AgentFault, ComputationTime, Task, Violations};
+use serde::{Deserialize, Serialize};
+
+/// Why an episode ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EpisodeEnd {
+    /// All control steps were played.
+    Horizon,
+    /// The puck left the table: a goal, or worse.
+    LeftTable,
+    /// `hit`, `defend`: the puck moves back across the middle line. `prepare`: it crossed the line.
+    CrossedMiddle,
+    /// `defend`: the puck is slow enough.
+    Stopped,
+    /// `prepare`: the puck reached the table's long axis.
+    ReachedAxis,
+    /// The agent broke the protocol or a limit.
+    AgentFault,
+}
+
+/// What happened in one episode: all that scoring needs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EpisodeOutcome {
+    /// The task.
+    pub task: Task,
+    /// Index of the episode within the evaluation, from 0.
+    pub episode: u32,
+    /// Control steps played.
+    pub steps: u32,
+    /// Why it ended.
+    pub end: EpisodeEnd,
+    /// Success, tested on the last true state; always false after an agent fault.
+    pub success: bool,
+    /// Constraints broken at least once.
+    pub violations: Violations,
+    /// The agent's computation times.
+    pub computation_time: ComputationTime,
+    /// The fault, if the episode ended by one.
+    pub fault: Option<AgentFault>,
+}

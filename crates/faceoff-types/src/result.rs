@@ -1,0 +1,71 @@
+use crate::{Profile, Seed, Task, Tier};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Episodes in which each constraint was violated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct ViolationCounts {
+    /// End-effector position.
+    pub ee: u32,
+    /// Elbow and wrist height.
+    pub link: u32,
+    /// Joint position.
+    pub joint_pos: u32,
+    /// Joint velocity.
+    pub joint_vel: u32,
+    /// Computation time.
+    pub computation_time: u32,
+}
+
+/// Computation times over all steps of a task, in seconds.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct ComputationTimeSummary {
+    /// Mean.
+    pub mean: f64,
+    /// 99th percentile (nearest rank).
+    pub p99: f64,
+    /// Maximum.
+    pub max: f64,
+}
+
+/// The score of one task.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TaskResult {
+    /// Episodes played.
+    pub episodes: u32,
+    /// Episodes that ended in success.
+    pub successes: u32,
+    /// Fraction of successes.
+    pub success_rate: f64,
+    /// 95 % Wilson interval of the success rate, as fractions.
+    pub success_ci95: [f64; 2],
+    /// Penalty points over all episodes: the task's deployability score (DS).
+    pub penalty_points: f64,
+    /// Episodes with each violation.
+    pub violations: ViolationCounts,
+    /// Tier that follows from the penalty points.
+    pub tier: Tier,
+    /// Control steps played.
+    pub steps: u64,
+    /// Computation times.
+    pub computation_time_s: ComputationTimeSummary,
+}
+
+/// The score of one evaluation; the layout of `results.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EvaluationResult {
+    /// The ruleset's name.
+    pub ruleset: String,
+    /// The perturbation profile.
+    pub profile: Profile,
+    /// The evaluation's seed, 64 hexadecimal digits.
+    pub seed: Seed,
+    /// The tasks played.
+    pub tasks: BTreeMap<Task, TaskResult>,
+    /// Overall score in percent; tasks not played count as 0.
+    pub score: f64,
+    /// Overall DS: the maximum over the tasks.
+    pub penalty_points: f64,
+    /// Overall tier: the worst over the tasks.
+    pub tier: Tier,
+}

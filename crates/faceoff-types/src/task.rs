@@ -1,0 +1,50 @@
+use serde::{Deserialize, Serialize};
+use std::{fmt, str::FromStr};
+
+/// A task of the qualifying stage (paper §2.1).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Task {
+    /// Score a goal against an opponent that moves in a fixed pattern.
+    Hit,
+    /// Stop an incoming puck on the own side.
+    Defend,
+    /// Move a puck from the border to a good hitting position.
+    Prepare,
+}
+
+impl Task {
+    /// All tasks, in board order.
+    pub const ALL: [Self; 3] = [Self::Hit, Self::Defend, Self::Prepare];
+
+    /// The name used in files, in the protocol and on the command line.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Hit => "hit",
+            Self::Defend => "defend",
+            Self::Prepare => "prepare",
+        }
+    }
+}
+
+impl fmt::Display for Task {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.as_str())
+    }
+}
+
+/// A word that names no task.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("unknown task {0:?}: expected hit, defend or prepare")]
+pub struct ParseTaskError(pub String);
+
+impl FromStr for Task {
+    type Err = ParseTaskError;
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        Self::ALL
+            .into_iter()
+            .find(|task| task.as_str() == s)
+            .ok_or_else(|| ParseTaskError(s.to_owned()))
+    }
+}

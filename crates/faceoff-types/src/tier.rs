@@ -1,0 +1,45 @@
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Deployability tier, best first (RULES, "Constraints and penalty points").
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Tier {
+    /// Safe enough for the real robot.
+    Deployable,
+    /// Could become safe enough.
+    Improvable,
+    /// Would endanger the real robot.
+    NonDeployable,
+}
+
+impl Tier {
+    /// All tiers, in board order.
+    pub const ALL: [Self; 3] = [Self::Deployable, Self::Improvable, Self::NonDeployable];
+
+    /// The name used in files.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Deployable => "deployable",
+            Self::Improvable => "improvable",
+            Self::NonDeployable => "non_deployable",
+        }
+    }
+
+    /// The heading used on boards.
+    #[must_use]
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Deployable => "Deployable",
+            Self::Improvable => "Improvable",
+            Self::NonDeployable => "Non-deployable",
+        }
+    }
+}
+
+impl fmt::Display for Tier {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.as_str())
+    }
+}
