@@ -107,6 +107,8 @@ fn recorded_actions_lead_to_recorded_episodes() {
     }
     println!("{close} of {total} pucks within 5 mm, {mild} arms within 5e-4 rad");
     assert_eq!(total, 90);
+    // A second contact may follow within the window: a few replays are chaotic already.
+    assert!(mild >= 85, "{mild} of {total} arms");
     assert!(
         close >= 70,
         "{close} of {total} pucks within 5 mm after the first impact"
