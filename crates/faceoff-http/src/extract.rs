@@ -115,14 +115,15 @@ where
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
-        let invalid = |detail: String| Problem::new(ProblemKind::InvalidRequest, detail);
+        // What cannot be an id is the id of nothing.
+        let not_found = |detail: String| Problem::new(ProblemKind::NotFound, detail);
         let params = RawPathParams::from_request_parts(parts, state)
             .await
-            .map_err(|rejection| invalid(rejection.body_text()))?;
+            .map_err(|rejection| not_found(rejection.body_text()))?;
         let text = params.iter().next().map_or("", |(_, text)| text);
         text.parse()
             .map(Self)
-            .map_err(|error: T::Err| invalid(error.to_string()))
+            .map_err(|error: T::Err| not_found(error.to_string()))
     }
 }
 

@@ -312,25 +312,7 @@ pub(crate) async fn evaluate_submission(
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,
 ) -> Result<impl IntoResponse, Problem> {
-    let submission = visible(&app, &caller, id).await?;
-    let not_valid = match submission.state {
-        SubmissionState::Valid { .. } => None,
-        SubmissionState::Validating { .. } => {
-            Some("is still being validated; wait until its state is “valid”".to_owned())
-        }
-        SubmissionState::Invalid { reason, .. } => {
-            Some(format!("is invalid ({reason}); upload a corrected bundle"))
-        }
-        SubmissionState::ValidationError { reason } => Some(format!(
-            "could not be validated by our fault ({reason}); upload it again"
-        )),
-    };
-    if let Some(why) = not_valid {
-        return Err(Problem::new(
-            ProblemKind::Conflict,
-            format!("the submission {why}"),
-        ));
-    }
+    visible(&app, &caller, id).await?;
     let evaluation = app
         .store
         .create_evaluation(id, &app.config.plan, app.config.clock.now())

@@ -8,7 +8,7 @@ use crate::{
         evaluations::{EvaluationStatus, Progress, with_names},
     },
     extract::PathParam,
-    problem::{Problem, ProblemKind},
+    problem::Problem,
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
@@ -233,8 +233,7 @@ pub(super) async fn by_task(
     State(app): State<App>,
     task: Result<PathParam<Task>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let PathParam(task) =
-        task.map_err(|problem| Problem::new(ProblemKind::NotFound, problem.detail()))?;
+    let PathParam(task) = task?;
     let season = app.store.season().await?;
     let (title, aim) = match task {
         Task::Hit => (

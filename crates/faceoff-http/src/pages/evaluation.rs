@@ -6,7 +6,7 @@ use crate::{
     App,
     api::{board::public_seed, evaluations::Progress},
     extract::PathParam,
-    problem::{Problem, ProblemKind},
+    problem::Problem,
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
@@ -98,8 +98,7 @@ pub(super) async fn page(
     State(app): State<App>,
     id: Result<PathParam<EvaluationId>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let PathParam(id) =
-        id.map_err(|problem| Problem::new(ProblemKind::NotFound, problem.detail()))?;
+    let PathParam(id) = id?;
     let evaluation = app.store.evaluation(id).await?;
     let team = app.store.team(evaluation.team).await?;
     let submission = app.store.submission(evaluation.submission).await?;
