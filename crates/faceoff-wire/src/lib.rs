@@ -8,7 +8,7 @@
 //!
 //! * [`message`]: what the evaluator says (`hello`, `reset`, `step`, `end`, `bye`);
 //! * [`answer`]: what the agent answers (`ready`, `act`);
-//! * [`Manifest`]: `agent.toml`;
+//! * [`Manifest`][]: `agent.toml`;
 //! * [`dataset`]: `manifest.json` and `violations.json` of a recorded evaluation.
 
 pub mod answer;
