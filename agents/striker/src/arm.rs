@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use crate::env::{Env, JOINTS, Joints};
 use crate::field::Vec2;
-use crate::kinematics::{Jacobian, Pose, forward};
+use crate::kinematics::{FOREARM_M, HAND_M, Jacobian, Pose, SHOULDER_M, UPPER_ARM_M, forward};
 
 /// Share of the evaluator's joint speed limits that references may use; the rest is for tracking
 /// errors and the observation filter.
@@ -92,7 +92,7 @@ impl Arm {
         let pose = self.pose();
         let goal = Vector3::new(position.x, position.y, self.height);
         let wish = (goal - pose.tip) / self.dt;
-        let preferred = self.posture_rate(posture);
+        let preferred = self.posture_rate(posture, position);
         // The mean speed over the step, from the Jacobian at its beginning …
         let (mean, share) = self.resolve(&pose.jacobian, &wish, &preferred);
         let mut q = self.q + self.dt * mean;
@@ -141,10 +141,10 @@ impl Arm {
     }
 
     /// Speed towards the preferred posture, changing no faster than the acceleration bound.
-    fn posture_rate(&mut self, posture: Posture) -> Joints {
+    fn posture_rate(&mut self, posture: Posture, position: Vec2) -> Joints {
         let wish = match posture {
             Posture::Free => Joints::zeros(),
-            Posture::Fast => POSTURE_RATE * (self.fast_posture() - self.q),
+            Posture::Fast => POSTURE_RATE * (self.fast_posture(position) - self.q),
         };
         let step = POSTURE_ACCELERATION * self.dt;
         for i in 0..JOINTS {
@@ -156,18 +156,25 @@ impl Arm {
 
     /// Elbow up in the vertical plane through the base, with the wrist bent so that shoulder, elbow
     /// and wrist share the work of a radial swing: the angle of joint 6 was found by maximising the
-    /// radial speed within the joint speed limits at each reach and is nearly linear in it. Joints 2
-    /// and 4 follow from the height and need no preference of their own.
-    fn fast_posture(&self) -> Joints {
-        let tip = forward(&self.q).tip;
-        let reach = tip.xy().norm();
-        let mut q = self.q;
-        q[0] = tip.y.atan2(tip.x);
-        q[2] = 0.0;
-        q[4] = 0.0;
-        q[5] = (1.88 - 1.45 * (reach - 0.65)).clamp(0.8, 1.88);
-        q[6] = 0.0;
-        q
+    /// radial speed within the joint speed limits at each reach and is nearly linear in it.
+    fn fast_posture(&self, position: Vec2) -> Joints {
+        let reach = position.norm();
+        let wrist = (1.88 - 1.45 * (reach - 0.65)).clamp(0.8, 1.88);
+        // With joint 6 given, forearm and rod are one bent link …
+        let (sin, cos) = wrist.sin_cos();
+        let (along, across) = (FOREARM_M + HAND_M * cos, HAND_M * sin);
+        let (lower, bend) = (along.hypot(across), across.atan2(along));
+        // … and the rest is a triangle between shoulder, elbow and tip. Angles from the vertical.
+        let rise = self.height - SHOULDER_M;
+        let distance = reach.hypot(rise).min(0.999 * (UPPER_ARM_M + lower));
+        let corner = |opposite: f64, a: f64, b: f64| {
+            ((a * a + b * b - opposite * opposite) / (2.0 * a * b)).clamp(-1.0, 1.0).acos()
+        };
+        let shoulder = reach.atan2(rise) - corner(lower, UPPER_ARM_M, distance);
+        let elbow = corner(distance, UPPER_ARM_M, lower);
+        // The bent link leaves the elbow at `shoulder + π − elbow`, the forearm `bend` before that.
+        let forearm = shoulder + std::f64::consts::PI - elbow - bend;
+        Joints::from([position.y.atan2(position.x), shoulder, 0.0, shoulder - forearm, 0.0, wrist, 0.0])
     }
 }
 

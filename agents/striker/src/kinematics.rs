@@ -25,6 +25,16 @@ const ORIGIN: [[f64; 3]; JOINTS] = [
 /// The end effector on link 7, metres along its z axis.
 const ROD_M: f64 = 0.585;
 
+// The same lengths for the arm in one plane (joints 3, 5 at zero).
+/// Height of joint 2's axis.
+pub const SHOULDER_M: f64 = 0.1575 + 0.2025;
+/// From joint 2's to joint 4's axis.
+pub const UPPER_ARM_M: f64 = 0.2045 + 0.2155;
+/// From joint 4's to joint 6's axis.
+pub const FOREARM_M: f64 = 0.1845 + 0.2155;
+/// From joint 6's axis to the end effector.
+pub const HAND_M: f64 = 0.081 + ROD_M;
+
 /// Orientation of a body in its parent at joint angle zero. All of them are multiples of quarter
 /// turns, so exact matrices stand in for the quaternions.
 #[rustfmt::skip]
@@ -85,3 +95,6 @@ pub fn forward(q: &Joints) -> Pose {
         jacobian,
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -6,6 +6,7 @@
 //! is free of clocks and I/O; `main.rs` adds the protocol.
 
 mod arm;
+mod contact;
 mod env;
 mod estimator;
 mod field;

@@ -79,6 +79,8 @@ impl Order {
 pub fn around(scene: &Scene<'_>, goal: Vec2, clearance: f64) -> Vec2 {
     let from = scene.mallet.pos;
     let puck = scene.puck.pos + 0.1 * scene.puck.vel;
+    // A goal closer to the puck than that is approached as closely as it lies itself.
+    let clearance = clearance.min((goal - puck).norm() - 1e-3);
     let way = goal - from;
     let length = way.norm();
     if length < 1e-6 {
