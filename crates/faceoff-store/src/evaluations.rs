@@ -1,5 +1,5 @@
 use crate::{
-    Event, Store, StoreError, Submission, SubmissionState, Team,
+    EvaluationPlan, Event, Store, StoreError, Submission, SubmissionState,
     column::{Instant, Json},
     shards, submissions,
 };
@@ -8,46 +8,6 @@ use faceoff_types::{
 };
 use jiff::{Timestamp, civil::Date, tz::TimeZone};
 use sqlx::{SqliteConnection, types::Text};
-use std::collections::HashMap;
-
-/// What an evaluation plays.
-#[derive(Debug, Clone, PartialEq)]
-pub struct EvaluationPlan {
-    /// The perturbations.
-    pub profile: Profile,
-    /// The tasks; at least one, none twice.
-    pub tasks: Vec<Task>,
-    /// Episodes of each task; at least one.
-    pub episodes_per_task: u32,
-    /// Episodes of one unit of work; at least one. Scores do not depend on it.
-    pub episodes_per_shard: u32,
-    /// More agent faults than this, summed over the evaluation, end it without a score.
-    pub max_faults: u32,
-}
-
-impl EvaluationPlan {
-    fn check(&self) -> Result<(), StoreError> {
-        let twice = |task: &Task| self.tasks.iter().filter(|other| *other == task).count() > 1;
-        if self.tasks.is_empty() || self.tasks.iter().any(twice) {
-            return Err(StoreError::Conflict(
-                "a plan names each task once, and at least one".into(),
-            ));
-        }
-        if self.episodes_per_task == 0 || self.episodes_per_shard == 0 {
-            return Err(StoreError::Conflict(
-                "a plan plays at least one episode".into(),
-            ));
-        }
-        Ok(())
-    }
-
-    /// Episodes over all tasks.
-    #[must_use]
-    pub fn episodes_total(&self) -> u32 {
-        let tasks = u32::try_from(self.tasks.len()).unwrap_or(u32::MAX);
-        tasks.saturating_mul(self.episodes_per_task)
-    }
-}
 
 /// One run of a submission over the tasks of a plan.
 #[derive(Debug, Clone, PartialEq)]
@@ -128,23 +88,6 @@ impl EvaluationState {
     pub const fn takes_turn(&self) -> bool {
         !matches!(self, Self::PlatformFailed { .. } | Self::Cancelled { .. })
     }
-}
-
-/// What a board row is made of.
-#[derive(Debug, Clone)]
-pub struct BoardRecord {
-    /// The team.
-    pub team: Team,
-    /// The submission that was evaluated.
-    pub submission: Submission,
-    /// The team's newest finished counting evaluation.
-    pub evaluation: EvaluationId,
-    /// Its day.
-    pub day: Date,
-    /// When it was scored.
-    pub finished_at: Timestamp,
-    /// The score.
-    pub result: EvaluationResult,
 }
 
 struct EvaluationRow {
@@ -264,6 +207,22 @@ pub(crate) async fn find(
         .await?
         .ok_or(StoreError::NotFound("evaluation"))?
         .try_into()
+}
+
+/// The finished evaluation of each team's newest such day, in no particular order.
+pub(crate) async fn newest_finished(
+    connection: &mut SqliteConnection,
+) -> Result<Vec<Evaluation>, StoreError> {
+    select_evaluations!(
+        "WHERE e.state = 'finished' AND NOT EXISTS (
+                 SELECT 1 FROM evaluations n
+                 WHERE n.team_id = e.team_id AND n.state = 'finished' AND n.day > e.day)"
+    )
+    .fetch_all(connection)
+    .await?
+    .into_iter()
+    .map(Evaluation::try_from)
+    .collect()
 }
 
 /// Takes the turn of `day` and queues the shards.
@@ -417,47 +376,5 @@ impl Store {
         for evaluation in started {
             self.signals.changed(Event::Evaluation(evaluation.id));
         }
-    }
-
-    /// What the board is made of: each team's newest finished counting evaluation, in the teams'
-    /// order of names. Ranks and tiers are the scoring's.
-    pub async fn board(&self) -> Result<Vec<BoardRecord>, StoreError> {
-        // one snapshot for the three queries
-        let mut tx = self.database.read.begin().await?;
-        let rows = select_evaluations!(
-            "WHERE e.state = 'finished' AND NOT EXISTS (
-                 SELECT 1 FROM evaluations n
-                 WHERE n.team_id = e.team_id AND n.state = 'finished' AND n.day > e.day)"
-        )
-        .fetch_all(&mut *tx)
-        .await?;
-        let mut newest = HashMap::new();
-        for row in rows {
-            let evaluation = Evaluation::try_from(row)?;
-            newest.insert(evaluation.team, evaluation);
-        }
-        let mut board = Vec::with_capacity(newest.len());
-        for team in crate::teams::all(&mut tx).await? {
-            let Some(evaluation) = newest.remove(&team.id) else {
-                continue;
-            };
-            let EvaluationState::Finished {
-                finished_at,
-                result,
-                ..
-            } = evaluation.state
-            else {
-                continue;
-            };
-            board.push(BoardRecord {
-                team,
-                submission: submissions::find(&mut tx, evaluation.submission).await?,
-                evaluation: evaluation.id,
-                day: evaluation.day,
-                finished_at,
-                result: *result,
-            });
-        }
-        Ok(board)
     }
 }

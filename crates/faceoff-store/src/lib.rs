@@ -17,6 +17,7 @@
 //! (`--check` compares instead of writing).
 
 mod artifacts;
+mod board;
 mod column;
 mod database;
 mod error;
@@ -24,6 +25,7 @@ mod evaluation_ends;
 mod evaluations;
 mod events;
 mod leases;
+mod plan;
 mod queue;
 mod schedule;
 mod season;
@@ -34,10 +36,12 @@ mod submissions;
 mod teams;
 
 pub use artifacts::{ArtifactStream, Artifacts};
+pub use board::BoardRecord;
 pub use error::StoreError;
-pub use evaluations::{BoardRecord, Evaluation, EvaluationPlan, EvaluationState};
+pub use evaluations::{Evaluation, EvaluationState};
 pub use events::Event;
 pub use leases::{Claim, Committed};
+pub use plan::EvaluationPlan;
 pub use queue::{MAX_ATTEMPTS, MAX_LEASES, Work};
 pub use season::Season;
 pub use shards::{Shard, ShardCommit};

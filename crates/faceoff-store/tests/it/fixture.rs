@@ -17,7 +17,11 @@ impl Fixture {
     pub async fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let store = Store::open(folder.path()).await.unwrap();
-        Self { store, folder, now: "2026-03-01T10:00:00Z".parse().unwrap() }
+        Self {
+            store,
+            folder,
+            now: "2026-03-01T10:00:00Z".parse().unwrap(),
+        }
     }
 
     /// Another handle on the same folder, as another process would have.
@@ -31,11 +35,17 @@ impl Fixture {
 
     pub async fn team(&self, name: &str) -> Team {
         let token_hash = *blake3::hash(name.as_bytes()).as_bytes();
-        self.store.create_team(&name.parse().unwrap(), token_hash, self.now).await.unwrap()
+        self.store
+            .create_team(&name.parse().unwrap(), token_hash, self.now)
+            .await
+            .unwrap()
     }
 
     pub async fn upload(&self, team: &Team) -> Submission {
-        self.store.create_submission(team.id, bundle(), self.now).await.unwrap()
+        self.store
+            .create_submission(team.id, bundle(), self.now)
+            .await
+            .unwrap()
     }
 
     pub async fn claim(&self) -> Option<Work> {
@@ -47,8 +57,14 @@ impl Fixture {
         let Some(Work::Smoke { claim, submission }) = self.claim().await else {
             panic!("no smoke run is queued")
         };
-        let outcome = SmokeOutcome::Valid { agent_name: "striker".into(), log: "hello\n".into() };
-        self.store.commit_smoke(&claim, outcome, self.now).await.unwrap();
+        let outcome = SmokeOutcome::Valid {
+            agent_name: "striker".into(),
+            log: "hello\n".into(),
+        };
+        self.store
+            .commit_smoke(&claim, outcome, self.now)
+            .await
+            .unwrap();
         self.store.submission(submission.id).await.unwrap()
     }
 
@@ -61,13 +77,21 @@ impl Fixture {
 
     pub async fn claim_shard(&self) -> (Claim, Evaluation, Shard) {
         match self.claim().await {
-            Some(Work::Shard { claim, evaluation, shard, .. }) => (claim, evaluation, shard),
+            Some(Work::Shard {
+                claim,
+                evaluation,
+                shard,
+                ..
+            }) => (claim, evaluation, shard),
             other => panic!("expected a shard, claimed {other:?}"),
         }
     }
 
     pub async fn play(&self, claim: &Claim, shard: &Shard, faults: u32) -> Committed {
-        self.store.commit_shard(claim, commit(shard, faults), self.now).await.unwrap()
+        self.store
+            .commit_shard(claim, commit(shard, faults), self.now)
+            .await
+            .unwrap()
     }
 
     pub async fn state(&self, id: EvaluationId) -> EvaluationState {
@@ -121,10 +145,20 @@ pub fn outcome(task: Task, episode: u32, faulty: bool) -> EpisodeOutcome {
         task,
         episode,
         steps: 17,
-        end: if faulty { EpisodeEnd::AgentFault } else { EpisodeEnd::LeftTable },
+        end: if faulty {
+            EpisodeEnd::AgentFault
+        } else {
+            EpisodeEnd::LeftTable
+        },
         success: !faulty,
-        violations: Violations { ee: true, ..Violations::default() },
-        computation_time: ComputationTime { mean_s: 0.1 + 0.2, max_s: 1e-3 / 3.0 },
+        violations: Violations {
+            ee: true,
+            ..Violations::default()
+        },
+        computation_time: ComputationTime {
+            mean_s: 0.1 + 0.2,
+            max_s: 1e-3 / 3.0,
+        },
         fault,
     }
 }
