@@ -541,6 +541,17 @@ async fn what_was_played_under_a_lost_lease_is_thrown_away() {
         .put_folder(&recording, scratch.path())
         .await
         .unwrap();
+    let recordings = server
+        .folder
+        .path()
+        .join("artifacts/recordings")
+        .join(id.to_string());
+    let of_the_shard = std::fs::read_dir(recordings.join(claim.unit.to_string())).unwrap();
+    assert_eq!(
+        of_the_shard.count(),
+        1,
+        "the stalled slot has removed its own"
+    );
     let shard = server.store.shards(id).await.unwrap().remove(0);
     let outcomes = (0..2).map(|episode| outcome(shard.task, episode)).collect();
     let commit = ShardCommit {
@@ -561,13 +572,12 @@ async fn what_was_played_under_a_lost_lease_is_thrown_away() {
     ));
     assert_eq!(evaluator.assembled.lock().unwrap()[0], "by the thief");
     running.stop().await;
-    let units = server
-        .folder
-        .path()
-        .join("artifacts/recordings")
-        .join(id.to_string());
-    let left = std::fs::read_dir(units).map_or(0, Iterator::count);
-    assert_eq!(left, 0, "no recording is left behind");
+    server
+        .store
+        .remove_old_recordings(server.now())
+        .await
+        .unwrap();
+    assert!(!recordings.exists() || std::fs::read_dir(&recordings).unwrap().next().is_none());
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
