@@ -19,7 +19,7 @@ fn an_evaluation_survives_kill_9_and_scores_as_the_local_evaluator_does() {
 
     // Killed whenever the next part of the evaluation has been played.
     for episodes in [1, 4, 8] {
-        server.poll(&evaluation, &team.token, |answer| {
+        let _ = server.poll(&evaluation, &team.token, |answer| {
             answer["progress"]["episodes_done"].as_u64() >= Some(episodes)
         });
         server.kill();
