@@ -215,6 +215,29 @@ impl Store {
         Ok(())
     }
 
+    /// Ends the leases of a worker that is known to be dead, and of its slots, so that nobody waits
+    /// for them to run out: `worker` itself and every name `worker/…`. Returns how many. The attempts
+    /// stay counted.
+    pub async fn end_leases_of(&self, worker: &str, now: Timestamp) -> Result<u64, StoreError> {
+        let now = Instant(now);
+        let mut tx = self.database.begin().await?;
+        let ended = sqlx::query!(
+            "UPDATE work_units SET claimable_at = ?1
+             WHERE state = 'leased' AND claimable_at > ?1
+               AND (worker = ?2 OR substr(worker, 1, length(?2) + 1) = ?2 || '/')",
+            now,
+            worker,
+        )
+        .execute(&mut *tx)
+        .await?
+        .rows_affected();
+        tx.commit().await?;
+        if ended > 0 {
+            self.signals.work_added();
+        }
+        Ok(ended)
+    }
+
     /// Shutdown: gives the unit back at once; the attempt does not count. Of a lost lease nothing is
     /// recorded.
     pub async fn release(&self, claim: &Claim, now: Timestamp) -> Result<(), StoreError> {

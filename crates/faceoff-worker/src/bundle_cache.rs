@@ -17,6 +17,7 @@ pub(crate) enum FetchError {
 #[derive(Debug)]
 pub(crate) struct BundleCache {
     folder: PathBuf,
+    /// the archive's hash, and what was unpacked from it
     held: Option<(String, Bundle)>,
 }
 
@@ -65,10 +66,7 @@ impl BundleCache {
         }
         let unpacked = self.folder.join("unpacked");
         fs::create_dir_all(&unpacked).map_err(|e| ours("making room for a bundle", &e))?;
-        // The name tells the format; of a team's file name only a known ending is taken over.
-        let archive = self
-            .folder
-            .join(format!("archive{}", ending(&bundle.file_name)));
+        let archive = self.folder.join("archive");
         handle
             .block_on(store.artifacts().get_to_file(&bundle.key, &archive))
             .map_err(|e| ours("fetching the bundle", &e))?;
@@ -91,12 +89,4 @@ impl BundleCache {
         fs::remove_file(&archive).map_err(|e| ours("removing the unpacked archive", &e))?;
         Ok(result)
     }
-}
-
-fn ending(file_name: &str) -> &'static str {
-    let name = file_name.to_ascii_lowercase();
-    [".tar.gz", ".tgz", ".tar.zst", ".zip"]
-        .into_iter()
-        .find(|ending| name.ends_with(ending))
-        .unwrap_or("")
 }

@@ -1,4 +1,4 @@
-use crate::now;
+use crate::clock::Clock;
 use faceoff_store::{Claim, Store};
 use faceoff_types::EpisodeOutcome;
 use std::{
@@ -37,13 +37,21 @@ impl LeaseKeeper {
         store: Store,
         claim: Claim,
         lease_s: u32,
+        clock: Clock,
         shutdown: CancellationToken,
     ) -> Self {
         let progress = Progress {
             episodes_done: Arc::default(),
             stop: CancellationToken::new(),
         };
-        let renewal = handle.spawn(renew(store, claim, lease_s, progress.clone(), shutdown));
+        let renewal = handle.spawn(renew(
+            store,
+            claim,
+            lease_s,
+            progress.clone(),
+            clock,
+            shutdown,
+        ));
         Self { progress, renewal }
     }
 
@@ -81,6 +89,7 @@ async fn renew(
     claim: Claim,
     lease_s: u32,
     progress: Progress,
+    clock: Clock,
     shutdown: CancellationToken,
 ) {
     // three tries before the lease ends
@@ -94,7 +103,7 @@ async fn renew(
             biased;
             () = shutdown.cancelled() => {
                 progress.stop.cancel();
-                if let Err(error) = store.release(&claim, now()).await {
+                if let Err(error) = store.release(&claim, clock.now()).await {
                     tracing::warn!(unit = %claim.unit, %error, "the unit could not be given back; its lease will end");
                 }
                 return;
@@ -105,7 +114,7 @@ async fn renew(
         if done == told && renewed_at.elapsed() < due_every {
             continue;
         }
-        match store.heartbeat(&claim, done, lease_s, now()).await {
+        match store.heartbeat(&claim, done, lease_s, clock.now()).await {
             Ok(true) => {
                 told = done;
                 renewed_at = tokio::time::Instant::now();

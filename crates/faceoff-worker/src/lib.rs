@@ -10,6 +10,7 @@
 //! lose: everything is in the store.
 
 mod bundle_cache;
+mod clock;
 mod cpus;
 mod evaluator;
 mod lease;
@@ -17,15 +18,10 @@ mod schedule;
 mod scratch;
 mod service;
 mod slot;
+#[cfg(test)]
+mod tests;
 mod units;
 
 pub use cpus::{CpuLayout, SlotCpus};
 pub use schedule::run_schedule;
 pub use service::{WorkerConfig, run};
-
-use jiff::Timestamp;
-
-/// The wall clock, which leases and UTC days are told by. Nothing else of this crate reads a clock.
-fn now() -> Timestamp {
-    Timestamp::now()
-}

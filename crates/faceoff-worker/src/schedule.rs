@@ -1,4 +1,4 @@
-use crate::now;
+use crate::clock::Clock;
 use anyhow::Context as _;
 use faceoff_store::{EvaluationPlan, Store};
 use jiff::{Timestamp, civil::Time, tz::TimeZone};
@@ -17,8 +17,9 @@ pub async fn run_schedule(
     at: Time,
     shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
+    let clock = Clock::system();
     loop {
-        let now = now();
+        let now = clock.now();
         let wait = match until_next(now, at).context("reckoning the time of the daily start")? {
             Due::In(wait) => wait,
             Due::Today { next } => match store.start_scheduled_day(&plan, now).await {

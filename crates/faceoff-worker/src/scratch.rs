@@ -1,14 +1,17 @@
 use anyhow::Context as _;
 use std::{
     fs::{self, File, TryLockError},
+    io::{Read as _, Seek as _, SeekFrom, Write as _},
     path::{Path, PathBuf},
 };
+use uuid::Uuid;
 
 /// The folder for what is unpacked and recorded until it is committed. Nothing in it is worth
 /// keeping, so it is emptied at the start; it belongs to one process at a time.
 #[derive(Debug)]
 pub(crate) struct Scratch {
     folder: PathBuf,
+    worker: String,
     _lock: File,
 }
 
@@ -17,7 +20,12 @@ impl Scratch {
     pub(crate) fn take(folder: &Path) -> anyhow::Result<Self> {
         fs::create_dir_all(folder)
             .with_context(|| format!("cannot create the scratch folder {}", folder.display()))?;
-        let lock = File::create(folder.join("lock"))
+        let mut lock = File::options()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(folder.join("lock"))
             .with_context(|| format!("cannot write to the scratch folder {}", folder.display()))?;
         match lock.try_lock() {
             Ok(()) => {}
@@ -42,10 +50,18 @@ impl Scratch {
                     .with_context(|| format!("cannot remove {}", entry.path().display()))?;
             }
         }
+        let worker = worker_name(&mut lock).context("cannot keep the worker's name")?;
         Ok(Self {
             folder: folder.to_owned(),
+            worker,
             _lock: lock,
         })
+    }
+
+    /// The name of whoever holds this folder, from one process to the next. Since the lock is ours,
+    /// all earlier holders are dead.
+    pub(crate) fn worker(&self) -> &str {
+        &self.worker
     }
 
     /// The empty folder of one slot.
@@ -54,6 +70,20 @@ impl Scratch {
         fs::create_dir(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
         Ok(folder)
     }
+}
+
+/// Reads the name from the lock file, or draws and writes one.
+fn worker_name(lock: &mut File) -> std::io::Result<String> {
+    let mut text = String::new();
+    lock.read_to_string(&mut text)?;
+    if let Ok(id) = Uuid::parse_str(text.trim()) {
+        return Ok(id.to_string());
+    }
+    let name = Uuid::now_v7().to_string();
+    lock.set_len(0)?;
+    lock.seek(SeekFrom::Start(0))?;
+    lock.write_all(name.as_bytes())?;
+    Ok(name)
 }
 
 #[cfg(test)]
@@ -77,7 +107,12 @@ mod tests {
         let scratch = Scratch::take(folder.path()).unwrap();
         let error = Scratch::take(folder.path()).unwrap_err().to_string();
         assert!(error.contains("used by another process"), "{error}");
+        let name = scratch.worker().to_owned();
         drop(scratch);
-        Scratch::take(folder.path()).unwrap();
+        assert_eq!(
+            Scratch::take(folder.path()).unwrap().worker(),
+            name,
+            "the name stays"
+        );
     }
 }

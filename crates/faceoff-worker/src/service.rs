@@ -1,8 +1,8 @@
 use crate::{
     bundle_cache::BundleCache,
+    clock::Clock,
     cpus::{self, CpuLayout, SlotCpus},
     evaluator::{Evaluator, Runner},
-    now,
     scratch::Scratch,
     slot::Slot,
     units::Tools,
@@ -14,12 +14,28 @@ use std::{path::PathBuf, sync::Arc, thread, time::Duration};
 use tokio::{runtime::Handle, sync::oneshot};
 use tokio_util::sync::CancellationToken;
 
-/// How long slots may take to leave what they are in the middle of (a step of an agent, an upload)
-/// once their units were given back.
-const SHUTDOWN_GRACE: Duration = Duration::from_secs(20);
+/// What time means here; tests are quicker.
+pub(crate) struct Pace {
+    pub(crate) clock: Clock,
+    /// See [`Slot::poll`].
+    pub(crate) poll: Duration,
+    /// How often the recordings of evaluations that are over are removed.
+    pub(crate) tidy_every: Duration,
+    /// How long slots may take to leave what they are in the middle of (a step of an agent, an
+    /// upload) once their units were given back.
+    pub(crate) shutdown_grace: Duration,
+}
 
-/// How often the recordings of evaluations that are over are removed.
-const TIDY_EVERY: Duration = Duration::from_secs(60);
+impl Default for Pace {
+    fn default() -> Self {
+        Self {
+            clock: Clock::system(),
+            poll: Duration::from_secs(2),
+            tidy_every: Duration::from_secs(60),
+            shutdown_grace: Duration::from_secs(20),
+        }
+    }
+}
 
 /// How this process works.
 #[derive(Debug, Clone)]
@@ -45,7 +61,7 @@ pub async fn run(
     config: WorkerConfig,
     shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
-    run_with(store, config, shutdown, Arc::new(Runner)).await
+    run_with(store, config, shutdown, Arc::new(Runner), Pace::default()).await
 }
 
 pub(crate) async fn run_with(
@@ -53,11 +69,20 @@ pub(crate) async fn run_with(
     config: WorkerConfig,
     shutdown: CancellationToken,
     evaluator: Arc<dyn Evaluator>,
+    pace: Pace,
 ) -> anyhow::Result<()> {
     anyhow::ensure!(config.slots > 0, "a worker needs at least one slot");
     anyhow::ensure!(config.lease_s > 0, "a lease lasts at least one second");
     let folder = config.scratch_dir.clone();
     let scratch = tokio::task::spawn_blocking(move || Scratch::take(&folder)).await??;
+
+    // A killed predecessor's units need not wait for their leases to run out.
+    let ended = store
+        .end_leases_of(scratch.worker(), pace.clock.now())
+        .await?;
+    if ended > 0 {
+        tracing::info!(units = ended, "taken over from this worker's last life");
+    }
 
     let layout = layout(&config);
     let mut slots = Vec::with_capacity(config.slots);
@@ -66,11 +91,13 @@ pub(crate) async fn run_with(
         let mut agent = config.agent.clone();
         agent.agent_cpus = cpus.agent;
         let slot = Slot {
-            name: format!("slot {index} of process {}", std::process::id()),
+            name: format!("{}/slot-{index}", scratch.worker()),
             lease_s: config.lease_s,
+            poll: pace.poll,
             tools: Tools {
                 store: store.clone(),
                 handle: Handle::current(),
+                clock: pace.clock.clone(),
                 evaluator: Arc::clone(&evaluator),
                 agent,
                 bundle_limits: config.bundle_limits,
@@ -81,9 +108,9 @@ pub(crate) async fn run_with(
         };
         slots.push((index, start(index, cpus.simulator, slot)?));
     }
-    let tidying = tokio::spawn(tidy(store, shutdown.clone()));
+    let tidying = tokio::spawn(tidy(store, pace.clock, pace.tidy_every, shutdown.clone()));
 
-    let ended = wait_for(slots, &shutdown).await;
+    let ended = wait_for(slots, pace.shutdown_grace, &shutdown).await;
     tidying.abort();
     ended
 }
@@ -128,6 +155,7 @@ fn start(
 
 async fn wait_for(
     slots: Vec<(usize, oneshot::Receiver<()>)>,
+    shutdown_grace: Duration,
     shutdown: &CancellationToken,
 ) -> anyhow::Result<()> {
     let all = async {
@@ -142,7 +170,7 @@ async fn wait_for(
     };
     let overdue = async {
         shutdown.cancelled().await;
-        tokio::time::sleep(SHUTDOWN_GRACE).await;
+        tokio::time::sleep(shutdown_grace).await;
     };
     tokio::select! {
         died = all => {
@@ -157,16 +185,16 @@ async fn wait_for(
 }
 
 /// Removes recordings that are no longer needed, now and then.
-async fn tidy(store: Store, shutdown: CancellationToken) {
+async fn tidy(store: Store, clock: Clock, every: Duration, shutdown: CancellationToken) {
     loop {
-        match store.remove_old_recordings(now()).await {
+        match store.remove_old_recordings(clock.now()).await {
             Ok(0) => {}
             Ok(evaluations) => tracing::debug!(evaluations, "recordings removed"),
             Err(error) => tracing::warn!(%error, "old recordings could not be removed"),
         }
         tokio::select! {
             () = shutdown.cancelled() => return,
-            () = tokio::time::sleep(TIDY_EVERY) => {}
+            () = tokio::time::sleep(every) => {}
         }
     }
 }

@@ -1,20 +1,18 @@
 use crate::{
     lease::LeaseKeeper,
-    now,
     units::{End, Ended, Tools},
 };
 use faceoff_store::Work;
 use std::{panic::AssertUnwindSafe, time::Duration};
 use tokio_util::sync::CancellationToken;
 
-/// How long an idle slot waits before it looks for units that became claimable by the passing of
-/// time: an expired lease, the end of a back-off, work added by another process.
-const POLL: Duration = Duration::from_secs(2);
-
 /// One slot: claims units and works them off, one at a time, on its own thread.
 pub(crate) struct Slot {
     pub(crate) name: String,
     pub(crate) lease_s: u32,
+    /// How long to wait, idle, before looking for units that became claimable by the passing of time:
+    /// an expired lease, the end of a back-off, work added by another process.
+    pub(crate) poll: Duration,
     pub(crate) tools: Tools,
     pub(crate) shutdown: CancellationToken,
 }
@@ -26,10 +24,11 @@ impl Slot {
         while !self.shutdown.is_cancelled() {
             // Seen before the claim, so that what is queued right after it wakes the wait.
             signal.borrow_and_update();
-            let claimed =
-                self.tools
-                    .handle
-                    .block_on(self.tools.store.claim(&self.name, self.lease_s, now()));
+            let claimed = self.tools.handle.block_on(self.tools.store.claim(
+                &self.name,
+                self.lease_s,
+                self.tools.clock.now(),
+            ));
             match claimed {
                 Ok(Some(work)) => self.work_on(&work),
                 Ok(None) => self.wait_for(Some(&mut signal)),
@@ -52,7 +51,7 @@ impl Slot {
             tokio::select! {
                 () = self.shutdown.cancelled() => {}
                 () = added => {}
-                () = tokio::time::sleep(POLL) => {}
+                () = tokio::time::sleep(self.poll) => {}
             }
         });
     }
@@ -64,6 +63,7 @@ impl Slot {
             self.tools.store.clone(),
             claim.clone(),
             self.lease_s,
+            self.tools.clock.clone(),
             self.shutdown.clone(),
         );
         tracing::info!(unit = %claim.unit, work = %Description(work), "begun");
@@ -111,10 +111,11 @@ impl Slot {
             return;
         }
         tracing::error!(unit = %claim.unit, work = %Description(work), reason, "platform fault");
-        let released =
-            self.tools
-                .handle
-                .block_on(self.tools.store.release_failed(claim, &reason, now()));
+        let released = self.tools.handle.block_on(self.tools.store.release_failed(
+            claim,
+            &reason,
+            self.tools.clock.now(),
+        ));
         if let Err(error) = released {
             tracing::error!(unit = %claim.unit, %error, "the unit could not be given back; its lease will end");
         }

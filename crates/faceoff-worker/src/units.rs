@@ -2,9 +2,9 @@
 
 use crate::{
     bundle_cache::{BundleCache, FetchError},
+    clock::Clock,
     evaluator::Evaluator,
     lease::Progress,
-    now,
 };
 use anyhow::Context as _;
 use faceoff_runner::{
@@ -33,6 +33,7 @@ pub(crate) enum End {
 pub(crate) struct Tools {
     pub(crate) store: Store,
     pub(crate) handle: Handle,
+    pub(crate) clock: Clock,
     pub(crate) evaluator: std::sync::Arc<dyn Evaluator>,
     pub(crate) agent: AgentEnvironment,
     pub(crate) bundle_limits: BundleLimits,
@@ -82,7 +83,7 @@ impl Tools {
             Err(FetchError::Platform(reason)) => anyhow::bail!(reason),
         };
         self.handle
-            .block_on(self.store.commit_smoke(claim, outcome, now()))?;
+            .block_on(self.store.commit_smoke(claim, outcome, self.clock.now()))?;
         Ok(End::Committed)
     }
 
@@ -132,7 +133,7 @@ impl Tools {
             stopped_by_faults: report.stopped_by_faults,
             recording: recording.clone(),
         };
-        match handle.block_on(store.commit_shard(claim, commit, now()))? {
+        match handle.block_on(store.commit_shard(claim, commit, self.clock.now()))? {
             Committed::Now | Committed::Before => Ok(End::Committed),
             Committed::LeaseLost => {
                 handle
@@ -167,7 +168,8 @@ impl Tools {
         handle
             .block_on(store.artifacts().put_file(&key, &archive))
             .context("storing the dataset")?;
-        let finished = handle.block_on(store.finish_evaluation(claim, &result, &key, now()));
+        let finished =
+            handle.block_on(store.finish_evaluation(claim, &result, &key, self.clock.now()));
         if finished.is_err() {
             // never stored: no other lease names this key
             handle

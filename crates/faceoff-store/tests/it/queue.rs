@@ -83,6 +83,40 @@ async fn an_expired_lease_is_leased_again_and_its_holder_told() {
 }
 
 #[tokio::test]
+async fn a_dead_workers_units_are_free_at_once_and_only_those() {
+    let f = Fixture::new().await;
+    let submission = f.ready_team("Alpha").await;
+    f.store
+        .create_evaluation(submission.id, &plan(), f.now)
+        .await
+        .unwrap();
+    let mut claims = Vec::new();
+    for worker in ["dead/slot-0", "dead/slot-1", "deadly/slot-0", "dead"] {
+        let work = f
+            .store
+            .claim(worker, LEASE_S, f.now)
+            .await
+            .unwrap()
+            .unwrap();
+        claims.push(work.claim().clone());
+    }
+    assert_eq!(f.store.end_leases_of("dead", f.now).await.unwrap(), 3);
+    assert_eq!(f.store.end_leases_of("dead", f.now).await.unwrap(), 0);
+    let mut again = Vec::new();
+    while let Some(work) = f.claim().await {
+        again.push(work.claim().unit);
+    }
+    assert_eq!(again.len(), 5, "three of the dead and two that nobody had");
+    assert!(!again.contains(&claims[2].unit));
+    assert!(
+        f.store
+            .heartbeat(&claims[2], 0, LEASE_S, f.now)
+            .await
+            .unwrap()
+    );
+}
+
+#[tokio::test]
 async fn work_finished_after_the_lease_counts_if_nobody_took_the_unit() {
     let mut f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
