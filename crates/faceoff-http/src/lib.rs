@@ -12,11 +12,11 @@ mod pages;
 pub mod problem;
 pub mod token;
 
-use axum::Router;
-use faceoff_store::{EvaluationPlan, Store};
+pub use axum::Router;
+use faceoff_store::{EvaluationPlan, Season, Store, StoreError};
 use jiff::{Timestamp, civil, tz::TimeZone};
-use std::{fmt, path::PathBuf, sync::Arc, time::Duration};
-use tokio::sync::Semaphore;
+use std::{fmt, io, path::PathBuf, sync::Arc, time::Duration};
+use tokio::{net::TcpListener, sync::Semaphore};
 
 /// Where the time comes from.
 #[derive(Clone)]
@@ -83,6 +83,8 @@ pub struct HttpConfig {
     pub admin_token_hash: [u8; 32],
     /// Existing folder for uploads under way, on a disk with room for some bundles.
     pub upload_dir: PathBuf,
+    /// Name of the season on the pages; `None` for the store's.
+    pub season_name: Option<String>,
     /// UTC time of the daily evaluation; `None` when the organiser starts it by hand. Shown only.
     pub daily_at: Option<civil::Time>,
     /// The time.
@@ -100,6 +102,20 @@ struct AppState {
 }
 
 type App = Arc<AppState>;
+
+impl AppState {
+    /// The season, under the name that the configuration gives it.
+    async fn season(&self) -> Result<Season, StoreError> {
+        let season = self.store.season().await?;
+        Ok(match &self.config.season_name {
+            Some(name) => Season {
+                name: name.clone(),
+                ..season
+            },
+            None => season,
+        })
+    }
+}
 
 /// The whole site: pages at `/`, API under `/api/v1`.
 ///
@@ -120,4 +136,18 @@ pub fn router(store: Store, config: HttpConfig) -> Router {
         .method_not_allowed_fallback(pages::unknown_method)
         .with_state(app);
     layers::around(site, limits.requests)
+}
+
+/// Answers requests until `until` ends, and after that the ones that are under way.
+///
+/// # Errors
+/// The listener failed.
+pub async fn serve(
+    listener: TcpListener,
+    router: Router,
+    until: impl Future<Output = ()> + Send + 'static,
+) -> io::Result<()> {
+    axum::serve(listener, router)
+        .with_graceful_shutdown(until)
+        .await
 }

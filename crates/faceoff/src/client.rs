@@ -10,11 +10,10 @@ use faceoff_http::api::{
     days::{DayView, StartDay},
     evaluations::EvaluationView,
     me::MeView,
-    season::SeasonView,
     submissions::SubmissionView,
     teams::{NewTeam, TeamView, TeamWithToken},
 };
-use faceoff_types::{EvaluationId, SubmissionId, Task, TeamId};
+use faceoff_types::{EvaluationId, SubmissionId, TeamId};
 use futures::StreamExt;
 use indicatif::ProgressBar;
 use jiff::civil::Date;
@@ -53,8 +52,9 @@ impl Client {
     /// # Errors
     /// If `server` is no `http://` address.
     pub fn new(server: &str, token: Option<&str>) -> anyhow::Result<Self> {
-        let url = reqwest::Url::parse(server)
-            .with_context(|| format!("{server:?} is no address; expected e.g. http://127.0.0.1:8080"))?;
+        let url = reqwest::Url::parse(server).with_context(|| {
+            format!("{server:?} is no address; expected e.g. http://127.0.0.1:8080")
+        })?;
         if url.scheme() != "http" {
             bail!(
                 "{server}: this program speaks http only; for a server behind TLS, tunnel to it \
@@ -79,7 +79,10 @@ impl Client {
     /// The same server, as somebody else.
     #[must_use]
     pub fn with_token(&self, token: &str) -> Self {
-        Self { token: Some(token.to_owned()), ..self.clone() }
+        Self {
+            token: Some(token.to_owned()),
+            ..self.clone()
+        }
     }
 
     /// Does the server answer?
@@ -87,31 +90,24 @@ impl Client {
     /// # Errors
     /// If it does not, or not well.
     pub async fn health(&self) -> anyhow::Result<()> {
-        self.send(self.request(Method::GET, "/health")).await.map(drop)
-    }
-
-    /// The season.
-    ///
-    /// # Errors
-    /// As [`ApiError`], or when the server cannot be reached; so for all calls below.
-    pub async fn season(&self) -> anyhow::Result<SeasonView> {
-        self.get("/season").await
+        self.send(self.request(Method::GET, "/health"))
+            .await
+            .map(drop)
     }
 
     /// The overall board.
+    ///
+    /// # Errors
+    /// As [`ApiError`], or when the server cannot be reached; so for all calls below.
     pub async fn board(&self) -> anyhow::Result<BoardView> {
         self.get("/board").await
     }
 
-    /// The board of one task.
-    pub async fn task_board(&self, task: Task) -> anyhow::Result<BoardView> {
-        self.get(&format!("/board/{task}")).await
-    }
-
     /// Organiser: creates a team; its token comes this once.
     pub async fn create_team(&self, name: &str) -> anyhow::Result<TeamWithToken> {
-        let request =
-            self.request(Method::POST, "/teams").json(&NewTeam { name: name.to_owned() });
+        let request = self.request(Method::POST, "/teams").json(&NewTeam {
+            name: name.to_owned(),
+        });
         read(self.send(request).await?).await
     }
 
@@ -128,12 +124,20 @@ impl Client {
 
     /// Organiser: starts today's evaluations, with another number of episodes if one is given.
     pub async fn start_day(&self, episodes_per_task: Option<u32>) -> anyhow::Result<DayView> {
-        self.start_day_as(&StartDay { episodes_per_task, profile: None }).await
+        self.start_day_as(&StartDay {
+            episodes_per_task,
+            profile: None,
+        })
+        .await
     }
 
     /// Organiser: starts today's evaluations.
     pub async fn start_day_as(&self, wanted: &StartDay) -> anyhow::Result<DayView> {
-        read(self.send(self.request(Method::POST, "/days").json(wanted)).await?).await
+        read(
+            self.send(self.request(Method::POST, "/days").json(wanted))
+                .await?,
+        )
+        .await
     }
 
     /// Team: who we are and whether today's turn is free.
@@ -179,11 +183,6 @@ impl Client {
             .header(header::CONTENT_LENGTH, bytes)
             .body(reqwest::Body::wrap_stream(stream));
         read(self.send(request).await?).await
-    }
-
-    /// Team: its submissions, newest first.
-    pub async fn submissions(&self) -> anyhow::Result<Vec<SubmissionView>> {
-        self.get("/submissions").await
     }
 
     /// Team or organiser: one submission.
@@ -232,7 +231,10 @@ impl Client {
                 .await
                 .with_context(|| format!("writing {}", partial.display()))?;
         }
-        writer.flush().await.with_context(|| format!("writing {}", partial.display()))?;
+        writer
+            .flush()
+            .await
+            .with_context(|| format!("writing {}", partial.display()))?;
         if announced.is_some_and(|announced| announced != bytes) {
             bail!("the download broke off after {bytes} bytes; try again");
         }
@@ -243,7 +245,9 @@ impl Client {
     }
 
     fn request(&self, method: Method, path: &str) -> RequestBuilder {
-        let request = self.http.request(method, format!("{}{BASE}{path}", self.base));
+        let request = self
+            .http
+            .request(method, format!("{}{BASE}{path}", self.base));
         match &self.token {
             Some(token) => request.bearer_auth(token),
             None => request,
@@ -271,14 +275,25 @@ impl Client {
         }
         let text = response.text().await.unwrap_or_default();
         let Ok(Problem { title, detail }) = serde_json::from_str(&text) else {
-            bail!("{} answered {status}, and not as a Faceoff server would", self.base);
+            bail!(
+                "{} answered {status}, and not as a Faceoff server would",
+                self.base
+            );
         };
-        Err(ApiError { status, title, detail }.into())
+        Err(ApiError {
+            status,
+            title,
+            detail,
+        }
+        .into())
     }
 }
 
 async fn read<T: DeserializeOwned>(response: Response) -> anyhow::Result<T> {
-    let bytes = response.bytes().await.context("reading the server's answer")?;
+    let bytes = response
+        .bytes()
+        .await
+        .context("reading the server's answer")?;
     serde_json::from_slice(&bytes)
         .context("the server's answer is not understood; is it another version of Faceoff?")
 }

@@ -4,8 +4,6 @@
 //! that the file, the documentation (`docs/operating.md`, held to them by a test) and the code
 //! cannot state different ones.
 
-mod runtimes;
-
 use anyhow::{Context, bail, ensure};
 use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::BundleLimits};
 use faceoff_sandbox::{Isolation, Layer, Limits, Runtime};
@@ -123,7 +121,12 @@ pub struct WorkersConfig {
 
 impl Default for WorkersConfig {
     fn default() -> Self {
-        Self { slots: None, lease_s: 30, agent_cpus: Vec::new(), scratch_dir: None }
+        Self {
+            slots: None,
+            lease_s: 30,
+            agent_cpus: Vec::new(),
+            scratch_dir: None,
+        }
     }
 }
 
@@ -157,8 +160,9 @@ impl Config {
                         return Ok(Self::default());
                     }
                     Err(error) => {
-                        return Err(error)
-                            .with_context(|| format!("reading the configuration {}", file.display()));
+                        return Err(error).with_context(|| {
+                            format!("reading the configuration {}", file.display())
+                        });
                     }
                 }
             }
@@ -184,12 +188,18 @@ impl Config {
             evaluation.episodes_per_shard >= 1,
             "evaluation.episodes_per_shard: expected at least 1, got 0"
         );
-        ensure!(!evaluation.tasks.is_empty(), "evaluation.tasks: expected at least one task");
+        ensure!(
+            !evaluation.tasks.is_empty(),
+            "evaluation.tasks: expected at least one task"
+        );
         let mut seen = BTreeSet::new();
         if let Some(twice) = evaluation.tasks.iter().find(|task| !seen.insert(**task)) {
             bail!("evaluation.tasks: {twice} is listed twice");
         }
-        ensure!(self.workers.slots != Some(0), "workers.slots: expected at least 1, got 0");
+        ensure!(
+            self.workers.slots != Some(0),
+            "workers.slots: expected at least 1, got 0"
+        );
         ensure!(
             (5..=3600).contains(&self.workers.lease_s),
             "workers.lease_s: expected 5 to 3600 seconds, got {}",
@@ -234,20 +244,22 @@ impl Config {
         }
     }
 
-    /// How agents are run here: all layers but those given up.
-    ///
-    /// # Errors
-    /// If this host's Python cannot be looked for.
-    pub fn agent_environment(&self) -> anyhow::Result<AgentEnvironment> {
-        let mut runtimes = runtimes::of_this_host()?;
+    /// How agents are run here: all layers but those given up; `native`, `python3` where this host
+    /// has one, and the configured runtimes.
+    #[must_use]
+    pub fn agent_environment(&self) -> AgentEnvironment {
+        let mut runtimes = BTreeMap::from([("native".to_owned(), Runtime::native())]);
+        runtimes.extend(Runtime::python3().map(|python| ("python3".to_owned(), python)));
         runtimes.extend(self.runtimes.clone());
-        Ok(AgentEnvironment {
+        AgentEnvironment {
             limits: self.limits.clone(),
             time: self.time.clone(),
-            isolation: Isolation::Sandboxed { given_up: self.sandbox.given_up.clone() },
+            isolation: Isolation::Sandboxed {
+                given_up: self.sandbox.given_up.clone(),
+            },
             runtimes,
             agent_cpus: self.workers.agent_cpus.clone(),
-        })
+        }
     }
 
     /// Worker slots: as configured, or one per two CPUs.
@@ -261,7 +273,10 @@ impl Config {
     /// Folder for unpacked bundles and recordings under way.
     #[must_use]
     pub fn scratch_dir(&self) -> PathBuf {
-        self.workers.scratch_dir.clone().unwrap_or_else(|| self.server.data_dir.join("scratch"))
+        self.workers
+            .scratch_dir
+            .clone()
+            .unwrap_or_else(|| self.server.data_dir.join("scratch"))
     }
 }
 

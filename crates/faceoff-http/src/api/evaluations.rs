@@ -155,10 +155,7 @@ impl From<AgentFault> for FaultView {
 
 impl Progress {
     pub(crate) fn of(evaluation: &Evaluation) -> Self {
-        let plan = &evaluation.plan;
-        let planned = plan
-            .episodes_per_task
-            .saturating_mul(plan.tasks.len().try_into().unwrap_or(0));
+        let planned = evaluation.plan.episodes_total();
         let (episodes_done, episodes_total) = match evaluation.state {
             EvaluationState::Running {
                 episodes_done,

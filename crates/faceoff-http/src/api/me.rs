@@ -3,7 +3,6 @@
 use super::teams::TeamView;
 use crate::{App, auth::TeamCaller, problem::Problem};
 use axum::{Json, extract::State};
-use faceoff_store::EvaluationState;
 use faceoff_types::EvaluationId;
 use jiff::civil;
 use serde::{Deserialize, Serialize};
@@ -46,13 +45,7 @@ pub(crate) async fn me(
         .evaluations_of(team.id)
         .await?
         .into_iter()
-        .find(|evaluation| {
-            evaluation.day == day
-                && !matches!(
-                    evaluation.state,
-                    EvaluationState::PlatformFailed { .. } | EvaluationState::Cancelled { .. }
-                )
-        })
+        .find(|evaluation| evaluation.day == day && evaluation.state.takes_turn())
         .map(|evaluation| evaluation.id);
     Ok(Json(MeView {
         team: team.into(),

@@ -32,7 +32,7 @@ pub struct SeasonView {
 /// The season.
 #[utoipa::path(get, path = "/season", tag = "public", responses((status = 200, body = SeasonView)))]
 pub(crate) async fn season(State(app): State<App>) -> Result<Json<SeasonView>, Problem> {
-    let season = app.store.season().await?;
+    let season = app.season().await?;
     Ok(Json(SeasonView {
         name: season.name,
         ruleset: RULESET.to_owned(),

@@ -13,7 +13,7 @@ use crate::{
 use askama::Template;
 use axum::{extract::State, response::Response};
 use faceoff_scoring::RankedEntry;
-use faceoff_store::{BoardRecord, Evaluation, EvaluationState};
+use faceoff_store::{BoardRecord, Evaluation};
 use faceoff_types::{EvaluationId, Task, TaskResult, Tier, ViolationCounts};
 use figures::Rate;
 use jiff::civil;
@@ -25,30 +25,44 @@ struct Who {
     agent: Option<String>,
     evaluation: EvaluationId,
     day: civil::Date,
-    /// “evaluation, 1000 episodes per task”
-    setting: String,
+    /// How it was evaluated, where the rows of the board differ in that.
+    setting: Option<String>,
+}
+
+/// How a result came about; results of different settings do not compare.
+fn setting(ranked: &RankedEntry<BoardRecord>) -> String {
+    let result = &ranked.entry.result;
+    let episodes = result
+        .tasks
+        .values()
+        .map(|task| task.episodes)
+        .max()
+        .unwrap_or(0);
+    format!(
+        "{} profile, {episodes} episodes per task, rules {}",
+        result.profile, result.ruleset
+    )
+}
+
+/// The setting of the whole board; `None` where its rows differ.
+fn common_setting(ranked: &[RankedEntry<BoardRecord>]) -> Option<String> {
+    let first = setting(ranked.first()?);
+    ranked
+        .iter()
+        .all(|entry| setting(entry) == first)
+        .then_some(first)
 }
 
 impl Who {
-    fn of(ranked: &RankedEntry<BoardRecord>) -> Self {
+    fn of(ranked: &RankedEntry<BoardRecord>, common_setting: Option<&String>) -> Self {
         let record = &ranked.entry.key;
-        let episodes = record
-            .result
-            .tasks
-            .values()
-            .map(|task| task.episodes)
-            .max()
-            .unwrap_or(0);
         Self {
             rank: ranked.rank,
             team: record.team.name.to_string(),
             agent: record.submission.agent_name.clone(),
             evaluation: record.evaluation,
             day: record.day,
-            setting: format!(
-                "{} profile, {episodes} episodes per task",
-                record.result.profile
-            ),
+            setting: common_setting.is_none().then(|| setting(ranked)),
         }
     }
 }
@@ -63,8 +77,8 @@ struct TierRows<Row> {
 }
 
 fn by_tier<Row>(
-    ranked: Vec<RankedEntry<BoardRecord>>,
-    row: impl Fn(RankedEntry<BoardRecord>) -> Row,
+    ranked: &[RankedEntry<BoardRecord>],
+    row: impl Fn(&RankedEntry<BoardRecord>) -> Row,
 ) -> Vec<TierRows<Row>> {
     let mut tiers: Vec<TierRows<Row>> = Tier::ALL
         .into_iter()
@@ -94,7 +108,7 @@ struct OverallRow {
 }
 
 impl OverallRow {
-    fn of(ranked: RankedEntry<BoardRecord>) -> Self {
+    fn of(ranked: &RankedEntry<BoardRecord>, common_setting: Option<&String>) -> Self {
         let result = &ranked.entry.result;
         let episodes = result
             .tasks
@@ -103,7 +117,7 @@ impl OverallRow {
             .max()
             .unwrap_or(0);
         Self {
-            who: Who::of(&ranked),
+            who: Who::of(ranked, common_setting),
             rates: Task::ALL
                 .into_iter()
                 .map(|task| (task, result.tasks.get(&task).map(Rate::of)))
@@ -130,14 +144,17 @@ struct OverallPage {
     today: civil::Date,
     daily_at: Option<String>,
     commitment: String,
+    setting: Option<String>,
     tiers: Vec<TierRows<OverallRow>>,
     under_way: Vec<UnderWay>,
 }
 
 /// The overall board.
 pub(super) async fn overall(State(app): State<App>) -> Result<Response, PageProblem> {
-    let season = app.store.season().await?;
+    let season = app.season().await?;
     let today = app.config.clock.today();
+    let ranked = ranked(&app, None).await?;
+    let setting = common_setting(&ranked);
     let page = OverallPage {
         frame: Frame::new(season.name, "/"),
         today,
@@ -146,7 +163,8 @@ pub(super) async fn overall(State(app): State<App>) -> Result<Response, PageProb
             .daily_at
             .map(|at| at.strftime("%H:%M").to_string()),
         commitment: season.commitment,
-        tiers: by_tier(ranked(&app, None).await?, OverallRow::of),
+        tiers: by_tier(&ranked, |entry| OverallRow::of(entry, setting.as_ref())),
+        setting,
         under_way: under_way(&app, today).await?,
     };
     render(&page)
@@ -158,12 +176,7 @@ async fn under_way(app: &App, today: civil::Date) -> Result<Vec<UnderWay>, PageP
         Ok(yesterday) => app.store.evaluations_on(yesterday).await?,
         Err(_) => Vec::new(),
     };
-    evaluations.retain(|evaluation| {
-        matches!(
-            evaluation.state,
-            EvaluationState::Queued | EvaluationState::Running { .. } | EvaluationState::Finalising
-        )
-    });
+    evaluations.retain(|evaluation| !evaluation.state.is_over());
     evaluations.extend(app.store.evaluations_on(today).await?);
     let views = with_names(app, evaluations).await?;
     Ok(views
@@ -204,10 +217,14 @@ struct TaskRow {
 }
 
 impl TaskRow {
-    fn of(ranked: RankedEntry<BoardRecord>, result: &TaskResult) -> Self {
+    fn of(
+        ranked: &RankedEntry<BoardRecord>,
+        result: &TaskResult,
+        common_setting: Option<&String>,
+    ) -> Self {
         let time = result.computation_time_s;
         Self {
-            who: Who::of(&ranked),
+            who: Who::of(ranked, common_setting),
             rate: Rate::of(result),
             penalty_points: figures::one(result.penalty_points),
             per_episode: figures::per_episode(result.penalty_points, result.episodes),
@@ -225,6 +242,7 @@ struct TaskPage {
     frame: Frame,
     title: &'static str,
     aim: &'static str,
+    setting: Option<String>,
     tiers: Vec<TierRows<TaskRow>>,
 }
 
@@ -234,7 +252,7 @@ pub(super) async fn by_task(
     task: Result<PathParam<Task>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PathParam(task) = task?;
-    let season = app.store.season().await?;
+    let season = app.season().await?;
     let (title, aim) = match task {
         Task::Hit => (
             "Hit",
@@ -252,15 +270,16 @@ pub(super) async fn by_task(
     let mut entries = ranked(&app, Some(task)).await?;
     // `task_board` leaves out teams without the task; a row without one could show nothing.
     entries.retain(|entry| entry.entry.result.tasks.contains_key(&task));
-    let tiers = by_tier(entries, |entry| {
-        let result = entry.entry.result.tasks[&task].clone();
-        TaskRow::of(entry, &result)
+    let setting = common_setting(&entries);
+    let tiers = by_tier(&entries, |entry| {
+        TaskRow::of(entry, &entry.entry.result.tasks[&task], setting.as_ref())
     });
     let frame = Frame::new(season.name, format!("/tasks/{task}"));
     render(&TaskPage {
         frame,
         title,
         aim,
+        setting,
         tiers,
     })
 }

@@ -102,7 +102,7 @@ pub(super) async fn page(
     let evaluation = app.store.evaluation(id).await?;
     let team = app.store.team(evaluation.team).await?;
     let submission = app.store.submission(evaluation.submission).await?;
-    let season = app.store.season().await?;
+    let season = app.season().await?;
     let today = app.config.clock.today();
     let progress = Progress::of(&evaluation);
     let (state, moving) = match &evaluation.state {

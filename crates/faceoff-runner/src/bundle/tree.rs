@@ -1,9 +1,9 @@
 use super::{BundleError, BundleLimits, links, no_manifest};
 use std::{
     collections::BTreeMap,
-    fs::{self, DirBuilder, OpenOptions},
+    fs::{self, OpenOptions, Permissions},
     io::{self, Read, Write},
-    os::unix::fs::{DirBuilderExt, OpenOptionsExt, symlink},
+    os::unix::fs::{PermissionsExt, symlink},
     path::{Path, PathBuf},
 };
 
@@ -32,6 +32,7 @@ pub(super) struct Tree {
     bytes: u64,
 }
 
+/// Set whatever the service's umask: agents run as another user when the service is root.
 const FOLDER_MODE: u32 = 0o755;
 /// Longest path in an archive, in bytes; with the folder it is unpacked to it must stay below the
 /// system's 4096.
@@ -47,6 +48,7 @@ impl Tree {
     /// An empty tree in the folder `into`.
     pub fn new(into: &Path, limits: &BundleLimits) -> Result<Self, BundleError> {
         fs::create_dir_all(into)
+            .and_then(|()| fs::set_permissions(into, Permissions::from_mode(FOLDER_MODE)))
             .map_err(BundleError::io(format!("creating {}", into.display())))?;
         let mut inside =
             fs::read_dir(into).map_err(BundleError::io(format!("reading {}", into.display())))?;
@@ -160,9 +162,9 @@ impl Tree {
                 self.limits.files
             )));
         }
-        DirBuilder::new()
-            .mode(FOLDER_MODE)
-            .create(self.into.join(path))
+        let place = self.into.join(path);
+        fs::create_dir(&place)
+            .and_then(|()| fs::set_permissions(&place, Permissions::from_mode(FOLDER_MODE)))
             .map_err(BundleError::io(format!("creating the folder {path:?}")))?;
         self.nodes.insert(path.to_owned(), Node::Folder { named });
         Ok(())
@@ -192,8 +194,9 @@ impl Tree {
         let mut file = OpenOptions::new()
             .write(true)
             .create_new(true)
-            .mode(file_mode)
             .open(target)
+            .map_err(BundleError::io(writing()))?;
+        file.set_permissions(Permissions::from_mode(file_mode))
             .map_err(BundleError::io(writing()))?;
         let mut buffer = vec![0; 64 << 10];
         loop {

@@ -4,7 +4,8 @@ use std::{
     io::{BufReader, Read},
 };
 use zip::{
-    CompressionMethod, ZipReadOptions, read::Config, result::ZipError, unstable::read::ZipIterable,
+    CompressionMethod, System, ZipReadOptions, read::Config, result::ZipError,
+    unstable::read::ZipIterable,
 };
 
 const KIND_MASK: u32 = 0o170_000;
@@ -45,7 +46,11 @@ pub(super) fn unpack(file: BufReader<File>, tree: &mut Tree) -> Result<(), Bundl
         ) {
             return Err(tree.refuse(&name, "compressed by another method than deflate"));
         }
-        let mode = entry.unix_mode().unwrap_or(0o644);
+        // The library's own translation hides set-id bits, which are to be refused.
+        let mode = match (entry.system(), entry.external_attributes() >> 16) {
+            (System::Dos, _) | (_, 0) => entry.unix_mode().unwrap_or(0o644),
+            (_, mode) => mode,
+        };
         let kind = match mode & KIND_MASK {
             0 if name.ends_with('/') => KIND_FOLDER,
             0 => KIND_FILE,

@@ -30,7 +30,11 @@ impl BundleFile {
         let absolute = bundle
             .canonicalize()
             .with_context(|| format!("the bundle {} cannot be found", bundle.display()))?;
-        let name = absolute.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let name = absolute
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
         let (place, name) = if absolute.is_dir() {
             ensure!(
                 absolute.join("agent.toml").is_file(),
@@ -47,8 +51,10 @@ impl BundleFile {
             Place::Given(path) => path.as_path(),
             Place::Packed(file) => file.path(),
         };
-        let bytes =
-            path.metadata().with_context(|| format!("reading {}", path.display()))?.len();
+        let bytes = path
+            .metadata()
+            .with_context(|| format!("reading {}", path.display()))?
+            .len();
         Ok(Self { place, name, bytes })
     }
 
@@ -76,6 +82,8 @@ fn pack(folder: &Path) -> std::io::Result<NamedTempFile> {
     archive.follow_symlinks(false);
     archive.append_dir_all(".", folder)?;
     let writer: BufWriter<File> = archive.into_inner()?.finish()?;
-    writer.into_inner().map_err(std::io::IntoInnerError::into_error)?;
+    writer
+        .into_inner()
+        .map_err(std::io::IntoInnerError::into_error)?;
     Ok(file)
 }

@@ -18,12 +18,20 @@ use std::path::{Path, PathBuf};
 pub struct AdminCommand {
     /// The server
     #[arg(
-        long, global = true, value_name = "URL", env = "FACEOFF_SERVER",
+        long,
+        global = true,
+        value_name = "URL",
+        env = "FACEOFF_SERVER",
         default_value = "http://127.0.0.1:8080"
     )]
     server: String,
     /// The organiser's token [default: the file admin-token in the data folder]
-    #[arg(long, global = true, env = "FACEOFF_ADMIN_TOKEN", hide_env_values = true)]
+    #[arg(
+        long,
+        global = true,
+        env = "FACEOFF_ADMIN_TOKEN",
+        hide_env_values = true
+    )]
     token: Option<String>,
     /// The server's data folder, on this machine [default: server.data_dir of faceoff.toml]
     #[arg(long, global = true, value_name = "FOLDER")]
@@ -106,8 +114,12 @@ impl AdminCommand {
                 })
             }
             Action::StartDay { episodes, profile } => {
-                let day =
-                    client.start_day_as(&StartDay { episodes_per_task: episodes, profile }).await?;
+                let day = client
+                    .start_day_as(&StartDay {
+                        episodes_per_task: episodes,
+                        profile,
+                    })
+                    .await?;
                 print(self.json, &day, || {
                     let mut lines = vec![format!(
                         "{}: {} started, {} there before",
@@ -138,13 +150,19 @@ impl AdminCommand {
                             )
                         })
                         .collect();
-                    or_none(lines, "no team yet; create one with faceoff admin create-team NAME")
+                    or_none(
+                        lines,
+                        "no team yet; create one with faceoff admin create-team NAME",
+                    )
                 })
             }
             Action::Evaluations { day } => {
                 let evaluations = client.evaluations(day).await?;
                 print(self.json, &evaluations, || {
-                    or_none(evaluations.iter().map(line).collect(), "no evaluation on that day")
+                    or_none(
+                        evaluations.iter().map(line).collect(),
+                        "no evaluation on that day",
+                    )
                 })
             }
         }
@@ -183,7 +201,10 @@ fn line(evaluation: &EvaluationView) -> String {
     let state = match &evaluation.status {
         EvaluationStatus::Queued => "queued".to_owned(),
         EvaluationStatus::Running => {
-            format!("running, {} of {} episodes", progress.episodes_done, progress.episodes_total)
+            format!(
+                "running, {} of {} episodes",
+                progress.episodes_done, progress.episodes_total
+            )
         }
         EvaluationStatus::Finalising => "computing the score".to_owned(),
         EvaluationStatus::Finished { result, .. } => format!(
@@ -194,7 +215,9 @@ fn line(evaluation: &EvaluationView) -> String {
         ),
         EvaluationStatus::AgentFailed { faults, .. } => format!(
             "the agent failed: {}",
-            faults.first().map_or("no fault is recorded", |fault| fault.message.as_str())
+            faults
+                .first()
+                .map_or("no fault is recorded", |fault| fault.message.as_str())
         ),
         EvaluationStatus::PlatformFailed { reason, .. } => {
             format!("our fault: {reason}; the turn was given back")
@@ -205,7 +228,11 @@ fn line(evaluation: &EvaluationView) -> String {
 }
 
 fn or_none(lines: Vec<String>, none: &str) -> String {
-    if lines.is_empty() { none.to_owned() } else { lines.join("\n") }
+    if lines.is_empty() {
+        none.to_owned()
+    } else {
+        lines.join("\n")
+    }
 }
 
 fn print<T: serde::Serialize>(
@@ -214,7 +241,10 @@ fn print<T: serde::Serialize>(
     text: impl FnOnce() -> String,
 ) -> anyhow::Result<()> {
     if json {
-        println!("{}", serde_json::to_string_pretty(value).context("writing JSON")?);
+        println!(
+            "{}",
+            serde_json::to_string_pretty(value).context("writing JSON")?
+        );
     } else {
         println!("{}", text());
     }

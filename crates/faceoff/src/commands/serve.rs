@@ -81,7 +81,9 @@ impl ServeCommand {
 
 fn start_log(format: LogFormat) {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
-    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    let log = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr);
     match format {
         LogFormat::Text => log.init(),
         LogFormat::Json => log.json().init(),
@@ -101,9 +103,14 @@ async fn serve(config: Config) -> anyhow::Result<()> {
     let store = Store::open(&data_dir)
         .await
         .with_context(|| format!("opening the data folder {}", data_dir.display()))?;
-    let listener = TcpListener::bind(config.server.listen).await.with_context(|| {
-        format!("listening on {}; choose another address with --listen", config.server.listen)
-    })?;
+    let listener = TcpListener::bind(config.server.listen)
+        .await
+        .with_context(|| {
+            format!(
+                "listening on {}; choose another address with --listen",
+                config.server.listen
+            )
+        })?;
     let plan = config.plan();
     let router = faceoff_http::router(
         store.clone(),
@@ -122,7 +129,7 @@ async fn serve(config: Config) -> anyhow::Result<()> {
         slots: config.slots(),
         lease_s: config.workers.lease_s,
         scratch_dir,
-        agent: config.agent_environment()?,
+        agent: config.agent_environment(),
         bundle_limits: config.bundle,
     };
     tracing::info!(
@@ -135,9 +142,18 @@ async fn serve(config: Config) -> anyhow::Result<()> {
 
     let shutdown = CancellationToken::new();
     let mut parts = JoinSet::new();
-    parts.spawn(faceoff_worker::run(store.clone(), workers, shutdown.clone()));
+    parts.spawn(faceoff_worker::run(
+        store.clone(),
+        workers,
+        shutdown.clone(),
+    ));
     if let Some(at) = config.evaluation.at {
-        parts.spawn(faceoff_worker::run_schedule(store, plan, at, shutdown.clone()));
+        parts.spawn(faceoff_worker::run_schedule(
+            store,
+            plan,
+            at,
+            shutdown.clone(),
+        ));
     }
     parts.spawn(answer(listener, router, shutdown.clone()));
 
@@ -150,7 +166,9 @@ async fn serve(config: Config) -> anyhow::Result<()> {
     shutdown.cancel();
     let rest = async {
         while let Some(part) = parts.join_next().await {
-            let ended = part.context("a part of the server panicked").and_then(|part| part);
+            let ended = part
+                .context("a part of the server panicked")
+                .and_then(|part| part);
             if outcome.is_ok() {
                 outcome = ended;
             }
@@ -180,7 +198,7 @@ async fn answer(
     shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
     let asked = shutdown.clone();
-    let serving = axum_serve(listener, router, async move { asked.cancelled().await });
+    let serving = faceoff_http::serve(listener, router, async move { asked.cancelled().await });
     let late = async {
         shutdown.cancelled().await;
         tokio::time::sleep(GRACE).await;
@@ -214,8 +232,15 @@ fn check_sandbox(features: &[HostFeature], given_up: &[Layer]) -> anyhow::Result
         if given_up.contains(&feature.layer) {
             tracing::warn!(layer = ?feature.layer, found = feature.found, "given up by configuration");
         } else {
-            let cure = feature.cure.as_deref().unwrap_or("none is known for this host");
-            missing.push(format!("{}: {}\n    cure: {cure}", name(feature.layer), feature.found));
+            let cure = feature
+                .cure
+                .as_deref()
+                .unwrap_or("none is known for this host");
+            missing.push(format!(
+                "{}: {}\n    cure: {cure}",
+                name(feature.layer),
+                feature.found
+            ));
         }
     }
     if missing.is_empty() {
@@ -273,8 +298,12 @@ fn admin_token(data_dir: &Path) -> anyhow::Result<[u8; 32]> {
     // Written beside and renamed, so that a crash cannot leave half a token behind.
     let fresh = data_dir.join(format!("{ADMIN_TOKEN_FILE}.new"));
     let write = || -> std::io::Result<()> {
-        let mut writer =
-            OpenOptions::new().write(true).create(true).truncate(true).mode(0o600).open(&fresh)?;
+        let mut writer = OpenOptions::new()
+            .write(true)
+            .create(true)
+            .truncate(true)
+            .mode(0o600)
+            .open(&fresh)?;
         writeln!(writer, "{}", token.as_str())?;
         writer.sync_all()?;
         fs::rename(&fresh, &file)
@@ -300,9 +329,18 @@ mod tests {
 
     #[test]
     fn a_missing_layer_stops_the_start_unless_it_is_given_up_by_name() {
-        let features = [feature(Layer::Seccomp, true), feature(Layer::CgroupMemory, false)];
+        let features = [
+            feature(Layer::Seccomp, true),
+            feature(Layer::CgroupMemory, false),
+        ];
         let error = check_sandbox(&features, &[]).unwrap_err().to_string();
-        for part in ["cgroup-memory", "what was found", "what to do", "faceoff doctor", "given_up"] {
+        for part in [
+            "cgroup-memory",
+            "what was found",
+            "what to do",
+            "faceoff doctor",
+            "given_up",
+        ] {
             assert!(error.contains(part), "{part} is not in: {error}");
         }
         assert!(!error.contains("seccomp"));
@@ -321,6 +359,9 @@ mod tests {
         assert!(token.starts_with("fo_admin_"));
         assert_eq!(hash_token(token.trim()), first);
         fs::write(&file, "\n").unwrap();
-        assert!(admin_token(folder.path()).is_err(), "an empty token lets nobody in, or everybody");
+        assert!(
+            admin_token(folder.path()).is_err(),
+            "an empty token lets nobody in, or everybody"
+        );
     }
 }

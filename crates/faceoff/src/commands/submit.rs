@@ -20,7 +20,12 @@ pub struct SubmitCommand {
     /// The agent: a .tar.gz, .tar.zst or .zip, or a folder with agent.toml, which is packed
     bundle: PathBuf,
     /// The server
-    #[arg(long, value_name = "URL", env = "FACEOFF_SERVER", default_value = "http://127.0.0.1:8080")]
+    #[arg(
+        long,
+        value_name = "URL",
+        env = "FACEOFF_SERVER",
+        default_value = "http://127.0.0.1:8080"
+    )]
     server: String,
     /// The team's token
     #[arg(long, env = "FACEOFF_TOKEN", hide_env_values = true)]
@@ -50,7 +55,10 @@ impl SubmitCommand {
         )?);
         let submission = client.upload_with(&self.bundle, &bar).await?;
         bar.finish_and_clear();
-        println!("uploaded {} as submission {}", submission.file_name, submission.id);
+        println!(
+            "uploaded {} as submission {}",
+            submission.file_name, submission.id
+        );
 
         let submission = verdict(&client, submission).await?;
         let agent = submission.agent_name.as_deref().unwrap_or("the agent");
@@ -77,7 +85,10 @@ impl SubmitCommand {
     }
 }
 
-async fn verdict(client: &Client, mut submission: SubmissionView) -> anyhow::Result<SubmissionView> {
+async fn verdict(
+    client: &Client,
+    mut submission: SubmissionView,
+) -> anyhow::Result<SubmissionView> {
     let spinner = ProgressBar::new_spinner().with_message("smoke run: does it start and answer?");
     spinner.enable_steady_tick(Duration::from_millis(100));
     while submission.status == SubmissionStatus::Validating {
@@ -89,8 +100,9 @@ async fn verdict(client: &Client, mut submission: SubmissionView) -> anyhow::Res
 }
 
 async fn follow(client: &Client, mut evaluation: EvaluationView) -> anyhow::Result<EvaluationView> {
-    let bar = ProgressBar::new(evaluation.progress.episodes_total.into())
-        .with_style(ProgressStyle::with_template("evaluating {bar:40} {pos}/{len} episodes {eta}")?);
+    let bar = ProgressBar::new(evaluation.progress.episodes_total.into()).with_style(
+        ProgressStyle::with_template("evaluating {bar:40} {pos}/{len} episodes {eta}")?,
+    );
     while !evaluation.status.is_final() {
         tokio::time::sleep(POLL).await;
         evaluation = client.evaluation(evaluation.id).await?;
@@ -102,7 +114,9 @@ async fn follow(client: &Client, mut evaluation: EvaluationView) -> anyhow::Resu
 
 fn result(evaluation: EvaluationView) -> anyhow::Result<()> {
     match evaluation.status {
-        EvaluationStatus::Finished { result, dataset, .. } => {
+        EvaluationStatus::Finished {
+            result, dataset, ..
+        } => {
             for (task, result) in &result.tasks {
                 let [low, high] = result.success_ci95.map(|bound| 100.0 * bound);
                 println!(
@@ -135,7 +149,9 @@ fn result(evaluation: EvaluationView) -> anyhow::Result<()> {
         EvaluationStatus::PlatformFailed { reason, .. } => {
             bail!("the server failed ({reason}); today's turn was given back")
         }
-        EvaluationStatus::Cancelled { reason, .. } => bail!("the evaluation was cancelled: {reason}"),
+        EvaluationStatus::Cancelled { reason, .. } => {
+            bail!("the evaluation was cancelled: {reason}")
+        }
         EvaluationStatus::Queued | EvaluationStatus::Running | EvaluationStatus::Finalising => {
             bail!("the evaluation is not over")
         }
@@ -144,6 +160,9 @@ fn result(evaluation: EvaluationView) -> anyhow::Result<()> {
 
 fn print_log(log: &str) {
     if !log.trim().is_empty() {
-        println!("--- the agent's log ---\n{}\n--- end of the log ---", log.trim_end());
+        println!(
+            "--- the agent's log ---\n{}\n--- end of the log ---",
+            log.trim_end()
+        );
     }
 }

@@ -51,10 +51,12 @@ fn every_section_is_read() {
     assert_eq!(config.limits.pids, 9);
     assert_eq!(config.limits.open_files, Limits::default().open_files);
     assert_eq!(config.bundle.files, 10);
-    let environment = config.agent_environment().unwrap();
+    let environment = config.agent_environment();
     assert_eq!(
         environment.isolation,
-        Isolation::Sandboxed { given_up: vec![Layer::CgroupMemory] }
+        Isolation::Sandboxed {
+            given_up: vec![Layer::CgroupMemory]
+        }
     );
     assert!(environment.runtimes.contains_key("julia"));
     assert!(environment.runtimes.contains_key("native"));

@@ -1,0 +1,10 @@
+//! The API and the pages over real HTTP, on a real store in a temporary folder.
+
+mod board;
+mod days;
+mod evaluations;
+mod openapi;
+mod problems;
+mod site;
+mod submissions;
+mod teams;
