@@ -168,21 +168,16 @@ fn a_sandbox_that_cannot_be_set_up_is_ours() {
     );
     subject.assert_nothing_left();
 
-    // Two things in one place: bubblewrap fails after its child exists.
-    let mut subject = Subject::new("echo", &[]);
-    let file = subject.bundle.path().join("file");
-    fs::write(&file, "").unwrap();
-    subject
-        .spec
-        .runtime
-        .read_only_paths
-        .push("/proc/self/status".into());
+    // A bundle that the agent's user may not enter: bubblewrap fails after its child exists.
+    let subject = Subject::new("echo", &[]);
+    fs::set_permissions(subject.bundle.path(), fs::Permissions::from_mode(0)).unwrap();
     match AgentProcess::spawn(&subject.spec) {
         Err(SpawnError::Platform(_)) => {}
         Err(SpawnError::Agent(fault)) => panic!("{fault}"),
         Ok(mut agent) => {
             let outcome = agent.read_line(LINE_CAP, Instant::now() + PATIENCE);
-            assert!(outcome.is_err(), "{outcome:?}");
+            let why = outcome.expect_err("the sandbox failed").to_string();
+            assert!(why.contains("/agent"), "{why}");
             assert_eq!(agent.diagnose_end(PATIENCE), None);
             assert!(agent.finish(PATIENCE).is_err());
         }

@@ -60,6 +60,9 @@ fn an_agent_sees_its_bundle_its_runtime_and_nothing_else() {
 
 #[test]
 fn an_agent_has_no_rights_no_terminal_and_no_descriptors_but_its_three() {
+    // Something that the service has open and that survives an exec.
+    let careless = std::fs::File::open("/etc/passwd").unwrap();
+    rustix::io::fcntl_setfd(&careless, rustix::io::FdFlags::empty()).unwrap();
     let report = Subject::new("looks_around", &[]).report();
     assert_eq!(report["uid"], 1000);
     let groups = report["groups"].as_array().unwrap();
