@@ -7,9 +7,9 @@ use crate::{
 use serde::Serialize;
 use std::{
     collections::BTreeMap,
-    fs,
+    fs, io,
     os::unix::fs::PermissionsExt,
-    path::Path,
+    path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
@@ -140,13 +140,8 @@ fn run(layer: Layer, file: &str) -> Result<String, String> {
         .into_iter()
         .find(|path| Path::new(path).is_file());
     let cat = cat.ok_or("the probe needs /usr/bin/cat")?;
-    let bundle = tempfile::Builder::new()
-        .prefix("faceoff-probe-")
-        .tempdir()
-        .and_then(|folder| {
-            fs::set_permissions(folder.path(), fs::Permissions::from_mode(0o755)).map(|()| folder)
-        })
-        .map_err(|error| format!("cannot make a folder for the probe: {error}"))?;
+    let (_private, bundle) =
+        bundle().map_err(|error| format!("cannot make a folder for the probe: {error}"))?;
     let mut runtime = Runtime::native();
     runtime.read_only_paths.push(cat.into());
     let given_up = Layer::ALL
@@ -154,7 +149,7 @@ fn run(layer: Layer, file: &str) -> Result<String, String> {
         .filter(|other| *other != layer)
         .collect();
     let spec = SpawnSpec {
-        bundle_dir: bundle.path().to_path_buf(),
+        bundle_dir: bundle,
         command: vec![cat.into(), file.into()],
         env: BTreeMap::new(),
         runtime,
@@ -195,6 +190,18 @@ fn run(layer: Layer, file: &str) -> Result<String, String> {
     }
 }
 
+/// An empty bundle in a folder that only the service may enter, as the data folder's are.
+fn bundle() -> io::Result<(tempfile::TempDir, PathBuf)> {
+    let private = tempfile::Builder::new()
+        .prefix("faceoff-probe-")
+        .tempdir()?;
+    fs::set_permissions(private.path(), fs::Permissions::from_mode(0o700))?;
+    let bundle = private.path().join("bundle");
+    fs::create_dir(&bundle)?;
+    fs::set_permissions(&bundle, fs::Permissions::from_mode(0o755))?;
+    Ok((private, bundle))
+}
+
 fn cure(layer: Layer) -> String {
     match layer {
         Layer::Namespaces => cure_namespaces(),
@@ -230,7 +237,7 @@ fn cure_namespaces() -> String {
             "sysctl -w kernel.apparmor_restrict_unprivileged_userns=0",
         ),
     ];
-    if matches!(Bubblewrap::find(), Err(SandboxError::Unavailable { .. })) {
+    if Bubblewrap::find().is_err() {
         return bubblewrap::CURE_INSTALL.into();
     }
     let switch = SWITCHES
