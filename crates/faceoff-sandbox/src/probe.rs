@@ -141,7 +141,7 @@ fn run(layer: Layer, file: &str) -> Result<String, String> {
         .find(|path| Path::new(path).is_file());
     let cat = cat.ok_or("the probe needs /usr/bin/cat")?;
     let (_private, bundle) =
-        bundle().map_err(|error| format!("cannot make a folder for the probe: {error}"))?;
+        bundle(layer).map_err(|error| format!("cannot make a folder for the probe: {error}"))?;
     let mut runtime = Runtime::native();
     runtime.read_only_paths.push(cat.into());
     let given_up = Layer::ALL
@@ -190,16 +190,22 @@ fn run(layer: Layer, file: &str) -> Result<String, String> {
     }
 }
 
-/// An empty bundle in a folder that only the service may enter, as the data folder's are.
-fn bundle() -> io::Result<(tempfile::TempDir, PathBuf)> {
-    let private = tempfile::Builder::new()
+/// An empty bundle. With namespaces it lies, as real ones do, in a folder that only the service may enter;
+/// the other layers are tried without them.
+fn bundle(layer: Layer) -> io::Result<(tempfile::TempDir, PathBuf)> {
+    let outer = tempfile::Builder::new()
         .prefix("faceoff-probe-")
         .tempdir()?;
-    fs::set_permissions(private.path(), fs::Permissions::from_mode(0o700))?;
-    let bundle = private.path().join("bundle");
+    let outer_mode = if layer == Layer::Namespaces {
+        0o700
+    } else {
+        0o755
+    };
+    let bundle = outer.path().join("bundle");
     fs::create_dir(&bundle)?;
     fs::set_permissions(&bundle, fs::Permissions::from_mode(0o755))?;
-    Ok((private, bundle))
+    fs::set_permissions(outer.path(), fs::Permissions::from_mode(outer_mode))?;
+    Ok((outer, bundle))
 }
 
 fn cure(layer: Layer) -> String {
