@@ -16,9 +16,13 @@ const CRUISE_SHARE: f64 = 0.93;
 /// Rate at which a free posture approaches its preference, 1/s.
 const POSTURE_RATE: f64 = 4.0;
 /// Share of the speed limits that a posture change may take.
-const POSTURE_SHARE: f64 = 0.45;
+const POSTURE_SHARE: f64 = 0.6;
 /// Largest acceleration of a posture change, rad/s².
 const POSTURE_ACCELERATION: f64 = 8.0;
+/// Share of the possible speed that strikes are planned with: the posture is never exactly the best.
+const STRIKE_SHARE: f64 = 0.96;
+/// Time in which the strike's way to share the load between joints fades, seconds.
+const FADE_TIME: f64 = 0.2;
 /// Integral gain from observed joint errors to the correction, 1/s.
 const CORRECTION_RATE: f64 = 4.0;
 /// Bound of the correction; static errors of the plant stay well below it, radians.
@@ -27,10 +31,22 @@ const CORRECTION_MAX: f64 = 0.04;
 /// What the arm prefers to do with its four free degrees of freedom.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Posture {
-    /// The planar family that is fast along its radius: for striking.
-    Fast,
+    /// Ready to strike: the family of [`Arm::strike_posture`].
+    Ready(Side),
+    /// Striking: as `Ready`, and the joints share the motion so that the fastest is as slow as
+    /// possible.
+    Strike(Side),
     /// Leave it as it is.
     Free,
+}
+
+/// To which side of the vertical plane through base and mallet the elbow leans.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// Joint 5 negative: fast for strikes that turn to the left (+y) of the radius.
+    Left,
+    /// Joint 5 positive: fast for strikes that turn to the right.
+    Right,
 }
 
 /// The reference of the arm, in its base frame.
@@ -45,6 +61,8 @@ pub struct Arm {
     /// Reference joint speeds, rad/s.
     pub dq: Joints,
     drift: Joints,
+    /// 0: loads spread evenly; 1: least peak load. In between while a strike fades out.
+    sharpness: f64,
     correction: Joints,
 }
 
@@ -59,6 +77,7 @@ impl Arm {
             q: Joints::zeros(),
             dq: Joints::zeros(),
             drift: Joints::zeros(),
+            sharpness: 0.0,
             correction: Joints::zeros(),
         }
     }
@@ -68,6 +87,7 @@ impl Arm {
         self.q = *q;
         self.dq = Joints::zeros();
         self.drift = Joints::zeros();
+        self.sharpness = 0.0;
         self.correction = Joints::zeros();
     }
 
@@ -93,6 +113,11 @@ impl Arm {
         let goal = Vector3::new(position.x, position.y, self.height);
         let wish = (goal - pose.tip) / self.dt;
         let preferred = self.posture_rate(posture, position);
+        // Striking begins at rest, where the two ways to share a motion agree, and fades out after it.
+        self.sharpness = match posture {
+            Posture::Strike(_) => 1.0,
+            Posture::Ready(_) | Posture::Free => (self.sharpness - self.dt / FADE_TIME).max(0.0),
+        };
         // The mean speed over the step, from the Jacobian at its beginning …
         let (mean, share) = self.resolve(&pose.jacobian, &wish, &preferred);
         let mut q = self.q + self.dt * mean;
@@ -124,7 +149,13 @@ impl Arm {
         velocity: &Vector3<f64>,
         preferred: &Joints,
     ) -> (Joints, f64) {
-        let base = even_speeds(jacobian, velocity, &self.speed_max);
+        let mut base = Joints::zeros();
+        if self.sharpness < 1.0 {
+            base += (1.0 - self.sharpness) * even_speeds(jacobian, velocity, &self.speed_max);
+        }
+        if self.sharpness > 0.0 {
+            base += self.sharpness * least_peak(jacobian, velocity, &self.speed_max);
+        }
         let peak = base.component_div(&self.speed_max).amax();
         if peak >= 1.0 {
             return (base / peak, 1.0 / peak);
@@ -144,7 +175,9 @@ impl Arm {
     fn posture_rate(&mut self, posture: Posture, position: Vec2) -> Joints {
         let wish = match posture {
             Posture::Free => Joints::zeros(),
-            Posture::Fast => POSTURE_RATE * (self.fast_posture(position) - self.q),
+            // A strike is over before the posture could follow.
+            Posture::Strike(_) => Joints::zeros(),
+            Posture::Ready(side) => POSTURE_RATE * (self.strike_posture(position, side) - self.q),
         };
         let step = POSTURE_ACCELERATION * self.dt;
         for i in 0..JOINTS {
@@ -154,27 +187,53 @@ impl Arm {
         self.drift
     }
 
-    /// Elbow up in the vertical plane through the base, with the wrist bent so that shoulder, elbow
-    /// and wrist share the work of a radial swing: the angle of joint 6 was found by maximising the
-    /// radial speed within the joint speed limits at each reach and is nearly linear in it.
-    fn fast_posture(&self, position: Vec2) -> Joints {
+    /// The posture for striking at `position` (base frame): elbow up and the hand turned out of the
+    /// arm's plane, so that all six joints share the work of a radial swing. Found by maximising the
+    /// radial speed within the joint speed limits at each reach; joints 5 and 6 come out nearly
+    /// linear in the reach and joint 3 near zero, and the other three follow from the position.
+    fn strike_posture(&self, position: Vec2, side: Side) -> Joints {
         let reach = position.norm();
-        let wrist = (1.88 - 1.45 * (reach - 0.65)).clamp(0.8, 1.88);
-        // With joint 6 given, forearm and rod are one bent link …
-        let (sin, cos) = wrist.sin_cos();
-        let (along, across) = (FOREARM_M + HAND_M * cos, HAND_M * sin);
+        let lean = (0.6 + 0.6 * (reach - 0.65)).clamp(0.5, 1.0);
+        let wrist = (1.78 - 1.45 * (reach - 0.65)).clamp(0.75, 1.85);
+        let lean = match side {
+            Side::Left => -lean,
+            Side::Right => lean,
+        };
+        // With joints 5 and 6 given, forearm and hand are one rigid, bent link …
+        let (along, across) = (FOREARM_M + HAND_M * wrist.cos(), HAND_M * wrist.sin() * lean.cos());
+        let outward = HAND_M * wrist.sin() * lean.sin();
         let (lower, bend) = (along.hypot(across), across.atan2(along));
+        let ahead = (reach * reach - outward * outward).max(0.0).sqrt();
         // … and the rest is a triangle between shoulder, elbow and tip. Angles from the vertical.
         let rise = self.height - SHOULDER_M;
-        let distance = reach.hypot(rise).min(0.999 * (UPPER_ARM_M + lower));
+        let distance = ahead.hypot(rise).min(0.999 * (UPPER_ARM_M + lower));
         let corner = |opposite: f64, a: f64, b: f64| {
             ((a * a + b * b - opposite * opposite) / (2.0 * a * b)).clamp(-1.0, 1.0).acos()
         };
-        let shoulder = reach.atan2(rise) - corner(lower, UPPER_ARM_M, distance);
+        let shoulder = ahead.atan2(rise) - corner(lower, UPPER_ARM_M, distance);
         let elbow = corner(distance, UPPER_ARM_M, lower);
         // The bent link leaves the elbow at `shoulder + π − elbow`, the forearm `bend` before that.
         let forearm = shoulder + std::f64::consts::PI - elbow - bend;
-        Joints::from([position.y.atan2(position.x), shoulder, 0.0, shoulder - forearm, 0.0, wrist, 0.0])
+        let azimuth = position.y.atan2(position.x) - (outward / reach).clamp(-1.0, 1.0).asin();
+        Joints::from([azimuth, shoulder, 0.0, shoulder - forearm, lean, wrist, 0.0])
+    }
+
+    /// How long the free joints need at least to be ready for a strike from `position`, seconds.
+    pub fn ready_time(&self, position: Vec2, side: Side) -> f64 {
+        let way = self.strike_posture(position, side) - self.q;
+        // Most of the way at full rate, the last part fading.
+        let share = way.component_div(&self.speed_max);
+        let longest = share[4].abs().max(share[5].abs());
+        longest / POSTURE_SHARE + if longest > 0.05 { 0.15 } else { 0.0 }
+    }
+
+    /// The speed that the mallet can have at `position` along `direction` (a unit vector, base frame)
+    /// in the posture for striking, m/s.
+    pub fn strike_speed(&self, position: Vec2, direction: Vec2, side: Side) -> f64 {
+        let pose = forward(&self.strike_posture(position, side));
+        let unit = Vector3::new(direction.x, direction.y, 0.0);
+        let peak = least_peak(&pose.jacobian, &unit, &self.speed_max).component_div(&self.speed_max).amax();
+        STRIKE_SHARE / peak.max(1e-6)
     }
 }
 
@@ -183,12 +242,12 @@ fn least_change(jacobian: &Jacobian, delta: &Vector3<f64>, cap: &Joints) -> Join
     weighted(jacobian, delta, &cap.component_mul(cap))
 }
 
-/// Joint speeds for the tip velocity that spread the load evenly relative to the limits: reweighted
-/// least squares towards the 4-norm, so that no joint saturates long before the others.
+/// Joint speeds for the tip velocity with moderate load on all joints: a few steps of reweighted
+/// least squares towards the 4-norm of the loads.
 fn even_speeds(jacobian: &Jacobian, velocity: &Vector3<f64>, cap: &Joints) -> Joints {
     let square = cap.component_mul(cap);
     let mut speeds = weighted(jacobian, velocity, &square);
-    for _ in 0..6 {
+    for _ in 0..4 {
         let load = speeds.component_div(cap);
         let peak = load.amax();
         if peak < 1e-9 {
@@ -197,6 +256,25 @@ fn even_speeds(jacobian: &Jacobian, velocity: &Vector3<f64>, cap: &Joints) -> Jo
         // The fourth power's weight is load²; the floor keeps idle joints available.
         let compliance = Joints::from_fn(|i, _| square[i] / (load[i] / peak).powi(2).max(0.05));
         speeds = 0.5 * (speeds + weighted(jacobian, velocity, &compliance));
+    }
+    speeds
+}
+
+/// Joint speeds for the tip velocity whose largest load is nearly the least possible (Lawson's
+/// iteration: compliances are divided by the loads they led to, again and again).
+fn least_peak(jacobian: &Jacobian, velocity: &Vector3<f64>, cap: &Joints) -> Joints {
+    let mut compliance = cap.component_mul(cap);
+    let mut speeds = weighted(jacobian, velocity, &compliance);
+    for _ in 0..12 {
+        let load = speeds.component_div(cap);
+        let peak = load.amax();
+        if peak < 1e-9 {
+            break;
+        }
+        for i in 0..JOINTS {
+            compliance[i] /= (load[i].abs() / peak).max(0.1);
+        }
+        speeds = weighted(jacobian, velocity, &compliance);
     }
     speeds
 }

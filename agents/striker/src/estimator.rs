@@ -17,9 +17,9 @@ const VELOCITY_NOISE: f64 = 0.1;
 /// Standard deviation of the observed yaw rate, rad/s.
 const SPIN_NOISE: f64 = 0.1;
 /// Correlation time of the air flow, seconds.
-const FLOW_TIME: f64 = 0.2;
+pub const FLOW_TIME: f64 = 0.2;
 /// Stationary standard deviation of the flow's acceleration per speed, 1/s.
-const FLOW_PER_SPEED: f64 = 0.4;
+pub const FLOW_PER_SPEED: f64 = 0.4;
 /// An observation further than this many standard deviations off means an unforeseen contact.
 const SURPRISE: f64 = 5.0;
 /// Longest documented loss of tracking, control steps.

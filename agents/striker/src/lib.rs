@@ -137,6 +137,7 @@ impl Agent {
             puck_speed_deviation: self.estimator.speed_deviation(),
             mallet: self.mallet,
             mallet_seen: seen,
+            arm: &self.arm,
             // In a game the other side is no pendulum; its position is no basis for a prediction.
             opponent: self.opponent.as_ref().filter(|_| self.task == Task::Hit),
         };

@@ -33,6 +33,7 @@ pub(crate) struct ChildSetup {
 /// The step that failed, sent as one byte.
 #[derive(Debug, Clone, Copy)]
 enum Step {
+    CloseDescriptors,
     EnterCgroup,
     SetCpus,
     SetRlimits,
@@ -43,7 +44,8 @@ enum Step {
 }
 
 impl Step {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 8] = [
+        Self::CloseDescriptors,
         Self::EnterCgroup,
         Self::SetCpus,
         Self::SetRlimits,
@@ -55,6 +57,9 @@ impl Step {
 
     fn what(self) -> &'static str {
         match self {
+            Self::CloseDescriptors => {
+                "cannot close what the service has open (close_range, Linux 5.11, is needed)"
+            }
             Self::EnterCgroup => "cannot enter the agent's cgroup",
             Self::SetCpus => "cannot bind the agent to its CPUs",
             Self::SetRlimits => "cannot set the agent's resource limits",
@@ -106,6 +111,7 @@ impl ChildSetup {
     }
 
     fn run(&self, parent: process::Pid) -> Result<(), (Step, Errno)> {
+        close_rest_on_exec().map_err(|error| (Step::CloseDescriptors, error))?;
         for procs in &self.cgroup_procs {
             write(procs, b"0").map_err(|error| (Step::EnterCgroup, error))?;
         }
@@ -147,6 +153,26 @@ impl ChildSetup {
     }
 }
 
+/// Whatever the service was started with, or a library opened carelessly, is not for the agent.
+fn close_rest_on_exec() -> Result<(), Errno> {
+    const FIRST: libc::c_uint = 3;
+    #[expect(unsafe_code, reason = "rustix has no close_range")]
+    // SAFETY: takes three numbers; marks descriptors and closes none, so nobody's descriptor goes away.
+    let result = unsafe {
+        libc::syscall(
+            libc::SYS_close_range,
+            FIRST,
+            libc::c_uint::MAX,
+            libc::CLOSE_RANGE_CLOEXEC,
+        )
+    };
+    if result == 0 {
+        return Ok(());
+    }
+    let error = io::Error::last_os_error();
+    Err(Errno::from_io_error(&error).unwrap_or(Errno::INVAL))
+}
+
 fn errno_of(error: &seccompiler::Error) -> Errno {
     match error {
         seccompiler::Error::Prctl(source) | seccompiler::Error::Seccomp(source) => {
@@ -170,8 +196,9 @@ pub(crate) fn rlimits(limits: &Limits, own_user: bool) -> Vec<(Resource, Rlimit)
         (Resource::Rtprio, 0),
     ];
     if own_user {
-        // Counted by user, so of use only where each agent has its own. The sandbox's process counts too.
-        wanted.push((Resource::Nproc, u64::from(limits.pids) + 1));
+        // Counted by user, so of use only where each agent has its own. A little above the cgroup's
+        // limit, which is to be met first, because it is counted and reported.
+        wanted.push((Resource::Nproc, u64::from(limits.pids) + 8));
     }
     wanted
         .into_iter()

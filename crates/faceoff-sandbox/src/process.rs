@@ -3,16 +3,19 @@ use crate::{
     affinity::cpu_set,
     agent_user::AgentUser,
     bubblewrap::{Bubblewrap, environment},
-    cgroup::{self, AgentCgroup},
+    cgroup::AgentCgroup,
     child_setup::{ChildSetup, rlimits},
     command_check::check_command,
     end::{End, Evidence},
     line_pipe::{LinePipe, Written},
+    output_holders,
+    owner::Owner,
     process_tree::ProcessTree,
     seccomp::Filters,
     spawner,
     status_pipe::StatusPipe,
     stderr_tail::StderrTail,
+    sweep::{self, SCRATCH_PREFIX},
 };
 use faceoff_types::AgentFaultKind;
 use std::{
@@ -26,6 +29,8 @@ use std::{
 
 /// How long bubblewrap may take to make a sandbox before that is a failure of the host.
 const SET_UP_PATIENCE: Duration = Duration::from_secs(20);
+/// When to look for the first time whether a silent agent has closed its output; then ever more rarely.
+const FIRST_LOOK: Duration = Duration::from_millis(100);
 /// How long to wait for the exit status once the pipes are closed.
 const END_PATIENCE: Duration = Duration::from_millis(500);
 
@@ -63,7 +68,7 @@ impl AgentProcess {
         static SWEEP: Once = Once::new();
         if matches!(spec.isolation, Isolation::Sandboxed { .. }) {
             SWEEP.call_once(|| {
-                cgroup::sweep_stale();
+                sweep::sweep_stale();
             });
         }
         let bundle_dir = fs::canonicalize(&spec.bundle_dir).map_err(|source| {
@@ -106,10 +111,25 @@ impl AgentProcess {
         max_bytes: usize,
         deadline: Instant,
     ) -> Result<ReadLine, SandboxError> {
-        let outcome = self
-            .lines
-            .read_line(max_bytes, deadline)
-            .map_err(|source| SandboxError::io("cannot read from the agent", source))?;
+        let mut pause = FIRST_LOOK;
+        let outcome = loop {
+            let until = if self.tree.is_sandboxed() {
+                deadline.min(Instant::now() + pause)
+            } else {
+                deadline
+            };
+            let outcome = self
+                .lines
+                .read_line(max_bytes, until)
+                .map_err(|source| SandboxError::io("cannot read from the agent", source))?;
+            if !matches!(outcome, ReadLine::TimedOut) || until == deadline {
+                break outcome;
+            }
+            if self.output_is_abandoned()? {
+                break ReadLine::Closed;
+            }
+            pause *= 2;
+        };
         if matches!(outcome, ReadLine::Closed) {
             self.check_platform()?;
         }
@@ -183,6 +203,18 @@ impl AgentProcess {
             self.end.get_or_insert(End::Killed);
         }
         self.stderr.close();
+    }
+
+    /// Has the agent, though alive, closed its output, with nothing left in it?
+    fn output_is_abandoned(&self) -> Result<bool, SandboxError> {
+        let held =
+            output_holders::any_holds(self.lines.output(), &self.tree.processes(), self.tree.pid());
+        if held {
+            return Ok(false);
+        }
+        let pending = self.lines.has_pending_output();
+        Ok(!pending
+            .map_err(|source| SandboxError::io("cannot look at the agent's output", source))?)
     }
 
     /// After a closed pipe: was it the sandbox that failed?
@@ -375,7 +407,7 @@ fn direct_command(spec: &SpawnSpec) -> Command {
 fn scratch_folder(user: Option<AgentUser>) -> Result<tempfile::TempDir, SandboxError> {
     let failed = |source| SandboxError::io("cannot make a scratch folder", source);
     let folder = tempfile::Builder::new()
-        .prefix("faceoff-scratch-")
+        .prefix(&Owner::this_process().name(SCRATCH_PREFIX))
         .tempdir()
         .map_err(failed)?;
     if let Some(user) = user {

@@ -3,9 +3,7 @@
 use crate::{cgroup::AgentCgroup, line_pipe::wait_for, status_pipe::StatusPipe};
 use rustix::{
     event::PollFlags,
-    process::{
-        Pid, PidfdFlags, Signal, kill_process, kill_process_group, pidfd_open, pidfd_send_signal,
-    },
+    process::{Pid, PidfdFlags, Signal, kill_process_group, pidfd_open, pidfd_send_signal},
 };
 use std::{
     fs, io,
@@ -66,7 +64,8 @@ impl ProcessTree {
         };
         // bubblewrap has one child only. If the process of that number is it, the descriptor is its;
         // else it has ended and the number may belong to a stranger.
-        if parent_of(pid.as_raw_nonzero().get()) == Some(self.pid().as_raw_nonzero().get()) {
+        let parent = parent_and_group(pid.as_raw_nonzero().get()).map(|(parent, _)| parent);
+        if parent == Some(self.pid().as_raw_nonzero().get()) {
             self.sandbox_init = Some(init);
         }
     }
@@ -79,6 +78,14 @@ impl ProcessTree {
         self.status.is_some()
     }
 
+    /// Every process of the tree that can be found.
+    pub(crate) fn processes(&self) -> Vec<Pid> {
+        match &self.cgroup {
+            Some(cgroup) => cgroup.processes(),
+            None => relatives(self.pid()),
+        }
+    }
+
     /// Has everything been reaped?
     pub(crate) fn has_ended(&self) -> bool {
         self.ended.is_some()
@@ -88,7 +95,7 @@ impl ProcessTree {
     pub(crate) fn wait(&mut self, deadline: Instant) -> io::Result<Option<ExitStatus>> {
         if self.ended.is_none() && wait_for(self.child_end.as_fd(), PollFlags::IN, deadline)? {
             // Not reaped yet, so its number is still its own, and so is the group's.
-            let _ = kill_process_group(self.pid(), Signal::KILL);
+            self.end_relatives();
             self.ended = Some(self.child.wait()?);
         }
         Ok(self.ended)
@@ -107,21 +114,38 @@ impl ProcessTree {
                 return;
             }
         }
-        let descendants = if self.is_sandboxed() {
-            Vec::new()
-        } else {
-            descendants(self.pid())
-        };
-        let _ = kill_process_group(self.pid(), Signal::KILL);
+        self.end_relatives();
         let _ = self.child.kill();
-        for pid in descendants {
-            let _ = kill_process(pid, Signal::KILL);
-        }
         if !matches!(self.wait(Instant::now() + KILL_PATIENCE), Ok(Some(_))) {
             tracing::error!(
                 pid = self.child.id(),
                 "an agent's process did not end after SIGKILL"
             );
+        }
+    }
+
+    /// Without a sandbox, whose end is the end of all in it: ends the child's process group and its
+    /// descendants, and waits until they are gone. The child itself is only killed.
+    fn end_relatives(&self) {
+        if self.is_sandboxed() {
+            return;
+        }
+        let ends: Vec<_> = relatives(self.pid())
+            .into_iter()
+            .filter_map(|pid| pidfd_open(pid, PidfdFlags::empty()).ok())
+            .collect();
+        let _ = kill_process_group(self.pid(), Signal::KILL);
+        for end in &ends {
+            let _ = pidfd_send_signal(end, Signal::KILL);
+        }
+        let deadline = Instant::now() + KILL_PATIENCE;
+        for end in &ends {
+            if !matches!(wait_for(end.as_fd(), PollFlags::IN, deadline), Ok(true)) {
+                tracing::error!(
+                    agent = self.child.id(),
+                    "a child of an agent did not end after SIGKILL"
+                );
+            }
         }
     }
 
@@ -145,40 +169,37 @@ impl Drop for ProcessTree {
     }
 }
 
-/// The parent of a process, as the kernel has it now.
-fn parent_of(pid: i32) -> Option<i32> {
+/// The parent and the process group of a process, as the kernel has them now.
+fn parent_and_group(pid: i32) -> Option<(i32, i32)> {
     let stat = fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-    stat.rsplit_once(')')?
-        .1
-        .split_whitespace()
-        .nth(1)?
-        .parse()
-        .ok()
+    // The command's name, in parentheses, may hold anything; the fields after it are plain.
+    let mut fields = stat.rsplit_once(')')?.1.split_whitespace().skip(1);
+    Some((fields.next()?.parse().ok()?, fields.next()?.parse().ok()?))
 }
 
-/// Children, their children and so on, as far as they are still linked to `root`.
-pub(crate) fn descendants(root: Pid) -> Vec<Pid> {
-    let mut links = Vec::new();
-    for entry in fs::read_dir("/proc").into_iter().flatten().flatten() {
-        let pid = entry
-            .file_name()
-            .to_str()
-            .and_then(|name| name.parse::<i32>().ok());
-        if let Some(pid) = pid
-            && let Some(parent) = parent_of(pid)
-        {
-            links.push((parent, pid));
-        }
-    }
-    let mut found = vec![root.as_raw_nonzero().get()];
+/// The other members of `root`'s process group, its children, theirs and so on, as far as they are still
+/// linked to it; without `root` itself.
+fn relatives(root: Pid) -> Vec<Pid> {
+    let root = root.as_raw_nonzero().get();
+    let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
+    let all: Vec<_> = entries
+        .filter_map(|entry| entry.file_name().to_str()?.parse::<i32>().ok())
+        .filter_map(|pid| parent_and_group(pid).map(|(parent, group)| (pid, parent, group)))
+        .collect();
+    let mut found = vec![root];
+    found.extend(
+        all.iter()
+            .filter(|(pid, _, group)| *group == root && *pid != root)
+            .map(|(pid, ..)| *pid),
+    );
     let mut next = 0;
     while let Some(&parent) = found.get(next) {
-        found.extend(
-            links
-                .iter()
-                .filter(|link| link.0 == parent)
-                .map(|link| link.1),
-        );
+        let children = all
+            .iter()
+            .filter(|(_, its_parent, _)| *its_parent == parent)
+            .map(|(pid, ..)| *pid);
+        let new: Vec<_> = children.filter(|pid| !found.contains(pid)).collect();
+        found.extend(new);
         next += 1;
     }
     found

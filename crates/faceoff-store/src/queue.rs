@@ -143,16 +143,26 @@ impl Store {
             let Some(unit) = lease_next(&mut tx, worker, nonce, lease_s, now).await? else {
                 break None;
             };
-            if unit.attempts <= MAX_LEASES {
+            let reason = if unit.attempts > MAX_LEASES {
+                format!("{MAX_LEASES} workers died over it")
+            } else {
                 let lease_until = leases::after(now, lease_s).0;
                 let claim = Claim {
                     unit: unit.id.0,
                     nonce,
                     lease_until,
                 };
-                break Some(describe(&mut tx, claim, &unit).await?);
-            }
-            let reason = format!("{MAX_LEASES} workers died over it");
+                match describe(&mut tx, claim, &unit).await {
+                    Ok(work) => break Some(work),
+                    // Given up rather than returned: it would be the next claim's unit again, and
+                    // nobody else's work would ever be done.
+                    Err(StoreError::Damaged(what)) => {
+                        tracing::error!(unit = %unit.id.0, what, "damaged work is given up");
+                        "a stored value is damaged".to_owned()
+                    }
+                    Err(error) => return Err(error),
+                }
+            };
             let evaluation = unit.evaluation.map(|id| id.0);
             give_up(
                 &mut tx,

@@ -11,7 +11,7 @@ use anyhow::Context as _;
 use faceoff_runner::{AgentEnvironment, bundle::BundleLimits};
 use faceoff_store::Store;
 use std::{path::PathBuf, sync::Arc, thread, time::Duration};
-use tokio::{runtime::Handle, sync::oneshot};
+use tokio::{runtime::Handle, sync::oneshot, task::JoinSet};
 use tokio_util::sync::CancellationToken;
 
 /// What time means here; tests are quicker.
@@ -85,7 +85,10 @@ pub(crate) async fn run_with(
     }
 
     let layout = layout(&config);
-    let mut slots = Vec::with_capacity(config.slots);
+    let stop = shutdown.child_token();
+    // However this function ends, its threads do, too.
+    let _stop = stop.clone().drop_guard();
+    let mut slots = JoinSet::new();
     for (index, cpus) in layout.into_iter().enumerate() {
         let folder = scratch.slot(index)?;
         let mut agent = config.agent.clone();
@@ -104,13 +107,14 @@ pub(crate) async fn run_with(
                 bundles: BundleCache::new(&folder),
                 folder,
             },
-            shutdown: shutdown.clone(),
+            shutdown: stop.clone(),
         };
-        slots.push((index, start(index, cpus.simulator, slot)?));
+        let end = start(index, cpus.simulator, slot)?;
+        slots.spawn(async move { end.await.map_err(|_| index) });
     }
     let tidying = tokio::spawn(tidy(store, pace.clock, pace.tidy_every, shutdown.clone()));
 
-    let ended = wait_for(slots, pace.shutdown_grace, &shutdown).await;
+    let ended = wait_for(slots, pace.shutdown_grace, &stop).await;
     tidying.abort();
     ended
 }
@@ -153,23 +157,26 @@ fn start(
     Ok(end)
 }
 
+/// Waits for the end of all slots. One that dies takes the others down: a server that looks well and
+/// does half of the work helps nobody.
 async fn wait_for(
-    slots: Vec<(usize, oneshot::Receiver<()>)>,
+    mut slots: JoinSet<Result<(), usize>>,
     shutdown_grace: Duration,
-    shutdown: &CancellationToken,
+    stop: &CancellationToken,
 ) -> anyhow::Result<()> {
     let all = async {
         let mut died = Vec::new();
-        for (index, end) in slots {
-            if end.await.is_err() {
+        while let Some(ended) = slots.join_next().await {
+            if let Ok(Err(index)) = ended {
                 tracing::error!(slot = index, "the slot's thread panicked");
                 died.push(index);
+                stop.cancel();
             }
         }
         died
     };
     let overdue = async {
-        shutdown.cancelled().await;
+        stop.cancelled().await;
         tokio::time::sleep(shutdown_grace).await;
     };
     tokio::select! {

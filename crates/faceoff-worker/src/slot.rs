@@ -2,6 +2,7 @@ use crate::{
     lease::LeaseKeeper,
     units::{End, Ended, Tools},
 };
+use faceoff_runner::PlatformFault;
 use faceoff_store::Work;
 use std::{panic::AssertUnwindSafe, time::Duration};
 use tokio_util::sync::CancellationToken;
@@ -105,12 +106,17 @@ impl Slot {
     /// Our fault. A unit whose lease was lost or given back stays as it is.
     fn give_back(&self, work: &Work, keeper: &LeaseKeeper, error: &anyhow::Error) {
         let claim = work.claim();
-        let reason = format!("{error:#}");
         if keeper.progress().stopped() {
-            tracing::info!(unit = %claim.unit, work = %Description(work), reason, "stopped");
+            tracing::info!(unit = %claim.unit, work = %Description(work), cause = format!("{error:#}"), "stopped");
             return;
         }
-        tracing::error!(unit = %claim.unit, work = %Description(work), reason, "platform fault");
+        tracing::error!(unit = %claim.unit, work = %Description(work), cause = format!("{error:#}"), "platform fault");
+        // The cause names folders of this host; a team is told enough to ask about it.
+        let reason = format!(
+            "{} (in the server's log: unit {})",
+            outside(error),
+            claim.unit
+        );
         let released = self.tools.handle.block_on(self.tools.store.release_failed(
             claim,
             &reason,
@@ -119,6 +125,16 @@ impl Slot {
         if let Err(error) = released {
             tracing::error!(unit = %claim.unit, %error, "the unit could not be given back; its lease will end");
         }
+    }
+}
+
+/// What a team may know of a fault of ours.
+fn outside(error: &anyhow::Error) -> &'static str {
+    match error.downcast_ref::<PlatformFault>() {
+        Some(PlatformFault::Sandbox(_)) => "the sandbox could not be set up",
+        Some(PlatformFault::Io { .. }) => "a file could not be read or written",
+        Some(PlatformFault::Recording(_)) => "the recording could not be made",
+        Some(PlatformFault::Cancelled) | None => "the evaluator failed",
     }
 }
 

@@ -5,23 +5,40 @@
 //! elsewhere when it arrives. The mallet waits behind the predicted contact and then accelerates
 //! along the line of the shot so that it arrives at full speed at the chosen time.
 
-use super::{Order, Scene, around, normal_cdf, strike_towards};
-use crate::arm::Posture;
+use super::{Order, Prepare, Scene, around, lean, normal_cdf, strike_towards};
+use crate::arm::{Posture, Side};
+use crate::estimator::{FLOW_PER_SPEED, FLOW_TIME};
 use crate::field::{Field, Vec2};
 use crate::motion::{Pace, Target};
 use crate::opponent::Opponent;
-use crate::puck::{DRAG, Puck};
+use crate::puck::{DRAG, MALLET_RESTITUTION, Puck};
 
 /// Duration of the run-up, seconds.
 const RUN_UP: f64 = 0.32;
+/// What speed² a run-up of one metre could reach: bounds the accelerations of short run-ups, m/s².
+const RUN_ACCELERATION: f64 = 30.0;
 /// Latest contact that is considered, seconds from now.
 const HORIZON: f64 = 2.2;
 /// A running plan is given up only for one that is better by this much.
 const LOYALTY: f64 = 0.06;
 /// Chance that a second of waiting costs.
 const IMPATIENCE: f64 = 0.05;
+/// Standard deviation of a shot's direction without air flow, radians.
+const AIM_ERROR: f64 = 0.03;
+/// Shots with less chance are not taken while the puck can be nudged to a better place.
+const WORTH_A_NUDGE: f64 = 0.4;
+/// Nudges per episode.
+const NUDGES_MAX: u32 = 1;
+/// Pucks nearer to our goal are worth a nudge.
+const NUDGE_FROM_X: f64 = -0.68;
+/// Where a nudged puck shall be …
+const NUDGE_TO_X: f64 = -0.38;
+/// … this long after the nudge, seconds.
+const NUDGE_TIME: f64 = 2.6;
+/// A puck slower than this that cannot be struck will not come into reach by itself, m/s.
+const STILL: f64 = 0.08;
 /// Goal-line points that are tried, metres.
-const AIMS: [f64; 7] = [-0.06, -0.04, -0.02, 0.0, 0.02, 0.04, 0.06];
+const AIMS: [f64; 5] = [-0.05, -0.025, 0.0, 0.025, 0.05];
 
 /// A strike at a chosen time.
 #[derive(Debug, Clone, Copy)]
@@ -36,6 +53,10 @@ struct Plan {
     normal: Vec2,
     /// Speed of the mallet at contact.
     speed: f64,
+    /// To which side the arm leans.
+    side: Side,
+    /// Moves the puck forward to be struck again, instead of shooting.
+    nudge: bool,
     /// Chance of a goal.
     chance: f64,
 }
@@ -60,6 +81,10 @@ enum Phase {
 #[derive(Debug, Clone)]
 pub struct Hit {
     phase: Phase,
+    /// Frees a puck that cannot be struck where it lies.
+    rescue: Option<Prepare>,
+    /// Nudges so far.
+    nudges: u32,
 }
 
 impl Hit {
@@ -67,6 +92,8 @@ impl Hit {
     pub fn new() -> Self {
         Self {
             phase: Phase::Seek(None),
+            rescue: None,
+            nudges: 0,
         }
     }
 
@@ -94,8 +121,14 @@ impl Hit {
     }
 
     fn seek(&mut self, scene: &Scene<'_>, old: Option<Plan>) -> Order {
+        if let Some(rescue) = self.rescue.as_mut().filter(|r| r.committed()) {
+            return rescue.decide(scene);
+        }
         let kept = old.and_then(|p| refresh(scene, &p));
-        let best = best_plan(scene);
+        let mut best = best_plan(scene);
+        if self.nudges < NUDGES_MAX && best.is_some_and(|b| b.chance < WORTH_A_NUDGE) {
+            best = best_nudge(scene).or(best);
+        }
         let plan = match (kept, best) {
             (Some(k), Some(b)) if b.chance > k.chance + LOYALTY => Some(b),
             (Some(k), _) => Some(k),
@@ -103,17 +136,15 @@ impl Hit {
         };
         self.phase = Phase::Seek(plan);
         let Some(plan) = plan else {
-            let behind = Vec2::new(
-                scene.field.mallet_x_min() + 0.03,
-                scene.puck.pos.y.clamp(-0.12, 0.12),
-            );
-            return Order::stop(
-                scene,
-                around(scene, behind, scene.field.contact() + 0.015),
-                Pace::CALM,
-            );
+            if scene.puck.vel.norm() < STILL && scene.puck.pos.x < -0.1 {
+                return self.rescue.get_or_insert_with(Prepare::new).decide(scene);
+            }
+            self.rescue = None;
+            let behind = Vec2::new(scene.field.mallet_x_min() + 0.03, scene.puck.pos.y.clamp(-0.12, 0.12));
+            return Order::stop(scene, around(scene, behind, scene.field.contact() + 0.015), Pace::CALM);
         };
-        let (start, run_up) = plan.run_up(scene.field);
+        self.rescue = None;
+       let (start, run_up) = plan.run_up(scene.field);
         let left = plan.contact_time - scene.time;
         if left <= run_up + 0.5 * scene.dt {
             self.phase = Phase::Swing(plan);
@@ -121,6 +152,7 @@ impl Hit {
         }
         let goal = around(scene, start, scene.field.contact() + 0.015);
         let mut order = Order::stop(scene, goal, Pace::CALM);
+        order.posture = Posture::Ready(plan.side);
         // Be there in time, not earlier than is comfortable.
         if goal == start {
             order.target.time = order.target.time.min((left - run_up).max(0.1));
@@ -131,21 +163,17 @@ impl Hit {
     fn swing(&mut self, scene: &Scene<'_>, plan: Plan) -> Order {
         let left = plan.contact_time - scene.time;
         if left <= 0.6 * scene.dt {
-            self.phase = Phase::Follow {
-                until: scene.time + 0.03,
-                rest_until: scene.time + 0.5,
-            };
+            // A nudged puck is followed at once, a shot puck is gone.
+            let rest = if plan.nudge { 0.1 } else { 0.5 };
+            self.nudges += u32::from(plan.nudge);
+            self.phase = Phase::Follow { until: scene.time + 0.03, rest_until: scene.time + rest };
             return coast(scene);
         }
-        let plan = aim_at(scene, scene.time, left, plan.aim, Some(plan.speed)).unwrap_or(plan);
+        let plan = again(scene, &plan, left, Some(plan.speed)).unwrap_or(plan);
         self.phase = Phase::Swing(plan);
         Order {
-            target: Target {
-                pos: plan.mallet,
-                vel: plan.speed * plan.normal,
-                time: left,
-            },
-            posture: Posture::Fast,
+            target: Target { pos: plan.mallet, vel: plan.speed * plan.normal, time: left },
+            posture: Posture::Strike(plan.side),
         }
     }
 }
@@ -160,57 +188,65 @@ fn coast(scene: &Scene<'_>) -> Order {
     };
     Order {
         target,
-        posture: Posture::Fast,
+        posture: Posture::Strike(lean(scene.mallet.pos)),
     }
 }
 
-/// Mallet speed that the arm reaches for a radial strike at this place (field frame), m/s.
-fn strike_speed(field: &Field, mallet: Vec2) -> f64 {
-    let reach = field.to_base(mallet).norm();
-    // Fit to the joint speed limits along the planar posture family, less a margin.
-    let table = [
-        (0.65, 1.70),
-        (0.8, 1.60),
-        (0.9, 1.50),
-        (1.0, 1.37),
-        (1.1, 1.19),
-        (1.2, 1.0),
-        (1.3, 0.78),
-    ];
-    let mut last = table[0];
-    if reach <= last.0 {
-        return last.1;
-    }
-    for point in table {
-        if reach <= point.0 {
-            let share = (reach - last.0) / (point.0 - last.0).max(1e-9);
-            return last.1 + share * (point.1 - last.1);
-        }
-        last = point;
-    }
-    0.7
-}
-
-/// The same plan with the present estimate of the puck.
+/// The same plan with the present estimate of the puck, if there is still time to change it.
 fn refresh(scene: &Scene<'_>, plan: &Plan) -> Option<Plan> {
     let left = plan.contact_time - scene.time;
-    (left > 0.1)
-        .then(|| aim_at(scene, scene.time, left, plan.aim, None))
-        .flatten()
+    (left > scene.dt).then(|| again(scene, plan, left, None)).flatten()
+}
+
+/// The same plan, `left` seconds before the contact.
+fn again(scene: &Scene<'_>, plan: &Plan, left: f64, speed: Option<f64>) -> Option<Plan> {
+    if plan.nudge { nudge_at(scene, left, plan.side) } else { aim_at(scene, left, plan.aim, plan.side, speed) }
+}
+
+/// The earliest nudge that can be made.
+fn best_nudge(scene: &Scene<'_>) -> Option<Plan> {
+    let side = lean(scene.puck.pos);
+    (0..20)
+        .map(|k| 0.2 + 0.06 * f64::from(k))
+        .find_map(|left| nudge_at(scene, left, side).filter(|plan| reachable(scene, plan, left)))
+}
+
+/// A gentle strike in `left` seconds after which the puck drifts to where shots are best.
+fn nudge_at(scene: &Scene<'_>, left: f64, side: Side) -> Option<Plan> {
+    let field = scene.field;
+    let mut puck = scene.puck;
+    if !puck.advance(field, left) || puck.pos.x > NUDGE_FROM_X || puck.pos.y.abs() > 0.4 {
+        return None;
+    }
+    let way = Vec2::new(NUDGE_TO_X, 0.8 * puck.pos.y) - puck.pos;
+    let direction = way.normalize();
+    let wanted = way.norm() * DRAG / (1.0 - (-DRAG * NUDGE_TIME).exp());
+    let speed = (wanted + MALLET_RESTITUTION * puck.vel.dot(&direction)) / (1.0 + MALLET_RESTITUTION);
+    if speed < 0.1 {
+        return None;
+    }
+    let (normal, _) = strike_towards(&puck, direction, speed, field.contact());
+    let mallet = puck.pos - field.contact() * normal;
+    if (mallet - field.clamp_mallet(mallet)).norm() > 1e-9 || room_behind(field, mallet, normal) < 0.02 {
+        return None;
+    }
+    let contact_time = scene.time + left;
+    Some(Plan { contact_time, aim: 0.0, mallet, normal, speed, side, nudge: true, chance: WORTH_A_NUDGE })
 }
 
 fn best_plan(scene: &Scene<'_>) -> Option<Plan> {
     let mut best: Option<Plan> = None;
+    let side = lean(scene.puck.pos);
     let mut left = RUN_UP + 0.1;
     while left < HORIZON {
         for aim in AIMS {
-            if let Some(plan) = aim_at(scene, scene.time, left, aim, None) {
+            if let Some(plan) = aim_at(scene, left, aim, side, None) {
                 if reachable(scene, &plan, left) && best.is_none_or(|b| plan.chance > b.chance) {
                     best = Some(plan);
                 }
             }
         }
-        left += 0.04;
+        left += 0.06;
     }
     best
 }
@@ -223,11 +259,30 @@ fn reachable(scene: &Scene<'_>, plan: &Plan, left: f64) -> bool {
     if way != start {
         time += 0.4;
     }
+    if !plan.nudge {
+        time = time.max(scene.arm.ready_time(scene.field.to_base(start), plan.side));
+    }
     time <= left - run_up
 }
 
+/// Length of the run-up that the table allows, metres.
+fn room_behind(field: &Field, contact: Vec2, direction: Vec2) -> f64 {
+    let limit = |pos: f64, step: f64, lo: f64, hi: f64| {
+        if step > 1e-6 {
+            (pos - lo) / step
+        } else if step < -1e-6 {
+            (pos - hi) / step
+        } else {
+            f64::INFINITY
+        }
+    };
+    let y = field.mallet_y_max();
+    let x = limit(contact.x, direction.x, field.mallet_x_min(), field.mallet_x_max());
+    x.min(limit(contact.y, direction.y, -y, y)).clamp(0.0, 1.0)
+}
+
 /// A strike in `left` seconds that sends the puck to `aim` on the goal line.
-fn aim_at(scene: &Scene<'_>, now: f64, left: f64, aim: f64, speed: Option<f64>) -> Option<Plan> {
+fn aim_at(scene: &Scene<'_>, left: f64, aim: f64, side: Side, speed: Option<f64>) -> Option<Plan> {
     let field = scene.field;
     let mut puck = scene.puck;
     if !puck.advance(field, left) {
@@ -236,19 +291,25 @@ fn aim_at(scene: &Scene<'_>, now: f64, left: f64, aim: f64, speed: Option<f64>) 
     let goal = Vec2::new(field.half_length, aim);
     let direction = (goal - puck.pos).normalize();
     let guess = puck.pos - field.contact() * direction;
-    let speed = speed.unwrap_or_else(|| strike_speed(field, guess));
+    let speed = speed.unwrap_or_else(|| {
+        let room = room_behind(field, guess, direction);
+        let swing = scene.arm.strike_speed(field.to_base(guess), direction, side);
+        swing.min((RUN_ACCELERATION * room).sqrt())
+    });
     let (normal, struck) = strike_towards(&puck, direction, speed, field.contact());
     let mallet = puck.pos - field.contact() * normal;
     if (mallet - field.clamp_mallet(mallet)).norm() > 1e-9 || mallet.x > -0.25 {
         return None;
     }
-    let chance = chance(field, scene.opponent, now + left, &struck, aim) - IMPATIENCE * left;
+    let chance = chance(field, scene.opponent, scene.time + left, &struck, aim) - IMPATIENCE * left;
     Some(Plan {
-        contact_time: now + left,
+        contact_time: scene.time + left,
         aim,
         mallet,
         normal,
         speed,
+        side,
+        nudge: false,
         chance,
     })
 }
@@ -262,8 +323,12 @@ fn chance(field: &Field, opponent: Option<&Opponent>, time: f64, struck: &Puck, 
         return 0.0;
     }
     let flight = -(1.0 - share).ln() / DRAG;
-    // The air flow turns the heading at random; what it adds up to grows with way and time.
-    let spread = (length * 0.11 * flight.sqrt()).hypot(length * 0.03);
+    // The air flow pushes with a random, correlated acceleration proportional to the speed; twice
+    // integrated over the flight this is its spread across the way. Aiming errors add to it.
+    let tau = FLOW_TIME;
+    let integral = 2.0 * tau * flight.powi(3) / 3.0 - (tau * flight).powi(2) + 2.0 * tau.powi(4)
+        - 2.0 * tau.powi(3) * (flight + tau) * (-flight / tau).exp();
+    let spread = (FLOW_PER_SPEED * length / flight * integral.max(0.0).sqrt()).hypot(AIM_ERROR * length);
     let within = |lo: f64, hi: f64| {
         if hi <= lo {
             0.0
@@ -271,7 +336,7 @@ fn chance(field: &Field, opponent: Option<&Opponent>, time: f64, struck: &Puck, 
             normal_cdf((hi - aim) / spread) - normal_cdf((lo - aim) / spread)
         }
     };
-    let half = field.half_goal - 0.6 * field.puck;
+    let half = field.half_goal - 0.7 * field.puck;
     let open = within(-half, half);
     let Some(opponent) = opponent else {
         return open;

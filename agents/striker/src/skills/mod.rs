@@ -10,7 +10,7 @@ pub use hit::Hit;
 pub use prepare::Prepare;
 pub use tournament::Tournament;
 
-use crate::arm::Posture;
+use crate::arm::{Arm, Posture, Side};
 use crate::estimator::MalletState;
 use crate::field::{Field, Vec2};
 use crate::motion::{Motion, Pace, Target};
@@ -34,6 +34,8 @@ pub struct Scene<'a> {
     pub mallet: Motion,
     /// The mallet as observed.
     pub mallet_seen: MalletState,
+    /// The arm, for what it can do.
+    pub arm: &'a Arm,
     /// The opponent, if there is one on the table.
     pub opponent: Option<&'a Opponent>,
 }
@@ -53,7 +55,7 @@ impl Order {
         let pos = scene.field.clamp_mallet(pos);
         Self {
             target: Target::stop(&scene.mallet, pos, pace),
-            posture: Posture::Fast,
+            posture: Posture::Ready(lean(pos)),
         }
     }
 
@@ -69,9 +71,14 @@ impl Order {
                 vel: Vec2::zeros(),
                 time,
             },
-            posture: Posture::Fast,
+            posture: Posture::Ready(lean(pos)),
         }
     }
+}
+
+/// The side to lean to for strikes from `pos` towards the middle of the other goal.
+pub fn lean(pos: Vec2) -> Side {
+    if pos.y >= 0.0 { Side::Right } else { Side::Left }
 }
 
 /// A way to `goal` that keeps the mallet's centre `clearance` away from the puck: `goal` itself, or

@@ -29,7 +29,7 @@ const SPEEDS: [f64; 7] = [0.12, 0.2, 0.3, 0.42, 0.55, 0.7, 0.9];
 /// Angles between contact normal and mallet motion that are tried, radians.
 const SLANTS: [f64; 3] = [0.0, -0.5, 0.5];
 /// Contact normals that are tried per control step.
-const PER_STEP: usize = 6;
+const PER_STEP: usize = 3;
 
 /// A strike: contact normal (mallet to puck), mallet velocity, and what it promises.
 #[derive(Debug, Clone, Copy)]
@@ -123,10 +123,10 @@ impl Prepare {
             }
             let rest = (time + left).max(scene.dt);
             let target = Target { pos: scene.mallet.pos + 0.5 * rest * scene.mallet.vel, vel: Vec2::zeros(), time: rest };
-            return Order { target, posture: Posture::Fast };
+            return Order { target, posture: Posture::Free };
         }
         let mallet = scene.puck.pos - scene.field.contact() * strike.normal;
-        Order { target: Target { pos: mallet, vel: strike.velocity, time: left }, posture: Posture::Fast }
+        Order { target: Target { pos: mallet, vel: strike.velocity, time: left }, posture: Posture::Free }
     }
 }
 

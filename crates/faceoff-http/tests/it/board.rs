@@ -31,7 +31,7 @@ fn texts(html: &Html, selector: &str) -> Vec<String> {
 }
 
 /// Five teams of the paper's qualifying table, in another order than the board's.
-pub async fn competition() -> Site {
+async fn competition() -> Site {
     let site = Site::start().await;
     for (name, rates, points) in [
         ("RL3_polimi", [0.227, 0.616, 0.362], 920.0),

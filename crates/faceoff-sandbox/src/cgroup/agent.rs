@@ -4,7 +4,8 @@ use super::{
     files,
     hierarchy::{Home, Version},
 };
-use crate::{Isolation, Layer, Limits, SandboxError, affinity::cpu_list};
+use crate::{Isolation, Layer, Limits, SandboxError, affinity::cpu_list, owner::Owner};
+use rustix::process::{Pid, Signal, kill_process};
 use std::{
     collections::BTreeMap,
     fs::{self, File},
@@ -18,10 +19,13 @@ use std::{
 /// Over which the CPU quota is enforced: the longest that an agent over its quota is held up is this,
 /// half a control step.
 const CPU_PERIOD_US: u64 = 10_000;
+/// The kernel charges memory in batches, so the peak may stay this far below the limit.
+const PEAK_SLACK_BYTES: u64 = 1 << 20;
 /// bubblewrap's own process is in the agent's cgroup.
 const OUR_PROCESSES: u64 = 1;
 const CURE: &str = "run the service as root, or let systemd delegate its cgroup: systemctl edit faceoff, \
      [Service] Delegate=yes (for a shell: systemd-run --user --scope -p Delegate=yes …)";
+pub(super) const LEAF_PREFIX: &str = "agent-";
 static NEXT: AtomicU64 = AtomicU64::new(0);
 
 /// A limit that the tree ran into, as the kernel counted it.
@@ -254,21 +258,22 @@ impl AgentCgroup {
     /// is not the tree's doing: its own limit must have been hit as well.
     pub(crate) fn trespass(&self) -> Option<Trespass> {
         if let Some((version, leaf)) = &self.memory {
-            let (killed, hit) = match version {
-                Version::V1 => (
-                    files::read_keyed(&leaf.join("memory.oom_control"), "oom_kill"),
-                    files::read_number(&leaf.join("memory.failcnt"))
-                        .max(files::read_number(&leaf.join("memory.memsw.failcnt"))),
-                ),
+            let killed_and_full = match version {
+                Version::V1 => {
+                    let killed = files::read_keyed(&leaf.join("memory.oom_control"), "oom_kill");
+                    // Recent kernels leave `failcnt` at zero; how full it was they all tell.
+                    let limit = files::read_number(&leaf.join("memory.limit_in_bytes"));
+                    let full = limit.zip(self.peak_memory_bytes());
+                    killed.unwrap_or(0) > 0
+                        && full.is_some_and(|(limit, peak)| peak + PEAK_SLACK_BYTES >= limit)
+                }
                 Version::V2 => {
                     let events = leaf.join("memory.events");
-                    (
-                        files::read_keyed(&events, "oom_kill"),
-                        files::read_keyed(&events, "oom"),
-                    )
+                    let count = |key| files::read_keyed(&events, key).unwrap_or(0);
+                    count("oom_kill") > 0 && count("oom") > 0
                 }
             };
-            if killed.unwrap_or(0) > 0 && hit.unwrap_or(0) > 0 {
+            if killed_and_full {
                 return Some(Trespass::Memory {
                     peak_bytes: self.peak_memory_bytes(),
                 });
@@ -279,11 +284,13 @@ impl AgentCgroup {
     }
 
     /// Every process in it, bubblewrap's own included.
-    pub(crate) fn processes(&self) -> Vec<i32> {
-        self.leaves
+    pub(crate) fn processes(&self) -> Vec<Pid> {
+        let pids = self
+            .leaves
             .first()
             .map(|leaf| files::processes(leaf))
-            .unwrap_or_default()
+            .unwrap_or_default();
+        pids.into_iter().filter_map(Pid::from_raw).collect()
     }
 
     /// Kills what still lives in it and removes it.
@@ -329,22 +336,15 @@ fn kill_all(leaf: &Path) {
     if fs::write(leaf.join("cgroup.kill"), "1").is_ok() {
         return;
     }
-    for pid in files::processes(leaf)
-        .into_iter()
-        .filter_map(rustix::process::Pid::from_raw)
-    {
-        let _ = rustix::process::kill_process(pid, rustix::process::Signal::KILL);
+    for pid in files::processes(leaf).into_iter().filter_map(Pid::from_raw) {
+        let _ = kill_process(pid, Signal::KILL);
     }
 }
 
 /// `agent-<pid>-<start time>-<number>`: whose it is can be told after that service has died.
 fn leaf_name() -> String {
-    let pid = std::process::id();
-    let start = super::stale::start_time(pid).unwrap_or(0);
-    format!(
-        "agent-{pid}-{start}-{}",
-        NEXT.fetch_add(1, Ordering::Relaxed)
-    )
+    let number = NEXT.fetch_add(1, Ordering::Relaxed);
+    format!("{}{number}", Owner::this_process().name(LEAF_PREFIX))
 }
 
 /// The host's hierarchies, read once per agent.

@@ -10,4 +10,4 @@ mod hierarchy;
 mod stale;
 
 pub(crate) use agent::{AgentCgroup, Trespass};
-pub use stale::sweep_stale;
+pub(crate) use stale::sweep;

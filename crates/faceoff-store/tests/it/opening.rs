@@ -99,6 +99,36 @@ async fn damaged_values_are_named_and_do_not_panic() {
 }
 
 #[tokio::test]
+async fn damaged_work_does_not_hold_up_the_others() {
+    let f = Fixture::new().await;
+    let alpha = f.ready_team("Alpha").await;
+    let beta = f.ready_team("Beta").await;
+    f.store
+        .create_evaluation(alpha.id, &plan(), f.now)
+        .await
+        .unwrap();
+    vandalise(&f, "UPDATE evaluations SET profile = 'dream'").await;
+    let sound = f
+        .store
+        .create_evaluation(beta.id, &plan(), f.now)
+        .await
+        .unwrap();
+    let (_, evaluation, _) = f.claim_shard().await;
+    assert_eq!(evaluation.id, sound.id);
+    vandalise(
+        &f,
+        "UPDATE evaluations SET profile = 'ideal' WHERE profile = 'dream'",
+    )
+    .await;
+    let evaluations = f.store.evaluations_of(alpha.team).await.unwrap();
+    let state = &evaluations[0].state;
+    assert!(
+        matches!(state, EvaluationState::PlatformFailed { .. }),
+        "{state:?}"
+    );
+}
+
+#[tokio::test]
 async fn half_made_states_cannot_be_stored() {
     let f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
