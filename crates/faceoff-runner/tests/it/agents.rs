@@ -3,7 +3,7 @@
 use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::Bundle};
 use faceoff_sandbox::{Isolation, Limits, Runtime};
 use faceoff_wire::Manifest;
-use std::{collections::BTreeMap, fs, os::unix::fs::PermissionsExt, path::Path};
+use std::{collections::BTreeMap, fs, os::unix::fs::PermissionsExt};
 use tempfile::TempDir;
 
 /// A whole agent that holds the pose it finds, with hooks to misbehave: `on_reset(episode)` and
@@ -45,7 +45,7 @@ for line in sys.stdin:
 
 /// A bundle whose agent is [`FRAME`] with hooks.
 pub struct Agent {
-    dir: TempDir,
+    _dir: TempDir,
     pub bundle: Bundle,
 }
 
@@ -71,29 +71,41 @@ impl Agent {
             interpolation: None,
             env: BTreeMap::new(),
         };
-        let bundle = Bundle { dir: dir.path().to_owned(), manifest };
-        Self { dir, bundle }
+        let bundle = Bundle {
+            dir: dir.path().to_owned(),
+            manifest,
+        };
+        Self { _dir: dir, bundle }
     }
 
     pub fn manifest(mut self, change: impl FnOnce(&mut Manifest)) -> Self {
         change(&mut self.bundle.manifest);
         self
     }
-
-    pub fn dir(&self) -> &Path {
-        self.dir.path()
-    }
 }
-
 /// The full sandbox with short but ample deadlines.
 pub fn sandboxed() -> AgentEnvironment {
     AgentEnvironment {
-        limits: Limits { memory_bytes: 256 << 20, pids: 20, ..Limits::default() },
-        time: TimeLimits { startup_s: 60.0, reset_s: 30.0, step_s: 30.0, bye_s: 10.0 },
-        isolation: Isolation::Sandboxed { given_up: Vec::new() },
+        limits: Limits {
+            memory_bytes: 256 << 20,
+            pids: 20,
+            ..Limits::default()
+        },
+        time: TimeLimits {
+            startup_s: 60.0,
+            reset_s: 30.0,
+            step_s: 30.0,
+            bye_s: 10.0,
+        },
+        isolation: Isolation::Sandboxed {
+            given_up: Vec::new(),
+        },
         runtimes: BTreeMap::from([
             ("native".to_owned(), Runtime::native()),
-            ("python3".to_owned(), Runtime::python3().expect("a python3 for the tests")),
+            (
+                "python3".to_owned(),
+                Runtime::python3().expect("a python3 for the tests"),
+            ),
         ]),
         agent_cpus: Vec::new(),
     }

@@ -17,7 +17,13 @@ fn verdict(hooks: &str) -> (AgentFaultKind, SmokeReport) {
 #[test]
 fn a_behaving_agent_passes_the_smoke_run() {
     let report = smoke(&Agent::behaving().bundle, &sandboxed()).unwrap();
-    assert_eq!(report, SmokeReport { fault: None, log: "goodbye\n".repeat(3) });
+    assert_eq!(
+        report,
+        SmokeReport {
+            fault: None,
+            log: "goodbye\n".repeat(3)
+        }
+    );
 }
 
 #[test]
@@ -27,7 +33,11 @@ fn rubbish_is_quoted() {
     let fault = report.fault.unwrap();
     assert_eq!((fault.episode, fault.step), (Some(0), Some(0)));
     assert_eq!(fault.line.as_deref(), Some("Traceback: x"));
-    assert!(report.log.contains("[faceoff] hit, episode 0, step 0: the answer is not a JSON object"));
+    assert!(
+        report
+            .log
+            .contains("[faceoff] hit, episode 0, step 0: the answer is not a JSON object")
+    );
 }
 
 #[test]
@@ -35,7 +45,10 @@ fn prints_between_the_lines_are_quoted() {
     let (kind, report) = verdict("say('loading the model')");
     assert!(matches!(kind, AgentFaultKind::NotJson { .. }), "{kind:?}");
     let fault = report.fault.unwrap();
-    assert_eq!((fault.episode, fault.line.as_deref()), (None, Some("loading the model")));
+    assert_eq!(
+        (fault.episode, fault.line.as_deref()),
+        (None, Some("loading the model"))
+    );
 }
 
 #[test]
@@ -45,24 +58,40 @@ fn an_answer_before_the_question_is_a_fault() {
         "def on_step(step, answer):\n    \
          return json.dumps(answer) + '\\n' + json.dumps({**answer, 'step': step + 1})",
     );
-    let AgentFaultKind::WrongMessage { expected, .. } = &kind else { panic!("{kind:?}") };
-    assert!(expected.starts_with("no output before the next question"), "{expected}");
+    let AgentFaultKind::WrongMessage { expected, .. } = &kind else {
+        panic!("{kind:?}")
+    };
+    assert!(
+        expected.starts_with("no output before the next question"),
+        "{expected}"
+    );
     assert!(report.fault.unwrap().line.unwrap().contains("\"step\": 1"));
 }
 
 #[test]
 fn a_wrong_step_is_named() {
-    let (kind, _) = verdict("def on_step(step, answer): return json.dumps({**answer, 'step': step + 5})");
-    let AgentFaultKind::WrongMessage { expected, got } = kind else { panic!("{kind:?}") };
-    assert_eq!((expected.as_str(), got.as_str()), ("act with step 0", "act with step 5"));
+    let (kind, _) =
+        verdict("def on_step(step, answer): return json.dumps({**answer, 'step': step + 5})");
+    let AgentFaultKind::WrongMessage { expected, got } = kind else {
+        panic!("{kind:?}")
+    };
+    assert_eq!(
+        (expected.as_str(), got.as_str()),
+        ("act with step 0", "act with step 5")
+    );
 }
 
 #[test]
 fn a_wrong_shape_is_named() {
-    let (kind, _) = verdict("def on_step(step, answer): return json.dumps({**answer, 'action': [[0] * 6] * 2})");
+    let (kind, _) = verdict(
+        "def on_step(step, answer): return json.dumps({**answer, 'action': [[0] * 6] * 2})",
+    );
     assert_eq!(
         kind,
-        AgentFaultKind::WrongShape { expected: "[2][7]".into(), got: "[2][6]".into() }
+        AgentFaultKind::WrongShape {
+            expected: "[2][7]".into(),
+            got: "[2][6]".into()
+        }
     );
 }
 
@@ -78,7 +107,13 @@ fn nan_is_not_finite() {
 fn silence_times_out() {
     let agent = Agent::with("def on_step(step, answer): return None");
     let (kind, report) = verdict_in(&agent, &impatient());
-    assert_eq!(kind, AgentFaultKind::TimedOut { phase: "step".into(), limit_s: 0.5 });
+    assert_eq!(
+        kind,
+        AgentFaultKind::TimedOut {
+            phase: "step".into(),
+            limit_s: 0.5
+        }
+    );
     assert_eq!(report.fault.unwrap().step, Some(0));
 }
 
@@ -88,7 +123,13 @@ fn a_line_without_newline_times_out() {
         "def on_step(step, answer):\n    sys.stdout.write(json.dumps(answer)); sys.stdout.flush()",
     );
     let (kind, _) = verdict_in(&agent, &impatient());
-    assert_eq!(kind, AgentFaultKind::TimedOut { phase: "step".into(), limit_s: 0.5 });
+    assert_eq!(
+        kind,
+        AgentFaultKind::TimedOut {
+            phase: "step".into(),
+            limit_s: 0.5
+        }
+    );
 }
 
 #[test]
@@ -96,7 +137,12 @@ fn a_line_without_end_is_too_long() {
     let (kind, report) = verdict(
         "def on_step(step, answer):\n    sys.stdout.write('x' * 200_000); sys.stdout.flush()",
     );
-    assert_eq!(kind, AgentFaultKind::LineTooLong { limit_bytes: 65_536 });
+    assert_eq!(
+        kind,
+        AgentFaultKind::LineTooLong {
+            limit_bytes: 65_536
+        }
+    );
     assert_eq!(report.fault.unwrap().line.unwrap().chars().count(), 400);
 }
 
@@ -123,15 +169,22 @@ fn exits_and_signals_are_told_apart() {
 fn a_wrong_ready_is_named() {
     for (hooks, expected_got) in [
         ("INTERPOLATION = 9", "ready with interpolation 9"),
-        ("INTERPOLATION = 'cubic'", "ready with interpolation \"cubic\""),
+        (
+            "INTERPOLATION = 'cubic'",
+            "ready with interpolation \"cubic\"",
+        ),
     ] {
         let (kind, _) = verdict(hooks);
-        let AgentFaultKind::WrongMessage { got, .. } = kind else { panic!("{kind:?}") };
+        let AgentFaultKind::WrongMessage { got, .. } = kind else {
+            panic!("{kind:?}")
+        };
         assert_eq!(got, expected_got);
     }
     let agent = Agent::behaving().manifest(|manifest| manifest.interpolation = Some(5));
     let (kind, _) = verdict_in(&agent, &sandboxed());
-    let AgentFaultKind::WrongMessage { expected, got } = kind else { panic!("{kind:?}") };
+    let AgentFaultKind::WrongMessage { expected, got } = kind else {
+        panic!("{kind:?}")
+    };
     assert_eq!(expected, "ready with interpolation 5, as agent.toml says");
     assert_eq!(got, "ready with interpolation 3");
 }
@@ -141,7 +194,9 @@ fn eating_memory_exceeds_a_limit() {
     let (kind, _) = verdict(
         "def on_step(step, answer):\n    hoard = [bytearray(os.urandom(1 << 20)) for _ in range(600)]",
     );
-    let AgentFaultKind::LimitExceeded { limit, .. } = &kind else { panic!("{kind:?}") };
+    let AgentFaultKind::LimitExceeded { limit, .. } = &kind else {
+        panic!("{kind:?}")
+    };
     assert_eq!(limit, "memory");
 }
 
@@ -168,12 +223,20 @@ fn a_fork_bomb_ends_in_a_verdict() {
 
 #[test]
 fn what_cannot_be_started_is_named() {
-    let missing = Agent::behaving()
-        .manifest(|manifest| manifest.command = vec!["./no-such-program".into()]);
+    let missing =
+        Agent::behaving().manifest(|manifest| manifest.command = vec!["./no-such-program".into()]);
     let (kind, _) = verdict_in(&missing, &sandboxed());
-    assert!(matches!(&kind, AgentFaultKind::CannotStart { detail } if detail.contains("no-such-program")), "{kind:?}");
+    assert!(
+        matches!(&kind, AgentFaultKind::CannotStart { detail } if detail.contains("no-such-program")),
+        "{kind:?}"
+    );
     let runtime = Agent::behaving().manifest(|manifest| manifest.runtime = "matlab".into());
     let (kind, _) = verdict_in(&runtime, &sandboxed());
-    let AgentFaultKind::CannotStart { detail } = kind else { panic!("{kind:?}") };
-    assert!(detail.contains("\"matlab\"") && detail.contains("offered: native, python3"), "{detail}");
+    let AgentFaultKind::CannotStart { detail } = kind else {
+        panic!("{kind:?}")
+    };
+    assert!(
+        detail.contains("\"matlab\"") && detail.contains("offered: native, python3"),
+        "{detail}"
+    );
 }

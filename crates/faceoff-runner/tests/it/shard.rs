@@ -1,5 +1,7 @@
 use crate::agents::{Agent, sandboxed};
-use faceoff_runner::{AgentEnvironment, Observer, PlatformFault, ShardReport, ShardSpec, run_shard};
+use faceoff_runner::{
+    AgentEnvironment, Observer, PlatformFault, ShardReport, ShardSpec, run_shard,
+};
 use faceoff_types::{AgentFaultKind, EpisodeEnd, EpisodeOutcome, Profile, Seed, Task};
 use std::{ops::Range, path::Path};
 
@@ -16,7 +18,8 @@ impl Observer for Watcher {
     }
 
     fn cancelled(&self) -> bool {
-        self.stop_after.is_some_and(|count| self.seen.len() >= count)
+        self.stop_after
+            .is_some_and(|count| self.seen.len() >= count)
     }
 }
 
@@ -64,7 +67,14 @@ fn a_behaving_agent_plays_all_tasks_with_every_interpolation_it_says() {
         let dir = out.path().join(task.as_str());
         let report = run(&spec(task, 0..2), &agent, &sandboxed(), &dir).unwrap();
         assert!(!report.stopped_by_faults);
-        assert_eq!(report.outcomes.iter().map(|o| o.episode).collect::<Vec<_>>(), [0, 1]);
+        assert_eq!(
+            report
+                .outcomes
+                .iter()
+                .map(|o| o.episode)
+                .collect::<Vec<_>>(),
+            [0, 1]
+        );
         for outcome in &report.outcomes {
             assert_eq!((outcome.task, &outcome.fault), (task, &None), "{outcome:?}");
             assert!(outcome.steps > 0 && outcome.steps <= faceoff_sim::EPISODE_STEPS);
@@ -80,11 +90,21 @@ fn results_do_not_depend_on_how_episodes_are_divided() {
     let out = tempfile::tempdir().unwrap();
     let agent = Agent::behaving();
     let env = sandboxed();
-    let whole = run(&spec(Task::Defend, 0..5), &agent, &env, &out.path().join("whole")).unwrap();
+    let whole = run(
+        &spec(Task::Defend, 0..5),
+        &agent,
+        &env,
+        &out.path().join("whole"),
+    )
+    .unwrap();
     let mut parts = Vec::new();
     for range in [3..5, 0..1, 1..3] {
         let dir = out.path().join(format!("from-{}", range.start));
-        parts.extend(run(&spec(Task::Defend, range), &agent, &env, &dir).unwrap().outcomes);
+        parts.extend(
+            run(&spec(Task::Defend, range), &agent, &env, &dir)
+                .unwrap()
+                .outcomes,
+        );
     }
     parts.sort_by_key(|outcome| outcome.episode);
     assert_eq!(timeless(&parts), timeless(&whole.outcomes));
@@ -105,18 +125,42 @@ fn a_fault_ends_its_episode_and_the_agent_is_restarted() {
         panic!("three episodes: {report:?}");
     };
     assert_eq!((&first.fault, &third.fault), (&None, &None));
-    assert_eq!((second.end, second.success, second.steps), (EpisodeEnd::AgentFault, false, 2));
+    assert_eq!(
+        (second.end, second.success, second.steps),
+        (EpisodeEnd::AgentFault, false, 2)
+    );
     let fault = second.fault.as_ref().unwrap();
-    assert!(matches!(fault.fault, AgentFaultKind::NotJson { .. }), "{fault}");
-    assert_eq!((fault.task, fault.episode, fault.step), (Task::Prepare, Some(1), Some(2)));
+    assert!(
+        matches!(fault.fault, AgentFaultKind::NotJson { .. }),
+        "{fault}"
+    );
+    assert_eq!(
+        (fault.task, fault.episode, fault.step),
+        (Task::Prepare, Some(1), Some(2))
+    );
     assert_eq!(fault.line.as_deref(), Some("oops"));
     // The counter shows the new process, the note the reason.
-    assert!(report.log.starts_with("reset 0 1\nreset 1 2\n[faceoff] prepare, episode 1, step 2: "));
-    assert!(report.log.ends_with("reset 2 1\ngoodbye\n"), "{}", report.log);
+    assert!(
+        report
+            .log
+            .starts_with("reset 0 1\nreset 1 2\n[faceoff] prepare, episode 1, step 2: ")
+    );
+    assert!(
+        report.log.ends_with("reset 2 1\ngoodbye\n"),
+        "{}",
+        report.log
+    );
     // Others' episodes are what they would have been.
-    let undisturbed =
-        run(&spec(Task::Prepare, 2..3), &Agent::behaving(), &sandboxed(), &out.path().join("x"));
-    assert_eq!(timeless(&undisturbed.unwrap().outcomes), timeless(std::slice::from_ref(third)));
+    let undisturbed = run(
+        &spec(Task::Prepare, 2..3),
+        &Agent::behaving(),
+        &sandboxed(),
+        &out.path().join("x"),
+    );
+    assert_eq!(
+        timeless(&undisturbed.unwrap().outcomes),
+        timeless(std::slice::from_ref(third))
+    );
 }
 
 #[test]
@@ -125,7 +169,11 @@ fn too_many_faults_stop_the_shard() {
     let agent = Agent::with("def on_step(step, answer): sys.exit(3)");
     let report = run(&spec(Task::Hit, 0..9), &agent, &sandboxed(), out.path()).unwrap();
     assert!(report.stopped_by_faults);
-    assert_eq!(report.outcomes.len(), 3, "two are allowed, the third ends it");
+    assert_eq!(
+        report.outcomes.len(),
+        3,
+        "two are allowed, the third ends it"
+    );
     for outcome in &report.outcomes {
         let fault = outcome.fault.as_ref().unwrap();
         assert_eq!(fault.fault, AgentFaultKind::Exited { code: 3 });
@@ -148,20 +196,40 @@ fn an_agent_that_does_not_start_faults_without_an_episode() {
 fn a_cancelled_shard_leaves_no_recording() {
     let out = tempfile::tempdir().unwrap();
     let agent = Agent::behaving();
-    let mut watcher = Watcher { stop_after: Some(1), ..Watcher::default() };
+    let mut watcher = Watcher {
+        stop_after: Some(1),
+        ..Watcher::default()
+    };
     let dir = out.path().join("shard");
-    let result =
-        run_shard(&spec(Task::Defend, 0..3), &agent.bundle, &sandboxed(), &dir, &mut watcher);
-    assert!(matches!(result, Err(PlatformFault::Cancelled)), "{result:?}");
+    let result = run_shard(
+        &spec(Task::Defend, 0..3),
+        &agent.bundle,
+        &sandboxed(),
+        &dir,
+        &mut watcher,
+    );
+    assert!(
+        matches!(result, Err(PlatformFault::Cancelled)),
+        "{result:?}"
+    );
     assert_eq!(watcher.seen, [0]);
     assert!(!dir.join("shard.json").exists());
     // The same folder serves the next try.
     run(&spec(Task::Defend, 0..1), &agent, &sandboxed(), &dir).unwrap();
-    let mut names: Vec<_> =
-        dir.read_dir().unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    let mut names: Vec<_> = dir
+        .read_dir()
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name())
+        .collect();
     names.sort();
     assert_eq!(
         names,
-        ["agent.log", "episodes.parquet", "report.json", "shard.json", "steps.parquet"]
+        [
+            "agent.log",
+            "episodes.parquet",
+            "report.json",
+            "shard.json",
+            "steps.parquet"
+        ]
     );
 }
