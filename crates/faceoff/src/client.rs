@@ -8,7 +8,7 @@ use faceoff_http::api::{
     BASE,
     board::BoardView,
     days::{DayView, StartDay},
-    evaluations::EvaluationView,
+    evaluations::{Cancellation, EvaluationView},
     me::MeView,
     submissions::SubmissionView,
     teams::{NewTeam, TeamView, TeamWithToken},
@@ -138,6 +138,14 @@ impl Client {
                 .await?,
         )
         .await
+    }
+
+    /// Organiser: stops an evaluation and gives the turn back.
+    pub async fn cancel(&self, id: EvaluationId, reason: &str) -> anyhow::Result<EvaluationView> {
+        let request = self
+            .request(Method::POST, &format!("/evaluations/{id}/cancel"))
+            .json(&Cancellation { reason: reason.to_owned() });
+        read(self.send(request).await?).await
     }
 
     /// Team: who we are and whether today's turn is free.

@@ -3,13 +3,12 @@
 use super::schema::{self, ProblemBody};
 use crate::{
     App,
-    auth::Caller,
-    extract::{PathParam, QueryParams},
+    auth::{Caller, Organiser},
+    extract::{Json as Body, PathParam, QueryParams},
     problem::{Problem, ProblemKind},
 };
 use axum::{
-    Json,
-    body::Body,
+    Json, body,
     extract::State,
     http::{HeaderValue, header},
     response::{IntoResponse, Response},
@@ -22,6 +21,9 @@ use jiff::{Timestamp, civil};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use utoipa::{IntoParams, ToSchema};
+
+/// Longest reason of a cancellation.
+const MAX_REASON_CHARS: usize = 500;
 
 /// One run of a submission over the tasks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -306,6 +308,47 @@ pub(crate) async fn evaluation(
     Ok(Json(EvaluationView::new(evaluation, team.name)))
 }
 
+/// Why an evaluation is stopped.
+#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cancellation {
+    /// Shown to the team; 1 to 500 characters.
+    pub reason: String,
+}
+
+/// Stops an evaluation that is not over and gives the team's turn of the day back.
+#[utoipa::path(
+    post, path = "/evaluations/{id}/cancel", tag = "organiser", security(("organiser" = [])),
+    params(("id" = String, Path, format = Uuid)), request_body = Cancellation,
+    responses(
+        (status = 200, body = EvaluationView),
+        (status = 404, body = ProblemBody, content_type = "application/problem+json"),
+        (status = 409, description = "it is over already", body = ProblemBody, content_type = "application/problem+json"),
+    )
+)]
+pub(crate) async fn cancel_evaluation(
+    _: Organiser,
+    State(app): State<App>,
+    PathParam(id): PathParam<EvaluationId>,
+    Body(Cancellation { reason }): Body<Cancellation>,
+) -> Result<Json<EvaluationView>, Problem> {
+    let chars = reason.trim().chars().count();
+    if !(1..=MAX_REASON_CHARS).contains(&chars) {
+        return Err(Problem::new(
+            ProblemKind::InvalidContent,
+            format!("reason: expected 1 to {MAX_REASON_CHARS} characters, got {chars}"),
+        )
+        .with("field", "reason"));
+    }
+    app.store
+        .cancel_evaluation(id, reason.trim(), app.config.clock.now())
+        .await?;
+    tracing::info!(evaluation = %id, reason, "evaluation cancelled");
+    let evaluation = app.store.evaluation(id).await?;
+    let team = app.store.team(evaluation.team).await?;
+    Ok(Json(EvaluationView::new(evaluation, team.name)))
+}
+
 /// The recorded dataset, a zip archive; for its team and the organiser.
 #[utoipa::path(
     get, path = "/evaluations/{id}/dataset", tag = "team",
@@ -325,7 +368,13 @@ pub(crate) async fn dataset(
     let evaluation = visible(&app, &caller, id).await?;
     let why_not = match &evaluation.state {
         EvaluationState::Finished { dataset, .. } => {
-            let (bytes, stream) = app.store.artifacts().read(dataset).await?;
+            // A dataset that a finished evaluation names must be there: without it, we lost it.
+            let (bytes, stream) = app
+                .store
+                .artifacts()
+                .read(dataset)
+                .await
+                .map_err(Problem::internal)?;
             let team = app.store.team(evaluation.team).await?;
             let name = download_name(team.name.as_str(), evaluation.day);
             let disposition = HeaderValue::try_from(format!("attachment; filename=\"{name}\""))
@@ -338,7 +387,7 @@ pub(crate) async fn dataset(
                 (header::CONTENT_LENGTH, HeaderValue::from(bytes)),
                 (header::CONTENT_DISPOSITION, disposition),
             ];
-            return Ok((headers, Body::from_stream(stream)).into_response());
+            return Ok((headers, body::Body::from_stream(stream)).into_response());
         }
         EvaluationState::Queued | EvaluationState::Running { .. } | EvaluationState::Finalising => {
             "the evaluation is not finished; follow it until its state is “finished”"

@@ -82,6 +82,7 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(submissions::evaluate_submission))
         .routes(routes!(evaluations::list_evaluations))
         .routes(routes!(evaluations::evaluation))
+        .routes(routes!(evaluations::cancel_evaluation))
         .routes(routes!(evaluations::dataset))
         .layer(middleware::from_fn_with_state(patience, layers::time_out))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES));

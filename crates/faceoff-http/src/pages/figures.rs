@@ -83,6 +83,17 @@ pub(super) const fn tier_bounds(tier: Tier) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use faceoff_scoring::{DEPLOYABLE_POINTS_PER_EPISODE, IMPROVABLE_POINTS_PER_EPISODE};
+
+    #[test]
+    fn the_tiers_bounds_are_the_scorings() {
+        let deployable = DEPLOYABLE_POINTS_PER_EPISODE.to_string();
+        let improvable = IMPROVABLE_POINTS_PER_EPISODE.to_string();
+        assert!(tier_bounds(Tier::Deployable).contains(&deployable));
+        assert!(tier_bounds(Tier::Improvable).contains(&deployable));
+        assert!(tier_bounds(Tier::Improvable).contains(&improvable));
+        assert!(tier_bounds(Tier::NonDeployable).contains(&improvable));
+    }
 
     #[test]
     fn figures_read_as_in_the_paper() {

@@ -1,4 +1,7 @@
 use crate::site::{Site, result};
+use faceoff_scoring::{
+    COMPUTATION_TIME_MAX_POINTS, EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS,
+};
 use scraper::{Html, Selector};
 use serde_json::json;
 
@@ -97,6 +100,15 @@ async fn the_board_shows_tiers_in_order_with_rates_intervals_points_and_score() 
         "at most 0.5 per episode",
     ] {
         assert!(legend.contains(part), "{part:?} is not in the legend");
+    }
+    for rule in [
+        format!("end effector outside of its bounds {EE_POINTS}"),
+        format!("elbow or wrist too low {LINK_POINTS}"),
+        format!("joint position {JOINT_POS_POINTS}"),
+        format!("joint velocity {JOINT_VEL_POINTS}"),
+        format!("late answers 0.5 to {COMPUTATION_TIME_MAX_POINTS}"),
+    ] {
+        assert!(legend.contains(&rule), "{rule:?} is not in the legend");
     }
     assert!(texts(&html, "footer")[0].contains("airhockey-2023.1"));
     assert!(texts(&html, ".lead")[0].contains("Test season"));

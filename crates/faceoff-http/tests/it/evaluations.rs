@@ -144,21 +144,26 @@ async fn an_agent_that_failed_sees_every_fault_and_its_log() {
 }
 
 #[tokio::test]
-async fn our_fault_gives_the_turn_back() {
+async fn a_cancelled_evaluation_tells_why_and_gives_the_turn_back() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "striker").await;
     let path = site.evaluate(&team, &submission).await;
-    let id = path.rsplit('/').next().unwrap().parse().unwrap();
-    site.store
-        .cancel_evaluation(id, "power cut", site.now())
+    let cancel = format!("{path}/cancel");
+    let reason = json!({ "reason": "power cut" });
+    site.post(&cancel, Some(&team.token), &reason)
         .await
-        .unwrap();
+        .problem(403, "forbidden", &[]);
+    site.post(&cancel, Some(ADMIN), &json!({ "reason": " " }))
+        .await
+        .problem(422, "invalid-content", &["reason", "1 to 500"]);
+    site.post(&cancel, Some(ADMIN), &reason).await.json(200);
     let cancelled = site.get(&path, Some(&team.token)).await.json(200);
-    assert_eq!(
-        (&cancelled["state"], &cancelled["reason"]),
-        (&json!("cancelled"), &json!("power cut"))
-    );
+    assert_eq!(cancelled["state"], "cancelled");
+    assert_eq!(cancelled["reason"], "power cut");
+    site.post(&cancel, Some(ADMIN), &reason)
+        .await
+        .problem(409, "conflict", &["over already"]);
     let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
     assert_eq!(me["turn"]["evaluation"], json!(null));
     site.evaluate(&team, &submission).await;

@@ -1,5 +1,8 @@
 //! The API and the pages over real HTTP, on a real store in a temporary folder.
-#![expect(clippy::unwrap_used, reason = "helpers of tests fail as tests do: by panicking")]
+#![expect(
+    clippy::unwrap_used,
+    reason = "helpers of tests fail as tests do: by panicking"
+)]
 
 mod board;
 mod days;

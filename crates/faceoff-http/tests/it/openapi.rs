@@ -31,6 +31,7 @@ async fn the_document_lists_what_is_there_and_nothing_else() {
         "GET /api/v1/submissions/{id}",
         "GET /api/v1/teams",
         "POST /api/v1/days",
+        "POST /api/v1/evaluations/{id}/cancel",
         "POST /api/v1/submissions",
         "POST /api/v1/submissions/{id}/evaluations",
         "POST /api/v1/teams",

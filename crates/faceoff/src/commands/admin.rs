@@ -9,7 +9,7 @@ use faceoff_http::api::{
     days::StartDay,
     evaluations::{EvaluationStatus, EvaluationView},
 };
-use faceoff_types::{Profile, TeamId};
+use faceoff_types::{EvaluationId, Profile, TeamId};
 use jiff::civil::Date;
 use std::path::{Path, PathBuf};
 
@@ -63,6 +63,13 @@ enum Action {
         /// Perturbation profile [default: the server's configuration]
         #[arg(long)]
         profile: Option<Profile>,
+    },
+    /// Stop an evaluation that is not over and give the team's turn back
+    Cancel {
+        /// The evaluation's id
+        evaluation: EvaluationId,
+        /// Shown to the team
+        reason: String,
     },
     /// List the teams
     Teams,
@@ -135,6 +142,10 @@ impl AdminCommand {
                     );
                     lines.join("\n")
                 })
+            }
+            Action::Cancel { evaluation, reason } => {
+                let cancelled = client.cancel(evaluation, &reason).await?;
+                print(self.json, &cancelled, || line(&cancelled))
             }
             Action::Teams => {
                 let teams = client.teams().await?;
