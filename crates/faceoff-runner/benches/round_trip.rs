@@ -11,7 +11,6 @@
 //! The agent is this very program, started with `--agent` or `--echo`.
 #![expect(clippy::unwrap_used, reason = "a benchmark that cannot go on ends")]
 #![expect(clippy::print_stdout, reason = "a benchmark reports to the terminal")]
-#![expect(missing_docs, reason = "criterion's macros")]
 
 use criterion::{BatchSize, Criterion};
 use faceoff_runner::{
