@@ -93,6 +93,20 @@ impl Contacts {
         self.count == 0
     }
 
+    /// Does a contact push an arm?
+    pub fn move_arms(&self) -> bool {
+        self.rows[..2 * self.count]
+            .iter()
+            .any(|row| row.arms.iter().any(Option::is_some))
+    }
+
+    /// Force on the puck (N, N, N m) of contacts that push no arm, at a given acceleration without
+    /// contact.
+    pub fn solve_puck(&self, puck_acceleration: &[f64; 3]) -> [f64; 3] {
+        self.solve(puck_acceleration, &[[0.0; DOFS]; 2], |_, torque| *torque)
+            .puck
+    }
+
     /// Adds a contact, the touch's normal pointing into the pair's second body.
     pub fn add(&mut self, touch: Touch, material: &Material, pair: Pair<'_>) {
         let n = touch.normal;
