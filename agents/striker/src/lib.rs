@@ -16,6 +16,8 @@ mod opponent;
 pub mod protocol;
 mod puck;
 mod skills;
+#[cfg(test)]
+mod testing;
 
 use arm::Arm;
 use estimator::{Estimator, MalletState, PuckObservation};
