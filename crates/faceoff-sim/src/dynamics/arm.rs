@@ -1,0 +1,268 @@
+//! The arm's equations of motion: kinematics, recursive Newton–Euler, composite rigid body.
+
+use super::{
+    lanes::Lanes,
+    spatial::{Force, Frame, Inertia, Motion, Vec3},
+};
+use crate::robot::model::{DOFS, GRAVITY_M_S2, JOINTS, LINKS, Mount, Offset, SUBSTEP_S, TOOL};
+
+/// Where everything is: frames and joint axes in the base frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Kinematics<T> {
+    /// Frames of links 1…7, at their joints.
+    pub links: [Frame<T>; JOINTS],
+    /// Frame of the end effector.
+    pub end_effector: Frame<T>,
+    /// The mallet's z axis.
+    pub mallet_axis: Vec3<T>,
+    /// Motion of unit rate of each joint: 7 driven ones, then the universal joint's y and x hinge.
+    pub axes: [Motion<T>; DOFS],
+}
+
+impl<T: Lanes> Kinematics<T> {
+    /// Forward kinematics of the driven joints `q[..7]` and the universal joint `q[7..]`.
+    #[inline(always)]
+    pub fn new(q: &[T; DOFS]) -> Self {
+        let mut frame = Frame::base();
+        let mut links = [frame; JOINTS];
+        let mut axes = [Motion::zero(); DOFS];
+        for i in 0..JOINTS {
+            frame = step(&frame, LINKS[i].offset, LINKS[i].mount, q[i]);
+            links[i] = frame;
+            axes[i] = Motion::hinge(frame.z, frame.origin);
+        }
+        let end_effector = Frame {
+            origin: frame.origin + frame.z.scale(T::splat(TOOL.end_effector_z_m)),
+            ..frame
+        };
+        // Universal joint: a hinge about the end effector's y, then one about the turned x.
+        let (sin_1, cos_1) = q[7].sin_cos();
+        let (sin_2, cos_2) = q[8].sin_cos();
+        let ee = &end_effector;
+        let x = ee.x.scale(cos_1) - ee.z.scale(sin_1);
+        let z = ee.x.scale(sin_1) + ee.z.scale(cos_1);
+        let mallet_axis = z.scale(cos_2) - ee.y.scale(sin_2);
+        axes[7] = Motion::hinge(ee.y, ee.origin);
+        axes[8] = Motion::hinge(x, ee.origin);
+        Self {
+            links,
+            end_effector,
+            mallet_axis,
+            axes,
+        }
+    }
+
+    /// Centre of the mallet's striking cylinder, m, base frame.
+    #[inline(always)]
+    pub fn cylinder_centre(&self) -> Vec3<T> {
+        self.end_effector.origin + self.mallet_axis.scale(T::splat(TOOL.cylinder_centre_z_m))
+    }
+
+    /// The linear velocity that unit rate of each joint gives to a point fixed to the mallet.
+    #[inline(always)]
+    pub fn jacobian_at(&self, point: Vec3<T>) -> [Vec3<T>; DOFS] {
+        self.axes.map(|axis| axis.at(point))
+    }
+}
+
+#[inline(always)]
+fn step<T: Lanes>(parent: &Frame<T>, offset: Offset, mount: Mount, q: T) -> Frame<T> {
+    let origin = parent.origin
+        + match offset {
+            Offset::Y(d) => parent.y.scale(T::splat(d)),
+            Offset::Z(d) => parent.z.scale(T::splat(d)),
+        };
+    let zero = Vec3::zero();
+    let (x, y, z) = match mount {
+        Mount::Aligned => (parent.x, parent.y, parent.z),
+        Mount::HalfTurnYz => (zero - parent.x, parent.z, parent.y),
+        Mount::QuarterTurnX => (parent.x, parent.z, zero - parent.y),
+    };
+    let (sin, cos) = q.sin_cos();
+    Frame {
+        x: x.scale(cos) + y.scale(sin),
+        y: y.scale(cos) - x.scale(sin),
+        z,
+        origin,
+    }
+}
+
+/// Spatial inertias of the bodies at one configuration.
+#[derive(Debug, Clone, Copy)]
+pub struct Bodies<T> {
+    /// Links 1…7.
+    pub links: [Inertia<T>; JOINTS],
+    /// The end effector, fixed on link 7.
+    pub end_effector: Inertia<T>,
+    /// The mallet, on the universal joint's second hinge.
+    pub mallet: Inertia<T>,
+}
+
+impl<T: Lanes> Bodies<T> {
+    /// The nominal bodies.
+    #[inline(always)]
+    pub fn new(kinematics: &Kinematics<T>) -> Self {
+        let links = std::array::from_fn(|i| {
+            let link = &LINKS[i];
+            Inertia::of_body(
+                &kinematics.links[i],
+                link.mass_kg,
+                link.centre_m,
+                link.inertia_kg_m2,
+            )
+        });
+        let ee = kinematics.end_effector.origin;
+        let mallet_centre = ee
+            + kinematics
+                .mallet_axis
+                .scale(T::splat(TOOL.mallet_centre_z_m));
+        Self {
+            links,
+            end_effector: Inertia::isotropic(
+                ee,
+                TOOL.end_effector_mass_kg,
+                TOOL.end_effector_inertia_kg_m2,
+            ),
+            mallet: Inertia::isotropic(
+                mallet_centre,
+                TOOL.mallet_mass_kg,
+                TOOL.mallet_inertia_kg_m2,
+            ),
+        }
+    }
+
+    /// The inertia that each of the seven driven joints of the controller's model carries itself:
+    /// the end effector belongs to link 7, the mallet is missing.
+    #[inline(always)]
+    pub fn controller(&self) -> [Inertia<T>; JOINTS] {
+        let mut bodies = self.links;
+        bodies[6] = bodies[6] + self.end_effector;
+        bodies
+    }
+
+    /// The inertia that each degree of freedom of the plant carries itself. `scale` multiplies the
+    /// masses of links 1…7, end effector and mallet. The universal joint's first hinge carries
+    /// nothing but the second one, so that its entry is `None`.
+    #[inline(always)]
+    pub fn plant(&self, scale: &[f64; 9]) -> [Option<Inertia<T>>; DOFS] {
+        let link = |i: usize| self.links[i].scaled(scale[i]);
+        [
+            Some(link(0)),
+            Some(link(1)),
+            Some(link(2)),
+            Some(link(3)),
+            Some(link(4)),
+            Some(link(5)),
+            Some(link(6) + self.end_effector.scaled(scale[7])),
+            None,
+            Some(self.mallet.scaled(scale[8])),
+        ]
+    }
+}
+
+/// Rotor inertias by joint, kg m².
+fn armature(i: usize) -> f64 {
+    if i < JOINTS {
+        LINKS[i].armature_kg_m2
+    } else {
+        0.0
+    }
+}
+
+/// Inverse dynamics of the controller's seven-joint model by recursive Newton–Euler: the torques
+/// `M(q) ddq + bias(q, dq)`, N m.
+#[inline(always)]
+pub fn controller_torques<T: Lanes>(
+    kinematics: &Kinematics<T>,
+    bodies: &[Inertia<T>; JOINTS],
+    dq: &[T; JOINTS],
+    ddq: &[T; JOINTS],
+) -> [T; JOINTS] {
+    let mut velocity = Motion::zero();
+    // Accelerating the base upwards is the same as gravity pulling down.
+    let mut acceleration = Motion {
+        angular: Vec3::zero(),
+        linear: Vec3::splat([0.0, 0.0, GRAVITY_M_S2]),
+    };
+    let mut forces = [Force::zero(); JOINTS];
+    for i in 0..JOINTS {
+        let joint_velocity = kinematics.axes[i].scale(dq[i]);
+        // v × S q̇ needs only the parent's velocity, for S × S = 0.
+        acceleration =
+            acceleration + kinematics.axes[i].scale(ddq[i]) + velocity.cross_motion(joint_velocity);
+        velocity = velocity + joint_velocity;
+        forces[i] = bodies[i].mul(acceleration) + velocity.cross_force(bodies[i].mul(velocity));
+    }
+    let mut total = Force::zero();
+    let mut torques = [T::splat(0.0); JOINTS];
+    for i in (0..JOINTS).rev() {
+        total = total + forces[i];
+        torques[i] = kinematics.axes[i].dot(total) + T::splat(armature(i)) * ddq[i];
+    }
+    torques
+}
+
+/// Gravity, centrifugal and Coriolis torques of the nine-joint plant by recursive Newton–Euler, N m.
+#[inline(always)]
+pub fn plant_bias<T: Lanes>(
+    kinematics: &Kinematics<T>,
+    bodies: &[Option<Inertia<T>>; DOFS],
+    dq: &[T; DOFS],
+) -> [T; DOFS] {
+    let mut velocity = Motion::zero();
+    let mut acceleration = Motion {
+        angular: Vec3::zero(),
+        linear: Vec3::splat([0.0, 0.0, GRAVITY_M_S2]),
+    };
+    let mut forces = [None; DOFS];
+    for i in 0..DOFS {
+        let joint_velocity = kinematics.axes[i].scale(dq[i]);
+        acceleration = acceleration + velocity.cross_motion(joint_velocity);
+        velocity = velocity + joint_velocity;
+        forces[i] =
+            bodies[i].map(|body| body.mul(acceleration) + velocity.cross_force(body.mul(velocity)));
+    }
+    let mut total = Force::zero();
+    let mut torques = [T::splat(0.0); DOFS];
+    for i in (0..DOFS).rev() {
+        if let Some(force) = forces[i] {
+            total = total + force;
+        }
+        torques[i] = kinematics.axes[i].dot(total);
+    }
+    torques
+}
+
+/// The plant's joint-space inertia by the composite-rigid-body algorithm, kg m². Only the lower
+/// triangle is filled.
+#[inline(always)]
+pub fn mass_matrix<T: Lanes>(
+    kinematics: &Kinematics<T>,
+    bodies: &[Option<Inertia<T>>; DOFS],
+) -> [[T; DOFS]; DOFS] {
+    let mut mass = [[T::splat(0.0); DOFS]; DOFS];
+    let mut composite: Option<Inertia<T>> = None;
+    for i in (0..DOFS).rev() {
+        composite = match (composite, bodies[i]) {
+            (Some(a), Some(b)) => Some(a + b),
+            (a, b) => a.or(b),
+        };
+        let Some(carried) = composite else { continue };
+        let momentum = carried.mul(kinematics.axes[i]);
+        for j in 0..=i {
+            mass[i][j] = kinematics.axes[j].dot(momentum);
+        }
+        mass[i][i] += T::splat(armature(i));
+    }
+    mass
+}
+
+/// `M + h D`: the matrix of the semi-implicit Euler step with implicit joint damping.
+#[inline(always)]
+pub fn damped<T: Lanes>(mass: &[[T; DOFS]; DOFS], damping: &[f64; JOINTS]) -> [[T; DOFS]; DOFS] {
+    let mut m = *mass;
+    for i in 0..JOINTS {
+        m[i][i] += T::splat(SUBSTEP_S * damping[i]);
+    }
+    m
+}

@@ -1,0 +1,62 @@
+//! Factorisation of the joint-space inertia.
+
+use super::lanes::Lanes;
+use crate::robot::model::DOFS;
+
+/// `L D Lᵀ` of a symmetric positive definite matrix.
+#[derive(Debug, Clone, Copy)]
+pub struct Factor<T> {
+    /// Strictly lower triangle: L (unit diagonal). The diagonal holds 1 / D.
+    l: [[T; DOFS]; DOFS],
+}
+
+impl<T: Lanes> Factor<T> {
+    /// Factorises a matrix given by its lower triangle.
+    #[inline(always)]
+    pub fn new(matrix: &[[T; DOFS]; DOFS]) -> Self {
+        let mut l = *matrix;
+        let one = T::splat(1.0);
+        for j in 0..DOFS {
+            // Column j times D, of the rows handled so far.
+            let mut scaled = [one; DOFS];
+            let mut pivot = l[j][j];
+            for k in 0..j {
+                scaled[k] = l[j][k];
+                // l[j][k] still holds L·D; divide by D now.
+                let unit = l[j][k] * l[k][k];
+                pivot -= scaled[k] * unit;
+                l[j][k] = unit;
+            }
+            l[j][j] = one / pivot;
+            for i in j + 1..DOFS {
+                let mut sum = l[i][j];
+                for k in 0..j {
+                    sum -= l[i][k] * l[j][k];
+                }
+                l[i][j] = sum;
+            }
+        }
+        Self { l }
+    }
+
+    /// Solves for a right-hand side.
+    #[inline(always)]
+    pub fn solve(&self, rhs: &[T; DOFS]) -> [T; DOFS] {
+        let l = &self.l;
+        let mut x = *rhs;
+        for i in 0..DOFS {
+            for k in 0..i {
+                x[i] -= l[i][k] * x[k];
+            }
+        }
+        for i in 0..DOFS {
+            x[i] = x[i] * l[i][i];
+        }
+        for i in (0..DOFS).rev() {
+            for k in i + 1..DOFS {
+                x[i] -= l[k][i] * x[k];
+            }
+        }
+        x
+    }
+}

@@ -1,0 +1,410 @@
+//! Spatial (six-dimensional) vectors and inertias, all taken about the origin of the arm's base frame.
+//!
+//! With one common origin, velocities, forces and inertias of different links add without being
+//! transformed, which is what makes the recursions of this module short.
+
+use super::lanes::Lanes;
+use std::ops::{Add, Sub};
+
+/// A vector in the arm's base frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Vec3<T> {
+    /// Along the base's x.
+    pub x: T,
+    /// Along the base's y.
+    pub y: T,
+    /// Along the base's z, upwards.
+    pub z: T,
+}
+
+impl<T: Lanes> Vec3<T> {
+    /// From components.
+    #[inline(always)]
+    pub fn new(x: T, y: T, z: T) -> Self {
+        Self { x, y, z }
+    }
+
+    /// From constants, the same for every arm.
+    #[inline(always)]
+    pub fn splat(v: [f64; 3]) -> Self {
+        Self::new(T::splat(v[0]), T::splat(v[1]), T::splat(v[2]))
+    }
+
+    /// The zero vector.
+    #[inline(always)]
+    pub fn zero() -> Self {
+        Self::splat([0.0; 3])
+    }
+
+    /// Scalar product.
+    #[inline(always)]
+    pub fn dot(self, o: Self) -> T {
+        self.x * o.x + self.y * o.y + self.z * o.z
+    }
+
+    /// Vector product.
+    #[inline(always)]
+    pub fn cross(self, o: Self) -> Self {
+        Self::new(
+            self.y * o.z - self.z * o.y,
+            self.z * o.x - self.x * o.z,
+            self.x * o.y - self.y * o.x,
+        )
+    }
+
+    /// Times a number.
+    #[inline(always)]
+    pub fn scale(self, s: T) -> Self {
+        Self::new(self.x * s, self.y * s, self.z * s)
+    }
+
+    /// The vector of one arm.
+    #[inline(always)]
+    pub fn lane(self, i: usize) -> [f64; 3] {
+        [self.x.lane(i), self.y.lane(i), self.z.lane(i)]
+    }
+}
+
+impl<T: Lanes> Add for Vec3<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Self::new(self.x + o.x, self.y + o.y, self.z + o.z)
+    }
+}
+
+impl<T: Lanes> Sub for Vec3<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, o: Self) -> Self {
+        Self::new(self.x - o.x, self.y - o.y, self.z - o.z)
+    }
+}
+
+/// A rotation and an origin: a link's frame in the arm's base frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame<T> {
+    /// First column of the rotation.
+    pub x: Vec3<T>,
+    /// Second column of the rotation.
+    pub y: Vec3<T>,
+    /// Third column of the rotation.
+    pub z: Vec3<T>,
+    /// The frame's origin, m.
+    pub origin: Vec3<T>,
+}
+
+impl<T: Lanes> Frame<T> {
+    /// The base frame itself.
+    #[inline(always)]
+    pub fn base() -> Self {
+        Self {
+            x: Vec3::splat([1.0, 0.0, 0.0]),
+            y: Vec3::splat([0.0, 1.0, 0.0]),
+            z: Vec3::splat([0.0, 0.0, 1.0]),
+            origin: Vec3::zero(),
+        }
+    }
+
+    /// A direction of this frame, in the base frame.
+    #[inline(always)]
+    pub fn rotate(&self, v: [f64; 3]) -> Vec3<T> {
+        self.x.scale(T::splat(v[0])) + self.y.scale(T::splat(v[1])) + self.z.scale(T::splat(v[2]))
+    }
+
+    /// A point of this frame, in the base frame.
+    #[inline(always)]
+    pub fn point(&self, v: [f64; 3]) -> Vec3<T> {
+        self.origin + self.rotate(v)
+    }
+
+    /// The rotation as a row-major matrix, of one arm.
+    pub fn rotation(&self, lane: usize) -> [f64; 9] {
+        let (x, y, z) = (self.x.lane(lane), self.y.lane(lane), self.z.lane(lane));
+        [x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2]]
+    }
+}
+
+/// A spatial velocity or acceleration: the angular part, and the linear part at the base's origin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion<T> {
+    /// rad/s or rad/s².
+    pub angular: Vec3<T>,
+    /// m/s or m/s².
+    pub linear: Vec3<T>,
+}
+
+impl<T: Lanes> Motion<T> {
+    /// No motion.
+    #[inline(always)]
+    pub fn zero() -> Self {
+        Self {
+            angular: Vec3::zero(),
+            linear: Vec3::zero(),
+        }
+    }
+
+    /// The motion of unit rate about a hinge through `point` along `axis`.
+    #[inline(always)]
+    pub fn hinge(axis: Vec3<T>, point: Vec3<T>) -> Self {
+        Self {
+            angular: axis,
+            linear: point.cross(axis),
+        }
+    }
+
+    /// The velocity that this motion gives to a point.
+    #[inline(always)]
+    pub fn at(self, point: Vec3<T>) -> Vec3<T> {
+        self.linear + self.angular.cross(point)
+    }
+
+    /// Times a rate.
+    #[inline(always)]
+    pub fn scale(self, s: T) -> Self {
+        Self {
+            angular: self.angular.scale(s),
+            linear: self.linear.scale(s),
+        }
+    }
+
+    /// The rate of change of a motion vector `o` that is carried along by this velocity.
+    #[inline(always)]
+    pub fn cross_motion(self, o: Self) -> Self {
+        Self {
+            angular: self.angular.cross(o.angular),
+            linear: self.angular.cross(o.linear) + self.linear.cross(o.angular),
+        }
+    }
+
+    /// The rate of change of a force vector (a momentum) that is carried along by this velocity.
+    #[inline(always)]
+    pub fn cross_force(self, f: Force<T>) -> Force<T> {
+        Force {
+            moment: self.angular.cross(f.moment) + self.linear.cross(f.force),
+            force: self.angular.cross(f.force),
+        }
+    }
+
+    /// Power of a force on this motion, or the generalised force about this axis.
+    #[inline(always)]
+    pub fn dot(self, f: Force<T>) -> T {
+        self.angular.dot(f.moment) + self.linear.dot(f.force)
+    }
+}
+
+impl<T: Lanes> Add for Motion<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Self {
+            angular: self.angular + o.angular,
+            linear: self.linear + o.linear,
+        }
+    }
+}
+
+/// A spatial force or momentum: the moment about the base's origin, and the force.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Force<T> {
+    /// N m or N m s.
+    pub moment: Vec3<T>,
+    /// N or N s.
+    pub force: Vec3<T>,
+}
+
+impl<T: Lanes> Force<T> {
+    /// No force.
+    #[inline(always)]
+    pub fn zero() -> Self {
+        Self {
+            moment: Vec3::zero(),
+            force: Vec3::zero(),
+        }
+    }
+}
+
+impl<T: Lanes> Add for Force<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Self {
+            moment: self.moment + o.moment,
+            force: self.force + o.force,
+        }
+    }
+}
+
+/// A symmetric 3×3 matrix.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Symmetric<T> {
+    /// Diagonal entries.
+    pub xx: T,
+    /// Diagonal entry.
+    pub yy: T,
+    /// Diagonal entry.
+    pub zz: T,
+    /// Off-diagonal entry.
+    pub xy: T,
+    /// Off-diagonal entry.
+    pub xz: T,
+    /// Off-diagonal entry.
+    pub yz: T,
+}
+
+impl<T: Lanes> Symmetric<T> {
+    /// From the order xx, yy, zz, xy, xz, yz.
+    #[inline(always)]
+    pub fn splat(m: [f64; 6]) -> Self {
+        let [xx, yy, zz, xy, xz, yz] = m.map(T::splat);
+        Self {
+            xx,
+            yy,
+            zz,
+            xy,
+            xz,
+            yz,
+        }
+    }
+
+    /// Matrix times vector.
+    #[inline(always)]
+    pub fn mul(self, v: Vec3<T>) -> Vec3<T> {
+        Vec3::new(
+            self.xx * v.x + self.xy * v.y + self.xz * v.z,
+            self.xy * v.x + self.yy * v.y + self.yz * v.z,
+            self.xz * v.x + self.yz * v.y + self.zz * v.z,
+        )
+    }
+
+    /// `R m Rᵀ`: a matrix given in `frame`, in the base frame.
+    #[inline(always)]
+    fn rotated(self, f: &Frame<T>) -> Self {
+        // Columns of R m.
+        let a = f.x.scale(self.xx) + f.y.scale(self.xy) + f.z.scale(self.xz);
+        let b = f.x.scale(self.xy) + f.y.scale(self.yy) + f.z.scale(self.yz);
+        let c = f.x.scale(self.xz) + f.y.scale(self.yz) + f.z.scale(self.zz);
+        Self {
+            xx: a.x * f.x.x + b.x * f.y.x + c.x * f.z.x,
+            yy: a.y * f.x.y + b.y * f.y.y + c.y * f.z.y,
+            zz: a.z * f.x.z + b.z * f.y.z + c.z * f.z.z,
+            xy: a.x * f.x.y + b.x * f.y.y + c.x * f.z.y,
+            xz: a.x * f.x.z + b.x * f.y.z + c.x * f.z.z,
+            yz: a.y * f.x.z + b.y * f.y.z + c.y * f.z.z,
+        }
+    }
+}
+
+impl<T: Lanes> Add for Symmetric<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Self {
+            xx: self.xx + o.xx,
+            yy: self.yy + o.yy,
+            zz: self.zz + o.zz,
+            xy: self.xy + o.xy,
+            xz: self.xz + o.xz,
+            yz: self.yz + o.yz,
+        }
+    }
+}
+
+/// A rigid body's spatial inertia about the base's origin, in the base frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Inertia<T> {
+    /// kg.
+    pub mass: T,
+    /// Mass times centre of mass, kg m.
+    pub first_moment: Vec3<T>,
+    /// Rotational inertia about the base's origin, kg m².
+    pub rotational: Symmetric<T>,
+}
+
+impl<T: Lanes> Inertia<T> {
+    /// Of a body whose rotational inertia about its centre of mass is given in its own frame.
+    #[inline(always)]
+    pub fn of_body(frame: &Frame<T>, mass: f64, centre: [f64; 3], rotational: [f64; 6]) -> Self {
+        let about_centre = Symmetric::splat(rotational).rotated(frame);
+        Self::about(frame.point(centre), mass, about_centre)
+    }
+
+    /// Of a body whose rotational inertia about its centre of mass is the same about every axis.
+    #[inline(always)]
+    pub fn isotropic(centre: Vec3<T>, mass: f64, rotational: f64) -> Self {
+        let zero = T::splat(0.0);
+        let diagonal = T::splat(rotational);
+        Self::about(
+            centre,
+            mass,
+            Symmetric {
+                xx: diagonal,
+                yy: diagonal,
+                zz: diagonal,
+                xy: zero,
+                xz: zero,
+                yz: zero,
+            },
+        )
+    }
+
+    #[inline(always)]
+    fn about(c: Vec3<T>, mass: f64, about_centre: Symmetric<T>) -> Self {
+        let mass = T::splat(mass);
+        let h = c.scale(mass);
+        let (xx, yy, zz) = (h.x * c.x, h.y * c.y, h.z * c.z);
+        let steiner = Symmetric {
+            xx: yy + zz,
+            yy: xx + zz,
+            zz: xx + yy,
+            xy: -(h.x * c.y),
+            xz: -(h.x * c.z),
+            yz: -(h.y * c.z),
+        };
+        Self {
+            mass,
+            first_moment: h,
+            rotational: about_centre + steiner,
+        }
+    }
+
+    /// Momentum of a velocity, or force of an acceleration.
+    #[inline(always)]
+    pub fn mul(&self, v: Motion<T>) -> Force<T> {
+        Force {
+            moment: self.rotational.mul(v.angular) + self.first_moment.cross(v.linear),
+            force: v.linear.scale(self.mass) - self.first_moment.cross(v.angular),
+        }
+    }
+
+    /// A body of the same shape with `factor` times the mass.
+    #[inline(always)]
+    pub fn scaled(&self, factor: f64) -> Self {
+        let s = T::splat(factor);
+        let r = self.rotational;
+        Self {
+            mass: self.mass * s,
+            first_moment: self.first_moment.scale(s),
+            rotational: Symmetric {
+                xx: r.xx * s,
+                yy: r.yy * s,
+                zz: r.zz * s,
+                xy: r.xy * s,
+                xz: r.xz * s,
+                yz: r.yz * s,
+            },
+        }
+    }
+}
+
+impl<T: Lanes> Add for Inertia<T> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Self {
+            mass: self.mass + o.mass,
+            first_moment: self.first_moment + o.first_moment,
+            rotational: self.rotational + o.rotational,
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! The constraints on the robot's motion (RULES, "Constraints and penalty points").
+
+use crate::{
+    dynamics::arm::Kinematics,
+    robot::model::{EE_DESIRED_HEIGHT_M, JOINTS, LIMIT_FRACTION, LINKS, TOOL},
+    table::geometry::TABLE,
+};
+use faceoff_types::Violations;
+
+/// Tolerance of the end effector's height, m.
+const HEIGHT_TOLERANCE_M: f64 = 0.02;
+
+/// Least height of elbow and wrist above the robot's base frame, m.
+const LINK_HEIGHT_M: f64 = 0.25;
+
+/// Constraint values as the maximum over the group's values; violated when above 0. The value of a
+/// joint position is in rad, of a joint velocity in rad/s, the others in m.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ConstraintValues {
+    /// Joint positions against 95 % of their range.
+    pub joint_pos: f64,
+    /// Filtered joint velocities against 95 % of their limits.
+    pub joint_vel: f64,
+    /// End effector over its part of the table and at its height.
+    pub ee: f64,
+    /// Height of elbow (link 4) and wrist (link 7).
+    pub link: f64,
+}
+
+impl ConstraintValues {
+    /// At one instant.
+    #[must_use]
+    pub fn new(
+        q: &[f64; JOINTS],
+        dq_filtered: &[f64; JOINTS],
+        kinematics: &Kinematics<f64>,
+    ) -> Self {
+        let mut values = Self {
+            joint_pos: f64::NEG_INFINITY,
+            joint_vel: f64::NEG_INFINITY,
+            ..Self::default()
+        };
+        for (i, link) in LINKS.iter().enumerate() {
+            let position = q[i].abs() - LIMIT_FRACTION * link.range_rad;
+            let velocity = dq_filtered[i].abs() - LIMIT_FRACTION * link.velocity_limit_rad_s;
+            values.joint_pos = values.joint_pos.max(position);
+            values.joint_vel = values.joint_vel.max(velocity);
+        }
+        let [x, y, z] = kinematics.end_effector.origin.lane(0);
+        let radius = TOOL.cylinder_radius_m;
+        let near_edge = TABLE.base_x_m - (TABLE.half_length_m() - radius);
+        values.ee = (near_edge - x)
+            .max(y.abs() - (TABLE.half_width_m() - radius))
+            .max((z - EE_DESIRED_HEIGHT_M).abs() - HEIGHT_TOLERANCE_M);
+        let lowest = kinematics.links[3]
+            .origin
+            .z
+            .min(kinematics.links[6].origin.z);
+        values.link = LINK_HEIGHT_M - lowest;
+        values
+    }
+
+    /// Marks what these values break.
+    pub fn mark(&self, violations: &mut Violations) {
+        violations.ee |= self.ee > 0.0;
+        violations.link |= self.link > 0.0;
+        violations.joint_pos |= self.joint_pos > 0.0;
+        violations.joint_vel |= self.joint_vel > 0.0;
+    }
+}

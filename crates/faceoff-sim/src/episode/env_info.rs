@@ -1,0 +1,85 @@
+//! What an agent is told about its environment (PROTOCOL, "env").
+
+use crate::{
+    robot::model::{CONTROL_STEP_S, EE_DESIRED_HEIGHT_M, JOINTS, LINKS, TOOL},
+    table::geometry::{PUCK, TABLE},
+};
+use faceoff_types::Task;
+
+/// `env` of the protocol's hello, as plain data. SI units, radians; always the nominal robot's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EnvInfo {
+    /// Robots on the table.
+    pub n_agents: u32,
+    /// Goal line to goal line.
+    pub table_length: f64,
+    /// Long side to long side.
+    pub table_width: f64,
+    /// Width of a goal.
+    pub goal_width: f64,
+    /// Radius of the puck.
+    pub puck_radius: f64,
+    /// Radius of the mallet.
+    pub mallet_radius: f64,
+    /// Height of the mallet plane above the robot's base frame.
+    pub ee_desired_height: f64,
+    /// Height of the universal joint above the table's surface at that height.
+    pub universal_height: f64,
+    /// Control steps per second.
+    pub control_frequency: f64,
+    /// Lower and upper joint position limits.
+    pub joint_pos_limit: [[f64; JOINTS]; 2],
+    /// Lower and upper joint velocity limits.
+    pub joint_vel_limit: [[f64; JOINTS]; 2],
+    /// Lower and upper joint acceleration limits.
+    pub joint_acc_limit: [[f64; JOINTS]; 2],
+    /// 4×4 row-major transforms `table_from_robot`, the agent's own first.
+    pub base_frame: Vec<[f64; 16]>,
+    /// Length of a control step.
+    pub dt: f64,
+}
+
+/// Acceleration limits are this many times the velocity limits, 1/s.
+const ACCELERATION_PER_VELOCITY: f64 = 10.0;
+
+/// The environment of a task, as seen by robot 1.
+#[must_use]
+pub fn env_info(task: Task) -> EnvInfo {
+    env_info_for(if task == Task::Hit { 2 } else { 1 }, 0)
+}
+
+/// The environment of `robots` robots, as seen by one of them (0 or 1).
+#[must_use]
+pub fn env_info_for(robots: u32, own: usize) -> EnvInfo {
+    let both = |limit: fn(usize) -> f64| {
+        [false, true].map(|upper| std::array::from_fn(|i| if upper { limit(i) } else { -limit(i) }))
+    };
+    let base_frame = |robot: usize| {
+        let side = if robot == 0 { 1.0 } else { -1.0 };
+        let (x, z) = (-side * TABLE.base_x_m, TABLE.base_z_m);
+        [
+            side, 0.0, 0.0, x, 0.0, side, 0.0, 0.0, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0,
+        ]
+    };
+    let order = [own, 1 - own];
+    EnvInfo {
+        n_agents: robots,
+        table_length: TABLE.length_m,
+        table_width: TABLE.width_m,
+        goal_width: TABLE.goal_width_m,
+        puck_radius: PUCK.radius_m,
+        mallet_radius: TOOL.cylinder_radius_m,
+        ee_desired_height: EE_DESIRED_HEIGHT_M,
+        universal_height: EE_DESIRED_HEIGHT_M + TABLE.base_z_m,
+        control_frequency: 50.0,
+        joint_pos_limit: both(|i| LINKS[i].range_rad),
+        joint_vel_limit: both(|i| LINKS[i].velocity_limit_rad_s),
+        joint_acc_limit: both(|i| ACCELERATION_PER_VELOCITY * LINKS[i].velocity_limit_rad_s),
+        base_frame: order
+            .into_iter()
+            .take(robots as usize)
+            .map(base_frame)
+            .collect(),
+        dt: CONTROL_STEP_S,
+    }
+}

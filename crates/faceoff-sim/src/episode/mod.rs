@@ -1,0 +1,228 @@
+//! Episodes of the qualifying tasks.
+
+pub mod constraints;
+pub mod env_info;
+pub mod observation;
+pub mod opponent;
+pub mod task;
+
+use crate::{
+    perturbation::{
+        disturbance::Disturbance, noise::ObservationNoise, settings::PerturbationSettings,
+        stream::Stream, tracking_loss::TrackingLoss,
+    },
+    robot::{interpolation::Interpolation, model::JOINTS, plant::Plant},
+    world::World,
+};
+use constraints::ConstraintValues;
+use faceoff_types::{EpisodeEnd, Factor, Factors, Seed, Task, Violations};
+use observation::{OBSERVATION_LEN, OBSERVATION_WITH_OPPONENT_LEN, observe, wrap};
+use opponent::Opponent;
+
+/// Control steps of a qualifying episode.
+pub const EPISODE_STEPS: u32 = 500;
+
+/// One qualifying episode. Deterministic: no clock, no I/O. Clone saves and restores it exactly.
+#[derive(Debug, Clone)]
+pub struct Episode {
+    task: Task,
+    interpolation: Interpolation,
+    world: World,
+    opponent: Option<Opponent>,
+    noise: Option<ObservationNoise>,
+    disturbance: Option<Disturbance>,
+    tracking_loss: Option<TrackingLoss>,
+    observation: [f64; OBSERVATION_WITH_OPPONENT_LEN],
+    steps: u32,
+    violations: Violations,
+}
+
+impl Episode {
+    /// An episode at its start. `plant` is nominal unless the factors contain
+    /// [`Factor::ModelMismatch`]; the caller chooses it through [`Plant::mismatched`]. The initial
+    /// state and every factor draw from streams of their own, derived from `seed` by name.
+    #[must_use]
+    pub fn new(
+        task: Task,
+        interpolation: Interpolation,
+        factors: Factors,
+        settings: &PerturbationSettings,
+        plant: &Plant,
+        seed: Seed,
+    ) -> Self {
+        let puck = task::initial_puck(task, &mut Stream::new(&seed, "initial_state"));
+        Self::starting_with(task, interpolation, factors, settings, plant, seed, puck)
+    }
+
+    /// As [`Episode::new`], with a given initial puck [x, y, yaw, vx, vy, yaw rate].
+    #[must_use]
+    pub fn starting_with(
+        task: Task,
+        interpolation: Interpolation,
+        factors: Factors,
+        settings: &PerturbationSettings,
+        plant: &Plant,
+        seed: Seed,
+        puck: [f64; 6],
+    ) -> Self {
+        let stream = |factor: Factor| Stream::new(&seed, factor.as_str());
+        let on = |factor: Factor| factors.contains(factor).then(|| stream(factor));
+        let opponent = (task == Task::Hit).then(Opponent::new);
+        let world = World::with_robots(plant, if opponent.is_some() { 2 } else { 1 }, puck);
+        let mut episode = Self {
+            task,
+            interpolation,
+            world,
+            opponent,
+            noise: on(Factor::ObservationNoise)
+                .map(|stream| ObservationNoise::new(&settings.observation_noise, stream)),
+            disturbance: on(Factor::Disturbance)
+                .map(|stream| Disturbance::new(&settings.disturbance, stream)),
+            tracking_loss: on(Factor::TrackingLoss)
+                .map(|stream| TrackingLoss::new(&settings.tracking_loss, stream)),
+            observation: [0.0; OBSERVATION_WITH_OPPONENT_LEN],
+            steps: 0,
+            violations: Violations::default(),
+        };
+        episode.observe(false);
+        episode
+    }
+
+    /// The observation that the agent gets: 23 numbers for `hit`, 20 otherwise (PROTOCOL).
+    #[must_use]
+    pub fn observation(&self) -> &[f64] {
+        match self.opponent {
+            Some(_) => &self.observation,
+            None => &self.observation[..OBSERVATION_LEN],
+        }
+    }
+
+    /// One control step. `action` is row-major, of length [`Interpolation::len`], finite. Must not
+    /// be called after an end.
+    pub fn step(&mut self, action: &[f64]) -> StepOutcome {
+        debug_assert_eq!(action.len(), self.interpolation.len());
+        self.world.command(0, self.interpolation, action);
+        if let Some(opponent) = &mut self.opponent {
+            self.world
+                .command(1, Interpolation::LinearBoth, &opponent.action());
+        }
+        let disturbance = &mut self.disturbance;
+        self.world.control_step(|puck| {
+            disturbance
+                .as_mut()
+                .map_or([0.0; 2], |disturbance| disturbance.force(puck))
+        });
+        self.steps += 1;
+        let lost = self
+            .tracking_loss
+            .as_mut()
+            .is_some_and(TrackingLoss::advance);
+        self.observe(lost);
+
+        let constraints = self.constraints();
+        constraints.mark(&mut self.violations);
+        let end = task::end(self.task, self.world.puck())
+            .or((self.steps >= EPISODE_STEPS).then_some(EpisodeEnd::Horizon));
+        StepOutcome { end, constraints }
+    }
+
+    /// Control steps played.
+    #[must_use]
+    pub fn steps(&self) -> u32 {
+        self.steps
+    }
+
+    /// Success, tested on the last true state.
+    #[must_use]
+    pub fn success(&self) -> bool {
+        task::success(self.task, self.world.puck())
+    }
+
+    /// Constraints broken so far.
+    #[must_use]
+    pub fn violations(&self) -> Violations {
+        self.violations
+    }
+
+    /// Constraint values of the agent's robot now.
+    #[must_use]
+    pub fn constraints(&self) -> ConstraintValues {
+        ConstraintValues::new(
+            &self.world.joints(0),
+            self.world.filtered_velocities(0),
+            &self.world.kinematics(0),
+        )
+    }
+
+    /// True state after the last step, or the initial one.
+    #[must_use]
+    pub fn state(&self) -> EpisodeState {
+        let world = &self.world;
+        let ee = |robot: usize| world.kinematics(robot).end_effector.origin.lane(0);
+        let has_opponent = self.opponent.is_some();
+        EpisodeState {
+            puck: world.puck().state(),
+            q: world.joints(0),
+            dq: world.joint_velocities(0),
+            dq_filtered: *world.filtered_velocities(0),
+            universal: world.universal(0),
+            ee: ee(0),
+            opponent_q: has_opponent.then(|| world.joints(1)),
+            opponent_ee: has_opponent.then(|| ee(1)),
+        }
+    }
+
+    /// The physical world.
+    #[must_use]
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    fn observe(&mut self, lost: bool) {
+        let last_pose = [
+            self.observation[0],
+            self.observation[1],
+            self.observation[2],
+        ];
+        self.observation = observe(&self.world, 0);
+        // Noise is drawn for the lost puck too, so that a loss does not shift later draws.
+        if let Some(noise) = &mut self.noise {
+            noise.add(&mut self.observation);
+            self.observation[2] = wrap(self.observation[2]);
+        }
+        if lost {
+            self.observation[..3].copy_from_slice(&last_pose);
+            self.observation[3..6].fill(0.0);
+        }
+    }
+}
+
+/// What a control step led to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepOutcome {
+    /// The episode's end, if it came.
+    pub end: Option<EpisodeEnd>,
+    /// Constraint values at this step.
+    pub constraints: ConstraintValues,
+}
+
+/// True state, recorded per step. SI units, radians; the puck in the table frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EpisodeState {
+    /// x, y, yaw, vx, vy, yaw rate.
+    pub puck: [f64; 6],
+    /// Joint positions.
+    pub q: [f64; JOINTS],
+    /// Joint velocities.
+    pub dq: [f64; JOINTS],
+    /// Low-pass filtered joint velocities.
+    pub dq_filtered: [f64; JOINTS],
+    /// Universal joint angles.
+    pub universal: [f64; 2],
+    /// End effector in the robot's own base frame.
+    pub ee: [f64; 3],
+    /// Joint positions of the opponent, `hit` only.
+    pub opponent_q: Option<[f64; JOINTS]>,
+    /// The opponent's end effector in its own base frame, `hit` only.
+    pub opponent_ee: Option<[f64; 3]>,
+}

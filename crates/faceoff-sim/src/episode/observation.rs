@@ -1,0 +1,46 @@
+//! What an agent observes (PROTOCOL and MODEL, "Observation").
+
+use crate::{
+    table::{geometry::TABLE, puck::Puck},
+    world::World,
+};
+use std::f64::consts::{PI, TAU};
+
+/// Numbers in an observation without an opponent.
+pub const OBSERVATION_LEN: usize = 20;
+/// Numbers in an observation with an opponent.
+pub const OBSERVATION_WITH_OPPONENT_LEN: usize = 23;
+
+/// What a robot (0 or 1) sees of the world, in its own base frame, without noise: puck pose and
+/// velocity, joint positions, filtered joint velocities, and the opponent's end effector. The last
+/// three are zero without an opponent.
+#[must_use]
+pub fn observe(world: &World, robot: usize) -> [f64; OBSERVATION_WITH_OPPONENT_LEN] {
+    let mut observation = [0.0; OBSERVATION_WITH_OPPONENT_LEN];
+    observation[..6].copy_from_slice(&puck_in_robot_frame(world.puck(), robot));
+    observation[6..13].copy_from_slice(&world.joints(robot));
+    observation[13..20].copy_from_slice(world.filtered_velocities(robot));
+    if world.robots() == 2 {
+        let [x, y, z] = world.end_effector_before(1 - robot);
+        // The two base frames are each other's image under half a turn about the table's centre.
+        observation[20..].copy_from_slice(&[2.0 * TABLE.base_x_m - x, -y, z]);
+    }
+    observation
+}
+
+fn puck_in_robot_frame(puck: &Puck, robot: usize) -> [f64; 6] {
+    let ([x, y, yaw], [vx, vy, rate]) = (puck.pose, puck.velocity);
+    if robot == 0 {
+        [x + TABLE.base_x_m, y, wrap(yaw), vx, vy, rate]
+    } else {
+        [TABLE.base_x_m - x, -y, wrap(yaw - PI), -vx, -vy, rate]
+    }
+}
+
+/// An angle in [−π, π).
+#[must_use]
+pub fn wrap(angle: f64) -> f64 {
+    let turned = (angle + PI) - TAU * ((angle + PI) / TAU).floor();
+    // Rounding may land on the open end.
+    if turned >= TAU { -PI } else { turned - PI }
+}

@@ -1,0 +1,170 @@
+//! The three tasks: where the puck starts, when an episode ends, what counts as success
+//! (RULES, "Tasks").
+
+use crate::{
+    perturbation::stream::Stream,
+    robot::model::TOOL,
+    table::{
+        geometry::{PUCK, TABLE},
+        puck::Puck,
+    },
+};
+use faceoff_types::{EpisodeEnd, Task};
+use std::f64::consts::FRAC_PI_2;
+
+/// Numbers of the tasks, table frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TaskRules {
+    /// Range of x at the start of `hit`, m.
+    pub hit_x_m: [f64; 2],
+    /// Largest speed at the start of `hit`, m/s.
+    pub hit_speed_m_s: [f64; 2],
+    /// Largest angle of the first velocity of `hit`, rad.
+    pub hit_angle_rad: f64,
+    /// Largest yaw rate at the start of `hit`, rad/s.
+    pub hit_yaw_rate_rad_s: f64,
+    /// Least speed at which a goal counts, m/s: the paper asks for one, ref does not.
+    pub hit_min_goal_speed_m_s: f64,
+    /// Range of x at the start of `defend`, m.
+    pub defend_x_m: [f64; 2],
+    /// Largest |y| at the start of `defend`, m.
+    pub defend_y_m: f64,
+    /// Range of the speed at the start of `defend`, m/s.
+    pub defend_speed_m_s: [f64; 2],
+    /// Largest angle of the first velocity of `defend`, rad.
+    pub defend_angle_rad: f64,
+    /// Largest yaw rate at the start of `defend`, rad/s.
+    pub defend_yaw_rate_rad_s: f64,
+    /// `defend` ends below this speed, m/s.
+    pub defend_stopped_m_s: f64,
+    /// Side strip of `prepare`, range of x, m.
+    pub prepare_side_x_m: [f64; 2],
+    /// Corner strip of `prepare`, range of x, m.
+    pub prepare_corner_x_m: [f64; 2],
+    /// `prepare` ends within this |y|, m.
+    pub prepare_axis_m: f64,
+    /// Range of x that counts as a good position of the puck, m.
+    pub success_x_m: [f64; 2],
+    /// vx below which the puck counts as held, m/s.
+    pub success_vx_m_s: f64,
+    /// A faster puck is taken as gone, m/s.
+    pub lost_speed_m_s: f64,
+}
+
+/// The ruleset's numbers.
+pub const RULES: TaskRules = TaskRules {
+    hit_x_m: [-0.7, -0.2],
+    hit_speed_m_s: [0.0, 0.5],
+    hit_angle_rad: FRAC_PI_2 + 0.1,
+    hit_yaw_rate_rad_s: 2.0,
+    hit_min_goal_speed_m_s: 0.0,
+    defend_x_m: [0.29, 0.65],
+    defend_y_m: 0.4,
+    defend_speed_m_s: [1.0, 3.0],
+    defend_angle_rad: 0.5,
+    defend_yaw_rate_rad_s: 10.0,
+    defend_stopped_m_s: 0.1,
+    prepare_side_x_m: [-0.8, -0.2],
+    prepare_corner_x_m: [-0.94, -0.8],
+    prepare_axis_m: 0.01,
+    success_x_m: [-0.8, -0.2],
+    success_vx_m_s: 0.1,
+    lost_speed_m_s: 100.0,
+};
+
+/// |y| up to which a puck can be played without touching the long rims: a puck and a whole mallet
+/// from the rim, 0.39105 m.
+pub const PLAYABLE_Y_M: f64 = TABLE.half_width_m() - PUCK.radius_m - 2.0 * TOOL.cylinder_radius_m;
+
+/// |y| at the outer edge of the strips of `prepare`, 0.48535 m.
+const STRIP_Y_M: f64 = TABLE.half_width_m() - PUCK.radius_m - 0.002;
+
+/// Draws the puck's first state [x, y, yaw, vx, vy, yaw rate]. Always six draws.
+pub fn initial_puck(task: Task, stream: &mut Stream) -> [f64; 6] {
+    let u: [f64; 6] = std::array::from_fn(|_| stream.unit());
+    let between = |[low, high]: [f64; 2], u: f64| low + (high - low) * u;
+    let around = |limit: f64, u: f64| between([-limit, limit], u);
+    let moving = |x: f64, y: f64, speed: f64, angle: f64, yaw_rate: f64| {
+        let (sin, cos) = libm::sincos(angle);
+        [x, y, 0.0, -cos * speed, sin * speed, yaw_rate]
+    };
+    match task {
+        Task::Hit => moving(
+            between(RULES.hit_x_m, u[0]),
+            around(PLAYABLE_Y_M, u[1]),
+            between(RULES.hit_speed_m_s, u[2]),
+            around(RULES.hit_angle_rad, u[3]),
+            around(RULES.hit_yaw_rate_rad_s, u[4]),
+        ),
+        Task::Defend => moving(
+            between(RULES.defend_x_m, u[0]),
+            around(RULES.defend_y_m, u[1]),
+            between(RULES.defend_speed_m_s, u[2]),
+            around(RULES.defend_angle_rad, u[3]),
+            around(RULES.defend_yaw_rate_rad_s, u[4]),
+        ),
+        Task::Prepare => {
+            let side = (RULES.prepare_side_x_m, [PLAYABLE_Y_M, STRIP_Y_M]);
+            let corner = (
+                RULES.prepare_corner_x_m,
+                [TABLE.goal_width_m / 2.0, STRIP_Y_M],
+            );
+            let area = |(x, y): ([f64; 2], [f64; 2])| (x[1] - x[0]) * (y[1] - y[0]);
+            let (xs, ys) = if u[2] * (area(side) + area(corner)) < area(side) {
+                side
+            } else {
+                corner
+            };
+            let sign = if u[3] < 0.5 { -1.0 } else { 1.0 };
+            [
+                between(xs, u[0]),
+                sign * between(ys, u[1]),
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+            ]
+        }
+    }
+}
+
+/// Why an episode ends in this true state, before its horizon.
+#[must_use]
+pub fn end(task: Task, puck: &Puck) -> Option<EpisodeEnd> {
+    let [x, y, _] = puck.pose;
+    let vx = puck.velocity[0];
+    let speed = puck.speed();
+    // Written so that a state that is not a number ends the episode too.
+    let on_table = x.abs() <= TABLE.half_length_m()
+        && y.abs() <= TABLE.half_width_m()
+        && speed <= RULES.lost_speed_m_s;
+    if !on_table {
+        return Some(EpisodeEnd::LeftTable);
+    }
+    match task {
+        Task::Hit if x > 0.0 && vx < 0.0 => Some(EpisodeEnd::CrossedMiddle),
+        Task::Defend if x > 0.0 && vx > 0.0 => Some(EpisodeEnd::CrossedMiddle),
+        Task::Defend if speed < RULES.defend_stopped_m_s => Some(EpisodeEnd::Stopped),
+        Task::Prepare if x > 0.0 => Some(EpisodeEnd::CrossedMiddle),
+        Task::Prepare if y.abs() < RULES.prepare_axis_m => Some(EpisodeEnd::ReachedAxis),
+        _ => None,
+    }
+}
+
+/// Whether this true state, the last of an episode, is a success.
+#[must_use]
+pub fn success(task: Task, puck: &Puck) -> bool {
+    let [x, y, _] = puck.pose;
+    let in_place = RULES.success_x_m[0] < x
+        && x <= RULES.success_x_m[1]
+        && puck.velocity[0] < RULES.success_vx_m_s;
+    match task {
+        Task::Hit => {
+            x > TABLE.half_length_m()
+                && y.abs() < TABLE.goal_width_m / 2.0
+                && puck.speed() >= RULES.hit_min_goal_speed_m_s
+        }
+        Task::Defend => in_place,
+        Task::Prepare => in_place && y.abs() < PLAYABLE_Y_M,
+    }
+}

@@ -1,0 +1,8 @@
+//! How the evaluator's world differs from the ideal one. Every factor has a stream of its own.
+
+pub mod disturbance;
+mod mismatch;
+pub mod noise;
+pub mod settings;
+pub mod stream;
+pub mod tracking_loss;

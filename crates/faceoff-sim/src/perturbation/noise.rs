@@ -1,0 +1,48 @@
+//! Gaussian noise on what the agent observes.
+
+use super::{settings::NoiseSettings, stream::Stream};
+use crate::robot::model::JOINTS;
+
+/// Draws the noise of one observation after the other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ObservationNoise {
+    stream: Stream,
+    settings: NoiseSettings,
+}
+
+impl ObservationNoise {
+    /// From its stream.
+    #[must_use]
+    pub fn new(settings: &NoiseSettings, stream: Stream) -> Self {
+        Self {
+            stream,
+            settings: settings.clone(),
+        }
+    }
+
+    /// Adds noise to puck pose and velocity, joint positions and velocities: the first 20 numbers
+    /// of an observation, always 20 normal draws. The yaw is left unwrapped.
+    pub fn add(&mut self, observation: &mut [f64]) {
+        let s = &self.settings;
+        let deviations = [
+            s.puck_position_m,
+            s.puck_position_m,
+            s.puck_yaw_rad,
+            s.puck_velocity_m_s,
+            s.puck_velocity_m_s,
+            s.puck_yaw_rate_rad_s,
+        ]
+        .into_iter()
+        .chain([s.joint_position_rad; JOINTS])
+        .chain([s.joint_velocity_rad_s; JOINTS]);
+        let mut spare = None;
+        for (value, deviation) in observation.iter_mut().zip(deviations) {
+            let normal = spare.take().unwrap_or_else(|| {
+                let [first, second] = self.stream.normal_pair();
+                spare = Some(second);
+                first
+            });
+            *value += deviation * normal;
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! Magnitudes of the factors (RULES, "Perturbation profiles").
+
+use serde::{Deserialize, Serialize};
+
+/// Magnitudes of all factors; the default is the ruleset's.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PerturbationSettings {
+    /// The season's plant.
+    pub model_mismatch: MismatchSettings,
+    /// Noise on the observation.
+    pub observation_noise: NoiseSettings,
+    /// Air flow.
+    pub disturbance: DisturbanceSettings,
+    /// Lost puck.
+    pub tracking_loss: TrackingLossSettings,
+}
+
+/// How far the plant may be off.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MismatchSettings {
+    /// Range of the factor on each link's mass and inertia.
+    pub mass: [f64; 2],
+    /// Range of the factor on each joint's gains.
+    pub gains: [f64; 2],
+    /// Range of the factor on each joint's damping and dry friction.
+    pub friction: [f64; 2],
+    /// Accepted range of the largest static end-effector error over the workspace, m.
+    pub static_error_m: [f64; 2],
+}
+
+impl Default for MismatchSettings {
+    fn default() -> Self {
+        Self {
+            mass: [0.8, 1.2],
+            gains: [0.8, 1.2],
+            friction: [0.5, 1.5],
+            static_error_m: [0.005, 0.010],
+        }
+    }
+}
+
+/// Standard deviations of the observation noise.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct NoiseSettings {
+    /// Puck x and y, m.
+    pub puck_position_m: f64,
+    /// Puck yaw, rad.
+    pub puck_yaw_rad: f64,
+    /// Puck velocity, m/s.
+    pub puck_velocity_m_s: f64,
+    /// Puck yaw rate, rad/s.
+    pub puck_yaw_rate_rad_s: f64,
+    /// Joint positions, rad.
+    pub joint_position_rad: f64,
+    /// Joint velocities, rad/s.
+    pub joint_velocity_rad_s: f64,
+}
+
+impl Default for NoiseSettings {
+    fn default() -> Self {
+        Self {
+            puck_position_m: 0.001,
+            puck_yaw_rad: 0.02,
+            puck_velocity_m_s: 0.1,
+            puck_yaw_rate_rad_s: 0.1,
+            joint_position_rad: 1e-4,
+            joint_velocity_rad_s: 1e-3,
+        }
+    }
+}
+
+/// The air flow's force on the puck, proportional to its speed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DisturbanceSettings {
+    /// Stationary standard deviation per axis, N per m/s.
+    pub sigma_n_per_m_s: f64,
+    /// Correlation time, s.
+    pub correlation_time_s: f64,
+}
+
+impl Default for DisturbanceSettings {
+    fn default() -> Self {
+        Self {
+            sigma_n_per_m_s: 0.004,
+            correlation_time_s: 0.2,
+        }
+    }
+}
+
+/// How the tracking of the puck gets lost.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TrackingLossSettings {
+    /// Probability per control step, while tracked.
+    pub probability: f64,
+    /// Shortest and longest loss, control steps.
+    pub steps: [u32; 2],
+}
+
+impl Default for TrackingLossSettings {
+    fn default() -> Self {
+        Self {
+            probability: 0.03,
+            steps: [5, 20],
+        }
+    }
+}

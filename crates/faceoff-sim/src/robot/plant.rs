@@ -1,0 +1,66 @@
+//! What physically moves: nominal, or off by the season's model mismatch.
+
+use super::model::{DOFS, JOINTS, LINKS};
+use crate::dynamics::{
+    arm::{Bodies, Kinematics, mass_matrix},
+    factor::Factor,
+};
+
+/// The robot as it really is: masses, gains, damping and dry friction. Made once per season and
+/// shared by all episodes; every arm on the table is alike. The controller's feed-forward and the
+/// agent's model stay nominal, whatever the plant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plant {
+    /// Factor on the masses and inertias of links 1…7, end effector and mallet.
+    pub(crate) mass_scale: [f64; 9],
+    /// Proportional gains, N m/rad.
+    pub(crate) kp: [f64; JOINTS],
+    /// Derivative gains, N m s/rad.
+    pub(crate) kd: [f64; JOINTS],
+    /// Viscous joint damping, N m s/rad.
+    pub(crate) damping: [f64; JOINTS],
+    /// Dry friction, N m.
+    pub(crate) friction: [f64; JOINTS],
+    /// Diagonal of the inverse joint-space inertia at q = 0, 1/(kg m²): scales the regularisation of
+    /// the soft joint constraints.
+    pub(crate) inverse_inertia: [f64; DOFS],
+}
+
+impl Plant {
+    /// The plant of MODEL's tables.
+    #[must_use]
+    pub fn nominal() -> Self {
+        Self::new(
+            [1.0; 9],
+            LINKS.map(|link| link.kp),
+            LINKS.map(|link| link.kd),
+            LINKS.map(|link| link.damping),
+            LINKS.map(|link| link.friction_n_m),
+        )
+    }
+
+    pub(crate) fn new(
+        mass_scale: [f64; 9],
+        kp: [f64; JOINTS],
+        kd: [f64; JOINTS],
+        damping: [f64; JOINTS],
+        friction: [f64; JOINTS],
+    ) -> Self {
+        let kinematics = Kinematics::new(&[0.0; DOFS]);
+        let bodies = Bodies::new(&kinematics).plant(&mass_scale);
+        let factor = Factor::new(&mass_matrix(&kinematics, &bodies));
+        let inverse_inertia = std::array::from_fn(|i| {
+            let mut unit = [0.0; DOFS];
+            unit[i] = 1.0;
+            factor.solve(&unit)[i]
+        });
+        Self {
+            mass_scale,
+            kp,
+            kd,
+            damping,
+            friction,
+            inverse_inertia,
+        }
+    }
+}

@@ -1,0 +1,6 @@
+//! Table, puck and contacts.
+
+pub mod contact_finder;
+pub mod contact_law;
+pub mod geometry;
+pub mod puck;

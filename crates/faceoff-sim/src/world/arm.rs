@@ -1,0 +1,64 @@
+//! The state of one arm.
+
+use super::joints::JointConstraints;
+use crate::{
+    dynamics::arm::Kinematics,
+    robot::{
+        controller::Limiter,
+        interpolation::{Interpolation, Setpoint, Trajectory, interpolate},
+        inverse_kinematics::full,
+        model::{DOFS, JOINTS, SUBSTEPS},
+        plant::Plant,
+        universal_joint::{UniversalJoint, vertical},
+    },
+};
+
+/// One arm with its controller, exactly as far as its future depends on it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Arm {
+    pub(super) q: [f64; DOFS],
+    pub(super) dq: [f64; DOFS],
+    pub(super) dq_filtered: [f64; JOINTS],
+    pub(super) torque: [f64; JOINTS],
+    pub(super) trajectory: Trajectory,
+    pub(super) limiter: Limiter,
+    pub(super) universal: UniversalJoint,
+    pub(super) constraints: JointConstraints,
+    pub(super) ee_before: [f64; 3],
+}
+
+impl Arm {
+    /// At rest, the mallet vertical.
+    pub fn new(plant: &Plant, joints: &[f64; JOINTS]) -> Self {
+        let mut q = full(joints);
+        let ee = Kinematics::new(&q).end_effector;
+        let universal = vertical(ee.x.lane(0), ee.y.lane(0), [0.0; 2]);
+        q[JOINTS..].copy_from_slice(&universal);
+        Self {
+            q,
+            dq: [0.0; DOFS],
+            dq_filtered: [0.0; JOINTS],
+            torque: [0.0; JOINTS],
+            trajectory: [Setpoint::at_rest(*joints); SUBSTEPS],
+            limiter: Limiter::new(*joints),
+            universal: UniversalJoint::default(),
+            constraints: JointConstraints::new(plant),
+            ee_before: ee.origin.lane(0),
+        }
+    }
+
+    /// The end of the current trajectory, where the next one starts.
+    fn end(&self) -> &Setpoint {
+        &self.trajectory[SUBSTEPS - 1]
+    }
+
+    /// Starts a control step with an action.
+    pub fn command(&mut self, interpolation: Interpolation, action: &[f64]) {
+        self.trajectory = interpolate(interpolation, self.end(), action);
+    }
+
+    /// Starts a control step that holds the last commanded position at rest.
+    pub fn hold(&mut self) {
+        self.trajectory = [Setpoint::at_rest(self.end().position); SUBSTEPS];
+    }
+}
