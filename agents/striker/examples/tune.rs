@@ -139,14 +139,18 @@ fn play(agent: &mut Agent, episode: &mut Episode, tally: &mut Tally, trace: bool
 
 /// Largest filtered joint speed relative to its limit.
 fn speed_share(state: &EpisodeState) -> f64 {
+    speed_shares(state).into_iter().map(f64::abs).fold(0.0, f64::max)
+}
+
+fn speed_shares(state: &EpisodeState) -> Vec<f64> {
     let limits = env_info(Task::Defend).joint_vel_limit[1];
-    state.dq_filtered.iter().zip(limits).map(|(v, limit)| v.abs() / limit).fold(0.0, f64::max)
+    state.dq_filtered.iter().zip(limits).map(|(v, limit)| v / limit).collect()
 }
 
 fn print_step(agent: &Agent, episode: &Episode, state: &EpisodeState) {
     let p = state.puck;
     println!(
-        "{:3} puck {:+.3} {:+.3} v {:+.2} {:+.2} mallet {:+.3} {:+.3} z {:+.1} mm speed {:.2} {:.150}",
+        "{:3} puck {:+.3} {:+.3} v {:+.2} {:+.2} mallet {:+.3} {:+.3} z {:+.1} mm speed {:.2?} {:.150}",
         episode.steps(),
         p[0],
         p[1],
@@ -155,7 +159,7 @@ fn print_step(agent: &Agent, episode: &Episode, state: &EpisodeState) {
         state.ee[0] - 1.51,
         state.ee[1],
         1e3 * (state.ee[2] - 0.1645),
-        speed_share(state),
+        speed_shares(state),
         agent.describe(),
     );
 }
