@@ -53,8 +53,7 @@ impl Defend {
             if left <= 0.5 * scene.dt {
                 // Through the contact and a little longer along with the puck, then stop.
                 if left > -0.04 {
-                    let target = Target { pos: scene.mallet.pos + 0.1 * m.velocity, vel: m.velocity, time: 0.1 };
-                    return Order { target, posture: Posture::Free };
+                    return Order::coast(scene, m.velocity, Posture::Free);
                 }
                 self.meeting = None;
                 return Order::brake(scene);
@@ -72,10 +71,10 @@ impl Defend {
             (None, b) => b.map(|(b, _)| b),
         };
         match self.meeting {
-            Some(m) => Order {
-                target: Target { pos: m.mallet, vel: m.velocity, time: (m.time - scene.time).max(scene.dt) },
-                posture: Posture::Free,
-            },
+            Some(m) => {
+                let time = (m.time - scene.time).max(scene.dt);
+                Order::new(Target { pos: m.mallet, vel: m.velocity, time }, Posture::Free)
+            }
             None => guard(scene),
         }
     }
