@@ -3,8 +3,9 @@
 use crate::{
     Layer, SandboxError, SpawnSpec,
     seccomp::{self, Filters},
+    stage::Stage,
 };
-use rustix::fs::{MemfdFlags, Mode, OFlags, SeekFrom, memfd_create, open, seek};
+use rustix::fs::{MemfdFlags, SeekFrom, memfd_create, seek};
 use std::{
     ffi::OsString,
     fs,
@@ -29,8 +30,6 @@ pub(crate) struct Bubblewrap {
     pub program: PathBuf,
     /// e.g. `bubblewrap 0.8.0`
     pub version: String,
-    /// Mounts from an open folder, so that the agent's user need not be able to reach it by name.
-    binds_descriptors: bool,
     /// Forbids further user namespaces inside, beside the filter.
     disables_user_namespaces: bool,
 }
@@ -87,22 +86,23 @@ impl Bubblewrap {
             version: ask("--version")
                 .map(|text| text.trim().to_owned())
                 .unwrap_or_default(),
-            binds_descriptors: help.contains("--ro-bind-fd"),
             disables_user_namespaces: help.contains("--disable-userns"),
         }))
     }
 
-    /// The command line for `spec`; the second part must be inherited by the child.
+    /// The command line for `spec`, with what the child needs for it. `staged`: bubblewrap runs as a user
+    /// who may be unable to reach the files by name.
     pub(crate) fn command(
         &self,
         spec: &SpawnSpec,
         status: OwnedFd,
         filters: Option<&Filters>,
-    ) -> Result<(Command, Vec<OwnedFd>), SandboxError> {
+        staged: bool,
+    ) -> Result<Invocation, SandboxError> {
         let mut line = CommandLine {
             args: Vec::new(),
             inherit: Vec::new(),
-            bind_fds: self.binds_descriptors,
+            stage: staged.then(Stage::default),
         };
         line.args([
             "--unshare-user",
@@ -167,8 +167,20 @@ impl Bubblewrap {
         let mut command = Command::new(&self.program);
         // bubblewrap itself sees nothing of the bundle's variables: LD_PRELOAD would work on it outside.
         command.args(line.args).env_clear().current_dir("/");
-        Ok((command, line.inherit))
+        Ok(Invocation {
+            command,
+            inherit: line.inherit,
+            stage: line.stage,
+        })
     }
+}
+
+/// bubblewrap's command, and what its process needs before the exec.
+#[derive(Debug)]
+pub(crate) struct Invocation {
+    pub command: Command,
+    pub inherit: Vec<OwnedFd>,
+    pub stage: Option<Stage>,
 }
 
 /// The agent's variables; the bundle's own come last.
@@ -188,7 +200,7 @@ pub(crate) fn environment(spec: &SpawnSpec, home: &str) -> Vec<(String, String)>
 struct CommandLine {
     args: Vec<OsString>,
     inherit: Vec<OwnedFd>,
-    bind_fds: bool,
+    stage: Option<Stage>,
 }
 
 impl CommandLine {
@@ -225,15 +237,11 @@ impl CommandLine {
                 .extend(["--symlink".into(), target.into_os_string(), inside.into()]);
             return Ok(());
         }
-        let opened = open(host, OFlags::PATH | OFlags::CLOEXEC, Mode::empty());
-        let fd = opened.map_err(|error| failed(error.into()))?;
-        if self.bind_fds {
-            self.fd("--ro-bind-fd", fd);
-        } else {
-            let absolute = fs::canonicalize(host).map_err(failed)?;
-            self.args
-                .extend(["--ro-bind".into(), absolute.into_os_string()]);
-        }
+        let source = match &mut self.stage {
+            Some(stage) => stage.add(host)?,
+            None => fs::canonicalize(host).map_err(failed)?.into_os_string(),
+        };
+        self.args.extend(["--ro-bind".into(), source]);
         self.args.push(inside.into());
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! What the child does between fork and exec.
 
-use crate::{Limits, agent_user::AgentUser, seccomp::Filters};
+use crate::{Limits, agent_user::AgentUser, seccomp::Filters, stage::Stage};
 use rustix::{
     fs::{Mode, OFlags, open},
     io::{Errno, FdFlags, fcntl_setfd, write},
@@ -21,6 +21,8 @@ pub(crate) struct ChildSetup {
     pub cgroup_procs: Vec<OwnedFd>,
     pub cpus: Option<CpuSet>,
     pub rlimits: Vec<(Resource, Rlimit)>,
+    /// Files to show to that user, bound while the child is still root.
+    pub stage: Option<Stage>,
     pub user: Option<AgentUser>,
     /// Descriptors that survive the exec.
     pub inherit: Vec<OwnedFd>,
@@ -36,6 +38,7 @@ enum Step {
     CloseDescriptors,
     EnterCgroup,
     SetCpus,
+    Stage,
     SetRlimits,
     BecomeUser,
     Inherit,
@@ -44,10 +47,11 @@ enum Step {
 }
 
 impl Step {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 9] = [
         Self::CloseDescriptors,
         Self::EnterCgroup,
         Self::SetCpus,
+        Self::Stage,
         Self::SetRlimits,
         Self::BecomeUser,
         Self::Inherit,
@@ -62,6 +66,10 @@ impl Step {
             }
             Self::EnterCgroup => "cannot enter the agent's cgroup",
             Self::SetCpus => "cannot bind the agent to its CPUs",
+            Self::Stage => {
+                "cannot show files to the agent's user in a mount namespace (a root service needs \
+                 CAP_SYS_ADMIN for it; without, run it as an ordinary user)"
+            }
             Self::SetRlimits => "cannot set the agent's resource limits",
             Self::BecomeUser => "cannot become the agent's user",
             Self::Inherit => "cannot pass a descriptor to bubblewrap",
@@ -89,7 +97,7 @@ impl StepReport {
 
 impl ChildSetup {
     /// Arranges for `command` to do all this in the child.
-    pub(crate) fn install(self, command: &mut Command) -> io::Result<StepReport> {
+    pub(crate) fn install(mut self, command: &mut Command) -> io::Result<StepReport> {
         let (reader, writer) = pipe_with(PipeFlags::CLOEXEC)?;
         let parent = process::getpid();
         let hook = move || {
@@ -110,7 +118,7 @@ impl ChildSetup {
         Ok(StepReport(reader))
     }
 
-    fn run(&self, parent: process::Pid) -> Result<(), (Step, Errno)> {
+    fn run(&mut self, parent: process::Pid) -> Result<(), (Step, Errno)> {
         close_rest_on_exec().map_err(|error| (Step::CloseDescriptors, error))?;
         for procs in &self.cgroup_procs {
             write(procs, b"0").map_err(|error| (Step::EnterCgroup, error))?;
@@ -126,6 +134,9 @@ impl ChildSetup {
                 Mode::empty(),
             );
             let _ = file.and_then(|file| write(&file, b"800"));
+        }
+        if let Some(stage) = &mut self.stage {
+            stage.build().map_err(|error| (Step::Stage, error))?;
         }
         for &(resource, limit) in &self.rlimits {
             process::setrlimit(resource, limit).map_err(|error| (Step::SetRlimits, error))?;

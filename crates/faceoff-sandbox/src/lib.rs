@@ -29,6 +29,7 @@ mod process_tree;
 mod runtime;
 mod seccomp;
 mod spawner;
+mod stage;
 mod status_pipe;
 mod stderr_tail;
 mod sweep;

@@ -5,7 +5,8 @@ use std::{collections::BTreeMap, path::PathBuf};
 #[derive(Debug, Clone)]
 pub struct SpawnSpec {
     /// The unpacked bundle, mounted read-only at `/agent` (the working directory). A service that runs
-    /// as root starts agents as another user: folders in it need mode 0755, files 0644 or 0755.
+    /// as root starts agents as another user: folders in it need mode 0755, files 0644 or 0755. The way
+    /// to it may be closed to others, unless namespaces are given up.
     pub bundle_dir: PathBuf,
     /// Program and arguments. A program with a slash is relative to the bundle, else it is searched in
     /// the runtime's PATH.

@@ -7,9 +7,9 @@ use crate::{
 use serde::Serialize;
 use std::{
     collections::BTreeMap,
-    fs,
+    fs, io,
     os::unix::fs::PermissionsExt,
-    path::Path,
+    path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
@@ -140,13 +140,8 @@ fn run(layer: Layer, file: &str) -> Result<String, String> {
         .into_iter()
         .find(|path| Path::new(path).is_file());
     let cat = cat.ok_or("the probe needs /usr/bin/cat")?;
-    let bundle = tempfile::Builder::new()
-        .prefix("faceoff-probe-")
-        .tempdir()
-        .and_then(|folder| {
-            fs::set_permissions(folder.path(), fs::Permissions::from_mode(0o755)).map(|()| folder)
-        })
-        .map_err(|error| format!("cannot make a folder for the probe: {error}"))?;
+    let (_private, bundle) =
+        bundle(layer).map_err(|error| format!("cannot make a folder for the probe: {error}"))?;
     let mut runtime = Runtime::native();
     runtime.read_only_paths.push(cat.into());
     let given_up = Layer::ALL
@@ -154,7 +149,7 @@ fn run(layer: Layer, file: &str) -> Result<String, String> {
         .filter(|other| *other != layer)
         .collect();
     let spec = SpawnSpec {
-        bundle_dir: bundle.path().to_path_buf(),
+        bundle_dir: bundle,
         command: vec![cat.into(), file.into()],
         env: BTreeMap::new(),
         runtime,
@@ -195,6 +190,24 @@ fn run(layer: Layer, file: &str) -> Result<String, String> {
     }
 }
 
+/// An empty bundle. With namespaces it lies, as real ones do, in a folder that only the service may enter;
+/// the other layers are tried without them.
+fn bundle(layer: Layer) -> io::Result<(tempfile::TempDir, PathBuf)> {
+    let outer = tempfile::Builder::new()
+        .prefix("faceoff-probe-")
+        .tempdir()?;
+    let outer_mode = if layer == Layer::Namespaces {
+        0o700
+    } else {
+        0o755
+    };
+    let bundle = outer.path().join("bundle");
+    fs::create_dir(&bundle)?;
+    fs::set_permissions(&bundle, fs::Permissions::from_mode(0o755))?;
+    fs::set_permissions(outer.path(), fs::Permissions::from_mode(outer_mode))?;
+    Ok((outer, bundle))
+}
+
 fn cure(layer: Layer) -> String {
     match layer {
         Layer::Namespaces => cure_namespaces(),
@@ -230,7 +243,7 @@ fn cure_namespaces() -> String {
             "sysctl -w kernel.apparmor_restrict_unprivileged_userns=0",
         ),
     ];
-    if matches!(Bubblewrap::find(), Err(SandboxError::Unavailable { .. })) {
+    if Bubblewrap::find().is_err() {
         return bubblewrap::CURE_INSTALL.into();
     }
     let switch = SWITCHES

@@ -20,8 +20,8 @@ use crate::{
 use faceoff_types::AgentFaultKind;
 use std::{
     fs, io,
-    os::unix::process::CommandExt,
-    path::PathBuf,
+    os::unix::{fs::PermissionsExt, process::CommandExt},
+    path::{Path, PathBuf},
     process::{Command, Stdio},
     sync::Once,
     time::{Duration, Instant},
@@ -290,8 +290,11 @@ impl Prepared {
         if enforces(Layer::Namespaces) {
             let failed = |source| SandboxError::io("cannot make a pipe", source);
             let (status, writer) = StatusPipe::new().map_err(failed)?;
-            let (command, inherit) = Bubblewrap::find()?.command(spec, writer, filters.as_ref())?;
-            setup.inherit = inherit;
+            let invocation =
+                Bubblewrap::find()?.command(spec, writer, filters.as_ref(), user.is_some())?;
+            setup.inherit = invocation.inherit;
+            setup.stage = invocation.stage;
+            let command = invocation.command;
             return Ok(Self {
                 command,
                 setup,
@@ -299,6 +302,9 @@ impl Prepared {
                 cgroup,
                 scratch: None,
             });
+        }
+        if user.is_some() {
+            check_reachable(&spec.bundle_dir)?;
         }
         setup.filters = filters;
         let scratch = scratch_folder(user)?;
@@ -393,8 +399,10 @@ impl Prepared {
 fn direct_command(spec: &SpawnSpec) -> Command {
     let program = spec.command.first().map(String::as_str).unwrap_or_default();
     let program = match program.strip_prefix("/agent/") {
-        Some(rest) => spec.bundle_dir.join(rest),
-        None if program.contains('/') => spec.bundle_dir.join(program),
+        // Relative to the working folder, which is entered before: the agent's user may be unable to reach
+        // it by its whole name.
+        Some(rest) => Path::new("./").join(rest),
+        None if program.contains('/') => Path::new("./").join(program),
         None => PathBuf::from(program),
     };
     let mut command = Command::new(program);
@@ -402,6 +410,27 @@ fn direct_command(spec: &SpawnSpec) -> Command {
         .args(spec.command.iter().skip(1))
         .current_dir(&spec.bundle_dir);
     command
+}
+
+/// Without a mount namespace the agent's user must be able to walk to the bundle. If it cannot, that must
+/// not look like a mistake of the bundle's.
+fn check_reachable(bundle_dir: &Path) -> Result<(), SandboxError> {
+    for folder in bundle_dir.ancestors() {
+        let meta = fs::metadata(folder)
+            .map_err(|source| SandboxError::io("cannot look at the bundle", source))?;
+        if meta.permissions().mode() & 0o001 == 0 {
+            return Err(SandboxError::Unavailable {
+                layer: Layer::Namespaces,
+                why: format!(
+                    "it is given up, so an agent of this root service, which is another user, would have to \
+                     reach its bundle through {}, which is closed to others; run the service as an ordinary \
+                     user, or keep the layer",
+                    folder.display()
+                ),
+            });
+        }
+    }
+    Ok(())
 }
 
 fn scratch_folder(user: Option<AgentUser>) -> Result<tempfile::TempDir, SandboxError> {

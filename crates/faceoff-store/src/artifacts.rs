@@ -1,10 +1,11 @@
 use crate::StoreError;
 use bytes::Bytes;
 use futures::{StreamExt, TryStreamExt, stream::BoxStream};
+use jiff::Timestamp;
 use object_store::{
     ObjectStore, ObjectStoreExt, WriteMultipart, local::LocalFileSystem, path::Path as Key,
 };
-use std::{path::Path, sync::Arc};
+use std::{path::Path, sync::Arc, time::SystemTime};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
 /// The bytes of an artifact, in order.
@@ -18,6 +19,7 @@ const PIECE_BYTES: usize = 1 << 20;
 #[derive(Debug, Clone)]
 pub struct Artifacts {
     objects: Arc<dyn ObjectStore>,
+    folder: Arc<Path>,
 }
 
 impl Artifacts {
@@ -33,6 +35,7 @@ impl Artifacts {
             .with_automatic_cleanup(true);
         Ok(Self {
             objects: Arc::new(objects),
+            folder: folder.into(),
         })
     }
 
@@ -140,6 +143,11 @@ impl Artifacts {
 
     /// Removes every artifact under `prefix/`.
     pub async fn delete_folder(&self, prefix: &str) -> Result<(), StoreError> {
+        self.delete_others(prefix, "").await
+    }
+
+    /// Removes every artifact under `prefix/` but the one with the key `kept`.
+    pub async fn delete_others(&self, prefix: &str, kept: &str) -> Result<(), StoreError> {
         let listed: Vec<_> = self
             .objects
             .list(Some(&parse(prefix)?))
@@ -148,10 +156,47 @@ impl Artifacts {
             .await
             .map_err(artifact_error)?;
         for location in listed {
-            self.delete(location.as_ref()).await?;
+            if location.as_ref() != kept {
+                self.delete(location.as_ref()).await?;
+            }
         }
         Ok(())
     }
+
+    /// Removes what a killed process has left half written, if it was begun before `before`. Returns
+    /// how many files.
+    pub async fn remove_abandoned(&self, before: Timestamp) -> Result<usize, StoreError> {
+        let folder = Arc::clone(&self.folder);
+        tokio::task::spawn_blocking(move || remove_staged(&folder, before.into()))
+            .await
+            .unwrap_or_else(|panic| Err(std::io::Error::other(panic)))
+            .map_err(|error| StoreError::Artifacts(format!("removing half-written files: {error}")))
+    }
+}
+
+/// `LocalFileSystem` writes to `NAME#NUMBER` beside the file and renames that when it is whole; its
+/// keys cannot hold a `#`.
+fn remove_staged(folder: &Path, before: SystemTime) -> std::io::Result<usize> {
+    let mut removed = 0;
+    for entry in std::fs::read_dir(folder)? {
+        let entry = entry?;
+        if entry.file_type()?.is_dir() {
+            removed += remove_staged(&entry.path(), before)?;
+            continue;
+        }
+        let name = entry.file_name();
+        let staged = name
+            .to_str()
+            .and_then(|name| name.rsplit_once('#'))
+            .is_some_and(|(_, number)| {
+                !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())
+            });
+        if staged && entry.metadata()?.modified()? < before {
+            std::fs::remove_file(entry.path())?;
+            removed += 1;
+        }
+    }
+    Ok(removed)
 }
 
 fn parse(key: &str) -> Result<Key, StoreError> {

@@ -10,9 +10,13 @@ use crate::{
 use anyhow::Context as _;
 use faceoff_runner::{AgentEnvironment, bundle::BundleLimits};
 use faceoff_store::Store;
+use jiff::SignedDuration;
 use std::{path::PathBuf, sync::Arc, thread, time::Duration};
 use tokio::{runtime::Handle, sync::oneshot, task::JoinSet};
 use tokio_util::sync::CancellationToken;
+
+/// No artifact is under way longer than this.
+const LONGEST_WRITE: SignedDuration = SignedDuration::from_hours(1);
 
 /// What time means here; tests are quicker.
 pub(crate) struct Pace {
@@ -31,7 +35,7 @@ impl Default for Pace {
         Self {
             clock: Clock::system(),
             poll: Duration::from_secs(2),
-            tidy_every: Duration::from_secs(60),
+            tidy_every: Duration::from_secs(300),
             shutdown_grace: Duration::from_secs(20),
         }
     }
@@ -191,13 +195,19 @@ async fn wait_for(
     }
 }
 
-/// Removes recordings that are no longer needed, now and then.
+/// Removes, now and then, recordings that are no longer needed and what kills left half written.
 async fn tidy(store: Store, clock: Clock, every: Duration, shutdown: CancellationToken) {
     loop {
-        match store.remove_old_recordings(clock.now()).await {
-            Ok(0) => {}
-            Ok(evaluations) => tracing::debug!(evaluations, "recordings removed"),
-            Err(error) => tracing::warn!(%error, "old recordings could not be removed"),
+        let now = clock.now();
+        if let Err(error) = store.remove_old_recordings(now).await {
+            tracing::warn!(%error, "old recordings could not be removed");
+        }
+        if let Err(error) = store
+            .artifacts()
+            .remove_abandoned(now - LONGEST_WRITE)
+            .await
+        {
+            tracing::warn!(%error, "half-written artifacts could not be removed");
         }
         tokio::select! {
             () = shutdown.cancelled() => return,

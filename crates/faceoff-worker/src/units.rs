@@ -163,18 +163,22 @@ impl Tools {
         };
         let archive = work.path().join("dataset.zip");
         let result = self.evaluator.assemble(&meta, &recordings, &archive)?;
-        let key = format!("datasets/{}/{}.zip", evaluation.id, claim.nonce);
+        let datasets = format!("datasets/{}", evaluation.id);
+        let key = format!("{datasets}/{}.zip", claim.nonce);
         let (store, handle) = (&self.store, &self.handle);
         handle
             .block_on(store.artifacts().put_file(&key, &archive))
             .context("storing the dataset")?;
         let finished =
             handle.block_on(store.finish_evaluation(claim, &result, &key, self.clock.now()));
-        if finished.is_err() {
-            // never stored: no other lease names this key
-            handle
-                .block_on(store.artifacts().delete(&key))
-                .context("removing a dataset")?;
+        let tidied = match &finished {
+            // what finalisations left that were killed between upload and commit
+            Ok(()) => handle.block_on(store.artifacts().delete_others(&datasets, &key)),
+            // never published: no other lease names this key
+            Err(_) => handle.block_on(store.artifacts().delete(&key)),
+        };
+        if let Err(error) = tidied {
+            tracing::warn!(evaluation = %evaluation.id, %error, "a dataset that nobody needs is left");
         }
         finished?;
         Ok(End::Committed)

@@ -105,7 +105,7 @@ impl AgentCgroup {
         }
         group.measure_cpu(&hierarchies, &name);
         if !cpus.is_empty() {
-            group.holds_cpus = group.hold_cpus(&hierarchies, &name, cpus).is_some();
+            group.holds_cpus = group.hold_cpus(&hierarchies, &name, cpus);
         }
         Ok(Some(group))
     }
@@ -200,8 +200,20 @@ impl AgentCgroup {
             .map(|file| (home.version, file));
     }
 
-    /// Confines the tree to `cpus` by a cpuset, where the host offers one.
-    fn hold_cpus(&mut self, hierarchies: &Hierarchies, name: &str, cpus: &[usize]) -> Option<()> {
+    /// Confines the tree to `cpus` by a cpuset, where the host offers one; tells whether it does.
+    fn hold_cpus(&mut self, hierarchies: &Hierarchies, name: &str, cpus: &[usize]) -> bool {
+        let before = self.leaves.len();
+        let held = self.set_cpus(hierarchies, name, cpus).is_some();
+        if !held {
+            // A half-made cpuset lets nobody in.
+            for leaf in self.leaves.drain(before..) {
+                remove_leaf(&leaf);
+            }
+        }
+        held
+    }
+
+    fn set_cpus(&mut self, hierarchies: &Hierarchies, name: &str, cpus: &[usize]) -> Option<()> {
         let home = hierarchies.find("cpuset")?;
         let leaf = self.leaf(&home, &["cpuset"], name).ok()?;
         if home.version == Version::V1 {

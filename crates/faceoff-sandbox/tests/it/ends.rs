@@ -170,7 +170,7 @@ fn a_sandbox_that_cannot_be_set_up_is_ours() {
 
     // A bundle that the agent's user may not enter: bubblewrap fails after its child exists.
     let subject = Subject::new("echo", &[]);
-    fs::set_permissions(subject.bundle.path(), fs::Permissions::from_mode(0)).unwrap();
+    fs::set_permissions(subject.bundle.path(), fs::Permissions::from_mode(0o000)).unwrap();
     match AgentProcess::spawn(&subject.spec) {
         Err(SpawnError::Platform(_)) => {}
         Err(SpawnError::Agent(fault)) => panic!("{fault}"),

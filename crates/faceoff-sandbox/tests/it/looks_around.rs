@@ -1,4 +1,5 @@
 use crate::harness::{Subject, expect_echo, is_root, processes_marked};
+use faceoff_sandbox::{AgentProcess, Isolation, Layer, SandboxError, SpawnError};
 use std::{
     collections::{BTreeMap, BTreeSet},
     fs,
@@ -108,4 +109,49 @@ fn no_agent_is_root_on_the_host_and_no_two_are_one_user() {
         assert_eq!(users.contains(&own), !is_root());
     }
     assert_eq!(users[0] == users[1], !is_root());
+}
+
+/// An echo agent whose bundle lies in a folder that only we may enter.
+fn private_bundle() -> (Subject, tempfile::TempDir) {
+    let mut subject = Subject::new("echo", &[]);
+    let private = tempfile::tempdir().unwrap();
+    fs::set_permissions(private.path(), fs::Permissions::from_mode(0o700)).unwrap();
+    let bundle = private.path().join("bundle");
+    fs::create_dir(&bundle).unwrap();
+    fs::set_permissions(&bundle, fs::Permissions::from_mode(0o755)).unwrap();
+    fs::copy(
+        subject.bundle.path().join("echo.py"),
+        bundle.join("echo.py"),
+    )
+    .unwrap();
+    subject.spec.bundle_dir = bundle;
+    (subject, private)
+}
+
+#[test]
+fn a_bundle_in_a_folder_of_the_services_own_is_shown_to_its_agent() {
+    let (subject, _private) = private_bundle();
+    let mut agent = subject.spawn();
+    expect_echo(&mut agent, "hello");
+    subject.finish(agent);
+}
+
+#[test]
+fn a_bundle_that_only_the_service_can_reach_is_not_the_teams_fault() {
+    let (mut subject, _private) = private_bundle();
+    let Isolation::Sandboxed { given_up } = &mut subject.spec.isolation else {
+        unreachable!()
+    };
+    given_up.push(Layer::Namespaces);
+    match AgentProcess::spawn(&subject.spec) {
+        Err(SpawnError::Platform(SandboxError::Unavailable {
+            layer: Layer::Namespaces,
+            ..
+        })) if is_root() => {}
+        Ok(agent) if !is_root() => {
+            subject.finish(agent);
+        }
+        other => panic!("{other:?}"),
+    }
+    subject.assert_nothing_left();
 }

@@ -79,3 +79,13 @@ fn dropping_an_agent_is_enough() {
     drop(agent);
     subject.assert_nothing_left();
 }
+
+#[test]
+fn an_honest_agent_has_processes_threads_shared_memory_and_a_scratch_folder() {
+    let report = Subject::new("works", &[]).report();
+    let expected = serde_json::json!({
+        "pool": [0, 1, 4, 9, 16], "thread": [49], "loop": "6", "shared_memory": 42, "file": 1000,
+        "shell": "/tmp", "c_library": 3, "random": 8, "home": "/tmp",
+    });
+    assert_eq!(report, expected);
+}

@@ -127,3 +127,46 @@ async fn recordings_go_once_their_evaluation_is_over() {
     );
     assert_eq!(f.store.remove_old_recordings(f.now).await.unwrap(), 0);
 }
+
+#[tokio::test]
+async fn what_a_kill_left_half_written_is_removed_and_nothing_else() {
+    let f = Fixture::new().await;
+    let artifacts = f.store.artifacts();
+    let bundles = f.folder.path().join("artifacts/bundles");
+    let source = f.folder.path().join("source");
+    fs::write(&source, "whole").unwrap();
+    artifacts.put_file("bundles/1", &source).await.unwrap();
+    fs::write(bundles.join("2#1"), "ha").unwrap();
+    let now = jiff::Timestamp::now();
+    let hour = jiff::SignedDuration::from_hours(1);
+    assert_eq!(
+        artifacts.remove_abandoned(now - hour).await.unwrap(),
+        0,
+        "it may be under way"
+    );
+    assert_eq!(artifacts.remove_abandoned(now + hour).await.unwrap(), 1);
+    assert!(!bundles.join("2#1").exists());
+    assert!(artifacts.read("bundles/1").await.is_ok());
+    assert!(
+        artifacts.put_file("bundles/3#1", &source).await.is_err(),
+        "no key looks like it"
+    );
+}
+
+#[tokio::test]
+async fn all_but_one_of_a_folder_can_go() {
+    let f = Fixture::new().await;
+    let artifacts = f.store.artifacts();
+    let source = f.folder.path().join("source");
+    fs::write(&source, "x").unwrap();
+    for key in ["datasets/e/1.zip", "datasets/e/2.zip", "datasets/f/1.zip"] {
+        artifacts.put_file(key, &source).await.unwrap();
+    }
+    artifacts
+        .delete_others("datasets/e", "datasets/e/2.zip")
+        .await
+        .unwrap();
+    assert!(artifacts.read("datasets/e/1.zip").await.is_err());
+    assert!(artifacts.read("datasets/e/2.zip").await.is_ok());
+    assert!(artifacts.read("datasets/f/1.zip").await.is_ok());
+}
