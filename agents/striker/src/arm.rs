@@ -290,3 +290,6 @@ fn weighted(jacobian: &Jacobian, delta: &Vector3<f64>, compliance: &Joints) -> J
         .try_inverse()
         .map_or_else(Joints::zeros, |inverse| cjt * (inverse * delta))
 }
+
+#[cfg(test)]
+mod tests;

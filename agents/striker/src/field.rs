@@ -72,12 +72,18 @@ impl Field {
 
     /// Largest x that a mallet reference may take: the arm is nearly stretched there.
     pub fn mallet_x_max(&self) -> f64 {
-        -0.2
+        -0.16
     }
 
     /// Largest |y| that a mallet reference may take.
     pub fn mallet_y_max(&self) -> f64 {
         self.half_width - self.mallet - MARGIN
+    }
+
+    /// Lowest and highest coordinates that a mallet reference may take.
+    pub fn mallet_bounds(&self) -> (Vec2, Vec2) {
+        let y = self.mallet_y_max();
+        (Vec2::new(self.mallet_x_min(), -y), Vec2::new(self.mallet_x_max(), y))
     }
 
     /// The nearest point where a mallet reference may be.

@@ -16,6 +16,8 @@ mod opponent;
 pub mod protocol;
 mod puck;
 mod skills;
+#[cfg(test)]
+mod testing;
 
 use arm::Arm;
 use estimator::{Estimator, MalletState, PuckObservation};
@@ -162,7 +164,8 @@ impl Agent {
     fn follow(&mut self, order: &Order) {
         let before = self.mallet;
         let mut next = before.towards(&order.target, self.dt);
-        next.confine(&self.field);
+        next.limit(&before, self.dt, order.acceleration);
+        next.confine(&before, self.dt, &self.field);
         let share = self
             .arm
             .advance(self.field.to_base(next.pos), next.vel, order.posture);

@@ -35,6 +35,8 @@ const NUDGE_FROM_X: f64 = -0.68;
 const NUDGE_TO_X: f64 = -0.38;
 /// … this long after the nudge, seconds.
 const NUDGE_TIME: f64 = 2.6;
+/// Largest acceleration of a strike, m/s².
+const STRIKE_ACCELERATION: f64 = 45.0;
 /// A puck slower than this that cannot be struck will not come into reach by itself, m/s.
 const STILL: f64 = 0.08;
 /// Goal-line points that are tried, metres.
@@ -70,11 +72,31 @@ impl Plan {
     }
 }
 
+/// Where and when the mallet comes to rest after a strike.
+#[derive(Debug, Clone, Copy)]
+struct Stop {
+    pos: Vec2,
+    time: f64,
+}
+
+impl Stop {
+    fn plan(scene: &Scene<'_>) -> Self {
+        let motion = scene.mallet;
+        let speed = motion.vel.norm().max(1e-3);
+        let wish = motion.pos + 0.5 * (0.08 + 0.14 * speed) * motion.vel;
+        let pos = scene.field.clamp_mallet(wish);
+        // A quintic to rest is even if it covers half of speed × time.
+        let time = (2.0 * (pos - motion.pos).norm() / speed).max(0.1);
+        Self { pos, time: scene.time + time }
+    }
+}
+
 #[derive(Debug, Clone, Copy)]
 enum Phase {
     Seek(Option<Plan>),
     Swing(Plan),
-    Follow { until: f64, rest_until: f64 },
+    /// `through`: until when at full speed; `rest`: how long to wait after stopping.
+    Follow { through: f64, stop: Option<Stop>, rest: f64 },
 }
 
 /// The skill's memory.
@@ -107,16 +129,7 @@ impl Hit {
         match self.phase {
             Phase::Seek(old) => self.seek(scene, old),
             Phase::Swing(plan) => self.swing(scene, plan),
-            Phase::Follow { until, rest_until } => {
-                if scene.time >= rest_until {
-                    self.phase = Phase::Seek(None);
-                }
-                if scene.time < until {
-                    coast(scene)
-                } else {
-                    Order::brake(scene)
-                }
-            }
+            Phase::Follow { through, stop, rest } => self.follow(scene, through, stop, rest),
         }
     }
 
@@ -164,31 +177,34 @@ impl Hit {
         let left = plan.contact_time - scene.time;
         if left <= 0.6 * scene.dt {
             // A nudged puck is followed at once, a shot puck is gone.
-            let rest = if plan.nudge { 0.1 } else { 0.5 };
+            let rest = if plan.nudge { 0.0 } else { 0.2 };
             self.nudges += u32::from(plan.nudge);
-            self.phase = Phase::Follow { until: scene.time + 0.03, rest_until: scene.time + rest };
-            return coast(scene);
+            self.phase = Phase::Follow { through: scene.time + 0.03, stop: None, rest };
+            return self.follow(scene, scene.time + 0.03, None, rest);
         }
         let plan = again(scene, &plan, left, Some(plan.speed)).unwrap_or(plan);
         self.phase = Phase::Swing(plan);
         Order {
             target: Target { pos: plan.mallet, vel: plan.speed * plan.normal, time: left },
             posture: Posture::Strike(plan.side),
+            acceleration: STRIKE_ACCELERATION,
         }
     }
-}
 
-/// Keep the present velocity.
-fn coast(scene: &Scene<'_>) -> Order {
-    let time = 0.1;
-    let target = Target {
-        pos: scene.mallet.pos + time * scene.mallet.vel,
-        vel: scene.mallet.vel,
-        time,
-    };
-    Order {
-        target,
-        posture: Posture::Strike(lean(scene.mallet.pos)),
+    /// Through the contact at full speed, then to a stop on a path that is fixed once, so that the
+    /// deceleration is even.
+    fn follow(&mut self, scene: &Scene<'_>, through: f64, stop: Option<Stop>, rest: f64) -> Order {
+        let posture = Posture::Strike(lean(scene.mallet.pos));
+        if scene.time < through {
+            return Order::coast(scene, scene.mallet.vel, posture);
+        }
+        let stop = stop.unwrap_or_else(|| Stop::plan(scene));
+        let left = stop.time - scene.time;
+        self.phase = if left < -rest { Phase::Seek(None) } else { Phase::Follow { through, stop: Some(stop), rest } };
+        if left < scene.dt {
+            return Order::stop(scene, scene.mallet.pos, Pace::CALM);
+        }
+        Order::new(Target { pos: stop.pos, vel: Vec2::zeros(), time: left }, Posture::Ready(lean(stop.pos)))
     }
 }
 

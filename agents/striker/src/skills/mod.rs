@@ -47,32 +47,36 @@ pub struct Order {
     pub target: Target,
     /// Preference for the free degrees of freedom.
     pub posture: Posture,
+    /// Largest acceleration of the reference, m/s².
+    pub acceleration: f64,
 }
 
+/// Largest acceleration of references outside strikes, m/s².
+const ACCELERATION: f64 = 14.0;
+
 impl Order {
+    /// An order with the usual bound on the acceleration.
+    pub fn new(target: Target, posture: Posture) -> Self {
+        Self { target, posture, acceleration: ACCELERATION }
+    }
+
     /// Go to a point and stop there.
     pub fn stop(scene: &Scene<'_>, pos: Vec2, pace: Pace) -> Self {
         let pos = scene.field.clamp_mallet(pos);
-        Self {
-            target: Target::stop(&scene.mallet, pos, pace),
-            posture: Posture::Ready(lean(pos)),
-        }
+        Self::new(Target::stop(&scene.mallet, pos, pace), Posture::Ready(lean(pos)))
     }
 
     /// Slow down along the present direction.
     pub fn brake(scene: &Scene<'_>) -> Self {
-        let time: f64 = 0.2;
-        let pos = scene
-            .field
-            .clamp_mallet(scene.mallet.pos + 0.5 * time * scene.mallet.vel);
-        Self {
-            target: Target {
-                pos,
-                vel: Vec2::zeros(),
-                time,
-            },
-            posture: Posture::Ready(lean(pos)),
-        }
+        let time = 0.1 + 0.1 * scene.mallet.vel.norm();
+        let pos = scene.field.clamp_mallet(scene.mallet.pos + 0.5 * time * scene.mallet.vel);
+        Self::new(Target { pos, vel: Vec2::zeros(), time }, Posture::Ready(lean(pos)))
+    }
+
+    /// Keep the present velocity.
+    pub fn coast(scene: &Scene<'_>, velocity: Vec2, posture: Posture) -> Self {
+        let time = 0.1;
+        Self::new(Target { pos: scene.mallet.pos + time * velocity, vel: velocity, time }, posture)
     }
 }
 

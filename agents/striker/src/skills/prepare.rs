@@ -122,11 +122,11 @@ impl Prepare {
                 return retreat(scene);
             }
             let rest = (time + left).max(scene.dt);
-            let target = Target { pos: scene.mallet.pos + 0.5 * rest * scene.mallet.vel, vel: Vec2::zeros(), time: rest };
-            return Order { target, posture: Posture::Free };
+            let pos = scene.mallet.pos + 0.5 * rest * scene.mallet.vel;
+            return Order::new(Target { pos, vel: Vec2::zeros(), time: rest }, Posture::Free);
         }
-        let mallet = scene.puck.pos - scene.field.contact() * strike.normal;
-        Order { target: Target { pos: mallet, vel: strike.velocity, time: left }, posture: Posture::Free }
+        let pos = scene.puck.pos - scene.field.contact() * strike.normal;
+        Order::new(Target { pos, vel: strike.velocity, time: left }, Posture::Free)
     }
 }
 
