@@ -8,7 +8,10 @@ use crate::config::Config;
 use anyhow::{Context, bail, ensure};
 use board::{Job, Verdict, play_all};
 use clap::Args;
-use faceoff_runner::{AgentEnvironment, EvaluationMeta, ShardSpec, assemble, bundle};
+use faceoff_runner::{
+    AgentEnvironment, EvaluationMeta, ShardSpec, assemble,
+    bundle::{self, Bundle, BundleError, BundleLimits},
+};
 use faceoff_sandbox::{Isolation, Runtime};
 use faceoff_types::{AgentFault, Profile, RULESET, Seed, Task};
 use faceoff_worker::CpuLayout;
@@ -88,7 +91,7 @@ impl EvalCommand {
             .permissions(std::os::unix::fs::PermissionsExt::from_mode(0o755))
             .tempdir_in(&self.out)
             .with_context(|| format!("making a folder in {}", self.out.display()))?;
-        let bundle = bundle::open(&self.bundle, scratch.path(), &config.bundle)?;
+        let bundle = self.open(scratch.path(), &config.bundle)?;
         let envs = self.environments(&config, &bundle.manifest.runtime)?;
 
         let mismatch_seed = self
@@ -128,6 +131,16 @@ impl EvalCommand {
         print!("{}", table::of(&meta.agent, &result));
         println!("\n{}\n{}", path.display(), dataset.display());
         Ok(())
+    }
+
+    /// A folder is copied under the rules of an archive, so that it is refused here if the server
+    /// would refuse it; without a sandbox it is used in place.
+    fn open(&self, scratch: &Path, limits: &BundleLimits) -> Result<Bundle, BundleError> {
+        if self.bundle.is_dir() && !self.no_sandbox {
+            bundle::copy(&self.bundle, &scratch.join("bundle"), limits)
+        } else {
+            bundle::open(&self.bundle, scratch, limits)
+        }
     }
 
     /// One environment per worker: the server's limits, on CPUs of its own where there are enough.
