@@ -1,0 +1,295 @@
+//! From a mallet motion to joint commands: redundancy, limits, and the model's errors.
+//!
+//! The arm keeps a *reference*: joint angles and speeds that follow the wanted mallet motion exactly
+//! at constant height. The command sent is the reference plus a slowly learnt *correction*, because
+//! the real arm is heavier or lighter than its controller believes and hangs up to a centimetre low.
+
+use nalgebra::{Matrix3, SMatrix, Vector3};
+
+use crate::env::{Env, JOINTS, Joints};
+use crate::field::Vec2;
+use crate::kinematics::{FOREARM_M, HAND_M, Jacobian, Pose, SHOULDER_M, UPPER_ARM_M, forward};
+
+/// Share of the evaluator's joint speed limits that references may use; the rest is for tracking
+/// errors and the observation filter.
+const CRUISE_SHARE: f64 = 0.93;
+/// Rate at which a free posture approaches its preference, 1/s.
+const POSTURE_RATE: f64 = 4.0;
+/// Share of the speed limits that a posture change may take.
+const POSTURE_SHARE: f64 = 0.6;
+/// Largest acceleration of a posture change, rad/s².
+const POSTURE_ACCELERATION: f64 = 8.0;
+/// Share of the possible speed that strikes are planned with: the posture is never exactly the best.
+const STRIKE_SHARE: f64 = 0.96;
+/// Time in which the strike's way to share the load between joints fades, seconds.
+const FADE_TIME: f64 = 0.2;
+/// Integral gain from observed joint errors to the correction, 1/s.
+const CORRECTION_RATE: f64 = 4.0;
+/// Bound of the correction; static errors of the plant stay well below it, radians.
+const CORRECTION_MAX: f64 = 0.04;
+
+/// What the arm prefers to do with its four free degrees of freedom.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Posture {
+    /// Ready to strike: the family of [`Arm::strike_posture`].
+    Ready(Side),
+    /// Striking: as `Ready`, and the joints share the motion so that the fastest is as slow as
+    /// possible.
+    Strike(Side),
+    /// Leave it as it is.
+    Free,
+}
+
+/// To which side of the vertical plane through base and mallet the elbow leans.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// Joint 5 negative: fast for strikes that turn to the left (+y) of the radius.
+    Left,
+    /// Joint 5 positive: fast for strikes that turn to the right.
+    Right,
+}
+
+/// The reference of the arm, in its base frame.
+#[derive(Debug, Clone)]
+pub struct Arm {
+    height: f64,
+    speed_max: Joints,
+    angle_max: Joints,
+    dt: f64,
+    /// Reference joint angles, radians.
+    pub q: Joints,
+    /// Reference joint speeds, rad/s.
+    pub dq: Joints,
+    drift: Joints,
+    /// 0: loads spread evenly; 1: least peak load. In between while a strike fades out.
+    sharpness: f64,
+    correction: Joints,
+}
+
+impl Arm {
+    /// An arm at joint angle zero; call [`Arm::reset`] before use.
+    pub fn new(env: &Env) -> Self {
+        Self {
+            height: env.robot.ee_desired_height,
+            speed_max: CRUISE_SHARE * env.robot.joint_speed_max(),
+            angle_max: env.robot.joint_angle_max(),
+            dt: env.dt,
+            q: Joints::zeros(),
+            dq: Joints::zeros(),
+            drift: Joints::zeros(),
+            sharpness: 0.0,
+            correction: Joints::zeros(),
+        }
+    }
+
+    /// Starts from rest at the observed joint angles. What was learnt about the plant stays.
+    pub fn reset(&mut self, q: &Joints) {
+        self.q = *q;
+        self.dq = Joints::zeros();
+        self.drift = Joints::zeros();
+        self.sharpness = 0.0;
+        self.correction = Joints::zeros();
+    }
+
+    /// Learns from the observed joint angles, which belong to the present reference.
+    pub fn observe(&mut self, q: &Joints) {
+        let error = self.q - q;
+        self.correction += CORRECTION_RATE * self.dt * error;
+        for c in self.correction.iter_mut() {
+            *c = c.clamp(-CORRECTION_MAX, CORRECTION_MAX);
+        }
+    }
+
+    /// Pose of the reference.
+    pub fn pose(&self) -> Pose {
+        forward(&self.q)
+    }
+
+    /// Moves the reference on by one control step so that the mallet is at `position` with
+    /// `velocity` (base frame, metres, m/s). Returns the share of the way that the joint speed
+    /// limits allowed, 1 if all of it.
+    pub fn advance(&mut self, position: Vec2, velocity: Vec2, posture: Posture) -> f64 {
+        let pose = self.pose();
+        let goal = Vector3::new(position.x, position.y, self.height);
+        let wish = (goal - pose.tip) / self.dt;
+        let preferred = self.posture_rate(posture, position);
+        // Striking begins at rest, where the two ways to share a motion agree, and fades out after it.
+        self.sharpness = match posture {
+            Posture::Strike(_) => 1.0,
+            Posture::Ready(_) | Posture::Free => (self.sharpness - self.dt / FADE_TIME).max(0.0),
+        };
+        // The mean speed over the step, from the Jacobian at its beginning …
+        let (mean, share) = self.resolve(&pose.jacobian, &wish, &preferred);
+        let mut q = self.q + self.dt * mean;
+        // … leaves a second-order error in height, which one Newton step at the end removes.
+        let end = forward(&q);
+        let reached = pose.tip + share * (goal - pose.tip);
+        let end_velocity = share * Vector3::new(velocity.x, velocity.y, 0.0);
+        q += least_change(&end.jacobian, &(reached - end.tip), &self.speed_max);
+        for i in 0..JOINTS {
+            q[i] = q[i].clamp(-self.angle_max[i], self.angle_max[i]);
+        }
+        let end = forward(&q);
+        let (dq, _) = self.resolve(&end.jacobian, &end_velocity, &preferred);
+        self.q = q;
+        self.dq = dq;
+        share
+    }
+
+    /// Position and velocity command for the end of this control step.
+    pub fn action(&self) -> [[f64; JOINTS]; 2] {
+        [(self.q + self.correction).into(), self.dq.into()]
+    }
+
+    /// Joint speeds that move the tip with `velocity` and, as far as the limits leave room, the free
+    /// posture with `preferred`. Also the share of `velocity` that the limits allow.
+    fn resolve(
+        &self,
+        jacobian: &Jacobian,
+        velocity: &Vector3<f64>,
+        preferred: &Joints,
+    ) -> (Joints, f64) {
+        let mut base = Joints::zeros();
+        if self.sharpness < 1.0 {
+            base += (1.0 - self.sharpness) * even_speeds(jacobian, velocity, &self.speed_max);
+        }
+        if self.sharpness > 0.0 {
+            base += self.sharpness * least_peak(jacobian, velocity, &self.speed_max);
+        }
+        let peak = base.component_div(&self.speed_max).amax();
+        if peak >= 1.0 {
+            return (base / peak, 1.0 / peak);
+        }
+        let null = preferred - least_change(jacobian, &(jacobian * preferred), &self.speed_max);
+        let mut room = 1.0_f64;
+        for i in 0..JOINTS {
+            let (b, n, cap) = (base[i], null[i], self.speed_max[i]);
+            if n.abs() > 1e-9 {
+                room = room.min((cap * n.signum() - b) / n);
+            }
+        }
+        (base + room.max(0.0) * null, 1.0)
+    }
+
+    /// Speed towards the preferred posture, changing no faster than the acceleration bound.
+    fn posture_rate(&mut self, posture: Posture, position: Vec2) -> Joints {
+        let wish = match posture {
+            Posture::Free => Joints::zeros(),
+            // A strike is over before the posture could follow.
+            Posture::Strike(_) => Joints::zeros(),
+            Posture::Ready(side) => POSTURE_RATE * (self.strike_posture(position, side) - self.q),
+        };
+        let step = POSTURE_ACCELERATION * self.dt;
+        for i in 0..JOINTS {
+            let cap = POSTURE_SHARE * self.speed_max[i];
+            self.drift[i] += (wish[i].clamp(-cap, cap) - self.drift[i]).clamp(-step, step);
+        }
+        self.drift
+    }
+
+    /// The posture for striking at `position` (base frame): elbow up and the hand turned out of the
+    /// arm's plane, so that all six joints share the work of a radial swing. Found by maximising the
+    /// radial speed within the joint speed limits at each reach; joints 5 and 6 come out nearly
+    /// linear in the reach and joint 3 near zero, and the other three follow from the position.
+    fn strike_posture(&self, position: Vec2, side: Side) -> Joints {
+        let reach = position.norm();
+        let lean = (0.6 + 0.6 * (reach - 0.65)).clamp(0.5, 1.0);
+        let wrist = (1.78 - 1.45 * (reach - 0.65)).clamp(0.75, 1.85);
+        let lean = match side {
+            Side::Left => -lean,
+            Side::Right => lean,
+        };
+        // With joints 5 and 6 given, forearm and hand are one rigid, bent link …
+        let (along, across) = (FOREARM_M + HAND_M * wrist.cos(), HAND_M * wrist.sin() * lean.cos());
+        let outward = HAND_M * wrist.sin() * lean.sin();
+        let (lower, bend) = (along.hypot(across), across.atan2(along));
+        let ahead = (reach * reach - outward * outward).max(0.0).sqrt();
+        // … and the rest is a triangle between shoulder, elbow and tip. Angles from the vertical.
+        let rise = self.height - SHOULDER_M;
+        let distance = ahead.hypot(rise).min(0.999 * (UPPER_ARM_M + lower));
+        let corner = |opposite: f64, a: f64, b: f64| {
+            ((a * a + b * b - opposite * opposite) / (2.0 * a * b)).clamp(-1.0, 1.0).acos()
+        };
+        let shoulder = ahead.atan2(rise) - corner(lower, UPPER_ARM_M, distance);
+        let elbow = corner(distance, UPPER_ARM_M, lower);
+        // The bent link leaves the elbow at `shoulder + π − elbow`, the forearm `bend` before that.
+        let forearm = shoulder + std::f64::consts::PI - elbow - bend;
+        let azimuth = position.y.atan2(position.x) - (outward / reach).clamp(-1.0, 1.0).asin();
+        Joints::from([azimuth, shoulder, 0.0, shoulder - forearm, lean, wrist, 0.0])
+    }
+
+    /// How long the free joints need at least to be ready for a strike from `position`, seconds.
+    pub fn ready_time(&self, position: Vec2, side: Side) -> f64 {
+        let way = self.strike_posture(position, side) - self.q;
+        // Most of the way at full rate, the last part fading.
+        let share = way.component_div(&self.speed_max);
+        let longest = share[4].abs().max(share[5].abs());
+        longest / POSTURE_SHARE + if longest > 0.05 { 0.15 } else { 0.0 }
+    }
+
+    /// The speed that the mallet can have at `position` along `direction` (a unit vector, base frame)
+    /// in the posture for striking, m/s.
+    pub fn strike_speed(&self, position: Vec2, direction: Vec2, side: Side) -> f64 {
+        let pose = forward(&self.strike_posture(position, side));
+        let unit = Vector3::new(direction.x, direction.y, 0.0);
+        let peak = least_peak(&pose.jacobian, &unit, &self.speed_max).component_div(&self.speed_max).amax();
+        STRIKE_SHARE / peak.max(1e-6)
+    }
+}
+
+/// The change of joints of least weighted norm that moves the tip by `delta`.
+fn least_change(jacobian: &Jacobian, delta: &Vector3<f64>, cap: &Joints) -> Joints {
+    weighted(jacobian, delta, &cap.component_mul(cap))
+}
+
+/// Joint speeds for the tip velocity with moderate load on all joints: a few steps of reweighted
+/// least squares towards the 4-norm of the loads.
+fn even_speeds(jacobian: &Jacobian, velocity: &Vector3<f64>, cap: &Joints) -> Joints {
+    let square = cap.component_mul(cap);
+    let mut speeds = weighted(jacobian, velocity, &square);
+    for _ in 0..4 {
+        let load = speeds.component_div(cap);
+        let peak = load.amax();
+        if peak < 1e-9 {
+            break;
+        }
+        // The fourth power's weight is load²; the floor keeps idle joints available.
+        let compliance = Joints::from_fn(|i, _| square[i] / (load[i] / peak).powi(2).max(0.05));
+        speeds = 0.5 * (speeds + weighted(jacobian, velocity, &compliance));
+    }
+    speeds
+}
+
+/// Joint speeds for the tip velocity whose largest load is nearly the least possible (Lawson's
+/// iteration: compliances are divided by the loads they led to, again and again).
+fn least_peak(jacobian: &Jacobian, velocity: &Vector3<f64>, cap: &Joints) -> Joints {
+    let mut compliance = cap.component_mul(cap);
+    let mut speeds = weighted(jacobian, velocity, &compliance);
+    for _ in 0..12 {
+        let load = speeds.component_div(cap);
+        let peak = load.amax();
+        if peak < 1e-9 {
+            break;
+        }
+        for i in 0..JOINTS {
+            compliance[i] /= (load[i].abs() / peak).max(0.1);
+        }
+        speeds = weighted(jacobian, velocity, &compliance);
+    }
+    speeds
+}
+
+/// `C Jᵀ (J C Jᵀ)⁻¹ delta` with the diagonal compliance C.
+fn weighted(jacobian: &Jacobian, delta: &Vector3<f64>, compliance: &Joints) -> Joints {
+    let cjt = SMatrix::<f64, JOINTS, 3>::from_fn(|i, k| compliance[i] * jacobian[(k, i)]);
+    let square: Matrix3<f64> = jacobian * cjt;
+    // Singular only with the arm stretched out, which the workspace excludes; the damping keeps the
+    // answer finite there.
+    let damped = square + Matrix3::identity() * 1e-9;
+    damped
+        .try_inverse()
+        .map_or_else(Joints::zeros, |inverse| cjt * (inverse * delta))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,239 @@
+//! Where the puck really is: a Kalman filter over noisy, sometimes missing observations.
+//!
+//! Per axis the state is position, velocity and the acceleration that the air flow causes; the flow
+//! decays with its own time constant, so that what it did in the last steps informs the next. Rims
+//! are part of the prediction. The mallet is too, but a contact is far less certain, so it opens up
+//! the velocity's covariance and lets the next observations decide.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::field::{Field, Vec2};
+use crate::puck::{DRAG, Puck, Rim};
+
+/// Standard deviation of an observed coordinate, metres.
+const POSITION_NOISE: f64 = 1e-3;
+/// Standard deviation of an observed velocity component, m/s.
+const VELOCITY_NOISE: f64 = 0.1;
+/// Standard deviation of the observed yaw rate, rad/s.
+const SPIN_NOISE: f64 = 0.1;
+/// Correlation time of the air flow, seconds.
+pub const FLOW_TIME: f64 = 0.2;
+/// Stationary standard deviation of the flow's acceleration per speed, 1/s.
+pub const FLOW_PER_SPEED: f64 = 0.4;
+/// An observation further than this many standard deviations off means an unforeseen contact.
+const SURPRISE: f64 = 5.0;
+/// Longest documented loss of tracking, control steps.
+const LOSS_MAX: u32 = 20;
+
+/// One coordinate: mean and covariance of (position, velocity, flow acceleration).
+#[derive(Debug, Clone, Copy)]
+struct Axis {
+    mean: Vector3<f64>,
+    cov: Matrix3<f64>,
+}
+
+impl Axis {
+    fn new(position: f64, velocity: f64, deviation: f64) -> Self {
+        Self {
+            mean: Vector3::new(position, velocity, 0.0),
+            cov: Matrix3::from_diagonal(&Vector3::new(1e-6, deviation * deviation, 1e-4)),
+        }
+    }
+
+    fn predict_covariance(&mut self, dt: f64, speed: f64) {
+        let fade = (-dt / FLOW_TIME).exp();
+        let f = Matrix3::new(
+            1.0,
+            dt,
+            0.5 * dt * dt,
+            0.0,
+            1.0 - DRAG * dt,
+            dt,
+            0.0,
+            0.0,
+            fade,
+        );
+        let sigma = FLOW_PER_SPEED * speed;
+        let mut q = Matrix3::zeros();
+        q[(0, 0)] = 1e-9;
+        q[(1, 1)] = 1e-7 + (0.25 * sigma * dt).powi(2);
+        q[(2, 2)] = sigma * sigma * (1.0 - fade * fade) + 1e-6;
+        self.cov = f * self.cov * f.transpose() + q;
+    }
+
+    /// Scalar Kalman update of component `index`.
+    fn update(&mut self, index: usize, value: f64, noise: f64) {
+        let column: Vector3<f64> = self.cov.column(index).into();
+        let gain = column / (column[index] + noise * noise);
+        self.mean += gain * (value - self.mean[index]);
+        self.cov -= gain * column.transpose();
+    }
+
+    /// The velocity may have changed by about `amount`.
+    fn open(&mut self, amount: f64) {
+        self.cov[(1, 1)] += amount * amount;
+    }
+}
+
+/// What the mallet does at the time of an observation, for contacts.
+#[derive(Debug, Clone, Copy)]
+pub struct MalletState {
+    /// Position, field frame, metres.
+    pub pos: Vec2,
+    /// Velocity, m/s.
+    pub vel: Vec2,
+}
+
+/// The puck as observed: pose and velocity in the field frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PuckObservation {
+    /// x, y, yaw.
+    pub pose: [f64; 3],
+    /// ẋ, ẏ, yaw rate.
+    pub velocity: [f64; 3],
+}
+
+/// The filter.
+#[derive(Debug, Clone)]
+pub struct Estimator {
+    field: Field,
+    dt: f64,
+    axes: Option<[Axis; 2]>,
+    spin: f64,
+    spin_var: f64,
+    last: Option<PuckObservation>,
+    lost: u32,
+}
+
+impl Estimator {
+    /// A filter without any observation yet.
+    pub fn new(field: &Field, dt: f64) -> Self {
+        Self {
+            field: field.clone(),
+            dt,
+            axes: None,
+            spin: 0.0,
+            spin_var: 1.0,
+            last: None,
+            lost: 0,
+        }
+    }
+
+    /// Forgets everything.
+    pub fn reset(&mut self) {
+        *self = Self::new(&self.field, self.dt);
+    }
+
+    /// Control steps since the puck was last seen.
+    pub fn lost_steps(&self) -> u32 {
+        self.lost
+    }
+
+    /// Standard deviations of the estimated speed components, m/s.
+    pub fn speed_deviation(&self) -> Vec2 {
+        self.axes.map_or(Vec2::zeros(), |[x, y]| {
+            Vec2::new(x.cov[(1, 1)].max(0.0).sqrt(), y.cov[(1, 1)].max(0.0).sqrt())
+        })
+    }
+
+    /// Takes in the observation of this control step and returns the estimate.
+    pub fn observe(&mut self, seen: &PuckObservation, mallet: MalletState) -> Puck {
+        let lost = self.is_lost(seen);
+        self.last = Some(*seen);
+        let [vx, vy, spin] = seen.velocity;
+        let Some(mut axes) = self.axes else {
+            self.axes = Some([
+                Axis::new(seen.pose[0], vx, VELOCITY_NOISE),
+                Axis::new(seen.pose[1], vy, VELOCITY_NOISE),
+            ]);
+            self.spin = spin;
+            self.spin_var = SPIN_NOISE * SPIN_NOISE;
+            return self.estimate();
+        };
+        self.predict(&mut axes, mallet);
+        self.lost = if lost { self.lost + 1 } else { 0 };
+        if !lost {
+            for (axis, (position, velocity)) in axes
+                .iter_mut()
+                .zip([(seen.pose[0], vx), (seen.pose[1], vy)])
+            {
+                let surprise = position - axis.mean[0];
+                if surprise.abs()
+                    > SURPRISE * (axis.cov[(0, 0)] + POSITION_NOISE * POSITION_NOISE).sqrt()
+                {
+                    // Something pushed it: trust position at once and velocity soon.
+                    axis.cov[(0, 0)] += surprise * surprise;
+                    axis.open((surprise.abs() / self.dt).min(3.0));
+                }
+                axis.update(0, position, POSITION_NOISE);
+                axis.update(1, velocity, VELOCITY_NOISE);
+            }
+            let gain = self.spin_var / (self.spin_var + SPIN_NOISE * SPIN_NOISE);
+            self.spin += gain * (spin - self.spin);
+            self.spin_var *= 1.0 - gain;
+        }
+        self.axes = Some(axes);
+        self.estimate()
+    }
+
+    /// The present estimate.
+    fn estimate(&self) -> Puck {
+        let [x, y] = self.axes.unwrap_or([Axis::new(0.0, 0.0, 1.0); 2]);
+        Puck {
+            pos: Vec2::new(x.mean[0], y.mean[0]),
+            vel: Vec2::new(x.mean[1], y.mean[1]),
+            spin: self.spin,
+        }
+    }
+
+    /// A lost puck is reported where it was, bit for bit, with exactly no velocity. A puck at rest
+    /// without noise looks the same, where treating it as seen does no harm.
+    fn is_lost(&self, seen: &PuckObservation) -> bool {
+        let repeated = self.last.is_some_and(|l| l.pose == seen.pose) && seen.velocity == [0.0; 3];
+        repeated && self.lost < LOSS_MAX && self.estimate().vel.norm() > 0.005
+    }
+
+    fn predict(&mut self, axes: &mut [Axis; 2], mallet: MalletState) {
+        let dt = self.dt;
+        let before = self.estimate();
+        let flow = Vec2::new(axes[0].mean[2], axes[1].mean[2]);
+        let mut puck = before;
+        puck.vel += 0.5 * dt * flow;
+        let rim = puck
+            .next_rim(&self.field)
+            .filter(|(t, _)| *t <= dt)
+            .map(|(_, rim)| rim);
+        puck.advance(&self.field, dt);
+        puck.vel += 0.5 * dt * flow;
+        let gap = (puck.pos - mallet.pos).norm() - self.field.contact();
+        let touched = gap < 0.0 && (puck.vel - mallet.vel).dot(&(puck.pos - mallet.pos)) < 0.0;
+        let closing = (before.vel - mallet.vel).norm();
+        if touched {
+            puck.strike(mallet.pos, mallet.vel);
+        }
+        let speed = before.vel.norm();
+        let fade = (-dt / FLOW_TIME).exp();
+        for (i, axis) in axes.iter_mut().enumerate() {
+            axis.predict_covariance(dt, speed);
+            axis.mean = Vector3::new(puck.pos[i], puck.vel[i], flow[i] * fade);
+            let bounced = matches!((rim, i), (Some(Rim::Short), 0) | (Some(Rim::Long), 1));
+            if bounced {
+                // Where in the millisecond it arrives decides between 0.69 and 1.03 of the speed.
+                axis.open(0.12 * before.vel[i].abs());
+                axis.cov[(0, 0)] += (0.5 * dt * 0.12 * before.vel[i]).powi(2);
+                axis.cov[(0, 1)] = 0.0;
+                axis.cov[(1, 0)] = 0.0;
+            } else if rim.is_some() {
+                axis.open(0.05 * speed);
+            }
+            if touched || gap < 0.01 {
+                axis.open(0.03 + 0.6 * closing);
+            }
+        }
+        self.spin = puck.spin;
+        self.spin_var += 0.05 + if rim.is_some() || touched { 25.0 } else { 0.0 };
+    }
+}
+
+#[cfg(test)]
+mod tests;
