@@ -110,7 +110,8 @@ impl Findings {
             runtimes: runtimes(config),
             cpus: cpus(config),
         };
-        findings.ok = findings.missing().next().is_none();
+        let complete = findings.missing().next().is_none();
+        findings.ok = complete;
         findings
     }
 
