@@ -153,12 +153,30 @@ fn meet(scene: &Scene<'_>, left: f64) -> Option<(Meeting, f64)> {
     let velocity = retreat * along;
     let target = Target { pos: mallet, vel: velocity, time: left };
     let effort = scene.mallet.cost(&target, field);
+    let early = early_touch(scene, &target);
     let outside = (puck.pos.x - MEET_X.1).max(MEET_X.0 - puck.pos.x).max(0.0);
     let cost = 20.0 * outside
         + 0.3 * effort.acceleration
         + 20.0 * (effort.speed - 1.2).max(0.0)
         + 2.0 * (effort.acceleration - 10.0).max(0.0)
         + 200.0 * effort.excess
+        + 300.0 * early
         + 2.0 * left;
     Some((Meeting { time: scene.time + left, mallet, velocity }, cost))
+}
+
+/// How deep the mallet would run into the puck before the planned contact, metres.
+fn early_touch(scene: &Scene<'_>, target: &Target) -> f64 {
+    let mut puck = scene.puck;
+    let mut deepest: f64 = 0.0;
+    let steps = 8;
+    let span = target.time / f64::from(steps);
+    for k in 1..steps {
+        if !puck.advance(scene.field, span) {
+            break;
+        }
+        let mallet = scene.mallet.towards(target, span * f64::from(k));
+        deepest = deepest.max(scene.field.contact() - (puck.pos - mallet.pos).norm());
+    }
+    deepest
 }
