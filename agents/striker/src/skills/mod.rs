@@ -1,5 +1,6 @@
 //! What to do with the mallet: one module per task, and what they share.
 
+mod absorb;
 mod defend;
 mod hit;
 mod prepare;

@@ -5,6 +5,7 @@
 //! uncertain, and the one that most often ends in the goal area is carried out. The search is spread
 //! over control steps to keep each of them short.
 
+use super::absorb::Absorb;
 use super::{Order, Scene, around};
 use crate::arm::Posture;
 use crate::contact::{SUBSTEP, substep};
@@ -20,6 +21,8 @@ const SAFE_X: (f64, f64) = (-0.77, -0.23);
 const CENTRE_Y: f64 = 0.01;
 /// Puck speed below which a strike may be planned, m/s.
 const CALM_PUCK: f64 = 0.04;
+/// A rolling puck whose prospects are worse than this is stopped.
+const SPOILT: f64 = 0.2;
 /// Deceleration of the mallet after a strike, m/s².
 const BRAKE: f64 = 7.0;
 /// Directions of the contact normal that are tried.
@@ -51,12 +54,14 @@ enum Phase {
 #[derive(Debug, Clone)]
 pub struct Prepare {
     phase: Phase,
+    /// Stops a puck that rolls where it should not.
+    absorb: Absorb,
 }
 
 impl Prepare {
     /// Nothing planned yet.
     pub fn new() -> Self {
-        Self { phase: Phase::Search { next: 0, best: None } }
+        Self { phase: Phase::Search { next: 0, best: None }, absorb: Absorb::new(0.05) }
     }
 
     /// True while a strike must not be interrupted.
@@ -72,7 +77,7 @@ impl Prepare {
             Phase::Run { strike, contact } => self.run(scene, strike, contact),
             Phase::Retreat { until } => {
                 if scene.time > until {
-                    *self = Self::new();
+                    self.phase = Phase::Search { next: 0, best: None };
                 }
                 retreat(scene)
             }
@@ -81,9 +86,19 @@ impl Prepare {
 
     fn search(&mut self, scene: &Scene<'_>, next: usize, mut best: Option<Strike>) -> Order {
         let puck = &scene.puck;
-        if prepared(puck) || puck.vel.norm() > CALM_PUCK || scene.puck_speed_deviation.norm() > 0.05 {
-            *self = Self::new();
-            return retreat(scene);
+        let moving = puck.vel.norm() > CALM_PUCK || scene.puck_speed_deviation.norm() > 0.05;
+        if moving || prepared(puck) {
+            self.phase = Phase::Search { next: 0, best: None };
+            if moving && slide_out(scene.field, *puck) < SPOILT {
+                if let Some(order) = self.absorb.decide(scene) {
+                    return order;
+                }
+            }
+            return if self.absorb.cancel(scene) {
+                retreat(scene)
+            } else {
+                self.absorb.decide(scene).unwrap_or_else(|| retreat(scene))
+            };
         }
         for k in next..(next + PER_STEP).min(NORMALS) {
             try_normal(scene, k, &mut best);
@@ -99,7 +114,7 @@ impl Prepare {
     fn approach(&mut self, scene: &Scene<'_>, strike: Strike, planned: Vec2) -> Order {
         let field = scene.field;
         if scene.puck.vel.norm() > 2.0 * CALM_PUCK || (scene.puck.pos - planned).norm() > 0.006 {
-            *self = Self::new();
+            self.phase = Phase::Search { next: 0, best: None };
             return retreat(scene);
         }
         let contact = scene.puck.pos - field.contact() * strike.normal;
@@ -118,7 +133,7 @@ impl Prepare {
             // Brake at once; the puck leaves faster than the mallet.
             let time = 2.0 * strike.velocity.norm() / BRAKE;
             if -left >= time {
-                self.phase = Phase::Retreat { until: scene.time + 0.5 };
+                self.phase = Phase::Retreat { until: scene.time + 0.25 };
                 return retreat(scene);
             }
             let rest = (time + left).max(scene.dt);
