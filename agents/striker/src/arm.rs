@@ -200,7 +200,10 @@ impl Arm {
             Side::Right => lean,
         };
         // With joints 5 and 6 given, forearm and hand are one rigid, bent link …
-        let (along, across) = (FOREARM_M + HAND_M * wrist.cos(), HAND_M * wrist.sin() * lean.cos());
+        let (along, across) = (
+            FOREARM_M + HAND_M * wrist.cos(),
+            HAND_M * wrist.sin() * lean.cos(),
+        );
         let outward = HAND_M * wrist.sin() * lean.sin();
         let (lower, bend) = (along.hypot(across), across.atan2(along));
         let ahead = (reach * reach - outward * outward).max(0.0).sqrt();
@@ -208,7 +211,9 @@ impl Arm {
         let rise = self.height - SHOULDER_M;
         let distance = ahead.hypot(rise).min(0.999 * (UPPER_ARM_M + lower));
         let corner = |opposite: f64, a: f64, b: f64| {
-            ((a * a + b * b - opposite * opposite) / (2.0 * a * b)).clamp(-1.0, 1.0).acos()
+            ((a * a + b * b - opposite * opposite) / (2.0 * a * b))
+                .clamp(-1.0, 1.0)
+                .acos()
         };
         let shoulder = ahead.atan2(rise) - corner(lower, UPPER_ARM_M, distance);
         let elbow = corner(distance, UPPER_ARM_M, lower);
@@ -232,7 +237,9 @@ impl Arm {
     pub fn strike_speed(&self, position: Vec2, direction: Vec2, side: Side) -> f64 {
         let pose = forward(&self.strike_posture(position, side));
         let unit = Vector3::new(direction.x, direction.y, 0.0);
-        let peak = least_peak(&pose.jacobian, &unit, &self.speed_max).component_div(&self.speed_max).amax();
+        let peak = least_peak(&pose.jacobian, &unit, &self.speed_max)
+            .component_div(&self.speed_max)
+            .amax();
         STRIKE_SHARE / peak.max(1e-6)
     }
 }

@@ -83,7 +83,10 @@ impl Field {
     /// Lowest and highest coordinates that a mallet reference may take.
     pub fn mallet_bounds(&self) -> (Vec2, Vec2) {
         let y = self.mallet_y_max();
-        (Vec2::new(self.mallet_x_min(), -y), Vec2::new(self.mallet_x_max(), y))
+        (
+            Vec2::new(self.mallet_x_min(), -y),
+            Vec2::new(self.mallet_x_max(), y),
+        )
     }
 
     /// The nearest point where a mallet reference may be.

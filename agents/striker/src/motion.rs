@@ -133,7 +133,11 @@ impl Motion {
     pub fn confine(&mut self, before: &Self, dt: f64, field: &Field) {
         let (low, high) = field.mallet_bounds();
         for i in 0..2 {
-            let room = if self.vel[i] > 0.0 { high[i] - before.pos[i] } else { before.pos[i] - low[i] };
+            let room = if self.vel[i] > 0.0 {
+                high[i] - before.pos[i]
+            } else {
+                before.pos[i] - low[i]
+            };
             let most = (2.0 * BOUND_BRAKE * room.max(0.0)).sqrt();
             if self.vel[i].abs() > most {
                 self.vel[i] = most * self.vel[i].signum();

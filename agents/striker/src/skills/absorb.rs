@@ -47,12 +47,18 @@ pub struct Absorb {
 impl Absorb {
     /// Nothing planned yet. Contacts nearer to the middle line than `keep_off_middle` are too late.
     pub fn new(keep_off_middle: f64) -> Self {
-        Self { meeting: None, keep_off_middle }
+        Self {
+            meeting: None,
+            keep_off_middle,
+        }
     }
 
     /// Forgets a plan that is not in its last moments.
     pub fn cancel(&mut self, scene: &Scene<'_>) -> bool {
-        if self.meeting.is_some_and(|m| (m.time - scene.time).abs() <= 0.05) {
+        if self
+            .meeting
+            .is_some_and(|m| (m.time - scene.time).abs() <= 0.05)
+        {
             return false;
         }
         self.meeting = None;
@@ -72,11 +78,17 @@ impl Absorb {
                 return Some(Order::brake(scene));
             }
         }
-        if scene.puck.vel.norm() < FAST { self.catch_slow(scene) } else { self.meet_fast(scene) }
+        if scene.puck.vel.norm() < FAST {
+            self.catch_slow(scene)
+        } else {
+            self.meet_fast(scene)
+        }
     }
 
     fn meet_fast(&mut self, scene: &Scene<'_>) -> Option<Order> {
-        let kept = self.meeting.and_then(|m| priced(scene, m.time - scene.time));
+        let kept = self
+            .meeting
+            .and_then(|m| priced(scene, m.time - scene.time));
         let best = best_meeting(scene);
         self.meeting = match (kept, best) {
             (Some((_, cost)), Some((b, least))) if least < cost - LOYALTY => Some(b),
@@ -96,22 +108,39 @@ impl Absorb {
             let needed = Target::stop(&scene.mallet, way, Pace::QUICK).time + detour;
             (early_enough && needed <= left).then_some(meeting)
         };
-        let kept = self.meeting.map(|m| m.time - scene.time).filter(|left| *left > scene.dt);
+        let kept = self
+            .meeting
+            .map(|m| m.time - scene.time)
+            .filter(|left| *left > scene.dt);
         // Close to the contact the plan stays; before, the earliest possible contact is best.
         self.meeting = match kept {
             Some(left) if left < 0.3 => meeting(scene, left).map(|(m, _)| m),
-            _ => (0..).map(|k| 0.1 + 0.04 * f64::from(k)).take_while(|left| *left < SLOW_HORIZON).find_map(possible),
+            _ => (0..)
+                .map(|k| 0.1 + 0.04 * f64::from(k))
+                .take_while(|left| *left < SLOW_HORIZON)
+                .find_map(possible),
         };
         let m = self.meeting?;
         let way = around(scene, m.mallet, clearance);
-        Some(if way == m.mallet { go(scene, &m) } else { Order::stop(scene, way, Pace::QUICK) })
+        Some(if way == m.mallet {
+            go(scene, &m)
+        } else {
+            Order::stop(scene, way, Pace::QUICK)
+        })
     }
 }
 
 /// On the way to a meeting.
 fn go(scene: &Scene<'_>, m: &Meeting) -> Order {
     let time = (m.time - scene.time).max(scene.dt);
-    Order::new(Target { pos: m.mallet, vel: m.velocity, time }, Posture::Free)
+    Order::new(
+        Target {
+            pos: m.mallet,
+            vel: m.velocity,
+            time,
+        },
+        Posture::Free,
+    )
 }
 
 fn best_meeting(scene: &Scene<'_>) -> Option<(Meeting, f64)> {
@@ -145,9 +174,20 @@ fn meeting(scene: &Scene<'_>, left: f64) -> Option<(Meeting, Puck)> {
         return None;
     }
     // (1 + e) w = e v stops the puck; a slower mallet sends it back a little.
-    let back = if along.x < -0.5 { (DRAG * (REST_X - puck.pos.x)).clamp(0.0, 0.2) } else { 0.0 };
+    let back = if along.x < -0.5 {
+        (DRAG * (REST_X - puck.pos.x)).clamp(0.0, 0.2)
+    } else {
+        0.0
+    };
     let retreat = (MALLET_RESTITUTION * speed - back) / (1.0 + MALLET_RESTITUTION);
-    Some((Meeting { time: scene.time + left, mallet, velocity: retreat * along }, puck))
+    Some((
+        Meeting {
+            time: scene.time + left,
+            mallet,
+            velocity: retreat * along,
+        },
+        puck,
+    ))
 }
 
 /// The meeting with a fast puck, and what it costs.
@@ -156,7 +196,11 @@ fn priced(scene: &Scene<'_>, left: f64) -> Option<(Meeting, f64)> {
     if puck.vel.x > -0.3 * puck.vel.norm() {
         return None;
     }
-    let target = Target { pos: m.mallet, vel: m.velocity, time: left };
+    let target = Target {
+        pos: m.mallet,
+        vel: m.velocity,
+        time: left,
+    };
     let effort = scene.mallet.cost(&target, scene.field);
     let outside = (puck.pos.x - MEET_X.1).max(MEET_X.0 - puck.pos.x).max(0.0);
     let cost = 20.0 * outside

@@ -23,7 +23,9 @@ pub struct Defend {
 impl Defend {
     /// Nothing planned yet.
     pub fn new() -> Self {
-        Self { absorb: Absorb::new(0.0) }
+        Self {
+            absorb: Absorb::new(0.0),
+        }
     }
 
     /// The order for this control step.
