@@ -146,6 +146,18 @@ impl Motion {
             }
             self.pos[i] = self.pos[i].clamp(low[i], high[i]);
         }
+        // The same along the reach of the arm.
+        let radius = field.to_base(self.pos);
+        let outward = radius / radius.norm();
+        let room = field.reach_max() - field.to_base(before.pos).norm();
+        let most = (2.0 * BOUND_BRAKE * room.max(0.0)).sqrt();
+        let excess = self.vel.dot(&outward) - most;
+        if excess > 0.0 {
+            self.vel -= excess * outward;
+            self.pos = before.pos + dt * self.vel;
+            self.acc = Vec2::zeros();
+        }
+        self.pos = field.clamp_mallet(self.pos);
     }
 }
 

@@ -356,7 +356,7 @@ fn room_behind(field: &Field, contact: Vec2, direction: Vec2) -> f64 {
         contact.x,
         direction.x,
         field.mallet_x_min(),
-        field.mallet_x_max(),
+        0.0,
     );
     x.min(limit(contact.y, direction.y, -y, y)).clamp(0.0, 1.0)
 }
