@@ -22,6 +22,8 @@ const SLOW_HORIZON: f64 = 3.0;
 const FAST: f64 = 0.6;
 /// Slower pucks have stopped, m/s.
 const STILL: f64 = 0.05;
+/// The meeting is no longer corrected this long before it, seconds.
+const LAST_CORRECTION: f64 = 0.05;
 /// A running plan is given up only for one that is cheaper by this much.
 const LOYALTY: f64 = 2.0;
 
@@ -77,6 +79,9 @@ impl Absorb {
                 self.meeting = None;
                 return Some(Order::brake(scene));
             }
+        }
+        if let Some(m) = self.meeting.filter(|m| m.time - scene.time < LAST_CORRECTION) {
+            return Some(go(scene, &m));
         }
         if scene.puck.vel.norm() < FAST {
             self.catch_slow(scene)

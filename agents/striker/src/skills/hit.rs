@@ -37,6 +37,10 @@ const NUDGE_TO_X: f64 = -0.38;
 const NUDGE_TIME: f64 = 2.6;
 /// Largest acceleration of a strike, m/s².
 const STRIKE_ACCELERATION: f64 = 45.0;
+/// The same for a nudge, m/s².
+const NUDGE_ACCELERATION: f64 = 14.0;
+/// The contact is no longer corrected this long before it, seconds.
+const LAST_CORRECTION: f64 = 0.05;
 /// A puck slower than this that cannot be struck will not come into reach by itself, m/s.
 const STILL: f64 = 0.08;
 /// Goal-line points that are tried, metres.
@@ -204,7 +208,12 @@ impl Hit {
             };
             return self.follow(scene, scene.time + 0.03, None, rest);
         }
-        let plan = again(scene, &plan, left, Some(plan.speed)).unwrap_or(plan);
+        // In the last moments corrections would be jerks, and a touch already shows in the estimate.
+        let plan = if left > LAST_CORRECTION {
+            again(scene, &plan, left, Some(plan.speed)).unwrap_or(plan)
+        } else {
+            plan
+        };
         self.phase = Phase::Swing(plan);
         Order {
             target: Target {
@@ -213,7 +222,7 @@ impl Hit {
                 time: left,
             },
             posture: Posture::Strike(plan.side),
-            acceleration: STRIKE_ACCELERATION,
+            acceleration: if plan.nudge { NUDGE_ACCELERATION } else { STRIKE_ACCELERATION },
         }
     }
 
