@@ -326,3 +326,80 @@ fn the_archive_is_read_by_others() {
         ]
     );
 }
+
+/// Everything in the tables but the two columns of measured times and what follows from them.
+fn timeless_columns(dir: &Path, table: &str) -> Vec<(String, arrow_array::ArrayRef)> {
+    let batch = read(&dir.join(table));
+    let schema = batch.schema();
+    schema
+        .fields()
+        .iter()
+        .zip(batch.columns())
+        .map(|(field, column)| (field.name().clone(), column.clone()))
+        .filter(|(name, _)| {
+            !name.starts_with("computation_time")
+                && name != "cpu_time_s"
+                && name != "penalty_points"
+        })
+        .collect()
+}
+
+#[test]
+fn one_worker_and_three_record_the_same() {
+    let dir = tempfile::tempdir().unwrap();
+    let agent = moving();
+    let play = |name: &str, shards: &[std::ops::Range<u32>], workers: usize| {
+        let dirs: Vec<PathBuf> = shards
+            .iter()
+            .map(|r| dir.path().join(format!("{name}-{}", r.start)))
+            .collect();
+        let next = std::sync::atomic::AtomicUsize::new(0);
+        std::thread::scope(|scope| {
+            for _ in 0..workers {
+                scope.spawn(|| {
+                    loop {
+                        let at = next.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+                        let Some(range) = shards.get(at) else { break };
+                        run(
+                            &spec(Task::Defend, range.clone()),
+                            &agent,
+                            &sandboxed(),
+                            &dirs[at],
+                        )
+                        .unwrap();
+                    }
+                });
+            }
+        });
+        let spec = spec(Task::Defend, 0..1);
+        let meta = EvaluationMeta {
+            profile: spec.profile,
+            seed: spec.seed,
+            mismatch_seed: spec.mismatch_seed,
+            agent: "test".into(),
+            ruleset: RULESET.into(),
+        };
+        let archive = dir.path().join(format!("{name}.zip"));
+        let mut result = assemble(&meta, &dirs, &archive).unwrap();
+        let out = dir.path().join(name);
+        unzip(&archive, &out);
+        // What is measured may differ; nothing else may.
+        let task = result.tasks.get_mut(&Task::Defend).unwrap();
+        task.computation_time_s = Default::default();
+        task.violations.computation_time = 0;
+        (out, task.clone())
+    };
+    let (one, result_one) = play("one", &[0..6], 1);
+    let (three, result_three) = play("three", &[0..1, 1..4, 4..5, 5..6], 3);
+    assert_eq!(result_one.successes, result_three.successes);
+    assert_eq!(result_one.violations, result_three.violations);
+    assert_eq!(result_one.steps, result_three.steps);
+    for table in ["steps.parquet", "episodes.parquet"] {
+        let (one, three) = (
+            timeless_columns(&one, table),
+            timeless_columns(&three, table),
+        );
+        assert!(one.len() > 30);
+        assert_eq!(one, three, "{table}");
+    }
+}

@@ -9,12 +9,17 @@ use std::{ops::Range, path::Path};
 #[derive(Default)]
 pub struct Watcher {
     pub seen: Vec<u32>,
+    pub logs: Vec<String>,
     pub stop_after: Option<usize>,
 }
 
 impl Observer for Watcher {
     fn episode_done(&mut self, outcome: &EpisodeOutcome) {
         self.seen.push(outcome.episode);
+    }
+
+    fn log(&mut self, log: &str) {
+        self.logs.push(log.to_owned());
     }
 
     fn cancelled(&self) -> bool {
@@ -195,7 +200,7 @@ fn an_agent_that_does_not_start_faults_without_an_episode() {
 #[test]
 fn a_cancelled_shard_leaves_no_recording() {
     let out = tempfile::tempdir().unwrap();
-    let agent = Agent::behaving();
+    let agent = Agent::with("print('started', file=sys.stderr)");
     let mut watcher = Watcher {
         stop_after: Some(1),
         ..Watcher::default()
@@ -213,6 +218,7 @@ fn a_cancelled_shard_leaves_no_recording() {
         "{result:?}"
     );
     assert_eq!(watcher.seen, [0]);
+    assert_eq!(watcher.logs, ["started\n"]);
     assert!(!dir.join("shard.json").exists());
     // The same folder serves the next try.
     run(&spec(Task::Defend, 0..1), &agent, &sandboxed(), &dir).unwrap();

@@ -82,7 +82,7 @@ impl DoctorCommand {
         } else {
             findings.print(&mut out)?;
         }
-        let missing: Vec<_> = findings.missing().map(Layer::as_str).collect();
+        let missing: Vec<_> = missing(&findings.features).map(Layer::as_str).collect();
         if !missing.is_empty() {
             bail!(
                 "agents cannot run here: {} missing; see the cures above, or name what you do without \
@@ -104,23 +104,13 @@ impl Findings {
                 host,
             })
             .collect();
-        let mut findings = Self {
-            ok: true,
+        let ok = missing(&features).next().is_none();
+        Self {
+            ok,
             features,
             runtimes: runtimes(config),
             cpus: cpus(config),
-        };
-        let complete = findings.missing().next().is_none();
-        findings.ok = complete;
-        findings
-    }
-
-    /// Layers that are neither there nor given up.
-    fn missing(&self) -> impl Iterator<Item = Layer> {
-        self.features
-            .iter()
-            .filter(|feature| !feature.host.available && !feature.given_up)
-            .map(|feature| feature.host.layer)
+        }
     }
 
     fn print(&self, out: &mut impl Write) -> std::io::Result<()> {
@@ -156,6 +146,14 @@ impl Findings {
         )?;
         print_cure(out, cpus.advice.as_deref())
     }
+}
+
+/// Layers that are neither there nor given up.
+fn missing(features: &[Feature]) -> impl Iterator<Item = Layer> {
+    features
+        .iter()
+        .filter(|feature| !feature.host.available && !feature.given_up)
+        .map(|feature| feature.host.layer)
 }
 
 fn print_cure(out: &mut impl Write, cure: Option<&str>) -> std::io::Result<()> {
@@ -239,17 +237,20 @@ mod tests {
 
     #[test]
     fn a_missing_layer_is_shown_with_its_cure_and_a_given_up_one_is_not_missing() {
-        let missing = findings(false, false);
-        assert_eq!(missing.missing().collect::<Vec<_>>(), [Layer::CgroupMemory]);
+        let found = findings(false, false);
+        assert_eq!(
+            missing(&found.features).collect::<Vec<_>>(),
+            [Layer::CgroupMemory]
+        );
         let mut text = Vec::new();
-        missing.print(&mut text).unwrap();
+        found.print(&mut text).unwrap();
         let text = String::from_utf8(text).unwrap();
         assert!(
             text.contains("MISSING   cgroup-memory  what was seen"),
             "{text}"
         );
         assert!(text.contains("-> what to type"), "{text}");
-        assert_eq!(findings(false, true).missing().count(), 0);
-        assert_eq!(findings(true, false).missing().count(), 0);
+        assert_eq!(missing(&findings(false, true).features).count(), 0);
+        assert_eq!(missing(&findings(true, false).features).count(), 0);
     }
 }

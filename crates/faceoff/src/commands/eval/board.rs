@@ -1,6 +1,6 @@
 use anyhow::Context;
 use faceoff_runner::{
-    AgentEnvironment, Observer, PlatformFault, ShardReport, ShardSpec, bundle::Bundle, run_shard,
+    AgentEnvironment, Observer, PlatformFault, ShardSpec, bundle::Bundle, run_shard,
 };
 use faceoff_types::{AgentFault, EpisodeOutcome};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -120,18 +120,13 @@ impl Board {
             let Some(Job { out, mut spec }) = job else {
                 return Ok(());
             };
-            // The limit is the evaluation's: a shard that exceeds what is left of it ends with its
-            // log, where a cancelled one would end without.
+            // The limit is the evaluation's, not the shard's.
             let faults_so_far = self.fault_count.load(Ordering::Relaxed);
             spec.max_faults = self.max_faults.saturating_sub(faults_so_far);
             self.bar.set_message(spec.task.as_str());
-            let result = run_shard(&spec, bundle, env, &out, &mut Seat(self));
-            match result {
-                Ok(ShardReport { log, .. }) => lock(&self.logs).push_str(&log),
-                Err(fault) => {
-                    self.stop.store(true, Ordering::Relaxed);
-                    return Err(fault);
-                }
+            if let Err(fault) = run_shard(&spec, bundle, env, &out, &mut Seat(self)) {
+                self.stop.store(true, Ordering::Relaxed);
+                return Err(fault);
             }
         }
     }
@@ -149,6 +144,10 @@ impl Observer for Seat<'_> {
                 self.0.stop.store(true, Ordering::Relaxed);
             }
         }
+    }
+
+    fn log(&mut self, log: &str) {
+        lock(&self.0.logs).push_str(log);
     }
 
     fn cancelled(&self) -> bool {
