@@ -39,9 +39,15 @@ impl Tally {
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let argument = |i: usize, default: &str| arguments.get(i).map_or(default, String::as_str).to_owned();
-    let tasks: Vec<Task> = argument(0, "hit,defend,prepare").split(',').map(str::parse).collect::<Result<_, _>>()?;
-    let episodes: u32 = argument(1, "50").parse().context("number of episodes per season")?;
+    let argument =
+        |i: usize, default: &str| arguments.get(i).map_or(default, String::as_str).to_owned();
+    let tasks: Vec<Task> = argument(0, "hit,defend,prepare")
+        .split(',')
+        .map(str::parse)
+        .collect::<Result<_, _>>()?;
+    let episodes: u32 = argument(1, "50")
+        .parse()
+        .context("number of episodes per season")?;
     let profile: Profile = argument(2, "evaluation").parse()?;
     let seasons: u64 = argument(3, "2").parse().context("number of seasons")?;
     let first: u64 = argument(4, "1").parse().context("first season's seed")?;
@@ -71,7 +77,12 @@ fn main() -> anyhow::Result<()> {
                     &plant,
                     seed.episode(task, index),
                 );
-                play(&mut agent, &mut episode, &mut tally, trace == Some((season, index)))?;
+                play(
+                    &mut agent,
+                    &mut episode,
+                    &mut tally,
+                    trace == Some((season, index)),
+                )?;
                 let v = episode.violations();
                 if list && (!episode.success() || v.ee || v.link || v.joint_pos || v.joint_vel) {
                     let puck = episode.state().puck;
@@ -103,7 +114,12 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-fn play(agent: &mut Agent, episode: &mut Episode, tally: &mut Tally, trace: bool) -> anyhow::Result<()> {
+fn play(
+    agent: &mut Agent,
+    episode: &mut Episode,
+    tally: &mut Tally,
+    trace: bool,
+) -> anyhow::Result<()> {
     agent.reset();
     loop {
         let observation = episode.observation().to_vec();
@@ -139,12 +155,20 @@ fn play(agent: &mut Agent, episode: &mut Episode, tally: &mut Tally, trace: bool
 
 /// Largest filtered joint speed relative to its limit.
 fn speed_share(state: &EpisodeState) -> f64 {
-    speed_shares(state).into_iter().map(f64::abs).fold(0.0, f64::max)
+    speed_shares(state)
+        .into_iter()
+        .map(f64::abs)
+        .fold(0.0, f64::max)
 }
 
 fn speed_shares(state: &EpisodeState) -> Vec<f64> {
     let limits = env_info(Task::Defend).joint_vel_limit[1];
-    state.dq_filtered.iter().zip(limits).map(|(v, limit)| v / limit).collect()
+    state
+        .dq_filtered
+        .iter()
+        .zip(limits)
+        .map(|(v, limit)| v / limit)
+        .collect()
 }
 
 fn print_step(agent: &Agent, episode: &Episode, state: &EpisodeState) {
@@ -168,9 +192,17 @@ fn agent(task: Task) -> anyhow::Result<Agent> {
     let info = env_info(task);
     let env = Env {
         dt: info.dt,
-        table: TableInfo { length: info.table_length, width: info.table_width, goal_width: info.goal_width },
-        puck: RadiusInfo { radius: info.puck_radius },
-        mallet: RadiusInfo { radius: info.mallet_radius },
+        table: TableInfo {
+            length: info.table_length,
+            width: info.table_width,
+            goal_width: info.goal_width,
+        },
+        puck: RadiusInfo {
+            radius: info.puck_radius,
+        },
+        mallet: RadiusInfo {
+            radius: info.mallet_radius,
+        },
         robot: RobotInfo {
             ee_desired_height: info.ee_desired_height,
             joint_pos_limit: info.joint_pos_limit,
@@ -178,5 +210,8 @@ fn agent(task: Task) -> anyhow::Result<Agent> {
             base_frame: info.base_frame.into_iter().map(BaseFrame::Flat).collect(),
         },
     };
-    Ok(Agent::new(serde_json::from_str(&format!("{:?}", task.as_str()))?, &env))
+    Ok(Agent::new(
+        serde_json::from_str(&format!("{:?}", task.as_str()))?,
+        &env,
+    ))
 }

@@ -133,7 +133,11 @@ impl Motion {
     pub fn confine(&mut self, before: &Self, dt: f64, field: &Field) {
         let (low, high) = field.mallet_bounds();
         for i in 0..2 {
-            let room = if self.vel[i] > 0.0 { high[i] - before.pos[i] } else { before.pos[i] - low[i] };
+            let room = if self.vel[i] > 0.0 {
+                high[i] - before.pos[i]
+            } else {
+                before.pos[i] - low[i]
+            };
             let most = (2.0 * BOUND_BRAKE * room.max(0.0)).sqrt();
             if self.vel[i].abs() > most {
                 self.vel[i] = most * self.vel[i].signum();
@@ -142,6 +146,18 @@ impl Motion {
             }
             self.pos[i] = self.pos[i].clamp(low[i], high[i]);
         }
+        // The same along the reach of the arm.
+        let radius = field.to_base(self.pos);
+        let outward = radius / radius.norm();
+        let room = field.reach_max() - field.to_base(before.pos).norm();
+        let most = (2.0 * BOUND_BRAKE * room.max(0.0)).sqrt();
+        let excess = self.vel.dot(&outward) - most;
+        if excess > 0.0 {
+            self.vel -= excess * outward;
+            self.pos = before.pos + dt * self.vel;
+            self.acc = Vec2::zeros();
+        }
+        self.pos = field.clamp_mallet(self.pos);
     }
 }
 

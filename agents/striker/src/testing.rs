@@ -4,7 +4,9 @@ use crate::Env;
 
 /// What the evaluator sends in `hello`.
 pub fn env() -> Env {
-    let position = [2.967_06, 2.0944, 2.967_06, 2.0944, 2.967_06, 2.0944, 3.054_33];
+    let position = [
+        2.967_06, 2.0944, 2.967_06, 2.0944, 2.967_06, 2.0944, 3.054_33,
+    ];
     let velocity = [85.0_f64, 85.0, 100.0, 75.0, 130.0, 135.0, 135.0].map(f64::to_radians);
     let env = serde_json::json!({
         "dt": 0.02,

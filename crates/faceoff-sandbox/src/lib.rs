@@ -23,6 +23,7 @@ mod line_pipe;
 mod output_holders;
 mod owner;
 mod plan;
+mod prepared;
 mod probe;
 mod process;
 mod process_tree;

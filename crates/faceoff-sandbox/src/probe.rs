@@ -211,16 +211,33 @@ fn bundle(layer: Layer) -> io::Result<(tempfile::TempDir, PathBuf)> {
 fn cure(layer: Layer) -> String {
     match layer {
         Layer::Namespaces => cure_namespaces(),
-        Layer::Seccomp => "use a kernel with CONFIG_SECCOMP_FILTER=y (every distribution's since 2014)".into(),
-        Layer::CgroupMemory | Layer::CgroupPids | Layer::CgroupCpu => {
-            "run the service as root, or as a systemd service whose unit says [Service] Delegate=yes; from a \
-             shell: systemd-run --user --scope -p Delegate=yes faceoff serve; in Docker: docker run --privileged \
-             --cgroupns=private"
-                .into()
+        Layer::Seccomp => {
+            "use a kernel with CONFIG_SECCOMP_FILTER=y (every distribution's since 2014)".into()
         }
+        Layer::CgroupMemory | Layer::CgroupPids | Layer::CgroupCpu => cure_cgroups(),
         Layer::Rlimits => {
-            format!("raise the service's own hard limits, e.g. ulimit -Hn {}", Limits::default().open_files)
+            format!(
+                "raise the service's own hard limits, e.g. ulimit -Hn {}",
+                Limits::default().open_files
+            )
         }
+    }
+}
+
+/// Version 2 can be handed to an ordinary user by systemd; version 1 only by root.
+fn cure_cgroups() -> String {
+    const CONTAINER: &str = "in Docker: docker run --privileged --cgroupns=private";
+    if Path::new("/sys/fs/cgroup/cgroup.controllers").exists() {
+        format!(
+            "run the service as root, or as a systemd service whose unit says [Service] Delegate=yes; from a \
+             shell: systemd-run --user --scope -p Delegate=yes faceoff serve; {CONTAINER}"
+        )
+    } else {
+        format!(
+            "run the service as root, or have root hand it a cgroup: for c in memory pids cpu cpuacct; do mkdir \
+             -p /sys/fs/cgroup/$c/agents; chown -R USER /sys/fs/cgroup/$c/agents; echo PID > \
+             /sys/fs/cgroup/$c/agents/cgroup.procs; done; {CONTAINER}"
+        )
     }
 }
 

@@ -23,8 +23,6 @@ const CPU_PERIOD_US: u64 = 10_000;
 const PEAK_SLACK_BYTES: u64 = 1 << 20;
 /// bubblewrap's own process is in the agent's cgroup.
 const OUR_PROCESSES: u64 = 1;
-const CURE: &str = "run the service as root, or let systemd delegate its cgroup: systemctl edit faceoff, \
-     [Service] Delegate=yes (for a shell: systemd-run --user --scope -p Delegate=yes …)";
 pub(super) const LEAF_PREFIX: &str = "agent-";
 static NEXT: AtomicU64 = AtomicU64::new(0);
 
@@ -95,7 +93,7 @@ impl AgentCgroup {
             };
             let leaf = group.leaf(&home, &together, &name).map_err(|error| {
                 unavailable(format!(
-                    "cannot make a cgroup in {}: {error}; {CURE}",
+                    "cannot make a cgroup in {}: {error}",
                     home.own.display()
                 ))
             })?;

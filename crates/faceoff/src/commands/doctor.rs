@@ -104,8 +104,9 @@ impl Findings {
                 host,
             })
             .collect();
+        let ok = missing(&features).next().is_none();
         Self {
-            ok: missing(&features).next().is_none(),
+            ok,
             features,
             runtimes: runtimes(config),
             cpus: cpus(config),
