@@ -20,6 +20,7 @@ mod recording;
 mod session;
 mod shard;
 mod smoke;
+mod wire_env;
 
 pub use assemble::{EvaluationMeta, assemble};
 pub use config::{AgentEnvironment, TimeLimits};

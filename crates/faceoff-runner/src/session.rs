@@ -1,12 +1,7 @@
-use crate::{AgentEnvironment, PlatformFault, TimeLimits, bundle::Bundle};
+use crate::{AgentEnvironment, PlatformFault, TimeLimits, bundle::Bundle, wire_env::wire_env};
 use faceoff_sandbox::{AgentProcess, ReadLine, SpawnError, SpawnSpec, WriteError};
-use faceoff_sim::EnvInfo;
-use faceoff_types::{AgentFaultKind, RULESET, Task};
-use faceoff_wire::{
-    Env, InterpolationCode, MAX_LINE_BYTES, Message, answer,
-    message::{DiscEnv, RobotEnv, TableEnv},
-    quote_line,
-};
+use faceoff_types::{AgentFaultKind, Task};
+use faceoff_wire::{InterpolationCode, MAX_LINE_BYTES, Message, answer, quote_line};
 use std::time::{Duration, Instant};
 
 /// How long an agent that has closed its output gets to end, so that its exit status can be told.
@@ -321,64 +316,5 @@ fn at_line(fault: AgentFaultKind, answer: &Answer) -> Trouble {
     Trouble::Agent {
         fault,
         line: Some(quote_line(&answer.bytes)),
-    }
-}
-
-/// The simulator's constants under the protocol's names.
-fn wire_env(task: Task) -> Env {
-    let EnvInfo {
-        n_agents,
-        table_length,
-        table_width,
-        goal_width,
-        puck_radius,
-        mallet_radius,
-        ee_desired_height,
-        universal_height,
-        control_frequency,
-        joint_pos_limit,
-        joint_vel_limit,
-        joint_acc_limit,
-        base_frame,
-        dt,
-    } = faceoff_sim::env_info(task);
-    let opponent: &[usize] = match task {
-        Task::Hit => &Env::OPPONENT_EE_IDS,
-        Task::Defend | Task::Prepare => &[],
-    };
-    Env {
-        dt,
-        n_agents,
-        puck_pos_ids: Env::PUCK_POS_IDS.to_vec(),
-        puck_vel_ids: Env::PUCK_VEL_IDS.to_vec(),
-        joint_pos_ids: Env::JOINT_POS_IDS.to_vec(),
-        joint_vel_ids: Env::JOINT_VEL_IDS.to_vec(),
-        opponent_ee_ids: opponent.to_vec(),
-        table: TableEnv {
-            length: table_length,
-            width: table_width,
-            goal_width,
-        },
-        puck: DiscEnv {
-            radius: puck_radius,
-        },
-        mallet: DiscEnv {
-            radius: mallet_radius,
-        },
-        robot: RobotEnv {
-            n_joints: faceoff_sim::JOINTS,
-            ee_desired_height,
-            universal_height,
-            control_frequency,
-            joint_pos_limit,
-            joint_vel_limit,
-            joint_acc_limit,
-            base_frame: base_frame
-                .iter()
-                .map(|m| [0, 4, 8, 12].map(|row| [m[row], m[row + 1], m[row + 2], m[row + 3]]))
-                .collect(),
-        },
-        episode_steps: faceoff_sim::EPISODE_STEPS,
-        ruleset: RULESET.to_owned(),
     }
 }
