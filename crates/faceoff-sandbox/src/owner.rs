@@ -37,9 +37,12 @@ impl Owner {
         format!("{prefix}{}-{}-{}-", self.pid, self.start, self.namespace)
     }
 
-    /// Is it dead for certain? Of services in other containers we cannot tell, so they count as alive.
+    /// Is it dead for certain? Of services in other containers we cannot tell, nor of any where `/proc` is
+    /// hidden, so they count as alive.
     pub(crate) fn is_dead(self) -> bool {
-        self.namespace == pid_namespace() && start_time(self.pid) != Some(self.start)
+        let us = Self::this_process();
+        let can_tell = us.start != 0 && us.namespace == self.namespace;
+        can_tell && start_time(self.pid) != Some(self.start)
     }
 }
 
