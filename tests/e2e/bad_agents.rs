@@ -11,18 +11,40 @@ use serde_json::Value;
 /// A broken agent: its name, what it does at each step, and a word of the verdict.
 const BROKEN: [(&str, &str, &str); 7] = [
     ("rubbish", "print('hello there', flush=True)", "JSON"),
-    ("slow", "time.sleep(5)", "1 s"),
-    ("endless", "sys.stdout.write('x' * 200000); sys.stdout.flush(); time.sleep(9)", "65536 bytes"),
-    ("late-step", "say({'type': 'act', 'step': message['step'] + 1, 'action': [held, [0.0] * 7]})", "step"),
-    ("quitter", "sys.stderr.write('giving up\\n'); sys.exit(3)", "status 3"),
-    ("not-a-number", "hold['action'][0][0] = float('nan'); say(hold)", "finite"),
-    ("glutton", "ballast = bytearray(8 << 30); say(hold)", "memory"),
+    ("slow", "time.sleep(60)", "5 s"),
+    (
+        "endless",
+        "sys.stdout.write('x' * 200000); sys.stdout.flush(); time.sleep(60)",
+        "65536 bytes",
+    ),
+    (
+        "late-step",
+        "say({'type': 'act', 'step': message['step'] + 1, 'action': [held, [0.0] * 7]})",
+        "step",
+    ),
+    (
+        "quitter",
+        "sys.stderr.write('giving up\\n'); sys.exit(3)",
+        "status 3",
+    ),
+    (
+        "not-a-number",
+        "hold['action'][0][0] = float('nan'); say(hold)",
+        "finite",
+    ),
+    (
+        "glutton",
+        "ballast = bytearray(1 << 30); say(hold)",
+        "memory",
+    ),
 ];
 
 #[test]
 fn a_broken_agent_gets_its_reason_and_its_log_and_harms_nobody() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    // Little memory and much time, so that a busy machine meets the first limit first.
+    let config = format!("{CONFIG}\n[limits]\nmemory_bytes = 268435456\n[time]\nstep_s = 5.0\n");
+    let server = Server::start(&scratch.path().join("data"), &config);
 
     let good = Team::create(&server, "Good");
     let submission = good.submit(&server, &repository().join("agents/hold"));
@@ -40,8 +62,13 @@ fn a_broken_agent_gets_its_reason_and_its_log_and_harms_nobody() {
         .collect();
     for (name, word, verdict) in verdicts {
         assert_eq!(verdict["state"], "invalid", "{name}: {verdict:#}");
-        let reason = verdict["reason"].as_str().expect("an invalid agent has a reason");
-        assert!(reason.contains(word), "{name}: {word:?} is not in {reason:?}");
+        let reason = verdict["reason"]
+            .as_str()
+            .expect("an invalid agent has a reason");
+        assert!(
+            reason.contains(word),
+            "{name}: {word:?} is not in {reason:?}"
+        );
         let log = verdict["log"].as_str().expect("an invalid agent has a log");
         assert!(log.contains(&format!("{name} speaks")), "{name}: {log:?}");
     }
@@ -82,20 +109,41 @@ fn an_agent_that_breaks_half_way_fails_its_evaluation_with_every_fault_named() {
     let server = Server::start(&scratch.path().join("data"), &config);
     let team = Team::create(&server, "Half way");
     // Good for longer than a smoke run looks.
-    let source = python_agent("if message['step'] == 120: sys.stderr.write('enough\\n'); sys.exit(9)\nsay(hold)");
+    let source = python_agent(
+        "if message['step'] == 120: sys.stderr.write('enough\\n'); sys.exit(9)\nsay(hold)",
+    );
     let folder = python_bundle(scratch.path(), "half-way", &source);
     let submission = team.submit(&server, &folder);
     assert_eq!(submission["state"], "valid", "{submission:#}");
     let evaluation = team.evaluate(&server, &submission);
     let done = team.finished(&server, &evaluation);
     assert_eq!(done["state"], "agent_failed", "{done:#}");
-    let faults = done["faults"].as_array().expect("a failed evaluation names its faults");
+    let faults = done["faults"]
+        .as_array()
+        .expect("a failed evaluation names its faults");
     assert!(faults.len() > 2, "{done:#}");
     for fault in faults {
         assert_eq!(fault["step"], 120);
-        assert!(fault["message"].as_str().is_some_and(|text| text.contains("status 9")), "{fault:#}");
+        assert!(
+            fault["message"]
+                .as_str()
+                .is_some_and(|text| text.contains("status 9")),
+            "{fault:#}"
+        );
     }
-    assert!(done["log"].as_str().is_some_and(|log| log.contains("enough")), "{done:#}");
-    let board: Value = server.get("/api/v1/board", None).json().expect("the API speaks JSON");
-    assert_eq!(board["rows"].as_array().map(Vec::len), Some(0), "no score is published");
+    assert!(
+        done["log"]
+            .as_str()
+            .is_some_and(|log| log.contains("enough")),
+        "{done:#}"
+    );
+    let board: Value = server
+        .get("/api/v1/board", None)
+        .json()
+        .expect("the API speaks JSON");
+    assert_eq!(
+        board["rows"].as_array().map(Vec::len),
+        Some(0),
+        "no score is published"
+    );
 }

@@ -33,7 +33,9 @@ fn an_evaluation_survives_kill_9_and_scores_as_the_local_evaluator_does() {
     let bytes = dataset.bytes().expect("the download completes");
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).expect("a dataset is a zip");
     let manifest: Value = serde_json::from_reader(
-        archive.by_name("manifest.json").expect("a dataset has a manifest"),
+        archive
+            .by_name("manifest.json")
+            .expect("a dataset has a manifest"),
     )
     .expect("it is JSON");
 
@@ -42,18 +44,36 @@ fn an_evaluation_survives_kill_9_and_scores_as_the_local_evaluator_does() {
     let local = Command::new(program("faceoff"))
         .arg("eval")
         .arg(&striker)
-        .args(["--task", "hit,defend,prepare", "--episodes", "4", "--profile", "evaluation"])
-        .args(["--seed", manifest["seed"].as_str().expect("the manifest names the seed")])
+        .args([
+            "--task",
+            "hit,defend,prepare",
+            "--episodes",
+            "4",
+            "--profile",
+            "evaluation",
+        ])
+        .args([
+            "--seed",
+            manifest["seed"]
+                .as_str()
+                .expect("the manifest names the seed"),
+        ])
         .args([
             "--mismatch-seed",
-            manifest["mismatch_seed"].as_str().expect("the manifest names the season's draw"),
+            manifest["mismatch_seed"]
+                .as_str()
+                .expect("the manifest names the season's draw"),
         ])
         .args(["--workers", "2"])
         .arg("--out")
         .arg(&out)
         .output()
         .expect("the program can be started");
-    assert!(local.status.success(), "{}", String::from_utf8_lossy(&local.stderr));
+    assert!(
+        local.status.success(),
+        "{}",
+        String::from_utf8_lossy(&local.stderr)
+    );
     let local: Value = serde_json::from_slice(
         &fs::read(out.join("results.json")).expect("the evaluator writes its result"),
     )

@@ -29,17 +29,20 @@ fn the_demo_plays_a_day_and_its_board_is_served() {
         .expect("the program can be started");
     let stdout = String::from_utf8_lossy(&output.stdout);
     let stderr = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "the demo failed\n{stdout}\n{stderr}");
+    assert!(
+        output.status.success(),
+        "the demo failed\n{stdout}\n{stderr}"
+    );
 
     // Tiers in order, with the teams where they belong.
     let place = |text: &str| {
-        stdout.find(text).unwrap_or_else(|| panic!("{text:?} is not in the output:\n{stdout}"))
+        stdout
+            .find(text)
+            .unwrap_or_else(|| panic!("{text:?} is not in the output:\n{stdout}"))
     };
     assert!(place("Deployable") < place("Non-deployable"));
     assert!(place("hold") < place("Non-deployable"));
-    assert!(
-        stdout.rfind("reckless").expect("the team is on the board") > place("Non-deployable")
-    );
+    assert!(stdout.rfind("reckless").expect("the team is on the board") > place("Non-deployable"));
 
     // The dataset is a complete archive.
     let dataset = std::fs::read_dir(&data_dir)
@@ -51,7 +54,9 @@ fn the_demo_plays_a_day_and_its_board_is_served() {
     let mut archive =
         zip::ZipArchive::new(File::open(&dataset).expect("it can be read")).expect("it is a zip");
     let results: Value = serde_json::from_reader(
-        archive.by_name("results.json").expect("a dataset has its score"),
+        archive
+            .by_name("results.json")
+            .expect("a dataset has its score"),
     )
     .expect("it is JSON");
     assert_eq!(results["ruleset"], "airhockey-2023.1");
@@ -62,16 +67,31 @@ fn the_demo_plays_a_day_and_its_board_is_served() {
 
     // The same board from the same folder, in a browser.
     let server = Server::start(&data_dir, "");
-    let board: Value = server.get("/api/v1/board", None).json().expect("the API speaks JSON");
+    let board: Value = server
+        .get("/api/v1/board", None)
+        .json()
+        .expect("the API speaks JSON");
     let rows = board["rows"].as_array().expect("a board has rows");
     assert_eq!(rows.len(), 3);
-    let page = browser::dump(&format!("{}/", server.url), scratch.path());
-    let mut from = 0;
-    for row in rows {
-        let team = row["team"].as_str().expect("a row names its team");
-        let at = page[from..].find(team).unwrap_or_else(|| {
-            panic!("{team} is not on the page, or not in the board's order:\n{page}")
-        });
-        from += at;
+    let teams: Vec<&str> = rows.iter().filter_map(|row| row["team"].as_str()).collect();
+    assert_in_order(
+        &browser::dump(&format!("{}/", server.url), scratch.path()),
+        &teams,
+    );
+    // What a visitor without JavaScript gets.
+    assert_in_order(
+        &server.get("/", None).text().expect("a page is text"),
+        &teams,
+    );
+}
+
+/// Asserts that a page's table of teams names `teams` in this order.
+fn assert_in_order(page: &str, teams: &[&str]) {
+    let mut rest = page.split_once("<tbody").map_or("", |(_, table)| table);
+    for team in teams {
+        rest = rest
+            .split_once(team)
+            .unwrap_or_else(|| panic!("{team} is not in its place in the table:\n{page}"))
+            .1;
     }
 }

@@ -26,10 +26,19 @@ struct Team {
 
 impl Team {
     fn create(server: &Server, name: &str) -> Self {
-        let answer = server.post("/api/v1/teams", &server.admin_token, &json!({ "name": name }));
+        let answer = server.post(
+            "/api/v1/teams",
+            &server.admin_token,
+            &json!({ "name": name }),
+        );
         assert_eq!(answer.status(), 201, "creating team {name}");
         let answer: Value = answer.json().expect("the API speaks JSON");
-        Self { token: answer["token"].as_str().expect("a new team gets a token").to_owned() }
+        Self {
+            token: answer["token"]
+                .as_str()
+                .expect("a new team gets a token")
+                .to_owned(),
+        }
     }
 
     /// Uploads a folder and waits for its verdict.
@@ -42,13 +51,18 @@ impl Team {
         let answer = server.upload(&self.token, archive);
         assert_eq!(answer.status(), 201, "uploading");
         let answer: Value = answer.json().expect("the API speaks JSON");
-        answer["id"].as_str().expect("a submission has an id").to_owned()
+        answer["id"]
+            .as_str()
+            .expect("a submission has an id")
+            .to_owned()
     }
 
     fn verdict(&self, server: &Server, submission: &str) -> Value {
-        server.poll(&format!("/api/v1/submissions/{submission}"), &self.token, |answer| {
-            answer["state"] != "validating"
-        })
+        server.poll(
+            &format!("/api/v1/submissions/{submission}"),
+            &self.token,
+            |answer| answer["state"] != "validating",
+        )
     }
 
     /// Uses today's turn and returns the evaluation's path.
@@ -61,7 +75,10 @@ impl Team {
         );
         assert_eq!(answer.status(), 201, "starting an evaluation");
         let answer: Value = answer.json().expect("the API speaks JSON");
-        format!("/api/v1/evaluations/{}", answer["id"].as_str().expect("an evaluation has an id"))
+        format!(
+            "/api/v1/evaluations/{}",
+            answer["id"].as_str().expect("an evaluation has an id")
+        )
     }
 
     fn finished(&self, server: &Server, evaluation: &str) -> Value {
@@ -72,21 +89,25 @@ impl Team {
     }
 }
 
-/// A result without what no run can repeat: computation times and what follows from them.
+/// A result without what no run can repeat: computation times and the points that follow from them.
 fn without_times(result: &Value) -> Value {
-    let mut result = result.clone();
-    for task in result["tasks"].as_object_mut().expect("a result has tasks").values_mut() {
-        let task = task.as_object_mut().expect("a task's result is an object");
-        task.remove("computation_time_s");
-        let late = task["violations"]["computation_time"].take();
-        if late != json!(0) {
-            // A stall of a busy test machine costs points; they are not what is compared here.
-            task.remove("penalty_points");
-            task.remove("tier");
+    fn remove(object: &mut Value, fields: &[&str]) {
+        let object = object
+            .as_object_mut()
+            .expect("a part of a result is an object");
+        for field in fields {
+            object.remove(*field).expect("a result has all its fields");
         }
     }
-    for field in ["penalty_points", "tier"] {
-        result.as_object_mut().expect("a result is an object").remove(field);
+    let mut result = result.clone();
+    remove(&mut result, &["penalty_points", "tier"]);
+    for task in result["tasks"]
+        .as_object_mut()
+        .expect("a result has tasks")
+        .values_mut()
+    {
+        remove(task, &["penalty_points", "tier", "computation_time_s"]);
+        remove(&mut task["violations"], &["computation_time"]);
     }
     result
 }

@@ -8,7 +8,8 @@ use serde_json::{Value, json};
 fn assert_problem(answer: reqwest::blocking::Response, status: u16) {
     assert_eq!(answer.status(), status);
     assert_eq!(
-        answer.headers()["content-type"], "application/problem+json",
+        answer.headers()["content-type"],
+        "application/problem+json",
         "errors are problem documents"
     );
     let problem: Value = answer.json().expect("a problem is JSON");
@@ -45,17 +46,30 @@ fn a_dataset_is_for_its_team_and_a_turn_is_used_once() {
     assert_problem(server.get(&path, Some(&other.token)), 404);
 
     // The day's turn is used.
-    assert_problem(server.post(&format!("{path}/evaluations"), &owner.token, &json!({})), 409);
+    assert_problem(
+        server.post(&format!("{path}/evaluations"), &owner.token, &json!({})),
+        409,
+    );
     let day: Value = server
         .post("/api/v1/days", &server.admin_token, &json!({}))
         .json()
         .expect("the API speaks JSON");
-    assert_eq!(day["created"], json!([]), "the day gives nobody a second turn: {day:#}");
+    assert_eq!(
+        day["created"],
+        json!([]),
+        "the day gives nobody a second turn: {day:#}"
+    );
 
     // Ids that are none, and ids of nothing.
-    assert_problem(server.get("/api/v1/evaluations/seventeen", Some(&owner.token)), 404);
     assert_problem(
-        server.get("/api/v1/evaluations/01890000-0000-7000-8000-000000000000", Some(&owner.token)),
+        server.get("/api/v1/evaluations/seventeen", Some(&owner.token)),
+        404,
+    );
+    assert_problem(
+        server.get(
+            "/api/v1/evaluations/01890000-0000-7000-8000-000000000000",
+            Some(&owner.token),
+        ),
         404,
     );
 }

@@ -66,7 +66,9 @@ pub fn python_bundle(folder: &Path, name: &str, source: &str) -> PathBuf {
     fs::create_dir_all(&bundle).expect("a scratch folder can be made");
     fs::write(
         bundle.join("agent.toml"),
-        format!("name = \"{name}\"\ncommand = [\"python3\", \"agent.py\"]\nruntime = \"python3\"\n"),
+        format!(
+            "name = \"{name}\"\ncommand = [\"python3\", \"agent.py\"]\nruntime = \"python3\"\n"
+        ),
     )
     .expect("a scratch file can be written");
     fs::write(bundle.join("agent.py"), source).expect("a scratch file can be written");
@@ -80,7 +82,9 @@ pub fn python_bundle(folder: &Path, name: &str, source: &str) -> PathBuf {
 #[must_use]
 pub fn packed(folder: &Path) -> Vec<u8> {
     let mut archive = tar::Builder::new(GzEncoder::new(Vec::new(), Compression::fast()));
-    archive.append_dir_all(".", folder).expect("the bundle's folder can be read");
+    archive
+        .append_dir_all(".", folder)
+        .expect("the bundle's folder can be read");
     archive
         .into_inner()
         .and_then(GzEncoder::finish)

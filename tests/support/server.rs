@@ -67,7 +67,10 @@ impl Server {
                 break;
             }
             if let Some(status) = child.try_wait().expect("a child can be asked") {
-                panic!("the server ended with {status}:\n{}", log.recv().unwrap_or_default());
+                panic!(
+                    "the server ended with {status}:\n{}",
+                    log.recv().unwrap_or_default()
+                );
             }
             assert!(started.elapsed() < PATIENCE, "the server does not answer");
             thread::yield_now();
@@ -76,7 +79,12 @@ impl Server {
             .expect("the server leaves the organiser's token in its folder")
             .trim()
             .to_owned();
-        Self { child, url, admin_token, client }
+        Self {
+            child,
+            url,
+            admin_token,
+            client,
+        }
     }
 
     /// Ends the server at once, as a power cut would (SIGKILL), and reaps it.
@@ -138,11 +146,17 @@ impl Server {
     pub fn poll(&self, path: &str, token: &str, done: impl Fn(&Value) -> bool) -> Value {
         let started = Instant::now();
         loop {
-            let answer: Value = self.get(path, Some(token)).json().expect("the API speaks JSON");
+            let answer: Value = self
+                .get(path, Some(token))
+                .json()
+                .expect("the API speaks JSON");
             if done(&answer) {
                 return answer;
             }
-            assert!(started.elapsed() < PATIENCE, "still waiting for {path}: {answer:#}");
+            assert!(
+                started.elapsed() < PATIENCE,
+                "still waiting for {path}: {answer:#}"
+            );
             // Polling is what a client of this API does; the pause keeps the CPU for the evaluation.
             thread::sleep(Duration::from_millis(50));
         }

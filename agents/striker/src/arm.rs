@@ -21,6 +21,8 @@ const POSTURE_SHARE: f64 = 0.6;
 const POSTURE_ACCELERATION: f64 = 8.0;
 /// Share of the possible speed that strikes are planned with: the posture is never exactly the best.
 const STRIKE_SHARE: f64 = 0.96;
+/// Largest correction of the tip per control step that does not come from the velocity, metres.
+const NUDGE_MAX_M: f64 = 0.004;
 /// Time in which the strike's way to share the load between joints fades, seconds.
 const FADE_TIME: f64 = 0.2;
 /// Integral gain from observed joint errors to the correction, 1/s.
@@ -63,7 +65,18 @@ pub struct Arm {
     drift: Joints,
     /// 0: loads spread evenly; 1: least peak load. In between while a strike fades out.
     sharpness: f64,
+    /// Compliances of the joints in a strike.
+    balance: Option<Joints>,
     correction: Joints,
+}
+
+/// Where the reference got to in a control step (base frame).
+#[derive(Debug, Clone, Copy)]
+pub struct Reached {
+    /// Mallet position, metres.
+    pub position: Vec2,
+    /// Mallet velocity, m/s.
+    pub velocity: Vec2,
 }
 
 impl Arm {
@@ -78,6 +91,7 @@ impl Arm {
             dq: Joints::zeros(),
             drift: Joints::zeros(),
             sharpness: 0.0,
+            balance: None,
             correction: Joints::zeros(),
         }
     }
@@ -88,6 +102,7 @@ impl Arm {
         self.dq = Joints::zeros();
         self.drift = Joints::zeros();
         self.sharpness = 0.0;
+        self.balance = None;
         self.correction = Joints::zeros();
     }
 
@@ -106,34 +121,37 @@ impl Arm {
     }
 
     /// Moves the reference on by one control step so that the mallet is at `position` with
-    /// `velocity` (base frame, metres, m/s). Returns the share of the way that the joint speed
-    /// limits allowed, 1 if all of it.
-    pub fn advance(&mut self, position: Vec2, velocity: Vec2, posture: Posture) -> f64 {
-        let pose = self.pose();
-        let goal = Vector3::new(position.x, position.y, self.height);
-        let wish = (goal - pose.tip) / self.dt;
+    /// `velocity` (base frame, metres, m/s), as far as the joint speed limits allow.
+    pub fn advance(&mut self, position: Vec2, velocity: Vec2, posture: Posture) -> Reached {
         let preferred = self.posture_rate(posture, position);
+        let velocity = Vector3::new(velocity.x, velocity.y, 0.0);
         // Striking begins at rest, where the two ways to share a motion agree, and fades out after it.
         self.sharpness = match posture {
             Posture::Strike(_) => 1.0,
             Posture::Ready(_) | Posture::Free => (self.sharpness - self.dt / FADE_TIME).max(0.0),
         };
-        // The mean speed over the step, from the Jacobian at its beginning …
-        let (mean, share) = self.resolve(&pose.jacobian, &wish, &preferred);
-        let mut q = self.q + self.dt * mean;
-        // … leaves a second-order error in height, which one Newton step at the end removes.
+        let expected = forward(&(self.q + self.dt * self.dq));
+        let (dq, share) = self.resolve(&expected.jacobian, &velocity, &preferred);
+        // Even acceleration over the step: what the cubic interpolation then does between its ends.
+        let mut q = self.q + 0.5 * self.dt * (self.dq + dq);
         let end = forward(&q);
-        let reached = pose.tip + share * (goal - pose.tip);
-        let end_velocity = share * Vector3::new(velocity.x, velocity.y, 0.0);
-        q += least_change(&end.jacobian, &(reached - end.tip), &self.speed_max);
+        let goal = if share < 1.0 {
+            Vector3::new(end.tip.x, end.tip.y, self.height)
+        } else {
+            Vector3::new(position.x, position.y, self.height)
+        };
+        // What is still missing is small unless a reference jumped; a jump must not reach the joints.
+        let missing = goal - end.tip;
+        let missing = missing * (NUDGE_MAX_M / missing.norm().max(NUDGE_MAX_M));
+        q += least_change(&end.jacobian, &missing, &self.speed_max);
         for i in 0..JOINTS {
             q[i] = q[i].clamp(-self.angle_max[i], self.angle_max[i]);
         }
-        let end = forward(&q);
-        let (dq, _) = self.resolve(&end.jacobian, &end_velocity, &preferred);
         self.q = q;
         self.dq = dq;
-        share
+        let end = forward(&q);
+        let velocity = end.jacobian * dq;
+        Reached { position: end.tip.xy(), velocity: velocity.xy() }
     }
 
     /// Position and velocity command for the end of this control step.
@@ -144,7 +162,7 @@ impl Arm {
     /// Joint speeds that move the tip with `velocity` and, as far as the limits leave room, the free
     /// posture with `preferred`. Also the share of `velocity` that the limits allow.
     fn resolve(
-        &self,
+        &mut self,
         jacobian: &Jacobian,
         velocity: &Vector3<f64>,
         preferred: &Joints,
@@ -154,7 +172,12 @@ impl Arm {
             base += (1.0 - self.sharpness) * even_speeds(jacobian, velocity, &self.speed_max);
         }
         if self.sharpness > 0.0 {
-            base += self.sharpness * least_peak(jacobian, velocity, &self.speed_max);
+            // Few steps from the last balance, so that it changes smoothly over a swing.
+            let rounds = if self.balance.is_some() { 3 } else { 12 };
+            let balance = self.balance.get_or_insert(self.speed_max.component_mul(&self.speed_max));
+            base += self.sharpness * least_peak(jacobian, velocity, &self.speed_max, balance, rounds);
+        } else {
+            self.balance = None;
         }
         let peak = base.component_div(&self.speed_max).amax();
         if peak >= 1.0 {
@@ -200,7 +223,10 @@ impl Arm {
             Side::Right => lean,
         };
         // With joints 5 and 6 given, forearm and hand are one rigid, bent link …
-        let (along, across) = (FOREARM_M + HAND_M * wrist.cos(), HAND_M * wrist.sin() * lean.cos());
+        let (along, across) = (
+            FOREARM_M + HAND_M * wrist.cos(),
+            HAND_M * wrist.sin() * lean.cos(),
+        );
         let outward = HAND_M * wrist.sin() * lean.sin();
         let (lower, bend) = (along.hypot(across), across.atan2(along));
         let ahead = (reach * reach - outward * outward).max(0.0).sqrt();
@@ -208,7 +234,9 @@ impl Arm {
         let rise = self.height - SHOULDER_M;
         let distance = ahead.hypot(rise).min(0.999 * (UPPER_ARM_M + lower));
         let corner = |opposite: f64, a: f64, b: f64| {
-            ((a * a + b * b - opposite * opposite) / (2.0 * a * b)).clamp(-1.0, 1.0).acos()
+            ((a * a + b * b - opposite * opposite) / (2.0 * a * b))
+                .clamp(-1.0, 1.0)
+                .acos()
         };
         let shoulder = ahead.atan2(rise) - corner(lower, UPPER_ARM_M, distance);
         let elbow = corner(distance, UPPER_ARM_M, lower);
@@ -232,7 +260,9 @@ impl Arm {
     pub fn strike_speed(&self, position: Vec2, direction: Vec2, side: Side) -> f64 {
         let pose = forward(&self.strike_posture(position, side));
         let unit = Vector3::new(direction.x, direction.y, 0.0);
-        let peak = least_peak(&pose.jacobian, &unit, &self.speed_max).component_div(&self.speed_max).amax();
+        let mut balance = self.speed_max.component_mul(&self.speed_max);
+        let speeds = least_peak(&pose.jacobian, &unit, &self.speed_max, &mut balance, 12);
+        let peak = speeds.component_div(&self.speed_max).amax();
         STRIKE_SHARE / peak.max(1e-6)
     }
 }
@@ -260,21 +290,28 @@ fn even_speeds(jacobian: &Jacobian, velocity: &Vector3<f64>, cap: &Joints) -> Jo
     speeds
 }
 
-/// Joint speeds for the tip velocity whose largest load is nearly the least possible (Lawson's
-/// iteration: compliances are divided by the loads they led to, again and again).
-fn least_peak(jacobian: &Jacobian, velocity: &Vector3<f64>, cap: &Joints) -> Joints {
-    let mut compliance = cap.component_mul(cap);
-    let mut speeds = weighted(jacobian, velocity, &compliance);
-    for _ in 0..12 {
+/// Joint speeds for the tip velocity whose largest load is nearly the least possible: Lawson's
+/// iteration divides the compliances by the loads they led to, again and again.
+fn least_peak(
+    jacobian: &Jacobian,
+    velocity: &Vector3<f64>,
+    cap: &Joints,
+    compliance: &mut Joints,
+    rounds: usize,
+) -> Joints {
+    let mut speeds = weighted(jacobian, velocity, compliance);
+    for _ in 0..rounds {
         let load = speeds.component_div(cap);
         let peak = load.amax();
         if peak < 1e-9 {
             break;
         }
         for i in 0..JOINTS {
-            compliance[i] /= (load[i].abs() / peak).max(0.1);
+            // Bounded relative to the others: an idle joint must be able to come back.
+            compliance[i] = (compliance[i] / (load[i].abs() / peak).max(0.1)).min(1e3);
         }
-        speeds = weighted(jacobian, velocity, &compliance);
+        *compliance /= compliance.min();
+        speeds = weighted(jacobian, velocity, compliance);
     }
     speeds
 }
@@ -290,3 +327,6 @@ fn weighted(jacobian: &Jacobian, delta: &Vector3<f64>, compliance: &Joints) -> J
         .try_inverse()
         .map_or_else(Joints::zeros, |inverse| cjt * (inverse * delta))
 }
+
+#[cfg(test)]
+mod tests;

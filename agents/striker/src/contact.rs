@@ -59,21 +59,54 @@ struct Wrench {
 
 /// Moves the puck on by one substep, with the mallet at `mallet` moving with `velocity`.
 pub fn substep(puck: &mut Puck, field: &Field, mallet: Vec2, velocity: Vec2) {
-    let free = Wrench { force: -DAMPING * puck.vel, torque: -SPIN_DAMPING * puck.spin };
-    let mut sum = Wrench { force: free.force, torque: free.torque };
+    let free = Wrench {
+        force: -DAMPING * puck.vel,
+        torque: -SPIN_DAMPING * puck.spin,
+    };
+    let mut sum = Wrench {
+        force: free.force,
+        torque: free.torque,
+    };
     let offset = puck.pos - mallet;
     let distance = offset.norm();
     if distance < field.contact() && distance > 1e-9 {
-        press(puck, field, &MALLET, &free, field.contact() - distance, offset / distance, velocity, &mut sum);
+        press(
+            puck,
+            field,
+            &MALLET,
+            &free,
+            field.contact() - distance,
+            offset / distance,
+            velocity,
+            &mut sum,
+        );
     }
     let side = puck.pos.y.abs() - field.puck_y();
     if side > 0.0 {
-        press(puck, field, &RIM, &free, side, Vec2::new(0.0, -puck.pos.y.signum()), Vec2::zeros(), &mut sum);
+        press(
+            puck,
+            field,
+            &RIM,
+            &free,
+            side,
+            Vec2::new(0.0, -puck.pos.y.signum()),
+            Vec2::zeros(),
+            &mut sum,
+        );
     }
     let end = puck.pos.x.abs() - field.puck_x();
     if end > 0.0 {
         if puck.pos.y.abs() > field.half_goal + POST {
-            press(puck, field, &RIM, &free, end, Vec2::new(-puck.pos.x.signum(), 0.0), Vec2::zeros(), &mut sum);
+            press(
+                puck,
+                field,
+                &RIM,
+                &free,
+                end,
+                Vec2::new(-puck.pos.x.signum(), 0.0),
+                Vec2::zeros(),
+                &mut sum,
+            );
         } else {
             let post = Vec2::new(
                 (field.half_length + POST) * puck.pos.x.signum(),
@@ -83,7 +116,16 @@ pub fn substep(puck: &mut Puck, field: &Field, mallet: Vec2, velocity: Vec2) {
             let distance = offset.norm();
             let depth = field.puck + POST - distance;
             if depth > 0.0 && distance > 1e-9 {
-                press(puck, field, &RIM, &free, depth, offset / distance, Vec2::zeros(), &mut sum);
+                press(
+                    puck,
+                    field,
+                    &RIM,
+                    &free,
+                    depth,
+                    offset / distance,
+                    Vec2::zeros(),
+                    &mut sum,
+                );
             }
         }
     }
@@ -94,7 +136,10 @@ pub fn substep(puck: &mut Puck, field: &Field, mallet: Vec2, velocity: Vec2) {
 
 /// Adds one contact's force. Contacts that overlap are solved one by one, which is close enough for
 /// planning.
-#[expect(clippy::too_many_arguments, reason = "one equation's terms; a struct would be built for this call only")]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "one equation's terms; a struct would be built for this call only"
+)]
 fn press(
     puck: &Puck,
     field: &Field,
@@ -121,10 +166,12 @@ fn press(
     let slip = relative.dot(&tangent) - puck.spin * r;
     let free_normal = free.force.dot(&normal) / MASS;
     let free_tangent = free.force.dot(&tangent) / MASS - free.torque / INERTIA * r;
-    let push = (-law.damping * relative.dot(&normal) + law.stiffness * impedance * depth - free_normal)
+    let push = (-law.damping * relative.dot(&normal) + law.stiffness * impedance * depth
+        - free_normal)
         / (1.0 / MASS + law.other + softness);
     let push = push.max(0.0);
-    let grip = (-law.damping * slip - free_tangent) / (1.0 / MASS + r * r / INERTIA + law.other + softness);
+    let grip = (-law.damping * slip - free_tangent)
+        / (1.0 / MASS + r * r / INERTIA + law.other + softness);
     let grip = grip.clamp(-law.friction * push, law.friction * push);
     sum.force += push * normal + grip * tangent;
     sum.torque -= grip * r;

@@ -234,3 +234,6 @@ impl Estimator {
         self.spin_var += 0.05 + if rim.is_some() || touched { 25.0 } else { 0.0 };
     }
 }
+
+#[cfg(test)]
+mod tests;

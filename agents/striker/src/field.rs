@@ -70,9 +70,10 @@ impl Field {
         -self.half_length + self.mallet + MARGIN
     }
 
-    /// Largest x that a mallet reference may take: the arm is nearly stretched there.
-    pub fn mallet_x_max(&self) -> f64 {
-        -0.2
+    /// Largest distance from the robot's base that a mallet reference may have: the arm is nearly
+    /// stretched there.
+    pub fn reach_max(&self) -> f64 {
+        1.3
     }
 
     /// Largest |y| that a mallet reference may take.
@@ -80,12 +81,18 @@ impl Field {
         self.half_width - self.mallet - MARGIN
     }
 
+    /// Lowest and highest coordinates that a mallet reference may take; the reach bounds it further.
+    pub fn mallet_bounds(&self) -> (Vec2, Vec2) {
+        let y = self.mallet_y_max();
+        (Vec2::new(self.mallet_x_min(), -y), Vec2::new(self.reach_max() - self.base, y))
+    }
+
     /// The nearest point where a mallet reference may be.
     pub fn clamp_mallet(&self, p: Vec2) -> Vec2 {
-        let y = self.mallet_y_max();
-        Vec2::new(
-            p.x.clamp(self.mallet_x_min(), self.mallet_x_max()),
-            p.y.clamp(-y, y),
-        )
+        let (low, high) = self.mallet_bounds();
+        let p = Vec2::new(p.x.clamp(low.x, high.x), p.y.clamp(low.y, high.y));
+        let from_base = self.to_base(p);
+        let reach = from_base.norm();
+        if reach <= self.reach_max() { p } else { self.from_base(from_base * (self.reach_max() / reach)) }
     }
 }

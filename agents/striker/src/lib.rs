@@ -16,6 +16,8 @@ mod opponent;
 pub mod protocol;
 mod puck;
 mod skills;
+#[cfg(test)]
+mod testing;
 
 use arm::Arm;
 use estimator::{Estimator, MalletState, PuckObservation};
@@ -162,15 +164,15 @@ impl Agent {
     fn follow(&mut self, order: &Order) {
         let before = self.mallet;
         let mut next = before.towards(&order.target, self.dt);
-        next.confine(&self.field);
-        let share = self
-            .arm
-            .advance(self.field.to_base(next.pos), next.vel, order.posture);
-        if share < 1.0 {
-            next.pos = before.pos + share * (next.pos - before.pos);
-            next.vel *= share;
+        next.limit(&before, self.dt, order.acceleration);
+        next.confine(&before, self.dt, &self.field);
+        let reached = self.arm.advance(self.field.to_base(next.pos), next.vel, order.posture);
+        // Where limits cut the motion, go on from what is possible.
+        if (reached.velocity - next.vel).norm() > 0.02 {
+            next.vel = reached.velocity;
             next.acc = Vec2::zeros();
         }
+        next.pos = self.field.from_base(reached.position);
         self.mallet = next;
     }
 }

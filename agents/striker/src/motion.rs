@@ -2,6 +2,9 @@
 
 use crate::field::{Field, Vec2};
 
+/// Deceleration in front of the bounds of the mallet's area, m/s².
+const BOUND_BRAKE: f64 = 12.0;
+
 /// State of the mallet reference in the field frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
@@ -112,16 +115,49 @@ impl Motion {
         effort
     }
 
-    /// Keeps the reference where the mallet may be; a component that runs into the bound stops.
-    pub fn confine(&mut self, field: &Field) {
-        let inside = field.clamp_mallet(self.pos);
+    /// Bounds the change of velocity since `before`, `dt` seconds ago: a plan that was changed at the
+    /// last moment may ask for more than the arm can follow.
+    pub fn limit(&mut self, before: &Self, dt: f64, acceleration: f64) {
+        let change = self.vel - before.vel;
+        let most = acceleration * dt;
+        if change.norm() > most {
+            let change = change * (most / change.norm());
+            self.vel = before.vel + change;
+            self.pos = before.pos + 0.5 * dt * (before.vel + self.vel);
+            self.acc = change / dt;
+        }
+    }
+
+    /// Keeps the reference where the mallet may be: it approaches a bound only as fast as it can
+    /// still stop before it.
+    pub fn confine(&mut self, before: &Self, dt: f64, field: &Field) {
+        let (low, high) = field.mallet_bounds();
         for i in 0..2 {
-            if (inside[i] - self.pos[i]).abs() > 1e-12 {
-                self.pos[i] = inside[i];
-                self.vel[i] = 0.0;
+            let room = if self.vel[i] > 0.0 {
+                high[i] - before.pos[i]
+            } else {
+                before.pos[i] - low[i]
+            };
+            let most = (2.0 * BOUND_BRAKE * room.max(0.0)).sqrt();
+            if self.vel[i].abs() > most {
+                self.vel[i] = most * self.vel[i].signum();
+                self.pos[i] = before.pos[i] + dt * self.vel[i];
                 self.acc[i] = 0.0;
             }
+            self.pos[i] = self.pos[i].clamp(low[i], high[i]);
         }
+        // The same along the reach of the arm.
+        let radius = field.to_base(self.pos);
+        let outward = radius / radius.norm();
+        let room = field.reach_max() - field.to_base(before.pos).norm();
+        let most = (2.0 * BOUND_BRAKE * room.max(0.0)).sqrt();
+        let excess = self.vel.dot(&outward) - most;
+        if excess > 0.0 {
+            self.vel -= excess * outward;
+            self.pos = before.pos + dt * self.vel;
+            self.acc = Vec2::zeros();
+        }
+        self.pos = field.clamp_mallet(self.pos);
     }
 }
 

@@ -61,8 +61,31 @@ pub fn assemble(
     let Scored { result, violations } = score(meta, &shards)?;
 
     let partial = archive.with_extension("zip.partial");
-    let file = File::create(&partial)
-        .map_err(PlatformFault::io(format!("creating {}", partial.display())))?;
+    write_dataset(meta, &shards, episodes, &result, &violations, &partial)
+        .and_then(|()| {
+            fs::rename(&partial, archive).map_err(PlatformFault::io(format!(
+                "renaming to {}",
+                archive.display()
+            )))
+        })
+        .inspect_err(|_| {
+            if let Err(error) = fs::remove_file(&partial) {
+                tracing::debug!(%error, "no unfinished dataset to remove");
+            }
+        })?;
+    Ok(result)
+}
+
+fn write_dataset(
+    meta: &EvaluationMeta,
+    shards: &[ShardRecording],
+    episodes: BTreeMap<Task, u32>,
+    result: &EvaluationResult,
+    violations: &ViolationsFile,
+    path: &Path,
+) -> Result<(), PlatformFault> {
+    let file =
+        File::create(path).map_err(PlatformFault::io(format!("creating {}", path.display())))?;
     let mut dataset = Dataset::new(file);
     let paths = |path: fn(&ShardRecording) -> &PathBuf| -> Vec<PathBuf> {
         shards.iter().map(|shard| path(shard).clone()).collect()
@@ -71,9 +94,9 @@ pub fn assemble(
     dataset.add(EPISODES_FILE, |out| {
         join(&paths(|shard| &shard.episodes), out)
     })?;
-    dataset.add_json("violations.json", &violations)?;
-    dataset.add_json("results.json", &result)?;
-    dataset.add(LOG_FILE, |out| write_log(&shards, out))?;
+    dataset.add_json("violations.json", violations)?;
+    dataset.add_json("results.json", result)?;
+    dataset.add(LOG_FILE, |out| write_log(shards, out))?;
     let manifest = DatasetManifest {
         schema: DATASET_SCHEMA.to_owned(),
         ruleset: meta.ruleset.clone(),
@@ -85,12 +108,7 @@ pub fn assemble(
         files: dataset.files.clone(),
     };
     dataset.add_json("manifest.json", &manifest)?;
-    dataset.finish()?;
-    fs::rename(&partial, archive).map_err(PlatformFault::io(format!(
-        "renaming to {}",
-        archive.display()
-    )))?;
-    Ok(result)
+    dataset.finish()
 }
 
 /// All shards belong to this evaluation and together hold each episode of each task once, from 0

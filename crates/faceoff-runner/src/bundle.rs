@@ -9,6 +9,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+mod folder;
 mod links;
 mod tar_archive;
 mod tree;
@@ -162,6 +163,19 @@ pub fn open(path: &Path, scratch: &Path, limits: &BundleLimits) -> Result<Bundle
     } else {
         unpack(path, &scratch.join("bundle"), limits)
     }
+}
+
+/// Copies a developer's own folder into the folder `into`, which is created and must be empty, under
+/// the rules and limits of an archive: what is refused here would be refused by the server.
+///
+/// # Errors
+/// As [`unpack`].
+pub fn copy(folder: &Path, into: &Path, limits: &BundleLimits) -> Result<Bundle, BundleError> {
+    let mut tree = Tree::new(into, limits)?;
+    folder::copy(folder, &mut tree)?;
+    let root = tree.bundle_root(MANIFEST_NAME)?;
+    tree.finish(&root)?;
+    open_dir(&into.join(root))
 }
 
 fn open_dir(path: &Path) -> Result<Bundle, BundleError> {

@@ -135,6 +135,14 @@ impl<'a> Player<'a> {
         Ok(self.log.into_text())
     }
 
+    /// Ends the agent at once and returns the log of all its processes.
+    pub fn abort(mut self) -> String {
+        if let Some(session) = self.session.take() {
+            self.log.add(&session.abort(), None);
+        }
+        self.log.into_text()
+    }
+
     fn start(&mut self) -> Result<Option<Fault>, PlatformFault> {
         match Session::start(self.bundle, self.env, self.task) {
             Ok(session) => {

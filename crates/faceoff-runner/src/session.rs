@@ -173,6 +173,12 @@ impl Session {
         observation: &[f64],
         action: &mut Vec<f64>,
     ) -> Result<Answered, Trouble> {
+        if !observation.iter().all(|value| value.is_finite()) {
+            // JSON would say null, and the agent would be blamed for what it makes of it.
+            return Err(Trouble::Platform(PlatformFault::Recording(format!(
+                "the simulator's observation of step {step} is not finite"
+            ))));
+        }
         let wait = Wait {
             phase: "step",
             limit_s: self.time.step_s,

@@ -41,6 +41,9 @@ pub struct ShardReport {
 pub trait Observer {
     /// An episode is over.
     fn episode_done(&mut self, outcome: &EpisodeOutcome);
+    /// The end of the agent's standard error with its faults, once, however the shard ends: also
+    /// when it was cancelled or the platform failed, and there is no report.
+    fn log(&mut self, _log: &str) {}
     /// Is the shard to stop? Asked before each step, so it must be cheap.
     fn cancelled(&self) -> bool;
 }
@@ -70,30 +73,47 @@ pub fn run_shard(
         spec.seed,
         spec.mismatch_seed,
     );
+    let (outcomes, stopped_by_faults) = match play(spec, &mut player, &mut recorder, observer) {
+        Ok(played) => played,
+        Err(fault) => {
+            observer.log(&player.abort());
+            return Err(fault);
+        }
+    };
+    let log = player.close()?;
+    observer.log(&log);
+    let report = ShardReport {
+        outcomes,
+        log,
+        stopped_by_faults,
+    };
+    recorder.finish()?;
+    folder.commit(spec, &report)?;
+    Ok(report)
+}
+
+/// Plays the episodes; tells also whether faults ended them early.
+fn play(
+    spec: &ShardSpec,
+    player: &mut Player<'_>,
+    recorder: &mut Recorder,
+    observer: &mut dyn Observer,
+) -> Result<(Vec<EpisodeOutcome>, bool), PlatformFault> {
     let mut outcomes = Vec::with_capacity(spec.episodes.len());
     let mut faults = 0;
-    let mut stopped_by_faults = false;
     for episode in spec.episodes.clone() {
         if observer.cancelled() {
             return Err(PlatformFault::Cancelled);
         }
-        let outcome = player.play(episode, faceoff_sim::EPISODE_STEPS, &mut recorder, &|| {
+        let outcome = player.play(episode, faceoff_sim::EPISODE_STEPS, recorder, &|| {
             observer.cancelled()
         })?;
         observer.episode_done(&outcome);
         faults += u32::from(outcome.fault.is_some());
         outcomes.push(outcome);
         if faults > spec.max_faults {
-            stopped_by_faults = true;
-            break;
+            return Ok((outcomes, true));
         }
     }
-    let report = ShardReport {
-        outcomes,
-        log: player.close()?,
-        stopped_by_faults,
-    };
-    recorder.finish()?;
-    folder.commit(spec, &report)?;
-    Ok(report)
+    Ok((outcomes, false))
 }

@@ -144,7 +144,9 @@ impl Client {
     pub async fn cancel(&self, id: EvaluationId, reason: &str) -> anyhow::Result<EvaluationView> {
         let request = self
             .request(Method::POST, &format!("/evaluations/{id}/cancel"))
-            .json(&Cancellation { reason: reason.to_owned() });
+            .json(&Cancellation {
+                reason: reason.to_owned(),
+            });
         read(self.send(request).await?).await
     }
 
@@ -305,3 +307,6 @@ async fn read<T: DeserializeOwned>(response: Response) -> anyhow::Result<T> {
     serde_json::from_slice(&bytes)
         .context("the server's answer is not understood; is it another version of Faceoff?")
 }
+
+#[cfg(test)]
+mod tests;

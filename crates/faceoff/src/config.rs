@@ -113,7 +113,7 @@ pub struct WorkersConfig {
     pub slots: Option<usize>,
     /// Seconds after which the work of a dead worker is given to another.
     pub lease_s: u32,
-    /// CPUs that agents run on; empty = all.
+    /// CPUs of all agents; empty = every slot has its own, where there are two per slot.
     pub agent_cpus: Vec<usize>,
     /// Folder for unpacked bundles and recordings under way; left out, `scratch` in the data folder.
     pub scratch_dir: Option<PathBuf>,

@@ -3,10 +3,15 @@ use serde_json::Value;
 use std::io::Read;
 
 fn recording() -> Value {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/reference/kinematics.json.gz");
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/reference/kinematics.json.gz"
+    );
     let file = std::fs::File::open(path).expect("the recording is part of the repository");
     let mut text = String::new();
-    flate2::read::GzDecoder::new(file).read_to_string(&mut text).expect("gzip");
+    flate2::read::GzDecoder::new(file)
+        .read_to_string(&mut text)
+        .expect("gzip");
     serde_json::from_str(&text).expect("JSON")
 }
 
@@ -18,15 +23,29 @@ fn numbers(value: &Value) -> Vec<f64> {
 }
 
 #[test]
-fn forward_kinematics_and_jacobian_match_the_reference() {
+fn positions_and_jacobian_match_the_reference() {
     let recording = recording();
     let cases = recording["fk"].as_array().expect("cases");
     assert!(cases.len() >= 200);
     for case in cases {
-        let q = Joints::from_column_slice(&numbers(&case["q"]));
-        let pose = forward(&q);
-        println!("{case:?}");
-        let _ = pose;
-        break;
+        let pose = forward(&Joints::from_column_slice(&numbers(&case["q"])));
+        let tip = numbers(&case["pos_ee"]);
+        for i in 0..3 {
+            assert!(
+                (pose.tip[i] - tip[i]).abs() < 1e-6,
+                "end effector {:?}, expected {tip:?}",
+                pose.tip
+            );
+        }
+        assert!((pose.elbow_z - numbers(&case["pos_4"])[2]).abs() < 1e-6);
+        assert!((pose.wrist_z - numbers(&case["pos_7"])[2]).abs() < 1e-6);
+        let jacobian = numbers(&case["jac_ee"]);
+        for row in 0..3 {
+            for joint in 0..JOINTS {
+                assert!(
+                    (pose.jacobian[(row, joint)] - jacobian[row * JOINTS + joint]).abs() < 1e-6
+                );
+            }
+        }
     }
 }

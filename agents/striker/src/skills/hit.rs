@@ -35,6 +35,12 @@ const NUDGE_FROM_X: f64 = -0.68;
 const NUDGE_TO_X: f64 = -0.38;
 /// … this long after the nudge, seconds.
 const NUDGE_TIME: f64 = 2.6;
+/// Largest acceleration of a strike, m/s².
+const STRIKE_ACCELERATION: f64 = 45.0;
+/// The same for a nudge, m/s².
+const NUDGE_ACCELERATION: f64 = 14.0;
+/// The contact is no longer corrected this long before it, seconds.
+const LAST_CORRECTION: f64 = 0.05;
 /// A puck slower than this that cannot be struck will not come into reach by itself, m/s.
 const STILL: f64 = 0.08;
 /// Goal-line points that are tried, metres.
@@ -70,11 +76,38 @@ impl Plan {
     }
 }
 
+/// Where and when the mallet comes to rest after a strike.
+#[derive(Debug, Clone, Copy)]
+struct Stop {
+    pos: Vec2,
+    time: f64,
+}
+
+impl Stop {
+    fn plan(scene: &Scene<'_>) -> Self {
+        let motion = scene.mallet;
+        let speed = motion.vel.norm().max(1e-3);
+        let wish = motion.pos + 0.5 * (0.08 + 0.14 * speed) * motion.vel;
+        let pos = scene.field.clamp_mallet(wish);
+        // A quintic to rest is even if it covers half of speed × time.
+        let time = (2.0 * (pos - motion.pos).norm() / speed).max(0.1);
+        Self {
+            pos,
+            time: scene.time + time,
+        }
+    }
+}
+
 #[derive(Debug, Clone, Copy)]
 enum Phase {
     Seek(Option<Plan>),
     Swing(Plan),
-    Follow { until: f64, rest_until: f64 },
+    /// `through`: until when at full speed; `rest`: how long to wait after stopping.
+    Follow {
+        through: f64,
+        stop: Option<Stop>,
+        rest: f64,
+    },
 }
 
 /// The skill's memory.
@@ -107,16 +140,11 @@ impl Hit {
         match self.phase {
             Phase::Seek(old) => self.seek(scene, old),
             Phase::Swing(plan) => self.swing(scene, plan),
-            Phase::Follow { until, rest_until } => {
-                if scene.time >= rest_until {
-                    self.phase = Phase::Seek(None);
-                }
-                if scene.time < until {
-                    coast(scene)
-                } else {
-                    Order::brake(scene)
-                }
-            }
+            Phase::Follow {
+                through,
+                stop,
+                rest,
+            } => self.follow(scene, through, stop, rest),
         }
     }
 
@@ -140,11 +168,18 @@ impl Hit {
                 return self.rescue.get_or_insert_with(Prepare::new).decide(scene);
             }
             self.rescue = None;
-            let behind = Vec2::new(scene.field.mallet_x_min() + 0.03, scene.puck.pos.y.clamp(-0.12, 0.12));
-            return Order::stop(scene, around(scene, behind, scene.field.contact() + 0.015), Pace::CALM);
+            let behind = Vec2::new(
+                scene.field.mallet_x_min() + 0.03,
+                scene.puck.pos.y.clamp(-0.12, 0.12),
+            );
+            return Order::stop(
+                scene,
+                around(scene, behind, scene.field.contact() + 0.015),
+                Pace::CALM,
+            );
         };
         self.rescue = None;
-       let (start, run_up) = plan.run_up(scene.field);
+        let (start, run_up) = plan.run_up(scene.field);
         let left = plan.contact_time - scene.time;
         if left <= run_up + 0.5 * scene.dt {
             self.phase = Phase::Swing(plan);
@@ -164,43 +199,80 @@ impl Hit {
         let left = plan.contact_time - scene.time;
         if left <= 0.6 * scene.dt {
             // A nudged puck is followed at once, a shot puck is gone.
-            let rest = if plan.nudge { 0.1 } else { 0.5 };
+            let rest = if plan.nudge { 0.0 } else { 0.2 };
             self.nudges += u32::from(plan.nudge);
-            self.phase = Phase::Follow { until: scene.time + 0.03, rest_until: scene.time + rest };
-            return coast(scene);
+            self.phase = Phase::Follow {
+                through: scene.time + 0.03,
+                stop: None,
+                rest,
+            };
+            return self.follow(scene, scene.time + 0.03, None, rest);
         }
-        let plan = again(scene, &plan, left, Some(plan.speed)).unwrap_or(plan);
+        // In the last moments corrections would be jerks, and a touch already shows in the estimate.
+        let plan = if left > LAST_CORRECTION {
+            again(scene, &plan, left, Some(plan.speed)).unwrap_or(plan)
+        } else {
+            plan
+        };
         self.phase = Phase::Swing(plan);
         Order {
-            target: Target { pos: plan.mallet, vel: plan.speed * plan.normal, time: left },
+            target: Target {
+                pos: plan.mallet,
+                vel: plan.speed * plan.normal,
+                time: left,
+            },
             posture: Posture::Strike(plan.side),
+            acceleration: if plan.nudge { NUDGE_ACCELERATION } else { STRIKE_ACCELERATION },
         }
     }
-}
 
-/// Keep the present velocity.
-fn coast(scene: &Scene<'_>) -> Order {
-    let time = 0.1;
-    let target = Target {
-        pos: scene.mallet.pos + time * scene.mallet.vel,
-        vel: scene.mallet.vel,
-        time,
-    };
-    Order {
-        target,
-        posture: Posture::Strike(lean(scene.mallet.pos)),
+    /// Through the contact at full speed, then to a stop on a path that is fixed once, so that the
+    /// deceleration is even.
+    fn follow(&mut self, scene: &Scene<'_>, through: f64, stop: Option<Stop>, rest: f64) -> Order {
+        let posture = Posture::Strike(lean(scene.mallet.pos));
+        if scene.time < through {
+            return Order::coast(scene, scene.mallet.vel, posture);
+        }
+        let stop = stop.unwrap_or_else(|| Stop::plan(scene));
+        let left = stop.time - scene.time;
+        self.phase = if left < -rest {
+            Phase::Seek(None)
+        } else {
+            Phase::Follow {
+                through,
+                stop: Some(stop),
+                rest,
+            }
+        };
+        if left < scene.dt {
+            return Order::stop(scene, scene.mallet.pos, Pace::CALM);
+        }
+        Order::new(
+            Target {
+                pos: stop.pos,
+                vel: Vec2::zeros(),
+                time: left,
+            },
+            Posture::Ready(lean(stop.pos)),
+        )
     }
 }
 
 /// The same plan with the present estimate of the puck, if there is still time to change it.
 fn refresh(scene: &Scene<'_>, plan: &Plan) -> Option<Plan> {
     let left = plan.contact_time - scene.time;
-    (left > scene.dt).then(|| again(scene, plan, left, None)).flatten()
+    (left > scene.dt)
+        .then(|| again(scene, plan, left, None))
+        .flatten()
 }
 
 /// The same plan, `left` seconds before the contact.
 fn again(scene: &Scene<'_>, plan: &Plan, left: f64, speed: Option<f64>) -> Option<Plan> {
-    if plan.nudge { nudge_at(scene, left, plan.side) } else { aim_at(scene, left, plan.aim, plan.side, speed) }
+    if plan.nudge {
+        nudge_at(scene, left, plan.side)
+    } else {
+        aim_at(scene, left, plan.aim, plan.side, speed)
+    }
 }
 
 /// The earliest nudge that can be made.
@@ -221,17 +293,29 @@ fn nudge_at(scene: &Scene<'_>, left: f64, side: Side) -> Option<Plan> {
     let way = Vec2::new(NUDGE_TO_X, 0.8 * puck.pos.y) - puck.pos;
     let direction = way.normalize();
     let wanted = way.norm() * DRAG / (1.0 - (-DRAG * NUDGE_TIME).exp());
-    let speed = (wanted + MALLET_RESTITUTION * puck.vel.dot(&direction)) / (1.0 + MALLET_RESTITUTION);
+    let speed =
+        (wanted + MALLET_RESTITUTION * puck.vel.dot(&direction)) / (1.0 + MALLET_RESTITUTION);
     if speed < 0.1 {
         return None;
     }
     let (normal, _) = strike_towards(&puck, direction, speed, field.contact());
     let mallet = puck.pos - field.contact() * normal;
-    if (mallet - field.clamp_mallet(mallet)).norm() > 1e-9 || room_behind(field, mallet, normal) < 0.02 {
+    if (mallet - field.clamp_mallet(mallet)).norm() > 1e-9
+        || room_behind(field, mallet, normal) < 0.02
+    {
         return None;
     }
     let contact_time = scene.time + left;
-    Some(Plan { contact_time, aim: 0.0, mallet, normal, speed, side, nudge: true, chance: WORTH_A_NUDGE })
+    Some(Plan {
+        contact_time,
+        aim: 0.0,
+        mallet,
+        normal,
+        speed,
+        side,
+        nudge: true,
+        chance: WORTH_A_NUDGE,
+    })
 }
 
 fn best_plan(scene: &Scene<'_>) -> Option<Plan> {
@@ -277,7 +361,12 @@ fn room_behind(field: &Field, contact: Vec2, direction: Vec2) -> f64 {
         }
     };
     let y = field.mallet_y_max();
-    let x = limit(contact.x, direction.x, field.mallet_x_min(), field.mallet_x_max());
+    let x = limit(
+        contact.x,
+        direction.x,
+        field.mallet_x_min(),
+        0.0,
+    );
     x.min(limit(contact.y, direction.y, -y, y)).clamp(0.0, 1.0)
 }
 
@@ -293,7 +382,9 @@ fn aim_at(scene: &Scene<'_>, left: f64, aim: f64, side: Side, speed: Option<f64>
     let guess = puck.pos - field.contact() * direction;
     let speed = speed.unwrap_or_else(|| {
         let room = room_behind(field, guess, direction);
-        let swing = scene.arm.strike_speed(field.to_base(guess), direction, side);
+        let swing = scene
+            .arm
+            .strike_speed(field.to_base(guess), direction, side);
         swing.min((RUN_ACCELERATION * room).sqrt())
     });
     let (normal, struck) = strike_towards(&puck, direction, speed, field.contact());
@@ -328,7 +419,8 @@ fn chance(field: &Field, opponent: Option<&Opponent>, time: f64, struck: &Puck, 
     let tau = FLOW_TIME;
     let integral = 2.0 * tau * flight.powi(3) / 3.0 - (tau * flight).powi(2) + 2.0 * tau.powi(4)
         - 2.0 * tau.powi(3) * (flight + tau) * (-flight / tau).exp();
-    let spread = (FLOW_PER_SPEED * length / flight * integral.max(0.0).sqrt()).hypot(AIM_ERROR * length);
+    let spread =
+        (FLOW_PER_SPEED * length / flight * integral.max(0.0).sqrt()).hypot(AIM_ERROR * length);
     let within = |lo: f64, hi: f64| {
         if hi <= lo {
             0.0

@@ -1,5 +1,6 @@
 //! What to do with the mallet: one module per task, and what they share.
 
+mod absorb;
 mod defend;
 mod hit;
 mod prepare;
@@ -47,38 +48,69 @@ pub struct Order {
     pub target: Target,
     /// Preference for the free degrees of freedom.
     pub posture: Posture,
+    /// Largest acceleration of the reference, m/s².
+    pub acceleration: f64,
 }
 
+/// Largest acceleration of references outside strikes, m/s².
+const ACCELERATION: f64 = 14.0;
+
 impl Order {
+    /// An order with the usual bound on the acceleration.
+    pub fn new(target: Target, posture: Posture) -> Self {
+        Self {
+            target,
+            posture,
+            acceleration: ACCELERATION,
+        }
+    }
+
     /// Go to a point and stop there.
     pub fn stop(scene: &Scene<'_>, pos: Vec2, pace: Pace) -> Self {
         let pos = scene.field.clamp_mallet(pos);
-        Self {
-            target: Target::stop(&scene.mallet, pos, pace),
-            posture: Posture::Ready(lean(pos)),
-        }
+        Self::new(
+            Target::stop(&scene.mallet, pos, pace),
+            Posture::Ready(lean(pos)),
+        )
     }
 
     /// Slow down along the present direction.
     pub fn brake(scene: &Scene<'_>) -> Self {
-        let time: f64 = 0.2;
+        let time = 0.1 + 0.1 * scene.mallet.vel.norm();
         let pos = scene
             .field
             .clamp_mallet(scene.mallet.pos + 0.5 * time * scene.mallet.vel);
-        Self {
-            target: Target {
+        Self::new(
+            Target {
                 pos,
                 vel: Vec2::zeros(),
                 time,
             },
-            posture: Posture::Ready(lean(pos)),
-        }
+            Posture::Ready(lean(pos)),
+        )
+    }
+
+    /// Keep the present velocity.
+    pub fn coast(scene: &Scene<'_>, velocity: Vec2, posture: Posture) -> Self {
+        let time = 0.1;
+        Self::new(
+            Target {
+                pos: scene.mallet.pos + time * velocity,
+                vel: velocity,
+                time,
+            },
+            posture,
+        )
     }
 }
 
 /// The side to lean to for strikes from `pos` towards the middle of the other goal.
 pub fn lean(pos: Vec2) -> Side {
-    if pos.y >= 0.0 { Side::Right } else { Side::Left }
+    if pos.y >= 0.0 {
+        Side::Right
+    } else {
+        Side::Left
+    }
 }
 
 /// A way to `goal` that keeps the mallet's centre `clearance` away from the puck: `goal` itself, or

@@ -13,6 +13,10 @@ use crate::{
 };
 use std::f64::consts::FRAC_PI_2;
 
+/// Rounds of the line search, and the relative change at which it ends.
+const LINE_SEARCH_ROUNDS: usize = 60;
+const LINE_SEARCH_TOLERANCE: f64 = 1e-14;
+
 /// Where a dry friction's force is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Friction {
@@ -124,10 +128,9 @@ impl JointConstraints {
         (diagonal, load)
     }
 
-    /// Corrects the set of constraints at their bounds from the accelerations it led to. With
-    /// `one_only` a single constraint is moved. Returns whether anything changed.
+    /// Sets which constraints are at their bounds from accelerations. Returns whether the set changed.
     #[inline(always)]
-    pub fn correct(&mut self, acceleration: &[f64; DOFS], one_only: bool) -> bool {
+    pub fn classify(&mut self, acceleration: &[f64; DOFS]) -> bool {
         let mut changed = false;
         for i in 0..JOINTS {
             let force = self.friction_stiffness[i] * (self.friction_target[i] - acceleration[i]);
@@ -138,27 +141,79 @@ impl JointConstraints {
             } else {
                 Friction::Inside
             };
-            if state != self.friction[i] {
-                self.friction[i] = state;
-                changed = true;
-                if one_only {
-                    return true;
-                }
-            }
+            changed |= state != self.friction[i];
+            self.friction[i] = state;
         }
         if self.any_stop {
             for stop in self.stops.iter_mut().flatten() {
                 let pressing = stop.target - stop.sign * acceleration[stop.joint] > 0.0;
-                if pressing != stop.pressing {
-                    stop.pressing = pressing;
-                    changed = true;
-                    if one_only {
-                        return true;
-                    }
-                }
+                changed |= pressing != stop.pressing;
+                stop.pressing = pressing;
             }
         }
         changed
+    }
+
+    /// The stiffness of the constraints that are not at a bound at these accelerations.
+    fn active_stiffness(&self, acceleration: &[f64; DOFS]) -> [f64; DOFS] {
+        let mut stiffness = [0.0; DOFS];
+        for i in 0..JOINTS {
+            let force = self.friction_stiffness[i] * (self.friction_target[i] - acceleration[i]);
+            if force.abs() <= self.friction_bound[i] {
+                stiffness[i] = self.friction_stiffness[i];
+            }
+        }
+        for stop in self.stops.iter().flatten() {
+            if stop.target - stop.sign * acceleration[stop.joint] > 0.0 {
+                stiffness[stop.joint] += stop.stiffness;
+            }
+        }
+        stiffness
+    }
+
+    /// How far to go from accelerations `from` along `direction` to the least of the convex function
+    /// whose gradient is `M a − load − torques(a)`: the point where its slope along the direction
+    /// vanishes. `residual` is `M from − load`, `curvature` the direction's own `dᵀ M d`.
+    pub fn line_search(
+        &self,
+        from: &[f64; DOFS],
+        direction: &[f64; DOFS],
+        residual: &[f64; DOFS],
+        curvature: f64,
+    ) -> f64 {
+        let dot = |a: &[f64; DOFS]| -> f64 { (0..DOFS).map(|i| a[i] * direction[i]).sum() };
+        let start = dot(residual);
+        let (mut low, mut high) = (0.0, f64::INFINITY);
+        let mut t = 1.0;
+        // The slope rises and is linear between a few kinks: Newton's method ends on its root
+        // exactly, kept between the bracket's ends.
+        for _ in 0..LINE_SEARCH_ROUNDS {
+            let at: [f64; DOFS] = std::array::from_fn(|i| from[i] + t * direction[i]);
+            let slope = start + t * curvature - dot(&self.torques(&at));
+            if slope > 0.0 {
+                high = t;
+            } else {
+                low = t;
+            }
+            let stiffness = self.active_stiffness(&at);
+            let rise: f64 = curvature
+                + (0..DOFS)
+                    .map(|i| stiffness[i] * direction[i] * direction[i])
+                    .sum::<f64>();
+            let mut next = t - slope / rise;
+            if next <= low || next >= high {
+                next = if high.is_finite() {
+                    0.5 * (low + high)
+                } else {
+                    2.0 * t
+                };
+            }
+            if (next - t).abs() <= LINE_SEARCH_TOLERANCE * t {
+                return next;
+            }
+            t = next;
+        }
+        t
     }
 
     /// The constraints' torques at the solution's accelerations, N m.

@@ -3,34 +3,27 @@
 mod arm;
 mod contacts;
 mod joints;
+mod solver;
+mod substep;
 
 use crate::{
-    dynamics::{
-        arm::{Bodies, Kinematics, controller_torques, damped, mass_matrix, plant_bias},
-        factor::Factor,
-        lanes::Lanes,
-    },
+    dynamics::arm::Kinematics,
     robot::{
-        controller::{filter_velocity, torque},
         interpolation::Interpolation,
-        model::{DOFS, INITIAL_Q, JOINTS, SUBSTEP_S, SUBSTEPS, TOOL},
+        model::{DOFS, INITIAL_Q, JOINTS, SUBSTEPS, TOOL},
         plant::Plant,
     },
     table::{
         contact_finder,
-        contact_law::{MALLET, MALLETS, RIM},
+        contact_law::{MALLET, RIM},
         geometry::{PUCK, TABLE},
         puck::Puck,
     },
 };
 pub use arm::Arm;
-use contacts::{ContactForces, Contacts, MalletMotion, Pair};
+use contacts::{Contacts, MalletMotion, Pair};
+use solver::add;
 use wide::f64x2;
-
-/// Full corrections of the set of joint constraints at their bounds; afterwards one at a time, which
-/// cannot cycle between two wrong sets, up to the second number.
-const FULL_CORRECTIONS: usize = 8;
-const CORRECTIONS: usize = 40;
 
 /// A mallet's striking cylinder: centre x, y, z (m) and velocity vx, vy (m/s), table frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,7 +42,6 @@ pub struct World {
     puck: Puck,
     /// Robot 1's mallet, when it is imposed in place of being moved by an arm.
     imposed: Option<MalletState>,
-    imposed_acceleration: [f64; 2],
     /// Force of the air on the puck, N.
     air_n: [f64; 2],
     /// Index of the next substep within the control step.
@@ -67,7 +59,6 @@ impl World {
             arms: joints.iter().take(2).map(|q| Arm::new(plant, q)).collect(),
             puck: Puck::from_state(puck),
             imposed: None,
-            imposed_acceleration: [0.0; 2],
             air_n: [0.0; 2],
             substep: 0,
         }
@@ -210,13 +201,9 @@ impl World {
     fn advance_puck_alone(&mut self) {
         let mut contacts = Contacts::none();
         self.add_rims(&mut contacts);
-        let forces = if contacts.is_empty() {
-            None
-        } else {
-            let free = self.puck.free_acceleration(self.air_n);
-            Some(contacts.solve(&free, &[[0.0; DOFS]; 2], |_, torque| *torque))
-        };
-        self.advance_puck(forces.map(|forces| forces.puck));
+        let force = (!contacts.is_empty())
+            .then(|| contacts.solve_puck(&self.puck.free_acceleration(self.air_n)));
+        self.advance_puck(force);
     }
 
     fn substep_imposed(&mut self) {
@@ -230,8 +217,7 @@ impl World {
             {
                 let motion = MalletMotion {
                     jacobian: None,
-                    velocity: mallet.velocity,
-                    acceleration: self.imposed_acceleration,
+                    velocity: [mallet.velocity[0], mallet.velocity[1], 0.0],
                 };
                 contacts.add(
                     touch,
@@ -244,13 +230,9 @@ impl World {
                 );
             }
         }
-        let forces = if contacts.is_empty() {
-            None
-        } else {
-            let free = self.puck.free_acceleration(self.air_n);
-            Some(contacts.solve(&free, &[[0.0; DOFS]; 2], |_, torque| *torque))
-        };
-        self.advance_puck(forces.map(|forces| forces.puck));
+        let force = (!contacts.is_empty())
+            .then(|| contacts.solve_puck(&self.puck.free_acceleration(self.air_n)));
+        self.advance_puck(force);
     }
 
     fn add_rims(&self, contacts: &mut Contacts) {
@@ -274,257 +256,6 @@ impl World {
         }
         self.puck.advance(force);
     }
-
-    /// One substep of all arms, `T::COUNT` of them, and the puck.
-    fn substep_lanes<T: Lanes>(&mut self) {
-        let arms = &mut self.arms;
-        let plant = &self.plant;
-        let q: [T; DOFS] = std::array::from_fn(|i| T::from_fn(|a| arms[a].q[i]));
-        let dq: [T; DOFS] = std::array::from_fn(|i| T::from_fn(|a| arms[a].dq[i]));
-        let dq_filtered: [T; JOINTS] =
-            std::array::from_fn(|i| T::from_fn(|a| arms[a].dq_filtered[i]));
-        let ddq: [T; JOINTS] = std::array::from_fn(|i| {
-            T::from_fn(|a| arms[a].trajectory[self.substep].acceleration[i])
-        });
-
-        // One forward pass serves controller and plant.
-        let kinematics = Kinematics::new(&q);
-        let bodies = Bodies::new(&kinematics);
-        let feed_forward =
-            controller_torques(&kinematics, &bodies.controller(), &dq_filtered, &ddq);
-        let bodies = bodies.plant(&plant.mass_scale);
-        let bias = plant_bias(&kinematics, &bodies, &dq);
-        let mass = mass_matrix(&kinematics, &bodies);
-
-        // Torques of the controllers, less bias and damping.
-        let mut load = [[0.0; DOFS]; 2];
-        for (a, arm) in arms.iter_mut().enumerate() {
-            let command = arm.limiter.limit(&arm.trajectory[self.substep]);
-            let feed_forward = std::array::from_fn(|i| feed_forward[i].lane(a));
-            arm.torque = torque(plant, &command, &arm.q, &arm.dq_filtered, &feed_forward);
-            let ee = &kinematics.end_effector;
-            let universal = arm.universal.torque(
-                ee.x.lane(a),
-                ee.y.lane(a),
-                [arm.q[7], arm.q[8]],
-                [arm.dq[7], arm.dq[8]],
-            );
-            for i in 0..JOINTS {
-                load[a][i] = arm.torque[i] - bias[i].lane(a) - plant.damping[i] * arm.dq[i];
-            }
-            for i in 0..2 {
-                load[a][7 + i] = universal[i] - bias[7 + i].lane(a);
-            }
-            arm.constraints.prepare(plant, &arm.q, &arm.dq);
-            arm.ee_before = ee.origin.lane(a);
-        }
-
-        // Friction, stops and contacts.
-        let contacts = find_contacts(&kinematics, &dq, &self.puck);
-        let mut puck_force = None;
-        match contacts {
-            None => {
-                let torques = joint_torques::<T>(arms, &mass, &load);
-                for (load, torques) in load.iter_mut().zip(torques) {
-                    add(load, &torques);
-                }
-            }
-            Some(contacts) => {
-                let free = self.puck.free_acceleration(self.air_n);
-                let (torques, forces) = contact_torques::<T>(arms, &mass, &load, &contacts, &free);
-                for (a, load) in load.iter_mut().enumerate() {
-                    add(load, &torques[a]);
-                    add(load, &forces.arms[a]);
-                }
-                puck_force = Some(forces.puck);
-            }
-        }
-
-        // Semi-implicit Euler, joint damping implicit.
-        let load: [T; DOFS] = std::array::from_fn(|i| T::from_fn(|a| load[a][i]));
-        let acceleration = Factor::new(&damped(&mass, &plant.damping)).solve(&load);
-        for (a, arm) in arms.iter_mut().enumerate() {
-            for i in 0..DOFS {
-                arm.dq[i] += SUBSTEP_S * acceleration[i].lane(a);
-                arm.q[i] += SUBSTEP_S * arm.dq[i];
-            }
-            filter_velocity(&mut arm.dq_filtered, &arm.dq);
-        }
-        self.advance_puck(puck_force);
-    }
-}
-
-/// Contacts of this substep, `None` where nothing touches.
-#[inline(always)]
-fn find_contacts<T: Lanes>(
-    kinematics: &Kinematics<T>,
-    dq: &[T; DOFS],
-    puck: &Puck,
-) -> Option<Contacts> {
-    let centre = kinematics.cylinder_centre();
-    let puck_xy = [puck.pose[0], puck.pose[1]];
-    let positions: [[f64; 3]; 2] = std::array::from_fn(|a| {
-        if a < T::COUNT {
-            table_from_robot(a, centre.lane(a))
-        } else {
-            [0.0; 3]
-        }
-    });
-    let touches: [Option<_>; 2] = std::array::from_fn(|a| {
-        let [x, y, z] = positions[a];
-        if a < T::COUNT && meets_puck(z) {
-            contact_finder::mallet_and_puck([x, y], puck_xy)
-        } else {
-            None
-        }
-    });
-    let between_mallets = if T::COUNT == 2
-        && (positions[0][2] - positions[1][2]).abs() < 2.0 * TOOL.cylinder_half_height_m
-    {
-        contact_finder::mallets(
-            [positions[0][0], positions[0][1]],
-            [positions[1][0], positions[1][1]],
-        )
-    } else {
-        None
-    };
-    let mut contacts = Contacts::none();
-    contact_finder::rims(puck_xy, |touch| {
-        contacts.add(
-            touch,
-            &RIM,
-            Pair::Rim {
-                puck: &puck.velocity,
-            },
-        );
-    });
-    if between_mallets.is_none() && touches == [None, None] {
-        return (!contacts.is_empty()).then_some(contacts);
-    }
-    let jacobian = kinematics.jacobian_at(centre);
-    let mallets: [MalletMotion; 2] = std::array::from_fn(|a| {
-        let lane = a.min(T::COUNT - 1);
-        let side = side(lane);
-        let rows: [[f64; DOFS]; 2] = [
-            std::array::from_fn(|i| side * jacobian[i].x.lane(lane)),
-            std::array::from_fn(|i| side * jacobian[i].y.lane(lane)),
-        ];
-        let velocity = rows.map(|row| (0..DOFS).map(|i| row[i] * dq[i].lane(lane)).sum());
-        MalletMotion {
-            jacobian: Some(rows),
-            velocity,
-            acceleration: [0.0; 2],
-        }
-    });
-    for (robot, touch) in touches.into_iter().enumerate() {
-        if let Some(touch) = touch {
-            let pair = Pair::Mallet {
-                robot,
-                mallet: &mallets[robot],
-                puck: &puck.velocity,
-            };
-            contacts.add(touch, &MALLET, pair);
-        }
-    }
-    if let Some(touch) = between_mallets {
-        contacts.add(
-            touch,
-            &MALLETS,
-            Pair::Mallets {
-                mallets: [&mallets[0], &mallets[1]],
-            },
-        );
-    }
-    Some(contacts)
-}
-
-/// Torques of friction and stops where nothing touches, all arms at once.
-#[inline(always)]
-fn joint_torques<T: Lanes>(
-    arms: &mut [Arm],
-    mass: &[[T; DOFS]; DOFS],
-    load: &[[f64; DOFS]; 2],
-) -> [[f64; DOFS]; 2] {
-    let mut acceleration = [[0.0; DOFS]; 2];
-    for round in 0..CORRECTIONS {
-        let mut matrix = *mass;
-        let mut rhs = [[0.0; DOFS]; 2];
-        let mut diagonal = [[0.0; DOFS]; 2];
-        for (a, arm) in arms.iter().enumerate() {
-            (diagonal[a], rhs[a]) = arm.constraints.assemble();
-            add(&mut rhs[a], &load[a]);
-        }
-        for i in 0..DOFS {
-            matrix[i][i] += T::from_fn(|a| diagonal[a][i]);
-        }
-        let rhs: [T; DOFS] = std::array::from_fn(|i| T::from_fn(|a| rhs[a][i]));
-        let solution = Factor::new(&matrix).solve(&rhs);
-        let mut changed = false;
-        for (a, arm) in arms.iter_mut().enumerate() {
-            acceleration[a] = std::array::from_fn(|i| solution[i].lane(a));
-            changed |= arm
-                .constraints
-                .correct(&acceleration[a], round >= FULL_CORRECTIONS);
-        }
-        if !changed {
-            break;
-        }
-    }
-    let mut torques = [[0.0; DOFS]; 2];
-    for (a, arm) in arms.iter().enumerate() {
-        torques[a] = arm.constraints.torques(&acceleration[a]);
-    }
-    torques
-}
-
-/// Torques of friction and stops together with the contact forces: given the set of joint
-/// constraints at their bounds, the contacts see arms whose inertia includes the other ones.
-#[cold]
-fn contact_torques<T: Lanes>(
-    arms: &mut [Arm],
-    mass: &[[T; DOFS]; DOFS],
-    load: &[[f64; DOFS]; 2],
-    contacts: &Contacts,
-    puck_acceleration: &[f64; 3],
-) -> ([[f64; DOFS]; 2], ContactForces) {
-    let mut acceleration = [[0.0; DOFS]; 2];
-    let mut forces = ContactForces {
-        puck: [0.0; 3],
-        arms: [[0.0; DOFS]; 2],
-    };
-    for round in 0..CORRECTIONS {
-        let factors: [Factor<f64>; 2] = std::array::from_fn(|a| {
-            let lane = a.min(T::COUNT - 1);
-            let mut matrix: [[f64; DOFS]; DOFS] =
-                std::array::from_fn(|i| std::array::from_fn(|j| mass[i][j].lane(lane)));
-            let (diagonal, mut rhs) = arms[lane].constraints.assemble();
-            for i in 0..DOFS {
-                matrix[i][i] += diagonal[i];
-            }
-            add(&mut rhs, &load[lane]);
-            let factor = Factor::new(&matrix);
-            acceleration[a] = factor.solve(&rhs);
-            factor
-        });
-        forces = contacts.solve(puck_acceleration, &acceleration, |arm, torque| {
-            factors[arm].solve(torque)
-        });
-        let mut changed = false;
-        for (a, arm) in arms.iter_mut().enumerate() {
-            add(&mut acceleration[a], &factors[a].solve(&forces.arms[a]));
-            changed |= arm
-                .constraints
-                .correct(&acceleration[a], round >= FULL_CORRECTIONS);
-        }
-        if !changed {
-            break;
-        }
-    }
-    let mut torques = [[0.0; DOFS]; 2];
-    for (a, arm) in arms.iter().enumerate() {
-        torques[a] = arm.constraints.torques(&acceleration[a]);
-    }
-    (torques, forces)
 }
 
 /// A robot's side of the table: its base frame is turned by π for robot 2.
@@ -544,17 +275,20 @@ fn table_from_robot(robot: usize, p: [f64; 3]) -> [f64; 3] {
     ]
 }
 
+/// A point of the table frame in a robot's base frame, m.
+fn robot_from_table(robot: usize, p: [f64; 3]) -> [f64; 3] {
+    let side = side(robot);
+    [
+        side * p[0] + TABLE.base_x_m,
+        side * p[1],
+        p[2] - TABLE.base_z_m,
+    ]
+}
+
 /// Do a mallet's cylinder, centred at height z (m, table frame), and the puck overlap in height?
 #[inline(always)]
 fn meets_puck(z: f64) -> bool {
     z - TOOL.cylinder_half_height_m < PUCK.height_m && z + TOOL.cylinder_half_height_m > 0.0
-}
-
-#[inline(always)]
-fn add(a: &mut [f64; DOFS], b: &[f64; DOFS]) {
-    for i in 0..DOFS {
-        a[i] += b[i];
-    }
 }
 
 fn head(q: &[f64; DOFS]) -> [f64; JOINTS] {

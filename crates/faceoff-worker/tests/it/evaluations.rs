@@ -3,7 +3,7 @@ use faceoff_store::*;
 use faceoff_types::*;
 use jiff::Timestamp;
 
-fn plan(episodes_per_shard: u32) -> EvaluationPlan {
+pub fn plan(episodes_per_shard: u32) -> EvaluationPlan {
     EvaluationPlan {
         profile: Profile::Evaluation,
         tasks: Task::ALL.to_vec(),
@@ -14,7 +14,7 @@ fn plan(episodes_per_shard: u32) -> EvaluationPlan {
 }
 
 /// What must not depend on how the work was shared out: all but the measured times.
-fn without_times(mut outcomes: Vec<EpisodeOutcome>) -> Vec<EpisodeOutcome> {
+pub fn without_times(mut outcomes: Vec<EpisodeOutcome>) -> Vec<EpisodeOutcome> {
     for outcome in &mut outcomes {
         outcome.computation_time = ComputationTime::default();
     }

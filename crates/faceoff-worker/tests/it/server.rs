@@ -6,13 +6,18 @@ use faceoff_store::*;
 use faceoff_types::*;
 use faceoff_worker::WorkerConfig;
 use jiff::Timestamp;
-use std::{collections::BTreeMap, path::Path};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 
 pub struct Server {
     pub store: Store,
-    folder: tempfile::TempDir,
+    folder: PathBuf,
+    /// removes the folder in the end, if it is this server's own
+    _guard: Option<tempfile::TempDir>,
 }
 
 pub struct Worker {
@@ -30,12 +35,25 @@ impl Worker {
 impl Server {
     pub async fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let store = Store::open(&folder.path().join("data")).await.unwrap();
-        Self { store, folder }
+        let server = Self::at(folder.path()).await;
+        Self {
+            _guard: Some(folder),
+            ..server
+        }
+    }
+
+    /// On a folder that is another process's, too.
+    pub async fn at(folder: &Path) -> Self {
+        let store = Store::open(&folder.join("data")).await.unwrap();
+        Self {
+            store,
+            folder: folder.to_owned(),
+            _guard: None,
+        }
     }
 
     pub fn path(&self) -> &Path {
-        self.folder.path()
+        &self.folder
     }
 
     pub fn work(&self, slots: usize) -> Worker {

@@ -63,18 +63,25 @@ impl DemoCommand {
     async fn play(self) -> anyhow::Result<()> {
         // Before anything is removed: another server's port would make the demo talk to that server.
         TcpListener::bind(self.listen).with_context(|| {
-            format!("{} is in use; choose another with LISTEN=127.0.0.1:PORT", self.listen)
+            format!(
+                "{} is in use; choose another with LISTEN=127.0.0.1:PORT",
+                self.listen
+            )
         })?;
         fresh_folder(&self.data_dir)?;
 
         println!("1. starting the server on {}", self.data_dir.display());
         let log = self.data_dir.join("server.log");
         let mut server = Server::start(self.listen, &self.data_dir, &log)?;
-        let organiser = server.ready().await.with_context(|| {
-            format!("the server did not start; its log is {}", log.display())
-        })?;
+        let organiser = server
+            .ready()
+            .await
+            .with_context(|| format!("the server did not start; its log is {}", log.display()))?;
 
-        println!("2. creating {} teams and uploading their agents", self.bundles.len());
+        println!(
+            "2. creating {} teams and uploading their agents",
+            self.bundles.len()
+        );
         let mut teams = Vec::new();
         for bundle in &self.bundles {
             let name = team_name(bundle)?;
@@ -88,7 +95,10 @@ impl DemoCommand {
             println!("   {name}: {verdict}");
         }
 
-        println!("3. evaluating: hit, defend, prepare × {} episodes", self.episodes);
+        println!(
+            "3. evaluating: hit, defend, prepare × {} episodes",
+            self.episodes
+        );
         let day = organiser.start_day(Some(self.episodes)).await?;
         ensure!(
             day.created.len() == teams.len(),
@@ -116,12 +126,19 @@ impl DemoCommand {
         let dataset = self.data_dir.join(format!("{name}-dataset.zip"));
         let bytes = client.download_dataset(own.id, &dataset).await?;
         ensure!(bytes > 0, "the dataset of {name} is empty");
-        println!("5. dataset of {name}: {} ({:.1} MB)", dataset.display(), bytes as f64 / 1e6);
+        println!(
+            "5. dataset of {name}: {} ({:.1} MB)",
+            dataset.display(),
+            bytes as f64 / 1e6
+        );
 
         if self.no_serve {
             return server.stop().await;
         }
-        println!("\nThe same board: http://{}/   (Ctrl-C ends the server)", self.listen);
+        println!(
+            "\nThe same board: http://{}/   (Ctrl-C ends the server)",
+            self.listen
+        );
         tokio::select! {
             stopped = tokio::signal::ctrl_c() => stopped.context("waiting for Ctrl-C")?,
             ended = server.child.wait() => bail!(
@@ -149,7 +166,8 @@ fn fresh_folder(folder: &Path) -> anyhow::Result<()> {
             "{} exists and was not made by a demo; choose another folder with --data-dir",
             folder.display()
         );
-        std::fs::remove_dir_all(folder).with_context(|| format!("removing {}", folder.display()))?;
+        std::fs::remove_dir_all(folder)
+            .with_context(|| format!("removing {}", folder.display()))?;
     }
     std::fs::create_dir_all(folder).with_context(|| format!("making {}", folder.display()))?;
     std::fs::write(folder.join(MARK), "")
@@ -175,8 +193,8 @@ struct Server {
 impl Server {
     fn start(listen: SocketAddr, data_dir: &Path, log: &Path) -> anyhow::Result<Self> {
         let program = std::env::current_exe().context("finding this program")?;
-        let log = std::fs::File::create(log)
-            .with_context(|| format!("making {}", log.display()))?;
+        let log =
+            std::fs::File::create(log).with_context(|| format!("making {}", log.display()))?;
         let mut command = Command::new(program);
         command
             .arg("serve")
@@ -190,7 +208,11 @@ impl Server {
             // A demo that fails half way leaves no server behind.
             .kill_on_drop(true);
         let child = command.spawn().context("starting the server")?;
-        Ok(Self { child, listen, data_dir: data_dir.to_owned() })
+        Ok(Self {
+            child,
+            listen,
+            data_dir: data_dir.to_owned(),
+        })
     }
 
     /// Waits until the server answers; returns the organiser's client.
@@ -223,7 +245,11 @@ impl Server {
             // Gone already is fine: it is reaped below either way.
             let _ = rustix::process::kill_process(id, rustix::process::Signal::TERM);
         }
-        let status = self.child.wait().await.context("waiting for the server to end")?;
+        let status = self
+            .child
+            .wait()
+            .await
+            .context("waiting for the server to end")?;
         ensure!(status.success(), "the server ended with {status}");
         Ok(())
     }
@@ -255,10 +281,9 @@ async fn follow(
     created: &[EvaluationView],
 ) -> anyhow::Result<Vec<EvaluationView>> {
     let bars = MultiProgress::new();
-    let style = ProgressStyle::with_template(
-        "   {prefix:<12} {bar:40} {pos:>5}/{len} episodes  {msg}",
-    )
-    .context("the progress bar's template")?;
+    let style =
+        ProgressStyle::with_template("   {prefix:<12} {bar:40} {pos:>5}/{len} episodes  {msg}")
+            .context("the progress bar's template")?;
     let bars: BTreeMap<EvaluationId, ProgressBar> = created
         .iter()
         .map(|evaluation| {
@@ -277,7 +302,10 @@ async fn follow(
             match &evaluation.status {
                 EvaluationStatus::Finished { .. } => bar.finish_with_message("scored"),
                 status if status.is_final() => {
-                    bail!("the evaluation of {} failed: {status:#?}", evaluation.team_name)
+                    bail!(
+                        "the evaluation of {} failed: {status:#?}",
+                        evaluation.team_name
+                    )
                 }
                 _ => continue,
             }

@@ -13,7 +13,7 @@ use faceoff_worker::WorkerConfig;
 use jiff::Timestamp;
 use std::{
     fs::{self, OpenOptions},
-    io::Write as _,
+    io::{IsTerminal as _, Write as _},
     net::SocketAddr,
     os::unix::fs::{DirBuilderExt, OpenOptionsExt},
     path::{Path, PathBuf},
@@ -83,7 +83,8 @@ fn start_log(format: LogFormat) {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
     let log = tracing_subscriber::fmt()
         .with_env_filter(filter)
-        .with_writer(std::io::stderr);
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal());
     match format {
         LogFormat::Text => log.init(),
         LogFormat::Json => log.json().init(),
@@ -149,7 +150,7 @@ async fn serve(config: Config) -> anyhow::Result<()> {
     ));
     if let Some(at) = config.evaluation.at {
         parts.spawn(faceoff_worker::run_schedule(
-            store,
+            store.clone(),
             plan,
             at,
             shutdown.clone(),
@@ -177,7 +178,10 @@ async fn serve(config: Config) -> anyhow::Result<()> {
     // The second signal is for the impatient; leases make that safe.
     let second = signalled()?;
     tokio::select! {
-        () = rest => {}
+        () = rest => {
+            store.close().await;
+            tracing::info!("ended");
+        }
         name = second => tracing::warn!(signal = name, "ending at once"),
     }
     outcome

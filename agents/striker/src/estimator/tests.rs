@@ -1,0 +1,123 @@
+use super::*;
+use crate::testing::env;
+
+const FAR: MalletState = MalletState {
+    pos: Vec2::new(-0.9, 0.0),
+    vel: Vec2::new(0.0, 0.0),
+};
+
+/// Repeatable noise: standard deviation about one.
+struct Noise(u64);
+
+impl Noise {
+    fn next(&mut self) -> f64 {
+        let mut sum = -6.0;
+        for _ in 0..12 {
+            self.0 = self
+                .0
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            sum += (self.0 >> 11) as f64 / (1_u64 << 53) as f64;
+        }
+        sum
+    }
+}
+
+fn seen(puck: &Puck, noise: &mut Noise) -> PuckObservation {
+    PuckObservation {
+        pose: [
+            puck.pos.x + 1e-3 * noise.next(),
+            puck.pos.y + 1e-3 * noise.next(),
+            0.02 * noise.next(),
+        ],
+        velocity: [
+            puck.vel.x + 0.1 * noise.next(),
+            puck.vel.y + 0.1 * noise.next(),
+            0.1 * noise.next(),
+        ],
+    }
+}
+
+#[test]
+fn velocity_becomes_much_better_than_what_is_seen() {
+    let field = Field::new(&env());
+    let mut noise = Noise(7);
+    let mut filter = Estimator::new(&field, 0.02);
+    let mut puck = Puck {
+        pos: Vec2::new(0.6, 0.1),
+        vel: Vec2::new(-1.0, 0.3),
+        spin: 0.0,
+    };
+    let mut worst: f64 = 0.0;
+    for k in 0..40 {
+        let estimate = filter.observe(&seen(&puck, &mut noise), FAR);
+        if k > 12 {
+            worst = worst.max((estimate.vel - puck.vel).norm());
+            assert!((estimate.pos - puck.pos).norm() < 4e-3);
+        }
+        puck.advance(&field, 0.02);
+    }
+    assert!(worst < 0.12, "velocity off by {worst} m/s");
+}
+
+#[test]
+fn a_lost_puck_moves_on_and_bounces() {
+    let field = Field::new(&env());
+    let mut noise = Noise(3);
+    let mut filter = Estimator::new(&field, 0.02);
+    let mut puck = Puck {
+        pos: Vec2::new(0.3, 0.3),
+        vel: Vec2::new(-1.0, 0.9),
+        spin: 0.0,
+    };
+    for _ in 0..9 {
+        filter.observe(&seen(&puck, &mut noise), FAR);
+        puck.advance(&field, 0.02);
+    }
+    let frozen = PuckObservation {
+        velocity: [0.0; 3],
+        ..seen(&puck, &mut noise)
+    };
+    filter.observe(
+        &PuckObservation {
+            velocity: [puck.vel.x, puck.vel.y, 0.0],
+            ..frozen
+        },
+        FAR,
+    );
+    let mut estimate = puck;
+    for _ in 0..14 {
+        puck.advance(&field, 0.02);
+        estimate = filter.observe(&frozen, FAR);
+    }
+    assert!(puck.vel.y < 0.0, "the case includes a bounce");
+    assert!(
+        (estimate.pos - puck.pos).norm() < 0.05,
+        "{estimate:?}, in truth {puck:?}"
+    );
+}
+
+#[test]
+fn a_struck_puck_is_believed_within_a_few_steps() {
+    let field = Field::new(&env());
+    let mut noise = Noise(11);
+    let mut filter = Estimator::new(&field, 0.02);
+    let mut puck = Puck {
+        pos: Vec2::new(-0.4, 0.0),
+        vel: Vec2::zeros(),
+        spin: 0.0,
+    };
+    for _ in 0..30 {
+        filter.observe(&seen(&puck, &mut noise), FAR);
+    }
+    puck.vel = Vec2::new(2.0, 0.5);
+    let mut estimate = puck;
+    for _ in 0..5 {
+        puck.advance(&field, 0.02);
+        estimate = filter.observe(&seen(&puck, &mut noise), FAR);
+    }
+    assert!(
+        (estimate.vel - puck.vel).norm() < 0.2,
+        "{estimate:?}, in truth {puck:?}"
+    );
+}

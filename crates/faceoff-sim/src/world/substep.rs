@@ -1,0 +1,195 @@
+//! One millisecond of arms and puck.
+
+use super::{
+    World, add,
+    contacts::{Contacts, MalletMotion, Pair},
+    meets_puck, robot_from_table, side,
+    solver::{accelerations_in_contact, joint_accelerations},
+    table_from_robot,
+};
+use crate::{
+    dynamics::{
+        arm::{Bodies, Kinematics, controller_torques, damped, mass_matrix, plant_bias},
+        factor::Factor,
+        lanes::Lanes,
+        spatial::Vec3,
+    },
+    robot::{
+        controller::{filter_velocity, torque},
+        model::{DOFS, JOINTS, SUBSTEP_S, TOOL},
+    },
+    table::{
+        contact_finder::{self, Touch},
+        contact_law::{MALLET, MALLETS, RIM},
+        geometry::PUCK,
+        puck::Puck,
+    },
+};
+
+/// Height of the point where a mallet is touched, m, table frame: the middle of the puck.
+const CONTACT_HEIGHT_M: f64 = PUCK.height_m / 2.0;
+
+impl World {
+    /// One substep of all arms, `T::COUNT` of them, and the puck.
+    pub(super) fn substep_lanes<T: Lanes>(&mut self) {
+        let arms = &mut self.arms;
+        let plant = &self.plant;
+        let q: [T; DOFS] = std::array::from_fn(|i| T::from_fn(|a| arms[a].q[i]));
+        let dq: [T; DOFS] = std::array::from_fn(|i| T::from_fn(|a| arms[a].dq[i]));
+        let dq_filtered: [T; JOINTS] =
+            std::array::from_fn(|i| T::from_fn(|a| arms[a].dq_filtered[i]));
+        let ddq: [T; JOINTS] = std::array::from_fn(|i| {
+            T::from_fn(|a| arms[a].trajectory[self.substep].acceleration[i])
+        });
+
+        // One forward pass serves controller and plant.
+        let kinematics = Kinematics::new(&q);
+        let bodies = Bodies::new(&kinematics);
+        let feed_forward =
+            controller_torques(&kinematics, &bodies.controller(), &dq_filtered, &ddq);
+        let bodies = bodies.plant(&plant.mass_scale);
+        let bias = plant_bias(&kinematics, &bodies, &dq);
+        let mass = mass_matrix(&kinematics, &bodies);
+
+        // Torques of the controllers, less bias and damping.
+        let mut load = [[0.0; DOFS]; 2];
+        for (a, arm) in arms.iter_mut().enumerate() {
+            let command = arm.limiter.limit(&arm.trajectory[self.substep]);
+            let feed_forward = std::array::from_fn(|i| feed_forward[i].lane(a));
+            arm.torque = torque(plant, &command, &arm.q, &arm.dq_filtered, &feed_forward);
+            let ee = &kinematics.end_effector;
+            let universal = arm.universal.torque(
+                ee.x.lane(a),
+                ee.y.lane(a),
+                [arm.q[7], arm.q[8]],
+                [arm.dq[7], arm.dq[8]],
+            );
+            for i in 0..JOINTS {
+                load[a][i] = arm.torque[i] - bias[i].lane(a) - plant.damping[i] * arm.dq[i];
+            }
+            for i in 0..2 {
+                load[a][7 + i] = universal[i] - bias[7 + i].lane(a);
+            }
+            arm.constraints.prepare(plant, &arm.q, &arm.dq);
+            arm.ee_before = ee.origin.lane(a);
+        }
+
+        // Friction, stops and contacts.
+        let contacts = find_contacts(&kinematics, &dq, &self.puck);
+        let free = || self.puck.free_acceleration(self.air_n);
+        let puck_force;
+        let accelerations = match &contacts {
+            Some(contacts) if contacts.move_arms() => {
+                let (accelerations, forces) =
+                    accelerations_in_contact(arms, &mass, &load, contacts, &free());
+                for (load, force) in load.iter_mut().zip(&forces.arms) {
+                    add(load, force);
+                }
+                puck_force = Some(forces.puck);
+                accelerations
+            }
+            contacts => {
+                puck_force = contacts
+                    .as_ref()
+                    .map(|contacts| contacts.solve_puck(&free()));
+                joint_accelerations(arms, &mass, &load)
+            }
+        };
+        for (a, arm) in arms.iter().enumerate() {
+            add(&mut load[a], &arm.constraints.torques(&accelerations[a]));
+        }
+
+        // Semi-implicit Euler, joint damping implicit.
+        let load: [T; DOFS] = std::array::from_fn(|i| T::from_fn(|a| load[a][i]));
+        let acceleration = Factor::new(&damped(&mass, &plant.damping)).solve(&load);
+        for (a, arm) in arms.iter_mut().enumerate() {
+            for i in 0..DOFS {
+                arm.dq[i] += SUBSTEP_S * acceleration[i].lane(a);
+                arm.q[i] += SUBSTEP_S * arm.dq[i];
+            }
+            filter_velocity(&mut arm.dq_filtered, &arm.dq);
+        }
+        self.advance_puck(puck_force);
+    }
+}
+
+/// Contacts of this substep, `None` where nothing touches.
+#[inline(always)]
+fn find_contacts<T: Lanes>(
+    kinematics: &Kinematics<T>,
+    dq: &[T; DOFS],
+    puck: &Puck,
+) -> Option<Contacts> {
+    let centre = kinematics.cylinder_centre();
+    let puck_xy = [puck.pose[0], puck.pose[1]];
+    let positions: [[f64; 3]; 2] = std::array::from_fn(|a| {
+        if a < T::COUNT {
+            table_from_robot(a, centre.lane(a))
+        } else {
+            [0.0; 3]
+        }
+    });
+    let touches: [Option<_>; 2] = std::array::from_fn(|a| {
+        let [x, y, z] = positions[a];
+        if a < T::COUNT && meets_puck(z) {
+            contact_finder::mallet_and_puck([x, y], puck_xy)
+        } else {
+            None
+        }
+    });
+    let between_mallets = if T::COUNT == 2
+        && (positions[0][2] - positions[1][2]).abs() < 2.0 * TOOL.cylinder_half_height_m
+    {
+        contact_finder::mallets(
+            [positions[0][0], positions[0][1]],
+            [positions[1][0], positions[1][1]],
+        )
+    } else {
+        None
+    };
+    let mut contacts = Contacts::none();
+    contact_finder::rims(puck_xy, |touch| {
+        contacts.add(
+            touch,
+            &RIM,
+            Pair::Rim {
+                puck: &puck.velocity,
+            },
+        );
+    });
+    if between_mallets.is_none() && touches == [None, None] {
+        return (!contacts.is_empty()).then_some(contacts);
+    }
+    let mallet = |a: usize, touch: &Touch| {
+        let lane = a.min(T::COUNT - 1);
+        let side = side(lane);
+        // The point of the mallet at the middle of the overlap.
+        let [x, y, z] = robot_from_table(lane, [touch.point[0], touch.point[1], CONTACT_HEIGHT_M]);
+        let jacobian = kinematics.jacobian_at(Vec3::splat([x, y, z]));
+        let rows: [[f64; DOFS]; 3] = [
+            std::array::from_fn(|i| side * jacobian[i].x.lane(lane)),
+            std::array::from_fn(|i| side * jacobian[i].y.lane(lane)),
+            std::array::from_fn(|i| jacobian[i].z.lane(lane)),
+        ];
+        let velocity = rows.map(|row| (0..DOFS).map(|i| row[i] * dq[i].lane(lane)).sum());
+        MalletMotion {
+            jacobian: Some(rows),
+            velocity,
+        }
+    };
+    for (robot, touch) in touches.into_iter().enumerate() {
+        if let Some(touch) = touch {
+            let pair = Pair::Mallet {
+                robot,
+                mallet: &mallet(robot, &touch),
+                puck: &puck.velocity,
+            };
+            contacts.add(touch, &MALLET, pair);
+        }
+    }
+    if let Some(touch) = between_mallets {
+        let mallets = [&mallet(0, &touch), &mallet(1, &touch)];
+        contacts.add(touch, &MALLETS, Pair::Mallets { mallets });
+    }
+    Some(contacts)
+}
