@@ -36,9 +36,10 @@ demo: setup
 	    --bundle agents/hold --bundle $(TARGET_DIR)/bundles/striker --bundle agents/reckless \
 	    $(if $(filter 0,$(SERVE)),--no-serve)
 
-# The programs first: the end-to-end tests run the real binary and the real agents.
+# The programs first: the end-to-end tests run the real binary and the real agents. With --tests the
+# dependencies get the same features as in the run below, and are not built twice.
 test: setup-test
-	$(CARGO) build --locked --workspace --bins
+	$(CARGO) build --locked --workspace --bins --tests
 	if $(CARGO) nextest --version >/dev/null 2>&1; \
 	    then $(CARGO) nextest run --locked --workspace --no-fail-fast; \
 	    else $(CARGO) test --locked --workspace --no-fail-fast -- --test-threads 2; fi
