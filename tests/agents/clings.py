@@ -1,5 +1,6 @@
-"""Tries to outlive its end: `ignores` signals and a closed input, `daemon` leaves a grandchild in a new
+"""Tries to outlive its end, untied from its parent: `ignores` signals and a closed input, `daemon` leaves a grandchild in a new
 session and exits, `daemon-stays` leaves one and goes on, `group` leaves many children."""
+import ctypes
 import os
 import signal
 import sys
@@ -23,6 +24,9 @@ for number in set(signal.Signals) - {signal.SIGKILL, signal.SIGSTOP}:
     except OSError:
         pass
 signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+
+# And from whoever started it (PR_SET_PDEATHSIG).
+ctypes.CDLL(None).prctl(1, 0)
 
 kind = sys.argv[2]
 if kind.startswith("daemon"):

@@ -197,10 +197,13 @@ fn errno_of(error: &seccompiler::Error) -> Errno {
 pub(crate) fn rlimits(limits: &Limits, own_user: bool) -> Vec<(Resource, Rlimit)> {
     const LOCKED_BYTES: u64 = 8 << 20;
     const STACK_BYTES: u64 = 8 << 20;
+    /// Not 0: a host whose core dumps go to a program starts it, as root, even at 0, but not at 1, which no
+    /// dump fits either.
+    const CORE_BYTES: u64 = 1;
     let mut wanted = vec![
         (Resource::Nofile, u64::from(limits.open_files)),
         (Resource::Fsize, limits.file_size_bytes),
-        (Resource::Core, 0),
+        (Resource::Core, CORE_BYTES),
         (Resource::Memlock, LOCKED_BYTES),
         (Resource::Stack, STACK_BYTES),
         (Resource::Nice, 0),

@@ -66,7 +66,7 @@ impl AgentProcess {
                 source,
             )
         })?;
-        check_command(&bundle_dir, &spec.command).map_err(SpawnError::Agent)?;
+        check_command(&bundle_dir, &spec.command, &spec.env).map_err(SpawnError::Agent)?;
         let spec = SpawnSpec {
             bundle_dir,
             ..spec.clone()

@@ -195,47 +195,37 @@ fn rule<const N: usize>(
         .map_err(|error| unavailable(&error))
 }
 
-/// `ENOSYS` for `clone3` and for every number above [`NEWEST_KNOWN`], the x32 ones (bit 30) included.
-/// The other filter has refused foreign architectures already, so this one need not look.
+/// `ENOSYS` for `clone3` and for every number above [`NEWEST_KNOWN`], the x32 ones (bit 30) included. And
+/// success, without doing it, for `prctl(PR_SET_PDEATHSIG)`: the agent is its sandbox's first process and
+/// could otherwise untie itself from the service, but libraries use the call for their own children, which
+/// here end with the agent in any case.
+/// The other filter refuses foreign architectures, so this one need not look.
 fn unknown_calls() -> BpfProgram {
     const LOAD: u16 = (libc::BPF_LD | libc::BPF_W | libc::BPF_ABS) as u16;
     const JUMP_EQUAL: u16 = (libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K) as u16;
     const JUMP_GREATER: u16 = (libc::BPF_JMP | libc::BPF_JGT | libc::BPF_K) as u16;
     const RETURN: u16 = (libc::BPF_RET | libc::BPF_K) as u16;
-    /// Offset of the call's number in `seccomp_data`.
+    /// Offsets in `seccomp_data`: the call's number, and the lower half of its first argument (the
+    /// filter compiler is for little-endian machines only).
     const NUMBER: u32 = 0;
-    let clone3 = libc::SYS_clone3 as u32;
+    const FIRST_ARGUMENT: u32 = 16;
+    let step = |code, k| sock_filter {
+        code,
+        jt: 0,
+        jf: 0,
+        k,
+    };
+    let jump = |code, k, jt, jf| sock_filter { code, jt, jf, k };
     vec![
-        sock_filter {
-            code: LOAD,
-            jt: 0,
-            jf: 0,
-            k: NUMBER,
-        },
-        sock_filter {
-            code: JUMP_GREATER,
-            jt: 2,
-            jf: 0,
-            k: NEWEST_KNOWN,
-        },
-        sock_filter {
-            code: JUMP_EQUAL,
-            jt: 1,
-            jf: 0,
-            k: clone3,
-        },
-        sock_filter {
-            code: RETURN,
-            jt: 0,
-            jf: 0,
-            k: libc::SECCOMP_RET_ALLOW,
-        },
-        sock_filter {
-            code: RETURN,
-            jt: 0,
-            jf: 0,
-            k: libc::SECCOMP_RET_ERRNO | libc::ENOSYS as u32,
-        },
+        step(LOAD, NUMBER),
+        jump(JUMP_GREATER, NEWEST_KNOWN, 5, 0),
+        jump(JUMP_EQUAL, libc::SYS_clone3 as u32, 4, 0),
+        jump(JUMP_EQUAL, libc::SYS_prctl as u32, 0, 2),
+        step(LOAD, FIRST_ARGUMENT),
+        jump(JUMP_EQUAL, libc::PR_SET_PDEATHSIG as u32, 2, 0),
+        step(RETURN, libc::SECCOMP_RET_ALLOW),
+        step(RETURN, libc::SECCOMP_RET_ERRNO | libc::ENOSYS as u32),
+        step(RETURN, libc::SECCOMP_RET_ERRNO),
     ]
 }
 

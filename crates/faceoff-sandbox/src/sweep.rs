@@ -20,7 +20,7 @@ pub fn sweep_stale() -> usize {
         let owner = name
             .to_str()
             .and_then(|name| Owner::of_name(name, SCRATCH_PREFIX));
-        if owner.is_some_and(|owner| !owner.lives()) && fs::remove_dir_all(entry.path()).is_ok() {
+        if owner.is_some_and(Owner::is_dead) && fs::remove_dir_all(entry.path()).is_ok() {
             tracing::info!(folder = %entry.path().display(), "removed the scratch folder of a dead service's agent");
             removed += 1;
         }

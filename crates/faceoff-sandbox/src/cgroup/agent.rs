@@ -351,7 +351,7 @@ fn kill_all(leaf: &Path) {
     }
 }
 
-/// `agent-<pid>-<start time>-<number>`: whose it is can be told after that service has died.
+/// `agent-<pid>-<start time>-<namespace>-<number>`: whose it is can be told after that service has died.
 fn leaf_name() -> String {
     let number = NEXT.fetch_add(1, Ordering::Relaxed);
     format!("{}{number}", Owner::this_process().name(LEAF_PREFIX))

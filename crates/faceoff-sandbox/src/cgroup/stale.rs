@@ -24,7 +24,7 @@ pub(crate) fn sweep() -> usize {
             let owner = name
                 .to_str()
                 .and_then(|name| Owner::of_name(name, LEAF_PREFIX));
-            if owner.is_some_and(|owner| !owner.lives()) {
+            if owner.is_some_and(Owner::is_dead) {
                 tracing::info!(cgroup = %entry.path().display(), "removing the cgroup of a dead service's agent");
                 remove_leaf(&entry.path());
                 removed += 1;

@@ -146,6 +146,40 @@ fn a_command_that_cannot_be_executed_is_the_teams_doing() {
 }
 
 #[test]
+fn what_cannot_be_passed_to_a_program_is_the_teams_doing() {
+    for (name, value) in [
+        ("A\0B", "x"),
+        ("A", "x\0y"),
+        ("", "x"),
+        ("A=B", "x"),
+        ("A", &"x".repeat(1 << 20)),
+    ] {
+        let mut subject = Subject::new("echo", &[]);
+        subject.spec.env.insert(name.to_owned(), value.to_owned());
+        let outcome = AgentProcess::spawn(&subject.spec);
+        assert!(
+            matches!(
+                &outcome,
+                Err(SpawnError::Agent(AgentFaultKind::CannotStart { .. }))
+            ),
+            "{name:?}: {outcome:?}"
+        );
+    }
+    let mut subject = Subject::new("echo", &[]);
+    subject.spec.env.insert(
+        "LD_PRELOAD".to_owned(),
+        "/agent/no-such-library.so".to_owned(),
+    );
+    let mut agent = subject.spawn();
+    crate::harness::expect_echo(&mut agent, "hello");
+    let log = subject.finish(agent).stderr_tail;
+    assert!(
+        log.contains("no-such-library.so") && !log.contains("bwrap"),
+        "{log}"
+    );
+}
+
+#[test]
 fn a_sandbox_that_cannot_be_set_up_is_ours() {
     let mut subject = Subject::new("echo", &[]);
     subject.spec.bundle_dir = subject.bundle.path().join("nowhere");

@@ -19,6 +19,8 @@ fn dangerous_system_calls_are_refused() {
             "{unknown}"
         );
     }
+    // Success without effect: it stays tied to the service.
+    assert_eq!(answers.remove("parent_death_signal").as_deref(), Some("9"));
     assert!(answers.len() > 40);
     for (call, answer) in answers {
         assert_eq!(answer, "EPERM", "{call}");
@@ -34,6 +36,7 @@ fn it_is_the_filter_that_refuses_them() {
     };
     given_up.push(Layer::Seccomp);
     let answers = answers(&subject);
+    assert_eq!(answers["parent_death_signal"], "0");
     for call in [
         "ptrace",
         "process_vm_readv",
