@@ -348,10 +348,10 @@ fn timeless_columns(dir: &Path, table: &str) -> Vec<(String, arrow_array::ArrayR
 fn one_worker_and_three_record_the_same() {
     let dir = tempfile::tempdir().unwrap();
     let agent = moving();
-    let play = |name: &str, shards: &[std::ops::Range<u32>], workers: usize| {
+    let play = |name: &str, shards: &[(u32, u32)], workers: usize| {
         let dirs: Vec<PathBuf> = shards
             .iter()
-            .map(|r| dir.path().join(format!("{name}-{}", r.start)))
+            .map(|(start, _)| dir.path().join(format!("{name}-{start}")))
             .collect();
         let next = std::sync::atomic::AtomicUsize::new(0);
         std::thread::scope(|scope| {
@@ -359,9 +359,11 @@ fn one_worker_and_three_record_the_same() {
                 scope.spawn(|| {
                     loop {
                         let at = next.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-                        let Some(range) = shards.get(at) else { break };
+                        let Some((start, end)) = shards.get(at) else {
+                            break;
+                        };
                         run(
-                            &spec(Task::Defend, range.clone()),
+                            &spec(Task::Defend, *start..*end),
                             &agent,
                             &sandboxed(),
                             &dirs[at],
@@ -389,8 +391,8 @@ fn one_worker_and_three_record_the_same() {
         task.violations.computation_time = 0;
         (out, task.clone())
     };
-    let (one, result_one) = play("one", &[0..6], 1);
-    let (three, result_three) = play("three", &[0..1, 1..4, 4..5, 5..6], 3);
+    let (one, result_one) = play("one", &[(0, 6)], 1);
+    let (three, result_three) = play("three", &[(0, 1), (1, 4), (4, 5), (5, 6)], 3);
     assert_eq!(result_one.successes, result_three.successes);
     assert_eq!(result_one.violations, result_three.violations);
     assert_eq!(result_one.steps, result_three.steps);
