@@ -5,11 +5,12 @@ use faceoff_sandbox::{
 };
 use faceoff_types::AgentFaultKind;
 use std::{
+    cell::RefCell,
     collections::BTreeMap,
     fs,
     os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
-    sync::OnceLock,
+    sync::{Mutex, MutexGuard, OnceLock, PoisonError},
     time::{Duration, Instant},
 };
 
@@ -17,17 +18,53 @@ use std::{
 pub const PATIENCE: Duration = Duration::from_secs(60);
 pub const LINE_CAP: usize = 64 << 10;
 
+/// One test at a time per process, for what is left is told by the process that made it. Under nextest,
+/// where each test is a process, it changes nothing.
+pub struct Turn(());
+
+static TURN: Mutex<()> = Mutex::new(());
+thread_local! {
+    /// How often this thread holds the turn, and the turn: a test may have several subjects.
+    static HELD: RefCell<(usize, Option<MutexGuard<'static, ()>>)> = const { RefCell::new((0, None)) };
+}
+
+impl Turn {
+    pub fn take() -> Self {
+        HELD.with_borrow_mut(|(count, guard)| {
+            if *count == 0 {
+                // A test that failed has poisoned it; the others go on.
+                *guard = Some(TURN.lock().unwrap_or_else(PoisonError::into_inner));
+            }
+            *count += 1;
+        });
+        Self(())
+    }
+}
+
+impl Drop for Turn {
+    fn drop(&mut self) {
+        HELD.with_borrow_mut(|(count, guard)| {
+            *count -= 1;
+            if *count == 0 {
+                *guard = None;
+            }
+        });
+    }
+}
+
 /// An agent under test, with a bundle of its own and a mark by which its processes are known.
 pub struct Subject {
     pub bundle: tempfile::TempDir,
     pub spec: SpawnSpec,
     pub mark: String,
+    _turn: Turn,
 }
 
 impl Subject {
     /// The program `tests/agents/NAME.py` with `arguments` in a bundle of its own, in the full sandbox
     /// that this host offers.
     pub fn new(name: &str, arguments: &[&str]) -> Self {
+        let turn = Turn::take();
         let bundle = tempfile::Builder::new()
             .prefix("bundle-")
             .tempdir()
@@ -57,7 +94,12 @@ impl Subject {
             },
             cpus: Vec::new(),
         };
-        Self { bundle, spec, mark }
+        Self {
+            bundle,
+            spec,
+            mark,
+            _turn: turn,
+        }
     }
 
     pub fn limits(mut self, change: impl FnOnce(&mut Limits)) -> Self {

@@ -2,7 +2,7 @@
 //! process, mount, cgroup or file may be left.
 //!
 //! As root every layer must be there, or the tests fail. As an ordinary user the cgroup layers may be
-//! missing; what then cannot be shown is printed. Run by `cargo nextest`, one process per test.
+//! missing; what then cannot be shown is printed.
 #![expect(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 #![expect(
     clippy::print_stdout,

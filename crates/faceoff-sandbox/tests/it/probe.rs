@@ -1,8 +1,9 @@
-use crate::harness::missing_layers;
+use crate::harness::{Turn, missing_layers};
 use faceoff_sandbox::{Layer, probe_host};
 
 #[test]
 fn the_probe_covers_every_layer_and_names_a_cure_for_what_is_missing() {
+    let _turn = Turn::take();
     let features = probe_host();
     let layers: Vec<_> = features.iter().map(|feature| feature.layer).collect();
     assert_eq!(layers, Layer::ALL);
