@@ -80,7 +80,10 @@ impl Absorb {
                 return Some(Order::brake(scene));
             }
         }
-        if let Some(m) = self.meeting.filter(|m| m.time - scene.time < LAST_CORRECTION) {
+        if let Some(m) = self
+            .meeting
+            .filter(|m| m.time - scene.time < LAST_CORRECTION)
+        {
             return Some(go(scene, &m));
         }
         if scene.puck.vel.norm() < FAST {
@@ -152,10 +155,10 @@ fn best_meeting(scene: &Scene<'_>) -> Option<(Meeting, f64)> {
     let mut best: Option<(Meeting, f64)> = None;
     let mut left = 2.0 * scene.dt;
     while left < FAST_HORIZON {
-        if let Some((m, cost)) = priced(scene, left) {
-            if best.is_none_or(|(_, c)| cost < c) {
-                best = Some((m, cost));
-            }
+        if let Some((m, cost)) = priced(scene, left)
+            && best.is_none_or(|(_, c)| cost < c)
+        {
+            best = Some((m, cost));
         }
         left += scene.dt;
     }
