@@ -13,7 +13,7 @@ use crate::puck::{DRAG, MALLET_RESTITUTION, Puck};
 /// Pucks are best met with their centre between these.
 const MEET_X: (f64, f64) = (-0.68, -0.4);
 /// Where a puck shall come to rest that had to be met close to the goal.
-const REST_X: f64 = -0.58;
+const REST_X: f64 = -0.5;
 /// Latest contact that is considered for a fast puck, seconds from now.
 const FAST_HORIZON: f64 = 1.6;
 /// The same for a slow one.
@@ -161,7 +161,7 @@ fn cushion(scene: &Scene<'_>) -> Option<Vec2> {
 /// The speed of the mallet along the puck's motion at contact: (1 + e) w = e v stops the puck, a
 /// slower mallet sends one that came far back a little forward again.
 fn retreat(speed: f64, along: Vec2, puck: Vec2) -> f64 {
-    let back = if along.x < -0.5 { (DRAG * (REST_X - puck.x)).clamp(0.0, 0.2) } else { 0.0 };
+    let back = if along.x < -0.5 { (DRAG * (REST_X - puck.x)).clamp(0.0, 0.25) } else { 0.0 };
     (MALLET_RESTITUTION * speed - back) / (1.0 + MALLET_RESTITUTION)
 }
 
