@@ -73,7 +73,7 @@ impl Field {
     /// Largest distance from the robot's base that a mallet reference may have: the arm is nearly
     /// stretched there.
     pub fn reach_max(&self) -> f64 {
-        1.3
+        1.36
     }
 
     /// Largest |y| that a mallet reference may take.
