@@ -1,23 +1,36 @@
-//! Scoring. (contract stub)
-#![expect(missing_docs, clippy::unimplemented, unused_variables, reason = "contract stub")]
-use faceoff_types::*;
-use std::collections::BTreeMap;
+//! Scoring: outcomes → penalty points → tiers → boards → standings, with intervals and paired tests.
+//!
+//! Everything here is a pure function of what it is given, so that a stored recording can be scored
+//! again without simulating, and anyone can check a published number. The rules are those of the
+//! ruleset [`faceoff_types::RULESET`]; `docs/rules.md` explains them.
+//!
+//! This crate reads no file, no clock and no random numbers, and it knows neither the simulator nor
+//! the database.
 
-/// Penalty points of one episode.
-pub fn episode_penalty(outcome: &EpisodeOutcome) -> f64 { unimplemented!() }
-/// Scores a task. `step_times_s`: computation times of all steps, any order (for mean, p99, max).
-pub fn score_task(outcomes: &[EpisodeOutcome], step_times_s: &mut [f64]) -> TaskResult { unimplemented!() }
-/// Overall score, DS, tier.
-pub fn score_evaluation(profile: Profile, seed: Seed, tasks: BTreeMap<Task, TaskResult>) -> EvaluationResult { unimplemented!() }
-/// Wilson 95 %.
-pub fn wilson95(successes: u32, episodes: u32) -> [f64; 2] { unimplemented!() }
+mod binomial;
+mod board;
+mod episode;
+mod evaluation;
+mod interval;
+mod paired;
+mod qualifying;
+mod rank_groups;
+mod task;
+mod tier;
+pub mod tournament;
+mod unique_map;
 
-/// One candidate row of a board.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BoardEntry<K> { pub key: K, pub result: EvaluationResult, /** earlier submissions first on a full tie */ pub submitted_at_ms: i64 }
-/// Sorts the overall board: tiers in order, then score desc, DS asc, earlier submission. Rank counts from 1 over the whole board.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RankedEntry<K> { pub rank: u32, pub tier: Tier, pub entry: BoardEntry<K> }
-pub fn overall_board<K>(entries: Vec<BoardEntry<K>>) -> Vec<RankedEntry<K>> { unimplemented!() }
-/// Same by one task's success rate, DS and tier; teams without the task are left out.
-pub fn task_board<K>(task: Task, entries: Vec<BoardEntry<K>>) -> Vec<RankedEntry<K>> { unimplemented!() }
+pub use board::{BoardEntry, RankedEntry, overall_board, task_board};
+pub use episode::{
+    COMPUTATION_TIME_MAX_POINTS, EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS,
+    MAX_EPISODE_PENALTY, computation_time_penalty, episode_penalty,
+};
+pub use evaluation::{overall_score, score_evaluation, task_weight_percent};
+pub use interval::{wilson95, wilson95_of_rate};
+pub use paired::{PairedTally, PairingError, SIGNIFICANCE, overall_p_value};
+pub use qualifying::{
+    InvalidTaskScore, QUALIFYING_EPISODES, QualifyingRow, QualifyingSheet, TaskRow, TaskScore,
+};
+pub use rank_groups::rank_groups;
+pub use task::score_task;
+pub use tier::{DEPLOYABLE_POINTS_PER_EPISODE, IMPROVABLE_POINTS_PER_EPISODE, tier_of};

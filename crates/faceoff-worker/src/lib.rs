@@ -1,16 +1,27 @@
-//! Worker. (contract stub)
-#![expect(missing_docs, clippy::unimplemented, unused_variables, reason = "contract stub")]
-use faceoff_runner::{AgentEnvironment, bundle::BundleLimits};
-use faceoff_store::{EvaluationPlan, Store};
-use std::path::PathBuf;
-use tokio_util::sync::CancellationToken;
+//! The part of the server that works: slots lease units from the store, run agents through
+//! `faceoff-runner`, and commit what came of it; and the daily schedule.
+//!
+//! A slot is a named operating-system thread: physics and the agent's pipes block, and must not share
+//! a thread with the service's async tasks. A unit is leased for seconds and renewed while it runs,
+//! so that the work of a slot that died is done by another. A fault of ours gives the unit back; only
+//! the runner's verdicts on the agent are stored as the agent's.
+//!
+//! This crate decides nothing about physics, protocol or scores, and holds no state that a kill would
+//! lose: everything is in the store.
 
-#[derive(Debug, Clone)]
-pub struct WorkerConfig {
-    pub slots: usize, pub lease_s: u32, pub scratch_dir: PathBuf,
-    pub agent: AgentEnvironment, pub bundle_limits: BundleLimits,
-}
-/// Runs `slots` named OS threads until cancelled; returns after every slot has given its unit back or finished it.
-pub async fn run(store: Store, config: WorkerConfig, shutdown: CancellationToken) -> anyhow::Result<()> { unimplemented!() }
-/// The daily schedule: calls store.start_day each UTC day at `at`.
-pub async fn run_schedule(store: Store, plan: EvaluationPlan, at: jiff::civil::Time, shutdown: CancellationToken) -> anyhow::Result<()> { unimplemented!() }
+mod bundle_cache;
+mod clock;
+mod cpus;
+mod evaluator;
+mod lease;
+mod schedule;
+mod scratch;
+mod service;
+mod slot;
+#[cfg(test)]
+mod tests;
+mod units;
+
+pub use cpus::{CpuLayout, SlotCpus};
+pub use schedule::run_schedule;
+pub use service::{WorkerConfig, run};

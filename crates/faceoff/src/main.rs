@@ -1,2 +1,50 @@
-//! The `faceoff` binary: parses the command line and wires the crates together.
-fn main() {}
+//! The `faceoff` binary: parses the command line and hands over to one file per subcommand.
+
+mod client;
+mod commands;
+mod config;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Competition server for robot-learning agents.
+#[derive(Debug, Parser)]
+#[command(name = "faceoff", version, propagate_version = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run the competition server: API, board and worker slots.
+    Serve(commands::serve::ServeCommand),
+    /// Play a whole competition day with the reference agents.
+    Demo(commands::demo::DemoCommand),
+    /// Evaluate a bundle locally with the server's evaluator.
+    Eval(commands::eval::EvalCommand),
+    /// Score results by hand: a qualifying board or a tournament.
+    Score(commands::score::ScoreCommand),
+    /// Simulate open loop, or measure the simulator.
+    Sim(commands::sim::SimCommand),
+    /// Upload a bundle and follow its validation.
+    Submit(commands::submit::SubmitCommand),
+    /// Organise a running competition.
+    Admin(commands::admin::AdminCommand),
+    /// Check what this host offers and what is missing.
+    Doctor(commands::doctor::DoctorCommand),
+}
+
+fn main() -> ExitCode {
+    let outcome = match Cli::parse().command {
+        Command::Serve(command) => command.run(),
+        Command::Demo(command) => command.run(),
+        Command::Eval(command) => command.run(),
+        Command::Score(command) => command.run(),
+        Command::Sim(command) => command.run(),
+        Command::Submit(command) => command.run(),
+        Command::Admin(command) => command.run(),
+        Command::Doctor(command) => command.run(),
+    };
+    commands::exit_code(outcome)
+}

@@ -24,6 +24,8 @@ pub struct Touch {
     pub normal: [f64; 2],
     /// Depth of the overlap, m, positive.
     pub depth_m: f64,
+    /// Middle of the overlap, m, table frame.
+    pub point: [f64; 2],
 }
 
 /// The table's rims never move: two long ones and the four parts beside the goals.
@@ -86,9 +88,13 @@ fn touch(first: (&Collider, Pose), second: (&Collider, Pose)) -> Option<Touch> {
     let contact =
         query::contact(&first.1, first.0.shape(), &second.1, second.0.shape(), skin).ok()??;
     let depth_m = skin - contact.dist;
+    // The skins thicken both sides of the gap.
+    let middle = (contact.point1 + contact.point2) * 0.5
+        + contact.normal1 * (0.5 * (first.0.contact_skin() - second.0.contact_skin()));
     (depth_m > 0.0).then_some(Touch {
         normal: [contact.normal1.x, contact.normal1.y],
         depth_m,
+        point: [middle.x, middle.y],
     })
 }
 

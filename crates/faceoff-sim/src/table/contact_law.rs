@@ -25,7 +25,7 @@ const WIDTH_M: f64 = 0.001;
 const PUCK_INVERSE_INERTIA: f64 = 200.0 / 3.0;
 
 /// That of a mallet at the end of its arm, 1/kg.
-const MALLET_INVERSE_INERTIA: f64 = 1.07;
+pub const MALLET_INVERSE_INERTIA: f64 = 1.07;
 
 /// Puck and rims: hard, and so rough that the puck never slips.
 pub const RIM: Material = Material {

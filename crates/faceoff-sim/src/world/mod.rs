@@ -42,7 +42,6 @@ pub struct World {
     puck: Puck,
     /// Robot 1's mallet, when it is imposed in place of being moved by an arm.
     imposed: Option<MalletState>,
-    imposed_acceleration: [f64; 2],
     /// Force of the air on the puck, N.
     air_n: [f64; 2],
     /// Index of the next substep within the control step.
@@ -60,7 +59,6 @@ impl World {
             arms: joints.iter().take(2).map(|q| Arm::new(plant, q)).collect(),
             puck: Puck::from_state(puck),
             imposed: None,
-            imposed_acceleration: [0.0; 2],
             air_n: [0.0; 2],
             substep: 0,
         }
@@ -219,8 +217,7 @@ impl World {
             {
                 let motion = MalletMotion {
                     jacobian: None,
-                    velocity: mallet.velocity,
-                    acceleration: self.imposed_acceleration,
+                    velocity: [mallet.velocity[0], mallet.velocity[1], 0.0],
                 };
                 contacts.add(
                     touch,
@@ -275,6 +272,16 @@ fn table_from_robot(robot: usize, p: [f64; 3]) -> [f64; 3] {
         side * (p[0] - TABLE.base_x_m),
         side * p[1],
         p[2] + TABLE.base_z_m,
+    ]
+}
+
+/// A point of the table frame in a robot's base frame, m.
+fn robot_from_table(robot: usize, p: [f64; 3]) -> [f64; 3] {
+    let side = side(robot);
+    [
+        side * p[0] + TABLE.base_x_m,
+        side * p[1],
+        p[2] - TABLE.base_z_m,
     ]
 }
 

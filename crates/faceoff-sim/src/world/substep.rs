@@ -3,7 +3,7 @@
 use super::{
     World, add,
     contacts::{Contacts, MalletMotion, Pair},
-    meets_puck, side,
+    meets_puck, robot_from_table, side,
     solver::{accelerations_in_contact, joint_accelerations},
     table_from_robot,
 };
@@ -12,17 +12,22 @@ use crate::{
         arm::{Bodies, Kinematics, controller_torques, damped, mass_matrix, plant_bias},
         factor::Factor,
         lanes::Lanes,
+        spatial::Vec3,
     },
     robot::{
         controller::{filter_velocity, torque},
         model::{DOFS, JOINTS, SUBSTEP_S, TOOL},
     },
     table::{
-        contact_finder,
+        contact_finder::{self, Touch},
         contact_law::{MALLET, MALLETS, RIM},
+        geometry::PUCK,
         puck::Puck,
     },
 };
+
+/// Height of the point where a mallet is touched, m, table frame: the middle of the puck.
+const CONTACT_HEIGHT_M: f64 = PUCK.height_m / 2.0;
 
 impl World {
     /// One substep of all arms, `T::COUNT` of them, and the puck.
@@ -155,39 +160,36 @@ fn find_contacts<T: Lanes>(
     if between_mallets.is_none() && touches == [None, None] {
         return (!contacts.is_empty()).then_some(contacts);
     }
-    let jacobian = kinematics.jacobian_at(centre);
-    let mallets: [MalletMotion; 2] = std::array::from_fn(|a| {
+    let mallet = |a: usize, touch: &Touch| {
         let lane = a.min(T::COUNT - 1);
         let side = side(lane);
-        let rows: [[f64; DOFS]; 2] = [
+        // The point of the mallet at the middle of the overlap.
+        let [x, y, z] = robot_from_table(lane, [touch.point[0], touch.point[1], CONTACT_HEIGHT_M]);
+        let jacobian = kinematics.jacobian_at(Vec3::splat([x, y, z]));
+        let rows: [[f64; DOFS]; 3] = [
             std::array::from_fn(|i| side * jacobian[i].x.lane(lane)),
             std::array::from_fn(|i| side * jacobian[i].y.lane(lane)),
+            std::array::from_fn(|i| jacobian[i].z.lane(lane)),
         ];
         let velocity = rows.map(|row| (0..DOFS).map(|i| row[i] * dq[i].lane(lane)).sum());
         MalletMotion {
             jacobian: Some(rows),
             velocity,
-            acceleration: [0.0; 2],
         }
-    });
+    };
     for (robot, touch) in touches.into_iter().enumerate() {
         if let Some(touch) = touch {
             let pair = Pair::Mallet {
                 robot,
-                mallet: &mallets[robot],
+                mallet: &mallet(robot, &touch),
                 puck: &puck.velocity,
             };
             contacts.add(touch, &MALLET, pair);
         }
     }
     if let Some(touch) = between_mallets {
-        contacts.add(
-            touch,
-            &MALLETS,
-            Pair::Mallets {
-                mallets: [&mallets[0], &mallets[1]],
-            },
-        );
+        let mallets = [&mallet(0, &touch), &mallet(1, &touch)];
+        contacts.add(touch, &MALLETS, Pair::Mallets { mallets });
     }
     Some(contacts)
 }

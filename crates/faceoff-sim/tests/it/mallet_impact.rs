@@ -39,7 +39,10 @@ fn impacts_match_recordings() {
         velocity_errors.push(velocity);
         position_errors.push(position);
     }
-    let (median, p90) = (quantile(&mut velocity_errors, 0.5), quantile(&mut velocity_errors, 0.9));
+    let (median, p90) = (
+        quantile(&mut velocity_errors, 0.5),
+        quantile(&mut velocity_errors, 0.9),
+    );
     let position = quantile(&mut position_errors, 0.5);
     println!("velocity median {median:.2e}, p90 {p90:.2e}; position median {position:.2e} m");
     assert!(median <= 0.015 && p90 <= 0.04);

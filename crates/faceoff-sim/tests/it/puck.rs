@@ -29,7 +29,10 @@ fn slides_match_until_a_rim_is_met() {
             if near_rim(recorded) {
                 break;
             }
-            assert!(max_difference(ours, recorded) <= 1e-6, "{ours:?} {recorded:?}");
+            assert!(
+                max_difference(ours, recorded) <= 1e-6,
+                "{ours:?} {recorded:?}"
+            );
         }
     }
 }
@@ -89,14 +92,23 @@ fn bounces_match_recordings() {
                 let ours_touched = first_touch(&ours);
                 let end = touched.map_or(0, |touched| (touched + 8).min(recorded.len() - 1));
                 let (velocity, _) = errors(&ours[end], &recorded[end], speed(&recorded[0]));
-                posts.push((touched, ours_touched, velocity, speed(&ours[end]), speed(&recorded[end])));
+                posts.push((
+                    touched,
+                    ours_touched,
+                    velocity,
+                    speed(&ours[end]),
+                    speed(&recorded[end]),
+                ));
             }
             other => panic!("unknown kind {other}"),
         }
     }
     let report = |name: &str, errors: &mut Vec<f64>| {
         let (median, p90) = (quantile(errors, 0.5), quantile(errors, 0.9));
-        println!("{name}: {} cases, median {median:.2e}, p90 {p90:.2e}", errors.len());
+        println!(
+            "{name}: {} cases, median {median:.2e}, p90 {p90:.2e}",
+            errors.len()
+        );
         (median, p90)
     };
     let (median, p90) = report("wall, velocity", &mut wall);

@@ -1,0 +1,52 @@
+# Two commands matter: `make demo` plays a competition day, `make test` proves that it works.
+
+# Variables a user may set:
+EPISODES ?= 50
+SERVE    ?= 1
+LISTEN   ?= 127.0.0.1:8080
+DEMO_DIR ?= demo-data
+
+CARGO      ?= cargo
+TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
+RELEASE    := $(TARGET_DIR)/release
+
+.PHONY: demo test lint format setup setup-test agents clean-demo help
+
+help:
+	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
+	@echo "make test   run everything that proves that it works"
+	@echo "make lint   format check and lints"
+
+setup:
+	@docker/setup.sh build
+
+setup-test:
+	@docker/setup.sh test
+
+# The bundles that the demo uploads: folders a team could copy.
+agents: setup
+	$(CARGO) build --release --locked --package striker
+	mkdir -p $(TARGET_DIR)/bundles/striker
+	cp agents/striker/agent.toml $(RELEASE)/striker $(TARGET_DIR)/bundles/striker/
+
+demo: setup
+	$(CARGO) build --release --locked --package faceoff --package striker
+	$(MAKE) --no-print-directory agents
+	$(RELEASE)/faceoff demo --episodes $(EPISODES) --listen $(LISTEN) --data-dir $(DEMO_DIR) \
+	    --bundle agents/hold --bundle $(TARGET_DIR)/bundles/striker --bundle agents/reckless \
+	    $(if $(filter 0,$(SERVE)),--no-serve)
+
+# The programs first: the end-to-end tests run the real binary and the real agents. With --tests the
+# dependencies get the same features as in the run below, and are not built twice.
+test: setup-test
+	$(CARGO) build --locked --workspace --bins --tests
+	if $(CARGO) nextest --version >/dev/null 2>&1; \
+	    then $(CARGO) nextest run --locked --workspace --no-fail-fast; \
+	    else $(CARGO) test --locked --workspace --no-fail-fast -- --test-threads 2; fi
+
+lint:
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy --locked --workspace --all-targets -- -D warnings
+
+format:
+	$(CARGO) fmt --all

@@ -1,0 +1,41 @@
+"""Breaks the safety rules on purpose: what a non-deployable agent looks like."""
+
+from protocol import play
+
+# Where each joint runs first. Shoulder back and elbow open lift the mallet off the table; the base turns
+# it over the edge.
+START = [+1, -1, +1, +1, +1, -1, +1]
+
+
+class Reckless:
+    """Runs every joint at its full speed from one end of its range to the other."""
+
+    def __init__(self, task, agent_id, env):
+        self.dt = env["dt"]
+        self.joint_pos_ids = env["joint_pos_ids"]
+        self.lower, self.upper = env["robot"]["joint_pos_limit"]
+        # The rules allow 95 % of these limits, and 95 % of the range above.
+        self.speed = env["robot"]["joint_vel_limit"][1]
+        self.reset()
+
+    def reset(self):
+        self.pose = None
+        self.direction = list(START)
+
+    def act(self, obs):
+        if self.pose is None:
+            self.pose = [obs[i] for i in self.joint_pos_ids]
+        velocity = []
+        for i, speed in enumerate(self.speed):
+            target = self.pose[i] + self.direction[i] * speed * self.dt
+            if not self.lower[i] < target < self.upper[i]:
+                self.direction[i] = -self.direction[i]
+                target = min(max(target, self.lower[i]), self.upper[i])
+            self.pose[i] = target
+            velocity.append(self.direction[i] * speed)
+        return [self.pose, velocity]
+
+
+if __name__ == "__main__":
+    # Interpolation 3: an action is the joints' positions and velocities at the end of the step.
+    play(Reckless, interpolation=3)

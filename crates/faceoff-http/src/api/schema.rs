@@ -1,0 +1,131 @@
+//! Shapes of answers for the OpenAPI document where the type itself lives in a crate that knows
+//! nothing of HTTP. A test holds them to the real types.
+#![expect(
+    dead_code,
+    reason = "only their shape is used, by the OpenAPI document"
+)]
+
+use std::collections::BTreeMap;
+use utoipa::ToSchema;
+
+/// Problem details (RFC 9457).
+#[derive(ToSchema)]
+#[schema(as = Problem)]
+pub(crate) struct ProblemBody {
+    /// Kind of the problem, explained at that place of the server.
+    #[schema(example = "/problems#already-evaluated")]
+    r#type: String,
+    /// The kind in a few words.
+    title: String,
+    /// The HTTP status.
+    status: u16,
+    /// What was expected, what came and what to do.
+    detail: String,
+}
+
+/// Episodes in which each constraint was violated.
+#[derive(ToSchema)]
+#[cfg_attr(test, derive(serde::Deserialize), serde(deny_unknown_fields))]
+pub(crate) struct ViolationCounts {
+    /// End-effector position.
+    ee: u32,
+    /// Elbow and wrist height.
+    link: u32,
+    /// Joint position.
+    joint_pos: u32,
+    /// Joint velocity.
+    joint_vel: u32,
+    /// Computation time.
+    computation_time: u32,
+}
+
+/// Computation times over all steps of a task, in seconds.
+#[derive(ToSchema)]
+#[cfg_attr(test, derive(serde::Deserialize), serde(deny_unknown_fields))]
+pub(crate) struct ComputationTimeSummary {
+    /// Mean.
+    mean: f64,
+    /// 99th percentile.
+    p99: f64,
+    /// Maximum.
+    max: f64,
+}
+
+/// The score of one task.
+#[derive(ToSchema)]
+#[cfg_attr(test, derive(serde::Deserialize), serde(deny_unknown_fields))]
+pub(crate) struct TaskResult {
+    /// Episodes played.
+    episodes: u32,
+    /// Episodes that ended in success.
+    successes: u32,
+    /// Fraction of successes.
+    success_rate: f64,
+    /// 95 % Wilson interval of the success rate, as fractions.
+    #[schema(value_type = Vec<f64>, min_items = 2, max_items = 2)]
+    success_ci95: [f64; 2],
+    /// Penalty points over all episodes.
+    penalty_points: f64,
+    /// Episodes with each violation.
+    violations: ViolationCounts,
+    /// deployable, improvable or non_deployable.
+    tier: String,
+    /// Control steps played.
+    steps: u64,
+    /// Computation times.
+    computation_time_s: ComputationTimeSummary,
+}
+
+/// The score of one evaluation; the layout of `results.json`.
+#[derive(ToSchema)]
+#[cfg_attr(test, derive(serde::Deserialize), serde(deny_unknown_fields))]
+pub(crate) struct EvaluationResult {
+    /// The ruleset's name.
+    ruleset: String,
+    /// The perturbation profile.
+    profile: String,
+    /// The evaluation's seed, 64 hexadecimal digits.
+    seed: String,
+    /// By task: hit, defend, prepare.
+    tasks: BTreeMap<String, TaskResult>,
+    /// Overall score in percent.
+    score: f64,
+    /// Penalty points: the maximum over the tasks.
+    penalty_points: f64,
+    /// deployable, improvable or non_deployable.
+    tier: String,
+}
+
+#[cfg(test)]
+mod tests {
+    use faceoff_types::{
+        ComputationTimeSummary, EvaluationResult, Profile, Seed, Task, TaskResult, Tier,
+        ViolationCounts,
+    };
+
+    #[test]
+    fn the_document_describes_the_real_result() {
+        let task = TaskResult {
+            episodes: 1,
+            successes: 1,
+            success_rate: 1.0,
+            success_ci95: [0.2, 1.0],
+            penalty_points: 0.5,
+            violations: ViolationCounts::default(),
+            tier: Tier::Deployable,
+            steps: 3,
+            computation_time_s: ComputationTimeSummary::default(),
+        };
+        let result = EvaluationResult {
+            ruleset: "r".into(),
+            profile: Profile::Ideal,
+            seed: Seed::from_number(1),
+            tasks: [(Task::Hit, task)].into(),
+            score: 40.0,
+            penalty_points: 0.5,
+            tier: Tier::Deployable,
+        };
+        let json = serde_json::to_string(&result).unwrap();
+        serde_json::from_str::<super::EvaluationResult>(&json).unwrap();
+    }
+}

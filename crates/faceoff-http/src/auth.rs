@@ -1,0 +1,108 @@
+//! Who is calling: extractors that turn the bearer token into a team or the organiser.
+
+use crate::{
+    App,
+    problem::{Problem, ProblemKind},
+    token::{hash_token, same_hash},
+};
+use axum::{
+    extract::FromRequestParts,
+    http::{HeaderMap, header, request::Parts},
+};
+use faceoff_store::Team;
+use faceoff_types::TeamId;
+
+/// A caller with a valid token.
+#[derive(Debug, Clone)]
+pub(crate) enum Caller {
+    Organiser,
+    Team(Team),
+}
+
+impl Caller {
+    /// May the caller see what belongs to `team`?
+    pub(crate) fn may_see(&self, team: TeamId) -> bool {
+        match self {
+            Self::Organiser => true,
+            Self::Team(own) => own.id == team,
+        }
+    }
+}
+
+/// Proof that the caller is the organiser.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Organiser;
+
+/// Proof that the caller is this team.
+#[derive(Debug, Clone)]
+pub(crate) struct TeamCaller(pub(crate) Team);
+
+fn bearer(headers: &HeaderMap) -> Result<&str, Problem> {
+    let problem = |detail: &str| Err(Problem::new(ProblemKind::Unauthenticated, detail));
+    let Some(value) = headers.get(header::AUTHORIZATION) else {
+        return problem(
+            "no token came; send the header “Authorization: Bearer TOKEN” with your team's token, \
+             or the organiser's",
+        );
+    };
+    match value.to_str().ok().and_then(|value| value.split_once(' ')) {
+        Some((scheme, token))
+            if scheme.eq_ignore_ascii_case("bearer") && !token.trim().is_empty() =>
+        {
+            Ok(token.trim())
+        }
+        _ => problem("the header Authorization is not of the form “Bearer TOKEN”"),
+    }
+}
+
+impl FromRequestParts<App> for Caller {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
+        let hash = hash_token(bearer(&parts.headers)?);
+        if same_hash(&hash, &app.config.admin_token_hash) {
+            return Ok(Self::Organiser);
+        }
+        // A look-up by hash is safe although its time may depend on the hash: nobody can choose a
+        // token whose hash begins as another's does.
+        match app.store.team_by_token_hash(hash).await? {
+            Some(team) => Ok(Self::Team(team)),
+            None => Err(Problem::new(
+                ProblemKind::Unauthenticated,
+                "the token is not known; it may have been replaced. Ask the organiser for a new one",
+            )),
+        }
+    }
+}
+
+impl FromRequestParts<App> for Organiser {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
+        match Caller::from_request_parts(parts, app).await? {
+            Caller::Organiser => Ok(Self),
+            Caller::Team(team) => Err(Problem::new(
+                ProblemKind::Forbidden,
+                format!(
+                    "this request needs the organiser's token; yours is that of the team “{}”",
+                    team.name
+                ),
+            )),
+        }
+    }
+}
+
+impl FromRequestParts<App> for TeamCaller {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
+        match Caller::from_request_parts(parts, app).await? {
+            Caller::Team(team) => Ok(Self(team)),
+            Caller::Organiser => Err(Problem::new(
+                ProblemKind::Forbidden,
+                "this request needs a team's token; yours is the organiser's. Use the token that \
+                 POST /api/v1/teams returned",
+            )),
+        }
+    }
+}

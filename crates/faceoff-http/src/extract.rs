@@ -1,0 +1,147 @@
+//! Extractors whose rejections are problems that name the place.
+
+use crate::problem::{Problem, ProblemKind};
+use axum::{
+    body::Bytes,
+    extract::{
+        FromRequest, FromRequestParts, Query, RawPathParams, Request, rejection::BytesRejection,
+    },
+    http::{StatusCode, header, request::Parts},
+};
+use serde::de::DeserializeOwned;
+use std::{fmt::Display, str::FromStr};
+
+/// Largest JSON body; the largest legitimate one has some hundred bytes.
+pub(crate) const MAX_JSON_BYTES: usize = 64 * 1024;
+
+/// A JSON body.
+#[derive(Debug)]
+pub(crate) struct Json<T>(pub(crate) T);
+
+impl<S, T> FromRequest<S> for Json<T>
+where
+    S: Send + Sync,
+    T: DeserializeOwned,
+{
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
+        parse(read(request, state).await?).map(Self)
+    }
+}
+
+/// A JSON body that may be left out altogether.
+#[derive(Debug)]
+pub(crate) struct OptionalJson<T>(pub(crate) T);
+
+impl<S, T> FromRequest<S> for OptionalJson<T>
+where
+    S: Send + Sync,
+    T: DeserializeOwned + Default,
+{
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
+        let (is_json, bytes) = read(request, state).await?;
+        if bytes.is_empty() {
+            return Ok(Self(T::default()));
+        }
+        parse((is_json, bytes)).map(Self)
+    }
+}
+
+async fn read<S: Send + Sync>(request: Request, state: &S) -> Result<(bool, Bytes), Problem> {
+    let is_json = request
+        .headers()
+        .get(header::CONTENT_TYPE)
+        .and_then(|value| value.to_str().ok())
+        .and_then(|value| value.split(';').next())
+        .is_some_and(|essence| essence.trim().eq_ignore_ascii_case("application/json"));
+    let bytes = Bytes::from_request(request, state)
+        .await
+        .map_err(|rejection| too_large(&rejection))?;
+    Ok((is_json, bytes))
+}
+
+fn too_large(rejection: &BytesRejection) -> Problem {
+    if rejection.status() == StatusCode::PAYLOAD_TOO_LARGE {
+        Problem::new(
+            ProblemKind::TooLarge,
+            format!("the body of this request is at most {MAX_JSON_BYTES} bytes of JSON"),
+        )
+        .with("limit_bytes", MAX_JSON_BYTES)
+    } else {
+        Problem::new(
+            ProblemKind::InvalidRequest,
+            format!(
+                "the body could not be read to its end: {}; send it again",
+                rejection.body_text()
+            ),
+        )
+    }
+}
+
+fn parse<T: DeserializeOwned>((is_json, bytes): (bool, Bytes)) -> Result<T, Problem> {
+    if !is_json {
+        return Err(Problem::new(
+            ProblemKind::UnsupportedMediaType,
+            "expected a JSON body; send it with the header “Content-Type: application/json”",
+        ));
+    }
+    serde_json::from_slice(&bytes).map_err(|error| {
+        if error.is_data() {
+            Problem::new(
+                ProblemKind::InvalidContent,
+                format!("the JSON does not fit: {error}"),
+            )
+        } else {
+            Problem::new(
+                ProblemKind::InvalidRequest,
+                format!("the body is not valid JSON: {error}"),
+            )
+        }
+    })
+}
+
+/// The single parameter of the path.
+#[derive(Debug)]
+pub(crate) struct PathParam<T>(pub(crate) T);
+
+impl<S, T> FromRequestParts<S> for PathParam<T>
+where
+    S: Send + Sync,
+    T: FromStr<Err: Display>,
+{
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        // What cannot be an id is the id of nothing.
+        let not_found = |detail: String| Problem::new(ProblemKind::NotFound, detail);
+        let params = RawPathParams::from_request_parts(parts, state)
+            .await
+            .map_err(|rejection| not_found(rejection.body_text()))?;
+        let text = params.iter().next().map_or("", |(_, text)| text);
+        text.parse()
+            .map(Self)
+            .map_err(|error: T::Err| not_found(error.to_string()))
+    }
+}
+
+/// The query string.
+#[derive(Debug)]
+pub(crate) struct QueryParams<T>(pub(crate) T);
+
+impl<S, T> FromRequestParts<S> for QueryParams<T>
+where
+    S: Send + Sync,
+    T: DeserializeOwned,
+{
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        Query::from_request_parts(parts, state)
+            .await
+            .map(|Query(query)| Self(query))
+            .map_err(|rejection| Problem::new(ProblemKind::InvalidRequest, rejection.body_text()))
+    }
+}

@@ -1,0 +1,108 @@
+//! Numbers as the pages write them. The pages' units are stated in the tables' heads.
+
+use faceoff_types::{TaskResult, Tier};
+
+/// A success rate with its interval.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Rate {
+    /// Percent, one decimal.
+    pub(super) percent: String,
+    /// Lower and upper bound in percent, one decimal.
+    pub(super) low: String,
+    pub(super) high: String,
+    /// Where the interval begins, how wide it is and where the rate lies, in hundredths of the bar.
+    pub(super) bar_from: String,
+    pub(super) bar_width: String,
+    pub(super) bar_at: String,
+}
+
+impl Rate {
+    pub(super) fn of(result: &TaskResult) -> Self {
+        let [low, high] = result
+            .success_ci95
+            .map(|bound| 100.0 * bound.clamp(0.0, 1.0));
+        let percent = 100.0 * result.success_rate;
+        Self {
+            percent: one(percent),
+            low: one(low),
+            high: one(high),
+            bar_from: one(low),
+            bar_width: one(high - low),
+            bar_at: one(percent),
+        }
+    }
+}
+
+/// One decimal; never “-0.0”.
+pub(super) fn one(value: f64) -> String {
+    format!("{:.1}", value + 0.0)
+}
+
+/// Seconds as milliseconds, with three significant places where that matters.
+pub(super) fn milliseconds(seconds: f64) -> String {
+    let ms = seconds * 1e3;
+    if ms < 10.0 {
+        format!("{ms:.2}")
+    } else {
+        format!("{ms:.0}")
+    }
+}
+
+/// Points per episode, by which the tiers are drawn.
+pub(super) fn per_episode(points: f64, episodes: u32) -> String {
+    format!("{:.2}", points / f64::from(episodes.max(1)))
+}
+
+/// A count with its share of the episodes in percent.
+pub(super) fn share(count: u32, episodes: u32) -> String {
+    if count == 0 {
+        return "0".to_owned();
+    }
+    let percent = 100.0 * f64::from(count) / f64::from(episodes.max(1));
+    format!("{count} ({percent:.0} %)")
+}
+
+/// A sign beside the tier's name, since colour alone must not carry it.
+pub(super) const fn tier_sign(tier: Tier) -> &'static str {
+    match tier {
+        Tier::Deployable => "✓",
+        Tier::Improvable => "▲",
+        Tier::NonDeployable => "✕",
+    }
+}
+
+/// What a tier means, as the legend and the tables' group heads say it.
+pub(super) const fn tier_bounds(tier: Tier) -> &'static str {
+    match tier {
+        Tier::Deployable => "at most 0.5 penalty points per episode",
+        Tier::Improvable => "more than 0.5, at most 1.5 penalty points per episode",
+        Tier::NonDeployable => "more than 1.5 penalty points per episode",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use faceoff_scoring::{DEPLOYABLE_POINTS_PER_EPISODE, IMPROVABLE_POINTS_PER_EPISODE};
+
+    #[test]
+    fn the_tiers_bounds_are_the_scorings() {
+        let deployable = DEPLOYABLE_POINTS_PER_EPISODE.to_string();
+        let improvable = IMPROVABLE_POINTS_PER_EPISODE.to_string();
+        assert!(tier_bounds(Tier::Deployable).contains(&deployable));
+        assert!(tier_bounds(Tier::Improvable).contains(&deployable));
+        assert!(tier_bounds(Tier::Improvable).contains(&improvable));
+        assert!(tier_bounds(Tier::NonDeployable).contains(&improvable));
+    }
+
+    #[test]
+    fn figures_read_as_in_the_paper() {
+        assert_eq!(one(54.94), "54.9");
+        assert_eq!(one(-0.0), "0.0");
+        assert_eq!(milliseconds(0.000_212), "0.21");
+        assert_eq!(milliseconds(0.0204), "20");
+        assert_eq!(per_episode(327.5, 1000), "0.33");
+        assert_eq!(share(0, 50), "0");
+        assert_eq!(share(5, 50), "5 (10 %)");
+    }
+}

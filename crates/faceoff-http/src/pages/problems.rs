@@ -1,0 +1,20 @@
+//! `/problems`: what each kind of error means; the `type` of every problem points here.
+
+use super::{Frame, PageProblem, render};
+use crate::problem::ProblemKind;
+use askama::Template;
+use axum::response::Response;
+
+#[derive(Template)]
+#[template(path = "problems.html")]
+struct Page {
+    frame: Frame,
+    kinds: [ProblemKind; ProblemKind::ALL.len()],
+}
+
+pub(super) async fn page() -> Result<Response, PageProblem> {
+    render(&Page {
+        frame: Frame::new(String::new(), "/problems"),
+        kinds: ProblemKind::ALL,
+    })
+}

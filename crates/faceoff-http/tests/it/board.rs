@@ -1,0 +1,244 @@
+use crate::site::{Site, result};
+use faceoff_scoring::{
+    COMPUTATION_TIME_MAX_POINTS, EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS,
+};
+use scraper::{Html, Selector};
+use serde_json::json;
+
+/// The page, which must be valid HTML.
+async fn page(site: &Site, path: &str) -> Html {
+    let answer = site.get(path, None).await;
+    assert_eq!(answer.status, 200, "{}", answer.body);
+    assert!(!answer.body.contains("<script") && !answer.body.contains("style="));
+    let html = Html::parse_document(&answer.body);
+    assert!(
+        html.errors.is_empty(),
+        "{path}: {:?}\n{}",
+        html.errors,
+        answer.body
+    );
+    html
+}
+
+fn texts(html: &Html, selector: &str) -> Vec<String> {
+    html.select(&Selector::parse(selector).unwrap())
+        .map(|element| {
+            element
+                .text()
+                .collect::<String>()
+                .split_whitespace()
+                .collect::<Vec<_>>()
+                .join(" ")
+        })
+        .collect()
+}
+
+/// Five teams of the paper's qualifying table, in another order than the board's.
+async fn competition() -> Site {
+    let site = Site::start().await;
+    for (name, rates, points) in [
+        ("RL3_polimi", [0.227, 0.616, 0.362], 920.0),
+        ("Kalash Jain", [0.0, 0.195, 0.083], 0.0),
+        ("Reckless", [0.9, 0.9, 0.9], 1500.5),
+        ("AiRLIHockey", [0.549, 0.845, 0.903], 327.5),
+        ("AeroTron", [0.332, 0.232, 0.665], 594.0),
+    ] {
+        site.ranked_team(name, &result(rates, points)).await;
+    }
+    site
+}
+
+const ORDER: [(&str, &str); 5] = [
+    ("deployable", "AiRLIHockey"),
+    ("deployable", "Kalash Jain"),
+    ("improvable", "RL3_polimi"),
+    ("improvable", "AeroTron"),
+    ("non_deployable", "Reckless"),
+];
+
+#[tokio::test]
+async fn the_board_shows_tiers_in_order_with_rates_intervals_points_and_score() {
+    let site = competition().await;
+    let html = page(&site, "/").await;
+    assert_eq!(
+        texts(&html, "tbody[data-tier] .group .tier"),
+        ["✓ Deployable", "▲ Improvable", "✕ Non-deployable"]
+    );
+    let names: Vec<_> = ORDER.iter().map(|(_, name)| *name).collect();
+    assert_eq!(texts(&html, ".board th.team a"), names);
+    assert_eq!(texts(&html, ".board td.rank"), ["1", "2", "3", "4", "5"]);
+    for (tier, name) in ORDER {
+        let rows = texts(&html, &format!("tbody[data-tier={tier}] th.team a"));
+        assert!(
+            rows.contains(&name.to_owned()),
+            "{name} is not among {tier}: {rows:?}"
+        );
+    }
+    let first = &texts(&html, ".board tbody tr:not(.group)")[0];
+    for part in [
+        "54.9 %",
+        "95 % interval 51.9 – 57.9",
+        "84.5 %",
+        "90.3 %",
+        "327.5",
+        "0.33 per episode",
+        "73.8",
+        "AiRLIHockey-agent",
+        "2026-03-01",
+    ] {
+        assert!(first.contains(part), "{part:?} is not in {first:?}");
+    }
+    let caption = &texts(&html, ".board caption")[0];
+    let setting = "evaluation profile, 1000 episodes per task, rules airhockey-2023.1";
+    assert!(caption.contains(setting), "{caption}");
+    let commitment = site.store.season().await.unwrap().commitment;
+    let legend = texts(&html, ".legend").join(" ");
+    for part in [
+        commitment.as_str(),
+        "Wilson",
+        "0.4 × hit",
+        "at most 0.5 per episode",
+    ] {
+        assert!(legend.contains(part), "{part:?} is not in the legend");
+    }
+    for rule in [
+        format!("end effector outside of its bounds {EE_POINTS}"),
+        format!("elbow or wrist too low {LINK_POINTS}"),
+        format!("joint position {JOINT_POS_POINTS}"),
+        format!("joint velocity {JOINT_VEL_POINTS}"),
+        format!("late answers 0.5 to {COMPUTATION_TIME_MAX_POINTS}"),
+    ] {
+        assert!(legend.contains(&rule), "{rule:?} is not in the legend");
+    }
+    assert!(texts(&html, "footer")[0].contains("airhockey-2023.1"));
+    assert!(texts(&html, ".lead")[0].contains("Test season"));
+    // what a screen reader needs of a table
+    assert_eq!(texts(&html, "table.board caption").len(), 1);
+    let unscoped = Selector::parse("table th:not([scope])").unwrap();
+    assert_eq!(html.select(&unscoped).count(), 0);
+}
+
+#[tokio::test]
+async fn the_api_board_has_the_same_order_and_hides_the_seed_of_the_day() {
+    let site = competition().await;
+    let board = site.get("/api/v1/board", None).await.json(200);
+    let rows = board["rows"].as_array().unwrap();
+    for (row, (tier, name)) in rows.iter().zip(ORDER) {
+        assert_eq!((&row["tier"], &row["team"]), (&json!(tier), &json!(name)));
+    }
+    assert_eq!(rows.len(), ORDER.len());
+    assert_eq!(
+        rows[0]["tasks"]["hit"]["success_ci95"]
+            .as_array()
+            .unwrap()
+            .len(),
+        2
+    );
+    assert_eq!(
+        rows[0]["seed"],
+        json!(null),
+        "teams with a free turn would know their episodes"
+    );
+    let evaluation = format!("/evaluations/{}", rows[0]["evaluation"].as_str().unwrap());
+    let seed = faceoff_types::Seed::from_number(7).to_string();
+    assert!(!site.get(&evaluation, None).await.body.contains(&seed));
+    site.next_day();
+    let board = site.get("/api/v1/board", None).await.json(200);
+    assert_eq!(board["rows"][0]["seed"], seed);
+    assert!(site.get(&evaluation, None).await.body.contains(&seed));
+}
+
+#[tokio::test]
+async fn a_tasks_board_ranks_by_the_task_alone() {
+    let site = competition().await;
+    let board = site.get("/api/v1/board/prepare", None).await.json(200);
+    let names: Vec<_> = board["rows"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|row| row["team"].clone())
+        .collect();
+    assert_eq!(
+        names,
+        [
+            "AiRLIHockey",
+            "Reckless",
+            "AeroTron",
+            "RL3_polimi",
+            "Kalash Jain"
+        ]
+    );
+    assert_eq!(board["task"], "prepare");
+    site.get("/api/v1/board/juggle", None)
+        .await
+        .problem(404, "not-found", &["juggle", "prepare"]);
+
+    let html = page(&site, "/tasks/prepare").await;
+    assert_eq!(
+        texts(&html, ".board th.team a"),
+        [
+            "AiRLIHockey",
+            "Reckless",
+            "AeroTron",
+            "RL3_polimi",
+            "Kalash Jain"
+        ]
+    );
+    assert_eq!(
+        texts(&html, "tbody[data-tier]").len(),
+        1,
+        "no team has points in this task"
+    );
+    assert_eq!(texts(&html, "nav [aria-current]"), ["Prepare"]);
+}
+
+#[tokio::test]
+async fn an_evaluations_page_shows_results_violations_and_times_to_everybody() {
+    let site = competition().await;
+    let board = site.get("/api/v1/board", None).await.json(200);
+    let path = format!(
+        "/evaluations/{}",
+        board["rows"][0]["evaluation"].as_str().unwrap()
+    );
+    let html = page(&site, &path).await;
+    assert_eq!(texts(&html, "h1"), ["AiRLIHockey"]);
+    assert_eq!(texts(&html, "table caption").len(), 3);
+    let tables = texts(&html, "table").join(" ");
+    for part in ["54.9 %", "7 (1 %)", "0.90", "12", "123456"] {
+        assert!(tables.contains(part), "{part:?} is not in {tables:?}");
+    }
+}
+
+#[tokio::test]
+async fn an_empty_board_says_what_comes_next_and_a_running_one_how_far_it_is() {
+    let site = Site::start().await;
+    let html = page(&site, "/").await;
+    let empty = texts(&html, ".empty").join(" ");
+    for part in [
+        "faceoff admin create-team",
+        "faceoff submit",
+        "faceoff admin start-day",
+    ] {
+        assert!(empty.contains(part), "{part:?} is not in {empty:?}");
+    }
+    page(&site, "/tasks/hit").await;
+
+    let team = site.team("Alpha").await;
+    let submission = site.valid_submission(&team, "striker").await;
+    let evaluation = site.evaluate(&team, &submission).await;
+    let faceoff_store::Work::Shard { claim, .. } = site.claim().await else {
+        panic!("expected a shard")
+    };
+    site.store
+        .heartbeat(&claim, 3, 60, site.now())
+        .await
+        .unwrap();
+    for day in ["today", "after midnight"] {
+        let html = page(&site, "/").await;
+        let rows = texts(&html, "table.plain tbody tr");
+        assert_eq!(rows, ["Alpha Running 3 of 12"], "{day}");
+        site.next_day();
+    }
+    let html = page(&site, &evaluation.replace("/api/v1", "")).await;
+    assert!(texts(&html, ".card").join(" ").contains("3 of 12 episodes"));
+}

@@ -1,0 +1,208 @@
+use crate::site::{ADMIN, Site, result, text};
+use faceoff_store::Work;
+use serde_json::json;
+
+#[tokio::test]
+async fn an_evaluation_is_followed_from_the_queue_to_the_dataset() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let submission = site.valid_submission(&team, "striker").await;
+    let path = site.evaluate(&team, &submission).await;
+    let token = Some(team.token.as_str());
+    let queued = site.get(&path, token).await.json(200);
+    assert_eq!(queued["state"], "queued");
+    assert_eq!(queued["team_name"], "Alpha");
+    assert_eq!(
+        queued["progress"],
+        json!({ "episodes_done": 0, "episodes_total": 12 })
+    );
+    site.get(&format!("{path}/dataset"), token)
+        .await
+        .problem(409, "conflict", &["not finished"]);
+
+    let Work::Shard { claim, .. } = site.claim().await else {
+        panic!("expected a shard")
+    };
+    assert!(
+        site.store
+            .heartbeat(&claim, 3, 60, site.now())
+            .await
+            .unwrap()
+    );
+    let running = site.get(&path, token).await.json(200);
+    assert_eq!(running["state"], "running");
+    assert_eq!(
+        running["progress"],
+        json!({ "episodes_done": 3, "episodes_total": 12 })
+    );
+    site.store.release(&claim, site.now()).await.unwrap();
+
+    let score = result([0.5, 0.6, 0.7], 100.0);
+    site.finish(&score).await;
+    let finished = site.get(&path, token).await.json(200);
+    assert_eq!(finished["state"], "finished");
+    assert_eq!(
+        finished["progress"],
+        json!({ "episodes_done": 12, "episodes_total": 12 })
+    );
+    assert_eq!(finished["result"], serde_json::to_value(&score).unwrap());
+    assert_eq!(finished["dataset"], format!("{path}/dataset"));
+    let me = site.get("/api/v1/me", token).await.json(200);
+    assert_eq!(me["turn"]["evaluation"], finished["id"]);
+
+    let dataset = site.get(&format!("{path}/dataset"), token).await;
+    assert_eq!(dataset.status, 200);
+    assert_eq!(dataset.body, "PK the recorded dataset");
+    assert_eq!(dataset.header("content-type"), "application/zip");
+    assert_eq!(dataset.header("content-length"), "23");
+    assert_eq!(
+        dataset.header("content-disposition"),
+        "attachment; filename=\"faceoff-Alpha-2026-03-01.zip\""
+    );
+}
+
+#[tokio::test]
+async fn a_second_run_on_the_same_day_is_refused_with_the_next_turn() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let submission = site.valid_submission(&team, "striker").await;
+    site.evaluate(&team, &submission).await;
+    let again = format!("{submission}/evaluations");
+    let problem = site
+        .post(&again, Some(&team.token), &json!({}))
+        .await
+        .problem(
+            409,
+            "already-evaluated",
+            &["2026-03-01", "once per UTC day", "2026-03-02"],
+        );
+    assert_eq!(problem["next_turn"], "2026-03-02");
+    site.next_day();
+    site.evaluate(&team, &submission).await;
+    let own = site
+        .get("/api/v1/evaluations", Some(&team.token))
+        .await
+        .json(200);
+    assert_eq!(own.as_array().unwrap().len(), 2);
+    let first = site
+        .get("/api/v1/evaluations?day=2026-03-01", Some(&team.token))
+        .await
+        .json(200);
+    assert_eq!(first.as_array().unwrap().len(), 1);
+}
+
+#[tokio::test]
+async fn a_submission_still_in_its_smoke_run_is_told_to_wait() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let id = text(
+        &site
+            .upload(&team.token, crate::site::GZIP.to_vec())
+            .await
+            .json(201)["id"],
+    );
+    site.post(
+        &format!("/api/v1/submissions/{id}/evaluations"),
+        Some(&team.token),
+        &json!({}),
+    )
+    .await
+    .problem(409, "conflict", &["wait"]);
+}
+
+#[tokio::test]
+async fn an_agent_that_failed_sees_every_fault_and_its_log() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let submission = site.valid_submission(&team, "striker").await;
+    let path = site.evaluate(&team, &submission).await;
+    site.play_shards(2).await;
+    let failed = site.get(&path, Some(&team.token)).await.json(200);
+    assert_eq!(failed["state"], "agent_failed", "{failed:#}");
+    let fault = &failed["faults"][0];
+    assert_eq!(
+        fault["message"],
+        "the action holds a number that is not finite"
+    );
+    assert_eq!((&fault["task"], &fault["step"]), (&json!("hit"), &json!(3)));
+    assert_eq!(fault["line"], "{\"type\":\"act\"}");
+    assert!(text(&failed["log"]).contains("log of hit"));
+    assert!(failed.get("result").is_none());
+    site.get(&format!("{path}/dataset"), Some(&team.token))
+        .await
+        .problem(409, "conflict", &["no dataset", "log"]);
+    let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
+    assert_eq!(
+        me["turn"]["evaluation"], failed["id"],
+        "the agent's own failure uses the turn"
+    );
+
+    let page = site.get(&path.replace("/api/v1", ""), None).await;
+    assert_eq!(page.status, 200);
+    assert!(page.body.contains("stopped"));
+    assert!(!page.body.contains("not finite") && !page.body.contains("log of hit"));
+}
+
+#[tokio::test]
+async fn a_cancelled_evaluation_tells_why_and_gives_the_turn_back() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let submission = site.valid_submission(&team, "striker").await;
+    let path = site.evaluate(&team, &submission).await;
+    let cancel = format!("{path}/cancel");
+    let reason = json!({ "reason": "power cut" });
+    site.post(&cancel, Some(&team.token), &reason)
+        .await
+        .problem(403, "forbidden", &[]);
+    site.post(&cancel, Some(ADMIN), &json!({ "reason": " " }))
+        .await
+        .problem(422, "invalid-content", &["reason", "1 to 500"]);
+    site.post(&cancel, Some(ADMIN), &reason).await.json(200);
+    let cancelled = site.get(&path, Some(&team.token)).await.json(200);
+    assert_eq!(cancelled["state"], "cancelled");
+    assert_eq!(cancelled["reason"], "power cut");
+    site.post(&cancel, Some(ADMIN), &reason)
+        .await
+        .problem(409, "conflict", &["over already"]);
+    let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
+    assert_eq!(me["turn"]["evaluation"], json!(null));
+    site.evaluate(&team, &submission).await;
+}
+
+#[tokio::test]
+async fn another_teams_evaluation_looks_like_none() {
+    let site = Site::start().await;
+    let (owner, other) = (site.team("Owner").await, site.team("Other").await);
+    let submission = site.valid_submission(&owner, "striker").await;
+    let path = site.evaluate(&owner, &submission).await;
+    site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
+    let dataset = format!("{path}/dataset");
+    for path in [&path, &dataset] {
+        let foreign = site.get(path, Some(&other.token)).await;
+        foreign.problem(404, "not-found", &["evaluation"]);
+        assert!(!foreign.body.contains("Owner"));
+        site.get(path, None)
+            .await
+            .problem(401, "unauthenticated", &[]);
+        site.get(path, Some("fo_team_wrong"))
+            .await
+            .problem(401, "unauthenticated", &[]);
+        assert_eq!(site.get(path, Some(ADMIN)).await.status, 200);
+    }
+    let missing = "/api/v1/evaluations/01890000-0000-7000-8000-000000000000";
+    site.get(missing, Some(&owner.token))
+        .await
+        .problem(404, "not-found", &[]);
+    site.get("/api/v1/evaluations/17", Some(&owner.token))
+        .await
+        .problem(404, "not-found", &["17"]);
+    assert_eq!(
+        site.get("/api/v1/evaluations", Some(&other.token))
+            .await
+            .json(200),
+        json!([])
+    );
+    site.get("/api/v1/evaluations?day=tomorrow", Some(ADMIN))
+        .await
+        .problem(400, "invalid-request", &["day"]);
+}

@@ -1,0 +1,14 @@
+//! The API and the pages over real HTTP, on a real store in a temporary folder.
+#![expect(
+    clippy::unwrap_used,
+    reason = "helpers of tests fail as tests do: by panicking"
+)]
+
+mod board;
+mod days;
+mod evaluations;
+mod openapi;
+mod problems;
+mod site;
+mod submissions;
+mod teams;

@@ -1,0 +1,163 @@
+use crate::site::{ADMIN, Answer, Site};
+use faceoff_http::HttpLimits;
+use reqwest::Method;
+use std::time::Duration;
+
+async fn send(site: &Site, method: Method, path: &str, accept: &str) -> Answer {
+    let request = site.request(method, path, None).header("accept", accept);
+    Answer::of(request.send().await.unwrap()).await
+}
+
+#[tokio::test]
+async fn unknown_paths_and_methods_are_problems_for_programs_and_pages_for_people() {
+    let site = Site::start().await;
+    site.get("/api/v1/nothing", None)
+        .await
+        .problem(404, "not-found", &["/api/v1/nothing"]);
+    site.get("/nothing", None)
+        .await
+        .problem(404, "not-found", &["/nothing"]);
+    let api = send(&site, Method::GET, "/api/v1/nothing", "text/html").await;
+    api.problem(404, "not-found", &[]);
+    let method = send(&site, Method::DELETE, "/api/v1/teams", "*/*").await;
+    method.problem(405, "method-not-allowed", &["DELETE", "Allow"]);
+    assert!(method.header("allow").contains("POST"));
+    send(&site, Method::PUT, "/api/v1/submissions", "*/*")
+        .await
+        .problem(405, "method-not-allowed", &["PUT"]);
+
+    let page = send(&site, Method::GET, "/nothing<script>", "text/html").await;
+    assert_eq!(page.status, 404);
+    assert!(page.header("content-type").starts_with("text/html"));
+    assert!(page.body.contains("Not found") && !page.body.contains("<script"));
+    for path in [
+        "/tasks/juggle",
+        "/evaluations/17",
+        "/evaluations/01890000-0000-7000-8000-000000000000",
+    ] {
+        assert_eq!(
+            send(&site, Method::GET, path, "text/html").await.status,
+            404,
+            "{path}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn bad_json_is_a_problem_that_names_the_place() {
+    let site = Site::start().await;
+    let post = |content_type: &'static str, body: String| {
+        let request = site
+            .request(Method::POST, "/api/v1/teams", Some(ADMIN))
+            .header("content-type", content_type)
+            .body(body);
+        async move { Answer::of(request.send().await.unwrap()).await }
+    };
+    let json = "application/json";
+    post(json, "{\"name\":".into())
+        .await
+        .problem(400, "invalid-request", &["JSON", "line 1"]);
+    post(json, "[1]".into())
+        .await
+        .problem(422, "invalid-content", &["line 1"]);
+    post(json, "{\"name\":7}".into())
+        .await
+        .problem(422, "invalid-content", &["string"]);
+    post(json, String::new())
+        .await
+        .problem(400, "invalid-request", &["JSON"]);
+    post("text/plain", "{\"name\":\"A\"}".into()).await.problem(
+        415,
+        "unsupported-media-type",
+        &["Content-Type: application/json"],
+    );
+    let large = format!("{{\"name\":\"{}\"}}", "a".repeat(70_000));
+    post(json, large)
+        .await
+        .problem(413, "too-large", &["65536"]);
+}
+
+#[tokio::test]
+async fn every_answer_carries_its_id_and_the_security_headers() {
+    let site = Site::start().await;
+    for path in [
+        "/",
+        "/api/v1/board",
+        "/api/v1/nothing",
+        "/static/faceoff.css",
+    ] {
+        let answer = site.get(path, None).await;
+        assert_eq!(answer.header("x-request-id").len(), 36, "{path}");
+        assert_eq!(answer.header("x-content-type-options"), "nosniff");
+        let policy = answer.header("content-security-policy");
+        assert!(
+            policy.starts_with("default-src 'none'") && !policy.contains("unsafe"),
+            "{policy}"
+        );
+        assert!(
+            !policy.contains("script"),
+            "the pages need no script: {policy}"
+        );
+    }
+    let imitated = site
+        .request(Method::GET, "/", None)
+        .header("x-request-id", "somebody-elses")
+        .send()
+        .await
+        .unwrap();
+    assert_ne!(imitated.headers()["x-request-id"], "somebody-elses");
+}
+
+#[tokio::test]
+async fn a_server_at_its_limit_says_when_to_come_back() {
+    let site = Site::start_with(HttpLimits {
+        requests: 0,
+        ..HttpLimits::default()
+    })
+    .await;
+    let busy = site.get("/api/v1/health", None).await;
+    busy.problem(503, "busy", &["try again"]);
+    assert_eq!(busy.header("retry-after"), "2");
+
+    // A body that never ends keeps the handler waiting.
+    let limits = HttpLimits {
+        answer: Duration::from_millis(50),
+        ..HttpLimits::default()
+    };
+    let site = Site::start_with(limits).await;
+    let endless = futures::stream::pending::<Result<bytes::Bytes, std::io::Error>>();
+    let slow = site
+        .request(Method::POST, "/api/v1/teams", Some(ADMIN))
+        .header("content-type", "application/json")
+        .body(reqwest::Body::wrap_stream(endless))
+        .send()
+        .await
+        .unwrap();
+    Answer::of(slow)
+        .await
+        .problem(503, "busy", &["longer than 0.05 s"]);
+}
+
+#[tokio::test]
+async fn a_broken_store_is_our_fault_and_keeps_its_cause_to_itself() {
+    let site = Site::start().await;
+    site.get("/api/v1/health", None).await.json(200);
+    site.store.close().await;
+    let broken = site.get("/api/v1/health", None).await;
+    broken.problem(500, "internal", &["x-request-id"]);
+    assert!(!broken.body.to_lowercase().contains("sql") && !broken.body.contains("pool"));
+}
+
+#[tokio::test]
+async fn every_kind_of_problem_is_explained_where_its_type_points() {
+    let site = Site::start().await;
+    let page = site.get("/problems", None).await;
+    assert_eq!(page.status, 200);
+    for kind in faceoff_http::problem::ProblemKind::ALL {
+        assert!(
+            page.body.contains(&format!("id=\"{}\"", kind.slug())),
+            "{}",
+            kind.slug()
+        );
+    }
+}

@@ -1,0 +1,369 @@
+//! A running site: axum on a loopback port, SQLite in a temporary folder, a clock that tests turn,
+//! and the steps that a worker would take.
+
+use faceoff_http::{Clock, HttpConfig, HttpLimits, router, token::hash_token};
+use faceoff_store::*;
+use faceoff_types::*;
+use jiff::{SignedDuration, Timestamp};
+use reqwest::{Method, RequestBuilder, Response, StatusCode};
+use serde_json::{Value, json};
+use std::sync::{Arc, Mutex};
+use tokio::{net::TcpListener, task::JoinHandle};
+
+pub const ADMIN: &str = "fo_admin_0123456789abcdef";
+pub const MAX_BUNDLE: u64 = 64 * 1024;
+/// The first bytes of a gzip stream; the web side looks no further.
+pub const GZIP: [u8; 4] = [0x1f, 0x8b, 8, 0];
+
+pub struct Site {
+    pub url: String,
+    pub store: Store,
+    pub folder: tempfile::TempDir,
+    now: Arc<Mutex<Timestamp>>,
+    http: reqwest::Client,
+    server: JoinHandle<()>,
+}
+
+impl Drop for Site {
+    fn drop(&mut self) {
+        self.server.abort();
+    }
+}
+
+pub struct TestTeam {
+    pub id: String,
+    pub token: String,
+}
+
+/// An answer, read to its end.
+#[derive(Debug)]
+pub struct Answer {
+    pub status: StatusCode,
+    pub headers: reqwest::header::HeaderMap,
+    pub body: String,
+}
+
+impl Answer {
+    pub async fn of(response: Response) -> Self {
+        let (status, headers) = (response.status(), response.headers().clone());
+        let body = response.text().await.unwrap();
+        Self {
+            status,
+            headers,
+            body,
+        }
+    }
+
+    pub fn header(&self, name: &str) -> &str {
+        self.headers
+            .get(name)
+            .unwrap_or_else(|| panic!("no {name} in {self:?}"))
+            .to_str()
+            .unwrap()
+    }
+
+    #[track_caller]
+    pub fn json(&self, status: u16) -> Value {
+        assert_eq!(self.status.as_u16(), status, "{}", self.body);
+        assert_eq!(self.header("content-type"), "application/json");
+        serde_json::from_str(&self.body).unwrap()
+    }
+
+    /// Asserts a whole problem document of this kind, whose detail contains `words`.
+    #[track_caller]
+    pub fn problem(&self, status: u16, slug: &str, words: &[&str]) -> Value {
+        assert_eq!(self.status.as_u16(), status, "{}", self.body);
+        assert_eq!(
+            self.header("content-type"),
+            "application/problem+json",
+            "{}",
+            self.body
+        );
+        let problem: Value = serde_json::from_str(&self.body).unwrap();
+        assert_eq!(problem["status"], status);
+        assert_eq!(problem["type"], format!("/problems#{slug}"), "{problem}");
+        assert!(!problem["title"].as_str().unwrap().is_empty());
+        let detail = problem["detail"].as_str().unwrap();
+        for word in words {
+            assert!(detail.contains(word), "{word:?} is not in {detail:?}");
+        }
+        problem
+    }
+}
+
+impl Site {
+    pub async fn start() -> Self {
+        Self::start_with(HttpLimits::default()).await
+    }
+
+    pub async fn start_with(limits: HttpLimits) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let upload_dir = folder.path().join("uploads");
+        std::fs::create_dir(&upload_dir).unwrap();
+        let store = Store::open(folder.path()).await.unwrap();
+        let now = Arc::new(Mutex::new(
+            "2026-03-01T10:00:00Z".parse::<Timestamp>().unwrap(),
+        ));
+        let clock = Arc::clone(&now);
+        let config = HttpConfig {
+            max_bundle_bytes: MAX_BUNDLE,
+            plan: EvaluationPlan {
+                profile: Profile::Evaluation,
+                tasks: Task::ALL.to_vec(),
+                episodes_per_task: 4,
+                episodes_per_shard: 4,
+                max_faults: 1,
+            },
+            admin_token_hash: hash_token(ADMIN),
+            upload_dir,
+            season_name: Some("Test season".into()),
+            daily_at: None,
+            clock: Clock::new(move || *clock.lock().unwrap()),
+            limits,
+        };
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let url = format!("http://{}", listener.local_addr().unwrap());
+        let site = router(store.clone(), config);
+        let server = tokio::spawn(async move {
+            faceoff_http::serve(listener, site, std::future::pending())
+                .await
+                .unwrap();
+        });
+        let http = reqwest::Client::builder().no_proxy().build().unwrap();
+        Self {
+            url,
+            store,
+            folder,
+            now,
+            http,
+            server,
+        }
+    }
+
+    pub fn now(&self) -> Timestamp {
+        *self.now.lock().unwrap()
+    }
+
+    pub fn next_day(&self) {
+        *self.now.lock().unwrap() += SignedDuration::from_hours(24);
+    }
+
+    /// A request; paths that begin with `/api` or not are taken as they are.
+    pub fn request(&self, method: Method, path: &str, token: Option<&str>) -> RequestBuilder {
+        let request = self.http.request(method, format!("{}{path}", self.url));
+        match token {
+            Some(token) => request.bearer_auth(token),
+            None => request,
+        }
+    }
+
+    pub async fn get(&self, path: &str, token: Option<&str>) -> Answer {
+        Answer::of(self.request(Method::GET, path, token).send().await.unwrap()).await
+    }
+
+    pub async fn post(&self, path: &str, token: Option<&str>, body: &Value) -> Answer {
+        let request = self.request(Method::POST, path, token).json(body);
+        Answer::of(request.send().await.unwrap()).await
+    }
+
+    pub async fn upload(&self, token: &str, body: impl Into<reqwest::Body>) -> Answer {
+        let request = self
+            .request(
+                Method::POST,
+                "/api/v1/submissions?file_name=striker.tar.gz",
+                Some(token),
+            )
+            .header("content-type", "application/octet-stream")
+            .body(body);
+        Answer::of(request.send().await.unwrap()).await
+    }
+
+    pub async fn team(&self, name: &str) -> TestTeam {
+        let answer = self
+            .post("/api/v1/teams", Some(ADMIN), &json!({ "name": name }))
+            .await;
+        let team = answer.json(201);
+        TestTeam {
+            id: text(&team["id"]),
+            token: text(&team["token"]),
+        }
+    }
+
+    /// Uploads a bundle and finds it valid, as a worker's smoke run would; the submission's path.
+    pub async fn valid_submission(&self, team: &TestTeam, agent: &str) -> String {
+        let submission = self.upload(&team.token, GZIP.to_vec()).await.json(201);
+        let outcome = SmokeOutcome::Valid {
+            agent_name: agent.into(),
+            log: "ready\n".into(),
+        };
+        self.smoke(outcome).await;
+        format!("/api/v1/submissions/{}", text(&submission["id"]))
+    }
+
+    /// Ends the next smoke run.
+    pub async fn smoke(&self, outcome: SmokeOutcome) {
+        match self.claim().await {
+            Work::Smoke { claim, .. } => {
+                self.store
+                    .commit_smoke(&claim, outcome, self.now())
+                    .await
+                    .unwrap();
+            }
+            other => panic!("expected a smoke run, claimed {other:?}"),
+        }
+    }
+
+    pub async fn claim(&self) -> Work {
+        self.store
+            .claim("slot 0", 60, self.now())
+            .await
+            .unwrap()
+            .expect("work is queued")
+    }
+
+    /// Plays the shards of the evaluation that comes next, with `faults` agent faults in each.
+    pub async fn play_shards(&self, faults: usize) {
+        for _ in Task::ALL {
+            let Work::Shard { claim, shard, .. } = self.claim().await else {
+                panic!("expected a shard");
+            };
+            let commit = ShardCommit {
+                outcomes: (shard.first_episode..shard.end_episode)
+                    .map(|episode| outcome(shard.task, episode, (episode as usize) < faults))
+                    .collect(),
+                log: format!("log of {}\n", shard.task),
+                stopped_by_faults: false,
+                recording: claim.recording_key(EvaluationId::new()),
+            };
+            self.store
+                .commit_shard(&claim, commit, self.now())
+                .await
+                .unwrap();
+            if faults > 0 {
+                // one shard's faults are more than the plan forgives
+                return;
+            }
+        }
+    }
+
+    /// Plays the evaluation that comes next and scores it as given.
+    pub async fn finish(&self, result: &EvaluationResult) {
+        self.play_shards(0).await;
+        let Work::Finalise {
+            claim, evaluation, ..
+        } = self.claim().await
+        else {
+            panic!("expected a finalisation");
+        };
+        let dataset = self.folder.path().join("dataset.zip");
+        std::fs::write(&dataset, b"PK the recorded dataset").unwrap();
+        let key = format!("datasets/{}.zip", evaluation.id);
+        self.store
+            .artifacts()
+            .put_file(&key, &dataset)
+            .await
+            .unwrap();
+        self.store
+            .finish_evaluation(&claim, result, &key, self.now())
+            .await
+            .unwrap();
+    }
+
+    /// Uses the team's turn of today; the evaluation's path in the API.
+    pub async fn evaluate(&self, team: &TestTeam, submission: &str) -> String {
+        let path = format!("{submission}/evaluations");
+        let evaluation = self
+            .post(&path, Some(&team.token), &json!({}))
+            .await
+            .json(201);
+        format!("/api/v1/evaluations/{}", text(&evaluation["id"]))
+    }
+
+    /// A team on the board.
+    pub async fn ranked_team(&self, name: &str, result: &EvaluationResult) -> TestTeam {
+        let team = self.team(name).await;
+        let submission = self.valid_submission(&team, &format!("{name}-agent")).await;
+        self.evaluate(&team, &submission).await;
+        self.finish(result).await;
+        team
+    }
+}
+
+pub fn text(value: &Value) -> String {
+    value
+        .as_str()
+        .unwrap_or_else(|| panic!("{value} is no text"))
+        .to_owned()
+}
+
+fn outcome(task: Task, episode: u32, faulty: bool) -> EpisodeOutcome {
+    let fault = faulty.then(|| AgentFault {
+        fault: AgentFaultKind::NonFinite,
+        task,
+        episode: Some(episode),
+        step: Some(3),
+        line: Some("{\"type\":\"act\"}".into()),
+    });
+    EpisodeOutcome {
+        task,
+        episode,
+        steps: 17,
+        end: if faulty {
+            EpisodeEnd::AgentFault
+        } else {
+            EpisodeEnd::LeftTable
+        },
+        success: !faulty,
+        violations: Violations::default(),
+        computation_time: ComputationTime {
+            mean_s: 1e-4,
+            max_s: 1e-3,
+        },
+        fault,
+    }
+}
+
+/// A result with these success rates (hit, defend, prepare) over 1000 episodes and these overall
+/// penalty points, all of them from `hit`.
+pub fn result(rates: [f64; 3], penalty_points: f64) -> EvaluationResult {
+    let tier = match penalty_points {
+        points if points <= 500.0 => Tier::Deployable,
+        points if points <= 1500.0 => Tier::Improvable,
+        _ => Tier::NonDeployable,
+    };
+    let tasks = Task::ALL
+        .into_iter()
+        .zip(rates)
+        .map(|(task, rate)| {
+            let is_hit = task == Task::Hit;
+            let result = TaskResult {
+                episodes: 1000,
+                successes: (1000.0 * rate) as u32,
+                success_rate: rate,
+                success_ci95: [(rate - 0.03).max(0.0), (rate + 0.03).min(1.0)],
+                penalty_points: if is_hit { penalty_points } else { 0.0 },
+                violations: ViolationCounts {
+                    ee: 7,
+                    ..ViolationCounts::default()
+                },
+                tier: if is_hit { tier } else { Tier::Deployable },
+                steps: 123_456,
+                computation_time_s: ComputationTimeSummary {
+                    mean: 2e-4,
+                    p99: 9e-4,
+                    max: 0.012,
+                },
+            };
+            (task, result)
+        })
+        .collect();
+    EvaluationResult {
+        ruleset: RULESET.into(),
+        profile: Profile::Evaluation,
+        seed: Seed::from_number(7),
+        tasks,
+        score: 100.0 * (0.4 * rates[0] + 0.4 * rates[1] + 0.2 * rates[2]),
+        penalty_points,
+        tier,
+    }
+}

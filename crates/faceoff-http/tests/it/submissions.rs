@@ -1,0 +1,244 @@
+use crate::site::{ADMIN, Answer, GZIP, MAX_BUNDLE, Site, text};
+use bytes::Bytes;
+use faceoff_http::HttpLimits;
+use faceoff_store::SmokeOutcome;
+use reqwest::{Body, Method};
+use serde_json::json;
+use std::{convert::Infallible, time::Duration};
+
+/// A bundle of `bytes` bytes, sent in pieces and without a Content-Length.
+fn in_pieces(bytes: usize) -> Body {
+    let mut bundle = vec![7; bytes];
+    bundle[..4].copy_from_slice(&GZIP);
+    let pieces: Vec<_> = bundle
+        .chunks(5000)
+        .map(|piece| Ok::<_, Infallible>(Bytes::copy_from_slice(piece)))
+        .collect();
+    Body::wrap_stream(futures::stream::iter(pieces))
+}
+
+fn uploads_left(site: &Site) -> usize {
+    std::fs::read_dir(site.folder.path().join("uploads"))
+        .unwrap()
+        .count()
+}
+
+#[tokio::test]
+async fn an_upload_is_stored_hashed_and_queued() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let size = MAX_BUNDLE as usize;
+    let answer = site.upload(&team.token, in_pieces(size)).await;
+    let submission = answer.json(201);
+    let path = format!("/api/v1/submissions/{}", text(&submission["id"]));
+    assert_eq!(answer.header("location"), path);
+    assert_eq!(submission["state"], "validating");
+    assert_eq!(submission["bytes"], MAX_BUNDLE);
+    assert_eq!(submission["file_name"], "striker.tar.gz");
+
+    let stored = site
+        .store
+        .submission(text(&submission["id"]).parse().unwrap())
+        .await
+        .unwrap();
+    let copy = site.folder.path().join("copy");
+    site.store
+        .artifacts()
+        .get_to_file(&stored.bundle.key, &copy)
+        .await
+        .unwrap();
+    let bytes = std::fs::read(&copy).unwrap();
+    assert_eq!(bytes.len(), size);
+    assert_eq!(
+        blake3::hash(&bytes).to_string(),
+        text(&submission["blake3"])
+    );
+    assert_eq!(uploads_left(&site), 0);
+
+    let outcome = SmokeOutcome::Valid {
+        agent_name: "striker 1.0".into(),
+        log: "model loaded\n".into(),
+    };
+    site.smoke(outcome).await;
+    let submission = site.get(&path, Some(&team.token)).await.json(200);
+    assert_eq!(submission["state"], "valid");
+    assert_eq!(submission["agent_name"], "striker 1.0");
+    assert_eq!(submission["log"], "model loaded\n");
+    let list = site
+        .get("/api/v1/submissions", Some(&team.token))
+        .await
+        .json(200);
+    assert_eq!(list, json!([submission]));
+}
+
+#[tokio::test]
+async fn an_invalid_bundle_shows_its_reason_and_its_log() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let id = text(&site.upload(&team.token, GZIP.to_vec()).await.json(201)["id"]);
+    let outcome = SmokeOutcome::Invalid {
+        agent_name: None,
+        reason: "no answer within the start-up limit of 120 s".into(),
+        log: "ImportError: torch\n".into(),
+    };
+    site.smoke(outcome).await;
+    let path = format!("/api/v1/submissions/{id}");
+    let submission = site.get(&path, Some(&team.token)).await.json(200);
+    assert_eq!(submission["state"], "invalid");
+    assert_eq!(
+        submission["reason"],
+        "no answer within the start-up limit of 120 s"
+    );
+    assert_eq!(submission["log"], "ImportError: torch\n");
+    site.post(
+        &format!("{path}/evaluations"),
+        Some(&team.token),
+        &json!({}),
+    )
+    .await
+    .problem(409, "conflict", &["invalid", "upload"]);
+}
+
+#[tokio::test]
+async fn a_bundle_that_is_too_large_is_refused_with_and_without_an_announced_length() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let limit = MAX_BUNDLE as usize;
+    let mut announced = vec![7; limit + 1];
+    announced[..4].copy_from_slice(&GZIP);
+    let problem = site.upload(&team.token, announced).await.problem(
+        413,
+        "too-large",
+        &["65536 bytes", "65537", "leave out"],
+    );
+    assert_eq!(problem["limit_bytes"], MAX_BUNDLE);
+    for bytes in [limit + 1, 20 * limit] {
+        site.upload(&team.token, in_pieces(bytes))
+            .await
+            .problem(413, "too-large", &["65536"]);
+    }
+    assert_eq!(uploads_left(&site), 0);
+    assert_eq!(
+        site.get("/api/v1/submissions", Some(&team.token))
+            .await
+            .json(200),
+        json!([])
+    );
+}
+
+#[tokio::test]
+async fn what_is_no_archive_is_refused_at_once() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let upload = |body: Vec<u8>| site.upload(&team.token, body);
+    let kind = "unsupported-media-type";
+    upload(b"#!/bin/sh".to_vec())
+        .await
+        .problem(415, kind, &["23212f62", ".tar.gz"]);
+    upload(vec![0x1f]).await.problem(415, kind, &["1f"]);
+    upload(vec![])
+        .await
+        .problem(400, "invalid-request", &["empty"]);
+
+    let form = site
+        .request(Method::POST, "/api/v1/submissions", Some(&team.token))
+        .header("content-type", "multipart/form-data; boundary=x")
+        .body("--x\r\n")
+        .send()
+        .await
+        .unwrap();
+    Answer::of(form)
+        .await
+        .problem(415, kind, &["multipart/form-data", "--data-binary"]);
+    site.request(
+        Method::POST,
+        "/api/v1/submissions?name=x",
+        Some(&team.token),
+    )
+    .body(GZIP.to_vec())
+    .send()
+    .await
+    .map(async |response| {
+        Answer::of(response)
+            .await
+            .problem(400, "invalid-request", &["name"])
+    })
+    .unwrap()
+    .await;
+    assert_eq!(uploads_left(&site), 0);
+}
+
+#[tokio::test]
+async fn an_upload_that_stalls_is_given_up() {
+    let limits = HttpLimits {
+        upload_pause: Duration::from_millis(50),
+        ..HttpLimits::default()
+    };
+    let site = Site::start_with(limits).await;
+    let team = site.team("Alpha").await;
+    use futures::StreamExt;
+    let first = futures::stream::iter([Ok::<_, Infallible>(Bytes::from_static(&GZIP))]);
+    let body = Body::wrap_stream(first.chain(futures::stream::pending()));
+    site.upload(&team.token, body)
+        .await
+        .problem(408, "request-timeout", &["send it again"]);
+    assert_eq!(uploads_left(&site), 0);
+}
+
+#[tokio::test]
+async fn a_team_cannot_fill_the_queue_with_uploads() {
+    let limits = HttpLimits {
+        pending_submissions: 2,
+        ..HttpLimits::default()
+    };
+    let site = Site::start_with(limits).await;
+    let team = site.team("Alpha").await;
+    for _ in 0..2 {
+        site.upload(&team.token, GZIP.to_vec()).await.json(201);
+    }
+    let refused = site.upload(&team.token, GZIP.to_vec()).await;
+    refused.problem(429, "too-many-pending", &["2 uploads", "verdict"]);
+    assert_eq!(refused.header("retry-after"), "30");
+    site.smoke(SmokeOutcome::Valid {
+        agent_name: "a".into(),
+        log: String::new(),
+    })
+    .await;
+    site.upload(&team.token, GZIP.to_vec()).await.json(201);
+}
+
+#[tokio::test]
+async fn another_teams_submission_looks_like_none() {
+    let site = Site::start().await;
+    let (owner, other) = (site.team("Owner").await, site.team("Other").await);
+    let path = site.valid_submission(&owner, "striker").await;
+    let foreign = site.get(&path, Some(&other.token)).await;
+    let missing = site
+        .get(
+            "/api/v1/submissions/01890000-0000-7000-8000-000000000000",
+            Some(&other.token),
+        )
+        .await;
+    foreign.problem(404, "not-found", &["submission"]);
+    assert_eq!(foreign.body, missing.body);
+    site.post(
+        &format!("{path}/evaluations"),
+        Some(&other.token),
+        &json!({}),
+    )
+    .await
+    .problem(404, "not-found", &[]);
+    assert_eq!(
+        site.get("/api/v1/submissions", Some(&other.token))
+            .await
+            .json(200),
+        json!([])
+    );
+    site.get(&path, Some(ADMIN)).await.json(200);
+    site.get(&path, None)
+        .await
+        .problem(401, "unauthenticated", &[]);
+    site.get("/api/v1/submissions/seventeen", Some(&owner.token))
+        .await
+        .problem(404, "not-found", &["seventeen", "UUID"]);
+}

@@ -1,0 +1,132 @@
+use crate::site::{ADMIN, Site, text};
+use serde_json::json;
+
+#[tokio::test]
+async fn a_team_gets_its_token_once_and_only_the_hash_is_kept() {
+    let site = Site::start().await;
+    let answer = site
+        .post("/api/v1/teams", Some(ADMIN), &json!({ "name": "Zoë 1" }))
+        .await;
+    let team = answer.json(201);
+    let token = text(&team["token"]);
+    assert!(token.starts_with("fo_team_"));
+    assert_eq!(answer.header("cache-control"), "no-store");
+
+    let list = site.get("/api/v1/teams", Some(ADMIN)).await;
+    assert_eq!(list.json(200)[0]["name"], "Zoë 1");
+    assert!(!list.body.contains(&token));
+    site.store.close().await;
+    for file in ["faceoff.sqlite3", "faceoff.sqlite3-wal"] {
+        if let Ok(bytes) = std::fs::read(site.folder.path().join(file)) {
+            let clear = bytes
+                .windows(token.len())
+                .any(|window| window == token.as_bytes());
+            assert!(!clear, "{file} holds the token in the clear");
+        }
+    }
+}
+
+#[tokio::test]
+async fn the_token_opens_the_teams_own_page() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
+    assert_eq!(me["team"]["name"], "Alpha");
+    assert_eq!(
+        me["turn"],
+        json!({ "day": "2026-03-01", "evaluation": null })
+    );
+    assert_eq!(me["max_bundle_bytes"], crate::site::MAX_BUNDLE);
+}
+
+#[tokio::test]
+async fn a_new_token_ends_the_old_one() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let path = format!("/api/v1/teams/{}/token", team.id);
+    let fresh = text(&site.post(&path, Some(ADMIN), &json!({})).await.json(200)["token"]);
+    assert_ne!(fresh, team.token);
+    site.get("/api/v1/me", Some(&fresh)).await.json(200);
+    site.get("/api/v1/me", Some(&team.token)).await.problem(
+        401,
+        "unauthenticated",
+        &["replaced", "organiser"],
+    );
+    site.post(
+        "/api/v1/teams/01890000-0000-7000-8000-000000000000/token",
+        Some(ADMIN),
+        &json!({}),
+    )
+    .await
+    .problem(404, "not-found", &["team"]);
+}
+
+#[tokio::test]
+async fn a_name_that_is_none_or_taken_is_refused_with_the_reason() {
+    let site = Site::start().await;
+    site.team("Alpha").await;
+    let create = |name: &'static str| {
+        let site = &site;
+        async move {
+            site.post("/api/v1/teams", Some(ADMIN), &json!({ "name": name }))
+                .await
+        }
+    };
+    create("Alpha")
+        .await
+        .problem(409, "team-name-taken", &["Alpha", "another name"]);
+    create("alpha")
+        .await
+        .problem(409, "team-name-taken", &["alpha"]);
+    create("")
+        .await
+        .problem(422, "invalid-content", &["name", "1 to 40"]);
+    create("<script>")
+        .await
+        .problem(422, "invalid-content", &["name", "'<'"]);
+    create(" Alpha")
+        .await
+        .problem(422, "invalid-content", &["space"]);
+    let long = "a".repeat(41);
+    site.post("/api/v1/teams", Some(ADMIN), &json!({ "name": long }))
+        .await
+        .problem(422, "invalid-content", &["41"]);
+    site.post(
+        "/api/v1/teams",
+        Some(ADMIN),
+        &json!({ "name": "Beta", "admin": true }),
+    )
+    .await
+    .problem(422, "invalid-content", &["admin"]);
+}
+
+#[tokio::test]
+async fn tokens_of_the_wrong_kind_and_no_tokens_are_told_what_to_do() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let new = json!({ "name": "Beta" });
+
+    let none = site.post("/api/v1/teams", None, &new).await;
+    none.problem(401, "unauthenticated", &["Authorization: Bearer"]);
+    assert!(none.header("www-authenticate").starts_with("Bearer"));
+    for wrong in ["fo_team_wrong", "fo_admin_wrong", "x"] {
+        site.post("/api/v1/teams", Some(wrong), &new)
+            .await
+            .problem(401, "unauthenticated", &[]);
+    }
+    site.post("/api/v1/teams", Some(&team.token), &new)
+        .await
+        .problem(403, "forbidden", &["organiser's token", "Alpha"]);
+    site.get("/api/v1/me", Some(ADMIN))
+        .await
+        .problem(403, "forbidden", &["team's token"]);
+    let basic = site
+        .request(reqwest::Method::GET, "/api/v1/me", None)
+        .basic_auth("team", Some(&team.token))
+        .send()
+        .await
+        .unwrap();
+    crate::site::Answer::of(basic)
+        .await
+        .problem(401, "unauthenticated", &["Bearer TOKEN"]);
+}

@@ -1,0 +1,347 @@
+//! What the platform adds to an agent's time, and what recording adds to the simulator's:
+//!
+//! * `bare pipe`: the bytes of one question and one answer go to a compiled child process and back
+//!   through two pipes, with blocking reads and writes and nothing else;
+//! * `protocol`: the same bytes through the session (sandbox, deadlines, serialising, strict
+//!   parsing) with a compiled agent that answers at once;
+//! * `control step`: one step of the simulator alone;
+//! * then the same episodes twice, as a bare loop of session and simulator and as a shard with its
+//!   recording: the difference is what recording costs.
+//!
+//! The agent is this very program, started with `--agent` or `--echo`.
+#![expect(clippy::unwrap_used, reason = "a benchmark that cannot go on ends")]
+#![expect(clippy::print_stdout, reason = "a benchmark reports to the terminal")]
+
+use criterion::{BatchSize, Criterion};
+use faceoff_runner::{
+    AgentEnvironment, Observer, Session, ShardSpec, TimeLimits, bundle::Bundle, run_shard,
+};
+use faceoff_sandbox::{Isolation, Limits, Runtime};
+use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
+use faceoff_types::{EpisodeOutcome, Profile, Seed, Task};
+use faceoff_wire::{Manifest, Message};
+use std::{
+    collections::BTreeMap,
+    fs,
+    io::{BufRead, BufReader, Read, Write},
+    os::unix::fs::PermissionsExt,
+    path::Path,
+    process::{Command, Stdio},
+    time::Duration,
+};
+
+/// An action of the cubic interpolation with all digits, as a real agent sends them.
+const ACTION: &str = "[[0.012345678901234567,-0.19612345678901234,0.0001234567890123456,\
+-1.8436123456789012,0.0012345678901234567,0.97041234567890123,0.0123456789012345],\
+[0.12345678901234567,-0.49612345678901234,0.5001234567890123,-1.1436123456789012,\
+0.7012345678901234,0.27041234567890123,-0.4123456789012345]]";
+
+fn observation() -> Vec<f64> {
+    (0..23)
+        .map(|i| (f64::from(i) * 0.7).sin() * 1.234_567)
+        .collect()
+}
+
+fn main() {
+    let mode = std::env::args().nth(1).unwrap_or_default();
+    match mode.as_str() {
+        "--agent" => instant_agent(),
+        "--echo" => echo(),
+        _ => {
+            let mut criterion = Criterion::default()
+                .configure_from_args()
+                .measurement_time(Duration::from_secs(5))
+                .warm_up_time(Duration::from_secs(1));
+            round_trips(&mut criterion);
+            steps(&mut criterion);
+            criterion.final_summary();
+        }
+    }
+}
+
+/// Answers every message at once, looking only at what it must.
+fn instant_agent() {
+    let mut input = BufReader::with_capacity(64 << 10, std::io::stdin());
+    let mut output = std::io::stdout();
+    let (mut line, mut answer) = (Vec::new(), Vec::new());
+    while input.read_until(b'\n', &mut line).unwrap() > 0 {
+        answer.clear();
+        if line.starts_with(b"{\"type\":\"step\",\"step\":") {
+            let digits = line[22..].split(|byte| *byte == b',').next().unwrap();
+            answer.extend_from_slice(b"{\"type\":\"act\",\"step\":");
+            answer.extend_from_slice(digits);
+            answer.extend_from_slice(b",\"action\":");
+            answer.extend_from_slice(ACTION.as_bytes());
+            answer.extend_from_slice(b"}\n");
+        } else if line.starts_with(b"{\"type\":\"reset\",\"episode\":") {
+            let digits = line[26..].split(|byte| *byte == b'}').next().unwrap();
+            answer.extend_from_slice(b"{\"type\":\"ready\",\"episode\":");
+            answer.extend_from_slice(digits);
+            answer.extend_from_slice(b"}\n");
+        } else if line.starts_with(b"{\"type\":\"hello\"") {
+            answer.extend_from_slice(b"{\"type\":\"ready\",\"protocol\":1,\"interpolation\":3}\n");
+        } else if line.starts_with(b"{\"type\":\"bye\"") {
+            return;
+        }
+        output.write_all(&answer).unwrap();
+        output.flush().unwrap();
+        line.clear();
+    }
+}
+
+/// The other end of the bare pipe: reads the question's bytes, writes the answer's.
+fn echo() {
+    let size = |index| {
+        std::env::args()
+            .nth(index)
+            .unwrap()
+            .parse::<usize>()
+            .unwrap()
+    };
+    let mut question = vec![0; size(2)];
+    let answer = vec![b'x'; size(3)];
+    let (mut input, mut output) = (std::io::stdin().lock(), std::io::stdout().lock());
+    while input.read_exact(&mut question).is_ok() {
+        output.write_all(&answer).unwrap();
+        output.flush().unwrap();
+    }
+}
+
+fn round_trips(criterion: &mut Criterion) {
+    let observation = observation();
+    let mut question = Vec::new();
+    Message::step(17, &observation).write_line(&mut question);
+    let answer_len = format!("{{\"type\":\"act\",\"step\":17,\"action\":{ACTION}}}\n").len();
+    println!(
+        "question {} bytes, answer {answer_len} bytes",
+        question.len()
+    );
+    let mut group = criterion.benchmark_group("round trip");
+
+    let mut child = Command::new(std::env::current_exe().unwrap())
+        .args([
+            "--echo",
+            &question.len().to_string(),
+            &answer_len.to_string(),
+        ])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let (mut stdin, mut stdout) = (child.stdin.take().unwrap(), child.stdout.take().unwrap());
+    let mut answer = vec![0; answer_len];
+    group.bench_function("bare pipe", |bencher| {
+        bencher.iter(|| {
+            stdin.write_all(&question).unwrap();
+            stdout.read_exact(&mut answer).unwrap();
+        });
+    });
+    drop(stdin);
+    child.wait().unwrap();
+
+    let agent = InstantAgent::new();
+    for (name, env) in [
+        (
+            "protocol, sandboxed",
+            environment(Isolation::Sandboxed {
+                given_up: Vec::new(),
+            }),
+        ),
+        ("protocol, no sandbox", environment(Isolation::None)),
+    ] {
+        let mut session = Session::start(&agent.bundle, &env, Task::Hit)
+            .map_err(|(trouble, _)| trouble)
+            .unwrap();
+        session.reset(0).unwrap();
+        let mut action = Vec::new();
+        let mut step = 0;
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| {
+                session.step(step, &observation, &mut action).unwrap();
+                step += 1;
+            });
+        });
+        // What a team is charged: the clock stops with the last byte of the answer.
+        let mut charged: Vec<f64> = (0..5000)
+            .map(|_| {
+                step += 1;
+                session
+                    .step(step, &observation, &mut action)
+                    .unwrap()
+                    .computation_time_s
+            })
+            .collect();
+        charged.sort_by(f64::total_cmp);
+        println!(
+            "{name}: charged computation time p50 {:.1} us, p99 {:.1} us, max {:.1} us",
+            1e6 * charged[2500],
+            1e6 * charged[4950],
+            1e6 * charged[4999]
+        );
+        session.finish().unwrap();
+    }
+    group.finish();
+}
+
+fn steps(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("control step");
+    group.sample_size(20);
+    let seed = Seed::from_number(1);
+    let settings = PerturbationSettings::default();
+    let plant = Plant::mismatched(&settings, seed.model_mismatch());
+    let world = || {
+        Episode::new(
+            Task::Prepare,
+            Interpolation::Cubic,
+            Profile::Evaluation.factors(),
+            &settings,
+            &plant,
+            seed.episode(Task::Prepare, 0),
+        )
+    };
+    group.bench_function("simulator alone", |bencher| {
+        bencher.iter_batched(
+            || {
+                let world = world();
+                let mut action = world.state().q.to_vec();
+                action.extend([0.0; 7]);
+                (world, action)
+            },
+            |(mut world, action)| {
+                for _ in 0..50 {
+                    std::hint::black_box(world.step(&action));
+                }
+            },
+            BatchSize::PerIteration,
+        );
+    });
+    group.finish();
+
+    // The same episodes without and with recording, alternating, the best of each.
+    let agent = InstantAgent::new();
+    let env = environment(Isolation::Sandboxed {
+        given_up: Vec::new(),
+    });
+    let out = tempfile::tempdir().unwrap();
+    let spec = ShardSpec {
+        task: Task::Hit,
+        episodes: 0..20,
+        profile: Profile::Evaluation,
+        seed,
+        mismatch_seed: seed.model_mismatch(),
+        max_faults: 0,
+    };
+    let (mut bare_s, mut recorded_s) = (f64::INFINITY, f64::INFINITY);
+    let mut steps = 0;
+    for _ in 0..3 {
+        let started = cpu_time_s();
+        steps = play_bare(&agent, &env, &spec, &settings);
+        bare_s = bare_s.min(cpu_time_s() - started);
+        let started = cpu_time_s();
+        run_shard(&spec, &agent.bundle, &env, out.path(), &mut Nobody).unwrap();
+        recorded_s = recorded_s.min(cpu_time_s() - started);
+    }
+    let bytes = fs::metadata(out.path().join("steps.parquet"))
+        .unwrap()
+        .len();
+    println!(
+        "{steps} steps: {:.1} us of CPU time per step without recording, {:.1} us with it ({:+.1} %); \
+         {:.0} bytes per step",
+        1e6 * bare_s / f64::from(steps),
+        1e6 * recorded_s / f64::from(steps),
+        100.0 * (recorded_s / bare_s - 1.0),
+        bytes as f64 / f64::from(steps)
+    );
+}
+
+/// CPU time of this thread: other work on the machine does not count.
+fn cpu_time_s() -> f64 {
+    let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    now.tv_sec as f64 + 1e-9 * now.tv_nsec as f64
+}
+
+/// What a shard does, without a recording. Returns the number of steps.
+fn play_bare(
+    agent: &InstantAgent,
+    env: &AgentEnvironment,
+    spec: &ShardSpec,
+    settings: &PerturbationSettings,
+) -> u32 {
+    let plant = Plant::mismatched(settings, spec.mismatch_seed);
+    let mut session = Session::start(&agent.bundle, env, spec.task)
+        .map_err(|(trouble, _)| trouble)
+        .unwrap();
+    let mut action = Vec::new();
+    let mut steps = 0;
+    for episode in spec.episodes.clone() {
+        let mut world = Episode::new(
+            spec.task,
+            Interpolation::Cubic,
+            spec.profile.factors(),
+            settings,
+            &plant,
+            spec.seed.episode(spec.task, episode),
+        );
+        session.reset(episode).unwrap();
+        loop {
+            session
+                .step(world.steps(), world.observation(), &mut action)
+                .unwrap();
+            if world.step(&action).end.is_some() {
+                break;
+            }
+        }
+        session.end(episode, world.steps()).unwrap();
+        steps += world.steps();
+    }
+    session.finish().unwrap();
+    steps
+}
+
+/// Watches nothing.
+struct Nobody;
+
+impl Observer for Nobody {
+    fn episode_done(&mut self, _: &EpisodeOutcome) {}
+    fn cancelled(&self) -> bool {
+        false
+    }
+}
+
+/// A bundle that holds this program.
+struct InstantAgent {
+    _dir: tempfile::TempDir,
+    bundle: Bundle,
+}
+
+impl InstantAgent {
+    fn new() -> Self {
+        let dir = tempfile::Builder::new()
+            .permissions(fs::Permissions::from_mode(0o755))
+            .tempdir()
+            .unwrap();
+        fs::copy(std::env::current_exe().unwrap(), dir.path().join("agent")).unwrap();
+        let manifest = Manifest {
+            name: "instant".into(),
+            command: vec!["./agent".into(), "--agent".into()],
+            runtime: "native".into(),
+            interpolation: Some(3),
+            env: BTreeMap::new(),
+        };
+        let bundle = Bundle {
+            dir: Path::new(dir.path()).to_owned(),
+            manifest,
+        };
+        Self { _dir: dir, bundle }
+    }
+}
+
+fn environment(isolation: Isolation) -> AgentEnvironment {
+    AgentEnvironment {
+        limits: Limits::default(),
+        time: TimeLimits::default(),
+        isolation,
+        runtimes: BTreeMap::from([("native".to_owned(), Runtime::native())]),
+        agent_cpus: Vec::new(),
+    }
+}

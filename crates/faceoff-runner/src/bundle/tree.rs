@@ -1,0 +1,296 @@
+use super::{BundleError, BundleLimits, links, no_manifest};
+use std::{
+    collections::BTreeMap,
+    fs::{self, OpenOptions, Permissions},
+    io::{self, Read, Write},
+    os::unix::fs::{PermissionsExt, symlink},
+    path::{Path, PathBuf},
+};
+
+/// What an entry of the archive became.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Node {
+    /// A folder; `named` when the archive has an entry for it, not only for something inside.
+    Folder {
+        named: bool,
+    },
+    File,
+    Link {
+        target: String,
+    },
+}
+
+/// The folder that grows while an archive is read. What is in it is known from memory, never asked
+/// back from the disk, and symbolic links are made last: nothing can be written through one.
+#[derive(Debug)]
+pub(super) struct Tree {
+    into: PathBuf,
+    limits: BundleLimits,
+    nodes: BTreeMap<String, Node>,
+    files: u64,
+    folders: u64,
+    bytes: u64,
+}
+
+/// Set whatever the service's umask: agents run as another user when the service is root.
+const FOLDER_MODE: u32 = 0o755;
+/// Longest path in an archive, in bytes; with the folder it is unpacked to it must stay below the
+/// system's 4096.
+const PATH_MAX_BYTES: usize = 1024;
+const NAME_MAX_BYTES: usize = 255;
+
+fn invalid(entry: &str, problem: impl std::fmt::Display) -> BundleError {
+    let shown: String = entry.chars().take(200).collect();
+    BundleError::Invalid(format!("entry {shown:?} {problem}"))
+}
+
+impl Tree {
+    /// An empty tree in the folder `into`.
+    pub fn new(into: &Path, limits: &BundleLimits) -> Result<Self, BundleError> {
+        fs::create_dir_all(into)
+            .and_then(|()| fs::set_permissions(into, Permissions::from_mode(FOLDER_MODE)))
+            .map_err(BundleError::io(format!("creating {}", into.display())))?;
+        let mut inside =
+            fs::read_dir(into).map_err(BundleError::io(format!("reading {}", into.display())))?;
+        if inside.next().is_some() {
+            let source = io::Error::from(io::ErrorKind::DirectoryNotEmpty);
+            return Err(BundleError::Io {
+                what: format!("unpacking into {}", into.display()),
+                source,
+            });
+        }
+        Ok(Self {
+            into: into.to_owned(),
+            limits: *limits,
+            nodes: BTreeMap::new(),
+            files: 0,
+            folders: 0,
+            bytes: 0,
+        })
+    }
+
+    /// The folder that is being filled.
+    pub fn place_on_disk(&self) -> &Path {
+        &self.into
+    }
+
+    /// The entry's path without `.` parts; empty for the archive's own root.
+    fn normalise(entry: &str) -> Result<String, BundleError> {
+        if entry.is_empty() {
+            return Err(invalid(entry, "has no name"));
+        }
+        if entry.contains('\0') {
+            return Err(invalid(entry, "has a NUL character in its name"));
+        }
+        if entry.starts_with('/') {
+            return Err(invalid(entry, "has an absolute path"));
+        }
+        let parts: Vec<&str> = entry
+            .split('/')
+            .filter(|part| !matches!(*part, "" | "."))
+            .collect();
+        if parts.contains(&"..") {
+            return Err(invalid(entry, "has '..' in its path"));
+        }
+        if entry.len() > PATH_MAX_BYTES || parts.iter().any(|part| part.len() > NAME_MAX_BYTES) {
+            return Err(invalid(
+                entry,
+                format_args!(
+                    "has too long a path: at most {PATH_MAX_BYTES} bytes, {NAME_MAX_BYTES} per name"
+                ),
+            ));
+        }
+        Ok(parts.join("/"))
+    }
+
+    fn check_mode(entry: &str, mode: u32) -> Result<(), BundleError> {
+        match mode & 0o6000 {
+            0 => Ok(()),
+            _ => Err(invalid(entry, "has a set-user-id or set-group-id bit")),
+        }
+    }
+
+    /// Takes a place in the tree for something that is no folder.
+    fn place(&mut self, entry: &str, node: Node) -> Result<PathBuf, BundleError> {
+        let path = Self::normalise(entry)?;
+        if path.is_empty() {
+            return Err(invalid(entry, "is the root, but not a folder"));
+        }
+        if let Some((parent, _)) = path.rsplit_once('/') {
+            self.make_folder(entry, parent, false)?;
+        }
+        if self.nodes.contains_key(&path) {
+            return Err(invalid(entry, "is in the archive twice"));
+        }
+        self.files += 1;
+        if self.files > self.limits.files {
+            return Err(BundleError::Invalid(format!(
+                "the archive has more than {} files",
+                self.limits.files
+            )));
+        }
+        let target = self.into.join(&path);
+        self.nodes.insert(path, node);
+        Ok(target)
+    }
+
+    fn make_folder(&mut self, entry: &str, path: &str, named: bool) -> Result<(), BundleError> {
+        match self.nodes.get_mut(path) {
+            Some(Node::Folder { named: before }) => {
+                if named && *before {
+                    return Err(invalid(entry, "is in the archive twice"));
+                }
+                *before |= named;
+                return Ok(());
+            }
+            Some(Node::File) => {
+                return Err(invalid(
+                    entry,
+                    format_args!("needs {path:?} to be a folder, but it is a file"),
+                ));
+            }
+            Some(Node::Link { .. }) => {
+                return Err(invalid(
+                    entry,
+                    format_args!("goes through the link {path:?}"),
+                ));
+            }
+            None => {}
+        }
+        if let Some((parent, _)) = path.rsplit_once('/') {
+            self.make_folder(entry, parent, false)?;
+        }
+        self.folders += 1;
+        if self.folders > self.limits.files {
+            return Err(BundleError::Invalid(format!(
+                "the archive has more than {} folders",
+                self.limits.files
+            )));
+        }
+        let place = self.into.join(path);
+        fs::create_dir(&place)
+            .and_then(|()| fs::set_permissions(&place, Permissions::from_mode(FOLDER_MODE)))
+            .map_err(BundleError::io(format!("creating the folder {path:?}")))?;
+        self.nodes.insert(path.to_owned(), Node::Folder { named });
+        Ok(())
+    }
+
+    /// A folder of the archive.
+    pub fn folder(&mut self, entry: &str, mode: u32) -> Result<(), BundleError> {
+        Self::check_mode(entry, mode)?;
+        let path = Self::normalise(entry)?;
+        if path.is_empty() {
+            return Ok(());
+        }
+        self.make_folder(entry, &path, true)
+    }
+
+    /// A file of the archive, its content streamed and counted.
+    pub fn file(
+        &mut self,
+        entry: &str,
+        mode: u32,
+        content: &mut dyn Read,
+    ) -> Result<(), BundleError> {
+        Self::check_mode(entry, mode)?;
+        let target = self.place(entry, Node::File)?;
+        let file_mode = if mode & 0o111 == 0 { 0o644 } else { 0o755 };
+        let writing = || format!("writing {entry:?}");
+        let mut file = OpenOptions::new()
+            .write(true)
+            .create_new(true)
+            .open(target)
+            .map_err(BundleError::io(writing()))?;
+        file.set_permissions(Permissions::from_mode(file_mode))
+            .map_err(BundleError::io(writing()))?;
+        let mut buffer = vec![0; 64 << 10];
+        loop {
+            let read = match content.read(&mut buffer) {
+                Ok(0) => return Ok(()),
+                Ok(read) => read,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+                Err(error) => return Err(BundleError::reading(entry)(error)),
+            };
+            self.bytes += read as u64;
+            if self.bytes > self.limits.unpacked_bytes {
+                return Err(BundleError::Invalid(format!(
+                    "the archive unpacks to more than {} bytes (stopped at entry {entry:?})",
+                    self.limits.unpacked_bytes
+                )));
+            }
+            file.write_all(&buffer[..read])
+                .map_err(BundleError::io(writing()))?;
+        }
+    }
+
+    /// A symbolic link; checked and made by [`Tree::finish`].
+    pub fn link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
+        if target.is_empty() || target.contains('\0') || target.len() > PATH_MAX_BYTES {
+            return Err(invalid(entry, "is a link to no possible path"));
+        }
+        self.place(
+            entry,
+            Node::Link {
+                target: target.to_owned(),
+            },
+        )?;
+        Ok(())
+    }
+
+    /// Another name of a file that the archive has brought already.
+    pub fn hard_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
+        let existing = Self::normalise(target)?;
+        if self.nodes.get(&existing) != Some(&Node::File) {
+            return Err(invalid(
+                entry,
+                format_args!(
+                    "is a hard link to {target:?}, which is no earlier file of the archive"
+                ),
+            ));
+        }
+        let place = self.place(entry, Node::File)?;
+        fs::hard_link(self.into.join(existing), place)
+            .map_err(BundleError::io(format!("linking {entry:?}")))
+    }
+
+    /// Anything that a bundle cannot hold.
+    pub fn refuse(&self, entry: &str, what: &str) -> BundleError {
+        invalid(
+            entry,
+            format_args!("is {what}; a bundle holds files, folders and links"),
+        )
+    }
+
+    /// The folder that holds `manifest`: the root (an empty path) or the single top folder.
+    pub fn bundle_root(&self, manifest: &str) -> Result<String, BundleError> {
+        if self.nodes.contains_key(manifest) {
+            return Ok(String::new());
+        }
+        let mut top = self.nodes.iter().filter(|(path, _)| !path.contains('/'));
+        match (top.next(), top.next()) {
+            (Some((folder, Node::Folder { .. })), None)
+                if self.nodes.contains_key(&format!("{folder}/{manifest}")) =>
+            {
+                Ok(folder.clone())
+            }
+            _ => Err(no_manifest()),
+        }
+    }
+
+    /// Checks that every link stays inside of the bundle's folder `root`, then makes the links.
+    pub fn finish(self, root: &str) -> Result<(), BundleError> {
+        for (path, node) in &self.nodes {
+            if let Node::Link { target } = node {
+                links::check(&self.nodes, root, path, target)
+                    .map_err(|problem| invalid(path, problem))?;
+            }
+        }
+        for (path, node) in &self.nodes {
+            if let Node::Link { target } = node {
+                symlink(target, self.into.join(path))
+                    .map_err(BundleError::io(format!("linking {path:?}")))?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,90 @@
+use super::{BundleError, tree::Tree};
+use std::{
+    fs::File,
+    io::{BufReader, Read},
+};
+use zip::{
+    CompressionMethod, System, ZipReadOptions, read::Config, result::ZipError,
+    unstable::read::ZipIterable,
+};
+
+const KIND_MASK: u32 = 0o170_000;
+const KIND_FOLDER: u32 = 0o040_000;
+const KIND_FILE: u32 = 0o100_000;
+const KIND_LINK: u32 = 0o120_000;
+
+/// Longest target of a symbolic link, in bytes.
+const LINK_MAX_BYTES: u64 = 4096;
+
+/// Unpacks a zip archive, entry by entry as its central directory lists them: the directory is
+/// never held in memory, and two entries of one name are both seen. (The library's indexed reader
+/// does neither; its iterating one may change between versions, which the lock file pins.)
+pub(super) fn unpack(file: BufReader<File>, tree: &mut Tree) -> Result<(), BundleError> {
+    let mut archive = ZipIterable::try_new(file, Config::default())
+        .map_err(|error| damaged("", error))?
+        .enforce_header_consistency(true);
+    let files = archive.files().map_err(|error| damaged("", error))?;
+    while let Some(entry) = files.next() {
+        let entry = entry.map_err(|error| damaged("", error))?;
+        let name = std::str::from_utf8(entry.name_raw())
+            .map_err(|_| {
+                BundleError::Invalid(format!(
+                    "the archive has a name that is not UTF-8: {:?}",
+                    String::from_utf8_lossy(entry.name_raw())
+                ))
+            })?
+            .to_owned();
+        if name.contains('\\') {
+            return Err(tree.refuse(&name, "named with a backslash"));
+        }
+        if entry.encrypted() {
+            return Err(tree.refuse(&name, "encrypted"));
+        }
+        if !matches!(
+            entry.compression(),
+            CompressionMethod::Stored | CompressionMethod::Deflated
+        ) {
+            return Err(tree.refuse(&name, "compressed by another method than deflate"));
+        }
+        // The library's own translation hides set-id bits, which are to be refused.
+        let mode = match (entry.system(), entry.external_attributes() >> 16) {
+            (System::Dos, _) | (_, 0) => entry.unix_mode().unwrap_or(0o644),
+            (_, mode) => mode,
+        };
+        let kind = match mode & KIND_MASK {
+            0 if name.ends_with('/') => KIND_FOLDER,
+            0 => KIND_FILE,
+            kind => kind,
+        };
+        let mut content = entry
+            .with_reader(files.reader_mut(), ZipReadOptions::new())
+            .map_err(|error| damaged(&name, error))?;
+        match kind {
+            KIND_FOLDER => tree.folder(&name, mode)?,
+            KIND_FILE if name.ends_with('/') => tree.folder(&name, mode)?,
+            KIND_FILE => tree.file(&name, mode, &mut content)?,
+            KIND_LINK => {
+                let mut target = Vec::new();
+                (&mut content)
+                    .take(LINK_MAX_BYTES)
+                    .read_to_end(&mut target)
+                    .map_err(BundleError::reading(&name))?;
+                let target = String::from_utf8(target)
+                    .map_err(|_| tree.refuse(&name, "a link to a name that is not UTF-8"))?;
+                tree.link(&name, &target)?;
+            }
+            _ => return Err(tree.refuse(&name, "a device, pipe or socket")),
+        }
+    }
+    Ok(())
+}
+
+fn damaged(entry: &str, error: ZipError) -> BundleError {
+    match error {
+        ZipError::Io(error) => BundleError::reading(entry)(error),
+        other if entry.is_empty() => {
+            BundleError::Invalid(format!("the archive is damaged: {other}"))
+        }
+        other => BundleError::Invalid(format!("the archive is damaged at {entry:?}: {other}")),
+    }
+}

@@ -1,0 +1,64 @@
+/// The end of what an agent's processes wrote to standard error, one after the other.
+#[derive(Debug)]
+pub(crate) struct Log {
+    text: String,
+    limit_bytes: usize,
+}
+
+impl Log {
+    /// An empty log that keeps its last bytes.
+    pub fn new(limit_bytes: u64) -> Self {
+        Self {
+            text: String::new(),
+            limit_bytes: usize::try_from(limit_bytes).unwrap_or(usize::MAX),
+        }
+    }
+
+    /// Adds what one process wrote, and why it ended, if that was a fault.
+    pub fn add(&mut self, stderr: &str, fault: Option<&str>) {
+        self.text.push_str(stderr);
+        if !self.text.is_empty() && !self.text.ends_with('\n') {
+            self.text.push('\n');
+        }
+        if let Some(fault) = fault {
+            self.text.push_str("[faceoff] ");
+            self.text.push_str(fault);
+            self.text.push('\n');
+        }
+        if self.text.len() > self.limit_bytes {
+            let mut cut = self.text.len() - self.limit_bytes;
+            while !self.text.is_char_boundary(cut) {
+                cut += 1;
+            }
+            self.text.drain(..cut);
+        }
+    }
+
+    /// What is kept.
+    pub fn into_text(self) -> String {
+        self.text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_end_is_kept_and_characters_stay_whole() {
+        let mut log = Log::new(10);
+        log.add("", None);
+        assert_eq!(log.text, "");
+        log.add("début", None);
+        assert_eq!(log.text, "début\n");
+        log.add("fin", Some("x"));
+        assert!(
+            log.text.len() <= 10 && log.text.ends_with("eoff] x\n"),
+            "{:?}",
+            log.text
+        );
+        let mut log = Log::new(2);
+        log.add("éé", None);
+        assert_eq!(log.text, "\n");
+    }
+}

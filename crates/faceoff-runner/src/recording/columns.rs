@@ -1,0 +1,117 @@
+use arrow_array::{ArrayRef, builder::Float64Builder};
+use arrow_schema::{DataType, Field};
+use faceoff_sim::EpisodeState;
+use std::sync::Arc;
+
+/// Columns of numbers that are filled row by row, from left to right.
+#[derive(Debug, Default)]
+pub(super) struct FloatColumns {
+    fields: Vec<Field>,
+    builders: Vec<Float64Builder>,
+    next: usize,
+}
+
+impl FloatColumns {
+    /// Adds columns to the right.
+    pub fn with<I: IntoIterator<Item = String>>(mut self, names: I, nullable: bool) -> Self {
+        for name in names {
+            self.fields
+                .push(Field::new(name, DataType::Float64, nullable));
+            self.builders.push(Float64Builder::new());
+        }
+        self
+    }
+
+    /// Adds the columns of a true state to the right, their names after `prefix`.
+    pub fn with_state(self, prefix: &str) -> Self {
+        let name = |suffix: &str| format!("{prefix}{suffix}");
+        self.with(
+            ["x", "y", "yaw", "vx", "vy", "yaw_rate"].map(|c| name(&format!("puck_{c}"))),
+            false,
+        )
+        .with(joints(&name("q")), false)
+        .with(joints(&name("dq")), false)
+        .with(joints(&name("dq_filtered")), false)
+        .with([name("universal_1"), name("universal_2")], false)
+        .with(["x", "y", "z"].map(|c| name(&format!("ee_{c}"))), false)
+        .with(joints(&name("opponent_q")), true)
+        .with(
+            ["x", "y", "z"].map(|c| name(&format!("opponent_ee_{c}"))),
+            true,
+        )
+    }
+
+    /// The columns' names and types.
+    pub fn fields(&self) -> &[Field] {
+        &self.fields
+    }
+
+    /// The next values of the row.
+    pub fn put(&mut self, values: &[f64]) {
+        for value in values {
+            self.builders[self.next].append_value(*value);
+            self.next += 1;
+        }
+    }
+
+    /// The next values of the row, absent or not.
+    pub fn put_optional<const N: usize>(&mut self, values: Option<[f64; N]>) {
+        match values {
+            Some(values) => self.put(&values),
+            None => self.put_absent(N),
+        }
+    }
+
+    /// The next `count` values of the row are absent.
+    pub fn put_absent(&mut self, count: usize) {
+        for _ in 0..count {
+            self.builders[self.next].append_null();
+            self.next += 1;
+        }
+    }
+
+    /// The columns of [`FloatColumns::with_state`].
+    pub fn put_state(&mut self, state: &EpisodeState) {
+        let EpisodeState {
+            puck,
+            q,
+            dq,
+            dq_filtered,
+            universal,
+            ee,
+            opponent_q,
+            opponent_ee,
+        } = state;
+        self.put(puck);
+        self.put(q);
+        self.put(dq);
+        self.put(dq_filtered);
+        self.put(universal);
+        self.put(ee);
+        self.put_optional(*opponent_q);
+        self.put_optional(*opponent_ee);
+    }
+
+    /// Ends the row. A row of another length is a mistake of this crate, not of its input.
+    pub fn end_row(&mut self) {
+        assert_eq!(
+            self.next,
+            self.builders.len(),
+            "every column of a row is filled"
+        );
+        self.next = 0;
+    }
+
+    /// The rows so far, which are removed.
+    pub fn take(&mut self) -> Vec<ArrayRef> {
+        self.builders
+            .iter_mut()
+            .map(|builder| Arc::new(builder.finish()) as ArrayRef)
+            .collect()
+    }
+}
+
+/// `name_1` … `name_7`.
+pub(super) fn joints(name: &str) -> [String; 7] {
+    [1, 2, 3, 4, 5, 6, 7].map(|joint| format!("{name}_{joint}"))
+}

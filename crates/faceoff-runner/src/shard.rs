@@ -1,0 +1,119 @@
+use crate::{
+    AgentEnvironment, PlatformFault,
+    bundle::Bundle,
+    cpu::OffTheAgentsCpus,
+    player::Player,
+    recording::{Recorder, ShardFolder},
+};
+use faceoff_types::{EpisodeOutcome, Profile, Seed, Task};
+use serde::{Deserialize, Serialize};
+use std::{ops::Range, path::Path};
+
+/// What to simulate.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ShardSpec {
+    /// The task.
+    pub task: Task,
+    /// The episodes, by their index within the evaluation.
+    pub episodes: Range<u32>,
+    /// The perturbation profile.
+    pub profile: Profile,
+    /// The evaluation's seed.
+    pub seed: Seed,
+    /// The seed of the season's model mismatch.
+    pub mismatch_seed: Seed,
+    /// More faults than this end the shard early.
+    pub max_faults: u32,
+}
+
+/// What one shard yields, beside its recording.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ShardReport {
+    /// What happened in each episode, in order.
+    pub outcomes: Vec<EpisodeOutcome>,
+    /// The end of the agent's standard error, with its faults.
+    pub log: String,
+    /// More than the allowed faults: the remaining episodes were not played.
+    pub stopped_by_faults: bool,
+}
+
+/// Follows a shard as it runs, and can stop it.
+pub trait Observer {
+    /// An episode is over.
+    fn episode_done(&mut self, outcome: &EpisodeOutcome);
+    /// The end of the agent's standard error with its faults, once, however the shard ends: also
+    /// when it was cancelled or the platform failed, and there is no report.
+    fn log(&mut self, _log: &str) {}
+    /// Is the shard to stop? Asked before each step, so it must be cheap.
+    fn cancelled(&self) -> bool;
+}
+
+/// Plays a shard and records it in the folder `out`, which is created: `steps.parquet`,
+/// `episodes.parquet`, `agent.log`, `report.json` (the returned report) and last, with the hashes
+/// of the others, `shard.json`. A folder without `shard.json` is no recording.
+///
+/// # Errors
+/// The platform's alone: the agent's faults are in the report. [`PlatformFault::Cancelled`] when
+/// the observer said so.
+pub fn run_shard(
+    spec: &ShardSpec,
+    bundle: &Bundle,
+    env: &AgentEnvironment,
+    out: &Path,
+    observer: &mut dyn Observer,
+) -> Result<ShardReport, PlatformFault> {
+    let _pinned = OffTheAgentsCpus::pin(&env.agent_cpus);
+    let folder = ShardFolder::create(out)?;
+    let mut recorder = Recorder::create(&folder, spec.task)?;
+    let mut player = Player::new(
+        bundle,
+        env,
+        spec.task,
+        spec.profile,
+        spec.seed,
+        spec.mismatch_seed,
+    );
+    let (outcomes, stopped_by_faults) = match play(spec, &mut player, &mut recorder, observer) {
+        Ok(played) => played,
+        Err(fault) => {
+            observer.log(&player.abort());
+            return Err(fault);
+        }
+    };
+    let log = player.close()?;
+    observer.log(&log);
+    let report = ShardReport {
+        outcomes,
+        log,
+        stopped_by_faults,
+    };
+    recorder.finish()?;
+    folder.commit(spec, &report)?;
+    Ok(report)
+}
+
+/// Plays the episodes; tells also whether faults ended them early.
+fn play(
+    spec: &ShardSpec,
+    player: &mut Player<'_>,
+    recorder: &mut Recorder,
+    observer: &mut dyn Observer,
+) -> Result<(Vec<EpisodeOutcome>, bool), PlatformFault> {
+    let mut outcomes = Vec::with_capacity(spec.episodes.len());
+    let mut faults = 0;
+    for episode in spec.episodes.clone() {
+        if observer.cancelled() {
+            return Err(PlatformFault::Cancelled);
+        }
+        let outcome = player.play(episode, faceoff_sim::EPISODE_STEPS, recorder, &|| {
+            observer.cancelled()
+        })?;
+        observer.episode_done(&outcome);
+        faults += u32::from(outcome.fault.is_some());
+        outcomes.push(outcome);
+        if faults > spec.max_faults {
+            return Ok((outcomes, true));
+        }
+    }
+    Ok((outcomes, false))
+}

@@ -1,0 +1,50 @@
+use crate::{AgentEnvironment, PlatformFault, bundle::Bundle, log::Log, player::Player, recording};
+use faceoff_types::{AgentFault, Profile, Seed, Task};
+use serde::{Deserialize, Serialize};
+
+/// Control steps of each smoke episode, at most.
+pub const SMOKE_STEPS: u32 = 50;
+
+/// What the smoke run of an upload found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SmokeReport {
+    /// The first fault, if there was one.
+    pub fault: Option<AgentFault>,
+    /// The end of the agent's standard error.
+    pub log: String,
+}
+
+/// Does the agent start, answer and keep time? One short episode of each task, in the same sandbox
+/// and with the same limits as an evaluation; ends with the first fault.
+///
+/// The seed is fixed and public: a smoke run must tell the same about the same bundle, and nothing
+/// about the season.
+///
+/// # Errors
+/// The platform's alone; the agent's fault is in the report.
+pub fn smoke(bundle: &Bundle, env: &AgentEnvironment) -> Result<SmokeReport, PlatformFault> {
+    let seed = Seed::from_number(0);
+    let mut log = Log::new(env.limits.stderr_tail_bytes);
+    for task in Task::ALL {
+        let mut player = Player::new(
+            bundle,
+            env,
+            task,
+            Profile::Evaluation,
+            seed,
+            seed.model_mismatch(),
+        );
+        let outcome = player.play(0, SMOKE_STEPS, &mut recording::Nowhere, &|| false)?;
+        log.add(&player.close()?, None);
+        if let Some(fault) = outcome.fault {
+            return Ok(SmokeReport {
+                fault: Some(fault),
+                log: log.into_text(),
+            });
+        }
+    }
+    Ok(SmokeReport {
+        fault: None,
+        log: log.into_text(),
+    })
+}

@@ -1,0 +1,109 @@
+use faceoff_sim::EnvInfo;
+use faceoff_types::{RULESET, Task};
+use faceoff_wire::{
+    Env,
+    message::{DiscEnv, RobotEnv, TableEnv},
+};
+
+/// The simulator's constants under the protocol's names.
+pub(crate) fn wire_env(task: Task) -> Env {
+    let EnvInfo {
+        n_agents,
+        table_length,
+        table_width,
+        goal_width,
+        puck_radius,
+        mallet_radius,
+        ee_desired_height,
+        universal_height,
+        control_frequency,
+        joint_pos_limit,
+        joint_vel_limit,
+        joint_acc_limit,
+        base_frame,
+        dt,
+    } = faceoff_sim::env_info(task);
+    let opponent: &[usize] = match task {
+        Task::Hit => &Env::OPPONENT_EE_IDS,
+        Task::Defend | Task::Prepare => &[],
+    };
+    Env {
+        dt,
+        n_agents,
+        puck_pos_ids: Env::PUCK_POS_IDS.to_vec(),
+        puck_vel_ids: Env::PUCK_VEL_IDS.to_vec(),
+        joint_pos_ids: Env::JOINT_POS_IDS.to_vec(),
+        joint_vel_ids: Env::JOINT_VEL_IDS.to_vec(),
+        opponent_ee_ids: opponent.to_vec(),
+        table: TableEnv {
+            length: table_length,
+            width: table_width,
+            goal_width,
+        },
+        puck: DiscEnv {
+            radius: puck_radius,
+        },
+        mallet: DiscEnv {
+            radius: mallet_radius,
+        },
+        robot: RobotEnv {
+            n_joints: faceoff_sim::JOINTS,
+            ee_desired_height,
+            universal_height,
+            control_frequency,
+            joint_pos_limit,
+            joint_vel_limit,
+            joint_acc_limit,
+            base_frame: base_frame
+                .iter()
+                .map(|m| [0, 4, 8, 12].map(|row| [m[row], m[row + 1], m[row + 2], m[row + 3]]))
+                .collect(),
+        },
+        episode_steps: faceoff_sim::EPISODE_STEPS,
+        ruleset: RULESET.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use faceoff_sim::Interpolation;
+    use faceoff_wire::InterpolationCode;
+
+    #[test]
+    fn simulator_and_protocol_agree_on_every_interpolation() {
+        for code in [Some(1), Some(2), Some(3), Some(4), Some(5), Some(-1), None] {
+            let (sim, wire) = (
+                Interpolation::from_code(code).unwrap(),
+                InterpolationCode::new(code).unwrap(),
+            );
+            assert_eq!(sim.shape(), wire.shape(), "{code:?}");
+            assert_eq!(sim.code(), wire.code());
+        }
+        assert_eq!(Interpolation::from_code(Some(6)), None);
+    }
+
+    #[test]
+    fn hello_states_the_rules_constants() {
+        let env = serde_json::to_value(wire_env(Task::Hit)).unwrap();
+        assert_eq!(env["dt"], 0.02);
+        assert_eq!(env["episode_steps"], 500);
+        assert_eq!(env["table"]["length"], 1.948);
+        assert_eq!(env["table"]["width"], 1.038);
+        assert_eq!(env["table"]["goal_width"], 0.25);
+        assert_eq!(env["puck"]["radius"], 0.03165);
+        assert_eq!(env["mallet"]["radius"], 0.04815);
+        assert_eq!(env["robot"]["ee_desired_height"], 0.1645);
+        assert_eq!(env["robot"]["universal_height"], 0.0645);
+        assert_eq!(env["robot"]["control_frequency"], 50.0);
+        assert_eq!(env["robot"]["n_joints"], 7);
+        assert_eq!(env["opponent_ee_ids"], serde_json::json!([20, 21, 22]));
+        assert_eq!(
+            env["robot"]["base_frame"][0][0],
+            serde_json::json!([1.0, 0.0, 0.0, -1.51])
+        );
+        for task in [Task::Defend, Task::Prepare] {
+            assert_eq!(wire_env(task).opponent_ee_ids, [] as [usize; 0]);
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! Agents in Python, behaving and not, each a real process.
+
+use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::Bundle};
+use faceoff_sandbox::{Isolation, Limits, Runtime};
+use faceoff_wire::Manifest;
+use std::{collections::BTreeMap, fs, os::unix::fs::PermissionsExt};
+use tempfile::TempDir;
+
+/// A whole agent that holds the pose it finds, with hooks to misbehave: `on_reset(episode)` and
+/// `on_step(step, answer)`, which returns the line to send or `None` for none.
+const FRAME: &str = r#"
+import json, os, sys, time
+INTERPOLATION = 3
+def on_hello(hello): pass
+def on_reset(episode): pass
+def on_step(step, answer): return json.dumps(answer)
+def say(line):
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
+#HOOKS
+held = None
+for line in sys.stdin:
+    message = json.loads(line)
+    kind = message["type"]
+    if kind == "hello":
+        env = message["env"]
+        on_hello(message)
+        say(json.dumps({"type": "ready", "protocol": 1, "interpolation": INTERPOLATION}))
+    elif kind == "reset":
+        held = None
+        on_reset(message["episode"])
+        say(json.dumps({"type": "ready", "episode": message["episode"]}))
+    elif kind == "step":
+        obs = message["obs"]
+        if held is None:
+            held = [obs[i] for i in env["joint_pos_ids"]]
+        action = {1: held, 3: [held, [0.0] * 7]}[INTERPOLATION]
+        answer = on_step(message["step"], {"type": "act", "step": message["step"], "action": action})
+        if answer is not None:
+            say(answer)
+    elif kind == "bye":
+        print("goodbye", file=sys.stderr)
+        break
+"#;
+
+/// A bundle whose agent is [`FRAME`] with hooks.
+pub struct Agent {
+    _dir: TempDir,
+    pub bundle: Bundle,
+}
+
+impl Agent {
+    pub fn behaving() -> Self {
+        Self::with("")
+    }
+
+    pub fn with(hooks: &str) -> Self {
+        Self::script(&FRAME.replace("#HOOKS", hooks))
+    }
+
+    pub fn script(script: &str) -> Self {
+        let dir = tempfile::Builder::new()
+            .permissions(fs::Permissions::from_mode(0o755))
+            .tempdir()
+            .unwrap();
+        fs::write(dir.path().join("agent.py"), script).unwrap();
+        let manifest = Manifest {
+            name: "test".into(),
+            command: vec!["python3".into(), "agent.py".into()],
+            runtime: "python3".into(),
+            interpolation: None,
+            env: BTreeMap::new(),
+        };
+        let bundle = Bundle {
+            dir: dir.path().to_owned(),
+            manifest,
+        };
+        Self { _dir: dir, bundle }
+    }
+
+    pub fn manifest(mut self, change: impl FnOnce(&mut Manifest)) -> Self {
+        change(&mut self.bundle.manifest);
+        self
+    }
+}
+/// The full sandbox with short but ample deadlines.
+pub fn sandboxed() -> AgentEnvironment {
+    AgentEnvironment {
+        limits: Limits {
+            memory_bytes: 256 << 20,
+            pids: 20,
+            ..Limits::default()
+        },
+        time: TimeLimits {
+            startup_s: 60.0,
+            reset_s: 30.0,
+            step_s: 30.0,
+            bye_s: 10.0,
+        },
+        isolation: Isolation::Sandboxed {
+            given_up: Vec::new(),
+        },
+        runtimes: BTreeMap::from([
+            ("native".to_owned(), Runtime::native()),
+            (
+                "python3".to_owned(),
+                Runtime::python3().expect("a python3 for the tests"),
+            ),
+        ]),
+        agent_cpus: Vec::new(),
+    }
+}
+
+/// The sandbox with a short step limit, for agents that are meant to meet it.
+pub fn impatient() -> AgentEnvironment {
+    let mut env = sandboxed();
+    env.time.step_s = 0.5;
+    env
+}

@@ -1,0 +1,532 @@
+use crate::archives::{MANIFEST, Tar, write, zip};
+use faceoff_runner::bundle::{Bundle, BundleError, BundleLimits, copy, open, unpack};
+use std::{
+    fs,
+    os::unix::fs::{MetadataExt, PermissionsExt},
+    path::Path,
+};
+use tar::EntryType;
+use tempfile::TempDir;
+
+fn try_unpack(bytes: &[u8], limits: BundleLimits) -> (TempDir, Result<Bundle, BundleError>) {
+    let dir = tempfile::tempdir().unwrap();
+    let archive = write(dir.path(), "upload", bytes);
+    let result = unpack(&archive, &dir.path().join("out"), &limits);
+    (dir, result)
+}
+
+#[track_caller]
+fn accepted(bytes: &[u8]) -> (TempDir, Bundle) {
+    let (dir, result) = try_unpack(bytes, BundleLimits::default());
+    (dir, result.unwrap())
+}
+
+#[track_caller]
+fn refused_with(bytes: &[u8], limits: BundleLimits, needle: &str) -> TempDir {
+    let (dir, result) = try_unpack(bytes, limits);
+    match result {
+        Err(BundleError::Invalid(message)) => {
+            assert!(message.contains(needle), "{message:?} lacks {needle:?}");
+        }
+        other => panic!("expected a refusal with {needle:?}, got {other:?}"),
+    }
+    dir
+}
+
+#[track_caller]
+fn refused(bytes: &[u8], needle: &str) -> TempDir {
+    refused_with(bytes, BundleLimits::default(), needle)
+}
+
+fn mode(path: &Path) -> u32 {
+    path.metadata().unwrap().permissions().mode() & 0o7777
+}
+
+#[test]
+fn the_three_kinds_of_archive_are_told_apart_by_their_bytes() {
+    let tar = || {
+        Tar::with_manifest()
+            .folder("weights/")
+            .file("./agent.py", 0o755, b"print()")
+            .file("weights/w.bin", 0o600, &[7; 100_000])
+    };
+    let zip = zip(&[
+        ("agent.toml", 0o644, MANIFEST.as_bytes()),
+        ("weights/", 0o755, b""),
+        ("agent.py", 0o755, b"print()"),
+        ("weights/w.bin", 0o600, &[7; 100_000]),
+    ]);
+    for bytes in [tar().gz(), tar().zst(), zip] {
+        let (_dir, bundle) = accepted(&bytes);
+        assert_eq!(bundle.manifest.name, "test");
+        assert_eq!(
+            fs::read(bundle.dir.join("weights/w.bin")).unwrap(),
+            [7; 100_000]
+        );
+        assert_eq!(mode(&bundle.dir.join("agent.py")), 0o755);
+        assert_eq!(mode(&bundle.dir.join("weights/w.bin")), 0o644);
+        assert_eq!(mode(&bundle.dir.join("weights")), 0o755);
+    }
+    refused(&tar().bytes(), "expected .tar.gz, .tar.zst or .zip");
+    refused(b"", "expected .tar.gz, .tar.zst or .zip");
+    refused(b"#!/bin/sh\n", "expected .tar.gz, .tar.zst or .zip");
+}
+
+#[test]
+fn a_single_top_folder_is_the_bundle() {
+    let (_dir, bundle) = accepted(
+        &Tar::new()
+            .file("striker-1.2/agent.toml", 0o644, MANIFEST.as_bytes())
+            .gz(),
+    );
+    assert!(bundle.dir.ends_with("striker-1.2"));
+    let two = Tar::new()
+        .file("a/agent.toml", 0o644, MANIFEST.as_bytes())
+        .file("b/x", 0o644, b"");
+    refused(&two.gz(), "there is no agent.toml");
+    refused(
+        &Tar::new().file("agent.py", 0o644, b"").gz(),
+        "there is no agent.toml",
+    );
+    refused(
+        &Tar::new().file("a/b/agent.toml", 0o644, b"").gz(),
+        "there is no agent.toml",
+    );
+    refused(&Tar::new().gz(), "there is no agent.toml");
+}
+
+#[test]
+fn a_wrong_manifest_is_told_by_its_key() {
+    let tar = |text: &str| Tar::new().file("agent.toml", 0o644, text.as_bytes()).gz();
+    refused(&tar("name = 3"), "agent.toml:");
+    refused(
+        &tar(&MANIFEST.replace("[\"python3\", \"agent.py\"]", "[]")),
+        "command must name",
+    );
+    refused(&tar(&"#".repeat(100_000)), "longer than 65536 bytes");
+    let not_utf8 = Tar::new()
+        .file("agent.toml", 0o644, b"name = \"\xff\"")
+        .gz();
+    refused(&not_utf8, "agent.toml: not UTF-8");
+}
+
+#[test]
+fn paths_that_leave_the_bundle_are_refused_by_name() {
+    for (name, why) in [
+        ("/etc/cron.d/x", "absolute path"),
+        ("../x", "'..'"),
+        ("a/../../x", "'..'"),
+        ("a/..", "'..'"),
+    ] {
+        let dir = refused(&Tar::with_manifest().file(name, 0o644, b"x").gz(), why);
+        assert!(!dir.path().join("x").exists());
+        refused(&Tar::with_manifest().file(name, 0o644, b"x").gz(), name);
+        refused(
+            &zip(&[
+                ("agent.toml", 0o644, MANIFEST.as_bytes()),
+                (name, 0o644, b"x"),
+            ]),
+            why,
+        );
+    }
+    refused(&zip(&[("a\\..\\b", 0o644, b"")]), "backslash");
+    refused(
+        &Tar::with_manifest()
+            .file(&format!("{}/x", "n".repeat(90)), 0o644, b"")
+            .file("", 0o644, b"")
+            .gz(),
+        "has no name",
+    );
+}
+
+#[test]
+fn links_that_stay_inside_work_and_others_are_refused() {
+    let good = Tar::with_manifest()
+        .file("lib/real.so.1", 0o644, b"library")
+        .symlink("lib/real.so", "real.so.1")
+        .symlink("main.so", "lib/real.so")
+        .entry(EntryType::Link, "copy", 0o644, "lib/real.so.1", b"");
+    let (_dir, bundle) = accepted(&good.gz());
+    assert_eq!(fs::read(bundle.dir.join("main.so")).unwrap(), b"library");
+    let copy = bundle.dir.join("copy").metadata().unwrap();
+    assert_eq!(
+        copy.ino(),
+        bundle.dir.join("lib/real.so.1").metadata().unwrap().ino()
+    );
+
+    let leaves = "is a link that leaves the bundle";
+    for target in ["/etc/passwd", "..", "../x", "lib/../.."] {
+        refused(&Tar::with_manifest().symlink("l", target).gz(), leaves);
+        let mut as_zip = ZipWithLink::new(target);
+        refused(&as_zip.bytes(), leaves);
+    }
+    // The archive's root is outside of a bundle in a top folder.
+    let top = Tar::new()
+        .file("top/agent.toml", 0o644, MANIFEST.as_bytes())
+        .symlink("top/l", "..");
+    refused(&top.gz(), leaves);
+    // A chain that only leaves when it is followed.
+    let chain = Tar::with_manifest()
+        .symlink("deep/up", "..")
+        .symlink("escape", "deep/up/../x");
+    refused(&chain.gz(), "escape");
+    refused(
+        &Tar::with_manifest()
+            .symlink("a", "b")
+            .symlink("b", "a")
+            .gz(),
+        "circle",
+    );
+    refused(
+        &Tar::with_manifest()
+            .entry(EntryType::Link, "passwd", 0o644, "/etc/passwd", b"")
+            .gz(),
+        "absolute path",
+    );
+    refused(
+        &Tar::with_manifest()
+            .entry(EntryType::Link, "l", 0o644, "missing", b"")
+            .gz(),
+        "no earlier file",
+    );
+}
+
+/// The zip library writes links as files with a mode, which is what attackers do.
+struct ZipWithLink(zip::ZipWriter<std::io::Cursor<Vec<u8>>>);
+
+impl ZipWithLink {
+    fn new(target: &str) -> Self {
+        let mut zip = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+        let options = zip::write::SimpleFileOptions::default();
+        zip.add_symlink("l", target, options).unwrap();
+        zip.start_file("agent.toml", options).unwrap();
+        std::io::Write::write_all(&mut zip, MANIFEST.as_bytes()).unwrap();
+        Self(zip)
+    }
+
+    fn bytes(&mut self) -> Vec<u8> {
+        std::mem::replace(
+            &mut self.0,
+            zip::ZipWriter::new(std::io::Cursor::new(Vec::new())),
+        )
+        .finish()
+        .unwrap()
+        .into_inner()
+    }
+}
+
+#[test]
+fn nothing_is_written_through_a_link() {
+    let outside = tempfile::tempdir().unwrap();
+    let target = outside.path().to_str().unwrap();
+    let tar = Tar::with_manifest()
+        .symlink("l", target)
+        .file("l/x", 0o644, b"owned");
+    refused(&tar.gz(), "goes through the link");
+    let tar = Tar::with_manifest()
+        .symlink("l", target)
+        .file("l", 0o644, b"owned");
+    refused(&tar.gz(), "twice");
+    assert_eq!(fs::read_dir(outside.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn duplicate_names_are_refused() {
+    let twice = |name: &str| {
+        Tar::with_manifest()
+            .file("a", 0o644, b"1")
+            .file(name, 0o644, b"2")
+            .gz()
+    };
+    refused(&twice("a"), "\"a\" is in the archive twice");
+    refused(&twice("./a"), "\"./a\" is in the archive twice");
+    refused(
+        &twice("a/b"),
+        "needs \"a\" to be a folder, but it is a file",
+    );
+    refused(&Tar::with_manifest().folder("d/").folder("d").gz(), "twice");
+    refused(
+        &Tar::with_manifest().folder("d/").file("d", 0o644, b"").gz(),
+        "twice",
+    );
+    // The library refuses to write two entries of one name, so one is renamed in the bytes.
+    let mut bytes = zip(&[
+        ("agent.toml", 0o644, MANIFEST.as_bytes()),
+        ("a1", 0o644, b"x"),
+        ("a2", 0o644, b"y"),
+    ]);
+    for at in 0..bytes.len() - 2 {
+        if &bytes[at..at + 2] == b"a2" {
+            bytes[at + 1] = b'1';
+        }
+    }
+    refused(&bytes, "\"a1\" is in the archive twice");
+}
+
+#[test]
+fn devices_pipes_and_set_id_bits_are_refused() {
+    for (kind, what) in [
+        (EntryType::Char, "a device"),
+        (EntryType::Block, "a device"),
+        (EntryType::Fifo, "a named pipe"),
+        (EntryType::GNUSparse, "a sparse file"),
+        (EntryType::new(b'Z'), "of an unknown kind"),
+    ] {
+        refused(
+            &Tar::with_manifest().entry(kind, "dev", 0o644, "", b"").gz(),
+            what,
+        );
+    }
+    refused(
+        &Tar::with_manifest().file("su", 0o4755, b"").gz(),
+        "set-user-id",
+    );
+    refused(
+        &Tar::with_manifest()
+            .entry(EntryType::Directory, "d", 0o2755, "", b"")
+            .gz(),
+        "set-user-id",
+    );
+    // The library writes no such modes, so they are patched into the central directory's entry.
+    for (mode, what) in [
+        (0o104_755_u16, "set-user-id"),
+        (0o020_644, "a device, pipe or socket"),
+    ] {
+        let mut bytes = zip(&[("x", 0o644, b"")]);
+        let at = bytes
+            .windows(4)
+            .rposition(|magic| magic == b"PK\x01\x02")
+            .unwrap();
+        bytes[at + 40..at + 42].copy_from_slice(&mode.to_le_bytes());
+        refused(&bytes, what);
+    }
+}
+
+#[test]
+fn long_names_of_both_dialects_are_read() {
+    let name = format!("{}/{}.py", "d".repeat(120), "n".repeat(120));
+    let gnu = Tar::with_manifest()
+        .entry(
+            EntryType::GNULongName,
+            "././@LongLink",
+            0o644,
+            "",
+            format!("{name}\0").as_bytes(),
+        )
+        .file("short", 0o644, b"gnu");
+    let (_dir, bundle) = accepted(&gnu.gz());
+    assert_eq!(fs::read(bundle.dir.join(&name)).unwrap(), b"gnu");
+
+    let record = format!(" path={name}\n");
+    let record = format!("{}{record}", record.len() + 3);
+    let pax = Tar::with_manifest()
+        .entry(
+            EntryType::XGlobalHeader,
+            "pax_global_header",
+            0o644,
+            "",
+            b"15 comment=abc\n",
+        )
+        .entry(
+            EntryType::XHeader,
+            "PaxHeaders/x",
+            0o644,
+            "",
+            record.as_bytes(),
+        )
+        .file("short", 0o644, b"pax");
+    let (_dir, bundle) = accepted(&pax.gz());
+    assert_eq!(fs::read(bundle.dir.join(&name)).unwrap(), b"pax");
+
+    let escape = Tar::with_manifest()
+        .entry(
+            EntryType::GNULongName,
+            "././@LongLink",
+            0o644,
+            "",
+            b"../../evil\0",
+        )
+        .file("fine", 0o644, b"");
+    refused(&escape.gz(), "'..'");
+    let size = Tar::with_manifest()
+        .entry(
+            EntryType::XHeader,
+            "PaxHeaders/x",
+            0o644,
+            "",
+            b"10 size=1\n",
+        )
+        .file("x", 0o644, b"12345");
+    refused(&size.gz(), "states a size outside of its header");
+}
+
+#[test]
+fn bombs_are_stopped_while_they_stream() {
+    let limits = BundleLimits {
+        packed_bytes: 1 << 20,
+        unpacked_bytes: 1 << 20,
+        files: 100,
+    };
+    let bomb = vec![0; 40 << 20];
+    for bytes in [
+        Tar::with_manifest().file("bomb", 0o644, &bomb).gz(),
+        Tar::with_manifest().file("bomb", 0o644, &bomb).zst(),
+        zip(&[("bomb", 0o644, &bomb)]),
+    ] {
+        assert!(
+            bytes.len() < 1 << 20,
+            "the bomb is small before it is unpacked"
+        );
+        let dir = refused_with(&bytes, limits, "unpacks to more than 1048576 bytes");
+        let written = dir.path().join("out/bomb").metadata().unwrap().len();
+        assert!(written <= 1 << 20, "{written} bytes were written");
+    }
+    // A header that describes the next entry is no way around the limit.
+    let header = Tar::with_manifest().entry(EntryType::GNULongName, "l", 0o644, "", &bomb);
+    refused_with(&header.gz(), limits, "has a header of 41943040 bytes");
+    refused_with(
+        &vec![b'x'; 2 << 20],
+        limits,
+        "has 2097152 bytes; at most 1048576",
+    );
+}
+
+#[test]
+fn files_and_folders_are_counted() {
+    let limits = BundleLimits {
+        files: 5,
+        ..BundleLimits::default()
+    };
+    let files = |count: usize| {
+        (0..count)
+            .fold(Tar::with_manifest(), |tar, i| {
+                tar.file(&format!("f{i}"), 0o644, b"")
+            })
+            .gz()
+    };
+    assert!(try_unpack(&files(4), limits).1.is_ok());
+    refused_with(&files(5), limits, "more than 5 files");
+    let folders = Tar::with_manifest().folder("1/2/3/4/5/6");
+    refused_with(&folders.gz(), limits, "more than 5 folders");
+    let names: Vec<String> = (0..6).map(|i| format!("f{i}")).collect();
+    let entries: Vec<(&str, u32, &[u8])> = names
+        .iter()
+        .map(|name| (name.as_str(), 0o644, &b""[..]))
+        .collect();
+    refused_with(&zip(&entries), limits, "more than 5 files");
+}
+
+#[test]
+fn fifty_thousand_and_one_files_are_one_too_many() {
+    let names: Vec<String> = (0..50_000).map(|i| format!("f{i}")).collect();
+    let tar = names
+        .iter()
+        .fold(Tar::with_manifest(), |tar, name| tar.file(name, 0o644, b""));
+    refused(&tar.gz(), "more than 50000 files");
+}
+
+#[test]
+fn damaged_archives_are_the_teams_affair() {
+    let tar = || Tar::with_manifest().file("agent.py", 0o644, &[1; 50_000]);
+    let gz = tar().gz();
+    refused(&gz[..gz.len() / 2], "the archive is damaged");
+    let zst = tar().zst();
+    refused(&zst[..zst.len() / 2], "the archive is damaged");
+    let zipped = zip(&[
+        ("agent.toml", 0o644, MANIFEST.as_bytes()),
+        ("x", 0o644, &[1; 5000]),
+    ]);
+    refused(&zipped[..zipped.len() / 2], "the archive is damaged");
+    let mut flipped = zip(&[("agent.toml", 0o644, MANIFEST.as_bytes())]);
+    flipped[50] ^= 0xff;
+    let (_dir, result) = try_unpack(&flipped, BundleLimits::default());
+    assert!(matches!(result, Err(BundleError::Invalid(_))), "{result:?}");
+    refused(b"PK\x03\x04 and nothing more", "the archive is damaged");
+}
+
+#[test]
+fn what_fails_on_our_side_is_not_the_teams_affair() {
+    let dir = tempfile::tempdir().unwrap();
+    let archive = write(dir.path(), "upload", &Tar::with_manifest().gz());
+    fs::create_dir(dir.path().join("full")).unwrap();
+    fs::write(dir.path().join("full/file"), "").unwrap();
+    for into in [dir.path().join("full"), archive.clone()] {
+        let result = unpack(&archive, &into, &BundleLimits::default());
+        assert!(matches!(result, Err(BundleError::Io { .. })), "{result:?}");
+    }
+    let missing = unpack(
+        &dir.path().join("nothing"),
+        &dir.path().join("out"),
+        &BundleLimits::default(),
+    );
+    assert!(
+        matches!(missing, Err(BundleError::Io { .. })),
+        "{missing:?}"
+    );
+}
+
+#[test]
+fn a_folder_is_opened_in_place() {
+    let dir = tempfile::tempdir().unwrap();
+    let scratch = tempfile::tempdir().unwrap();
+    let limits = BundleLimits::default();
+    let empty = open(dir.path(), scratch.path(), &limits).unwrap_err();
+    assert!(
+        empty.to_string().contains("there is no agent.toml"),
+        "{empty}"
+    );
+    write(dir.path(), "agent.toml", MANIFEST.as_bytes());
+    let bundle = open(dir.path(), scratch.path(), &limits).unwrap();
+    assert_eq!(bundle.dir, dir.path().canonicalize().unwrap());
+    assert_eq!(fs::read_dir(scratch.path()).unwrap().count(), 0);
+
+    let archive = write(
+        dir.path(),
+        "a.zip",
+        &zip(&[("agent.toml", 0o644, MANIFEST.as_bytes())]),
+    );
+    let bundle = open(&archive, scratch.path(), &limits).unwrap();
+    assert!(
+        bundle
+            .dir
+            .starts_with(scratch.path().canonicalize().unwrap())
+    );
+    let missing = open(&dir.path().join("nope"), scratch.path(), &limits).unwrap_err();
+    assert!(matches!(missing, BundleError::Invalid(_)), "{missing}");
+}
+
+#[test]
+fn a_folder_is_copied_under_the_rules_of_an_archive() {
+    let dir = tempfile::tempdir().unwrap();
+    let source = dir.path().join("source");
+    fs::create_dir_all(source.join("lib/deep")).unwrap();
+    write(&source, "agent.toml", MANIFEST.as_bytes());
+    let script = write(&source, "lib/deep/run", b"#!/bin/sh");
+    fs::set_permissions(&script, fs::Permissions::from_mode(0o700)).unwrap();
+    std::os::unix::fs::symlink("lib/deep/run", source.join("run")).unwrap();
+    let limits = BundleLimits::default();
+    let bundle = copy(&source, &dir.path().join("copy"), &limits).unwrap();
+    assert_eq!(fs::read(bundle.dir.join("run")).unwrap(), b"#!/bin/sh");
+    assert_eq!(mode(&bundle.dir.join("lib/deep/run")), 0o755);
+    assert_eq!(mode(&bundle.dir.join("agent.toml")), 0o644);
+
+    // Results may be written below the bundle itself.
+    let inside = copy(&source, &source.join("out/copy"), &limits).unwrap();
+    assert_eq!(fs::read_dir(inside.dir.join("out")).unwrap().count(), 0);
+    fs::remove_dir_all(source.join("out")).unwrap();
+
+    let refusal = |name: &str, limits: &BundleLimits| {
+        copy(&source, &dir.path().join(name), limits)
+            .unwrap_err()
+            .to_string()
+    };
+    let few = BundleLimits { files: 2, ..limits };
+    assert!(refusal("few", &few).contains("more than 2 files"));
+    let small = BundleLimits {
+        unpacked_bytes: 50,
+        ..limits
+    };
+    assert!(refusal("small", &small).contains("unpacks to more than 50 bytes"));
+    std::os::unix::fs::symlink("/etc", source.join("etc")).unwrap();
+    assert!(refusal("link", &limits).contains("\"etc\" is a link that leaves the bundle"));
+}

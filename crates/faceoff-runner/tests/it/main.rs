@@ -1,0 +1,11 @@
+//! The runner as the platform uses it: real archives, real agent processes in the sandbox, real
+//! recordings.
+#![expect(clippy::unwrap_used, reason = "a helper's failure is its test's")]
+
+mod agents;
+mod archives;
+mod bundle;
+mod dataset;
+mod misbehaviour;
+mod recording;
+mod shard;

@@ -1,0 +1,228 @@
+use crate::{
+    agents::{Agent, sandboxed},
+    shard::{run, spec},
+};
+use arrow_array::{
+    Array, Float64Array, ListArray, RecordBatch, StringArray, UInt32Array, cast::AsArray,
+};
+use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
+use faceoff_types::Task;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use std::{fs::File, path::Path};
+
+/// The whole table, in one batch.
+pub fn read(path: &Path) -> RecordBatch {
+    let builder = ParquetRecordBatchReaderBuilder::try_new(File::open(path).unwrap()).unwrap();
+    let rows = builder.metadata().file_metadata().num_rows() as usize;
+    let mut batches = builder.with_batch_size(rows).build().unwrap();
+    let batch = batches.next().expect("a row").unwrap();
+    assert_eq!(batch.num_rows(), rows);
+    batch
+}
+
+pub fn floats<'a>(batch: &'a RecordBatch, name: &str) -> &'a Float64Array {
+    batch
+        .column_by_name(name)
+        .unwrap_or_else(|| panic!("{name}"))
+        .as_primitive()
+}
+
+pub fn ints<'a>(batch: &'a RecordBatch, name: &str) -> &'a UInt32Array {
+    batch
+        .column_by_name(name)
+        .unwrap_or_else(|| panic!("{name}"))
+        .as_primitive()
+}
+
+pub fn texts<'a>(batch: &'a RecordBatch, name: &str) -> &'a StringArray {
+    batch
+        .column_by_name(name)
+        .unwrap_or_else(|| panic!("{name}"))
+        .as_string()
+}
+
+/// An agent that moves, so that every column changes.
+pub fn moving() -> Agent {
+    Agent::with(
+        "def on_step(step, answer):\n    \
+         q = [x + 0.002 * (step % 7) for x in answer['action'][0]]\n    \
+         return json.dumps({**answer, 'action': [q, [0.1] * 7]})",
+    )
+}
+
+/// Re-simulates from seed and recorded actions, and compares every number bit for bit.
+#[test]
+fn a_recording_holds_what_was_simulated() {
+    let out = tempfile::tempdir().unwrap();
+    for task in Task::ALL {
+        let spec = spec(task, 4..6);
+        let dir = out.path().join(task.as_str());
+        let report = run(&spec, &moving(), &sandboxed(), &dir).unwrap();
+        let steps = read(&dir.join("steps.parquet"));
+        let episodes = read(&dir.join("episodes.parquet"));
+        let played: u32 = report.outcomes.iter().map(|outcome| outcome.steps).sum();
+        assert_eq!(steps.num_rows(), played as usize);
+        assert_eq!(episodes.num_rows(), 2);
+
+        let settings = PerturbationSettings::default();
+        let plant = Plant::mismatched(&settings, spec.mismatch_seed);
+        let actions: &ListArray = steps.column_by_name("action").unwrap().as_list();
+        let mut row = 0;
+        for (index, outcome) in report.outcomes.iter().enumerate() {
+            let seed = spec.seed.episode(task, outcome.episode);
+            assert_eq!(texts(&episodes, "seed").value(index), seed.to_string());
+            assert_eq!(texts(&episodes, "interpolation").value(index), "3");
+            assert_eq!(ints(&episodes, "steps").value(index), outcome.steps);
+            let mut world = Episode::new(
+                task,
+                Interpolation::Cubic,
+                spec.profile.factors(),
+                &settings,
+                &plant,
+                seed,
+            );
+            compare_state(&episodes, "initial_", index, &world);
+            for step in 0..outcome.steps {
+                assert_eq!(texts(&steps, "task").value(row), task.as_str());
+                assert_eq!(ints(&steps, "episode").value(row), outcome.episode);
+                assert_eq!(ints(&steps, "step").value(row), step);
+                compare_observation(&steps, row, &world);
+                let action = actions.value(row);
+                let action: &Float64Array = action.as_primitive();
+                assert_eq!(action.len(), 14);
+                let values = world.step(action.values()).constraints;
+                compare_state(&steps, "", row, &world);
+                for (name, value) in [
+                    ("constraint_joint_pos", values.joint_pos),
+                    ("constraint_joint_vel", values.joint_vel),
+                    ("constraint_ee", values.ee),
+                    ("constraint_link", values.link),
+                ] {
+                    same(&steps, name, row, value);
+                }
+                row += 1;
+            }
+            assert_eq!(world.success(), outcome.success);
+            assert_eq!(world.violations(), outcome.violations);
+        }
+    }
+}
+
+#[track_caller]
+fn same(batch: &RecordBatch, name: &str, row: usize, value: f64) {
+    let column = floats(batch, name);
+    assert!(column.is_valid(row), "{name} is absent in row {row}");
+    assert_eq!(
+        column.value(row).to_bits(),
+        value.to_bits(),
+        "{name} in row {row}"
+    );
+}
+
+fn compare_observation(batch: &RecordBatch, row: usize, world: &Episode) {
+    let names: Vec<String> = batch
+        .schema()
+        .fields()
+        .iter()
+        .map(|field| field.name().clone())
+        .filter(|name| name.starts_with("obs_"))
+        .collect();
+    assert_eq!(names.len(), 23);
+    let observation = world.observation();
+    for (index, name) in names.iter().enumerate() {
+        match observation.get(index) {
+            Some(value) => same(batch, name, row, *value),
+            None => assert!(floats(batch, name).is_null(row), "{name}"),
+        }
+    }
+}
+
+fn compare_state(batch: &RecordBatch, prefix: &str, row: usize, world: &Episode) {
+    let state = world.state();
+    let axes = ["x", "y", "z"];
+    for (name, value) in ["x", "y", "yaw", "vx", "vy", "yaw_rate"]
+        .iter()
+        .zip(state.puck)
+    {
+        same(batch, &format!("{prefix}puck_{name}"), row, value);
+    }
+    for joint in 0..7 {
+        same(
+            batch,
+            &format!("{prefix}q_{}", joint + 1),
+            row,
+            state.q[joint],
+        );
+        same(
+            batch,
+            &format!("{prefix}dq_{}", joint + 1),
+            row,
+            state.dq[joint],
+        );
+        same(
+            batch,
+            &format!("{prefix}dq_filtered_{}", joint + 1),
+            row,
+            state.dq_filtered[joint],
+        );
+        let name = format!("{prefix}opponent_q_{}", joint + 1);
+        match state.opponent_q {
+            Some(q) => same(batch, &name, row, q[joint]),
+            None => assert!(floats(batch, &name).is_null(row)),
+        }
+    }
+    for (axis, name) in axes.iter().enumerate() {
+        same(batch, &format!("{prefix}ee_{name}"), row, state.ee[axis]);
+        let name = format!("{prefix}opponent_ee_{name}");
+        match state.opponent_ee {
+            Some(ee) => same(batch, &name, row, ee[axis]),
+            None => assert!(floats(batch, &name).is_null(row)),
+        }
+    }
+    same(
+        batch,
+        &format!("{prefix}universal_1"),
+        row,
+        state.universal[0],
+    );
+    same(
+        batch,
+        &format!("{prefix}universal_2"),
+        row,
+        state.universal[1],
+    );
+}
+
+#[test]
+fn times_and_faults_are_recorded() {
+    let out = tempfile::tempdir().unwrap();
+    let agent =
+        Agent::with("def on_step(step, answer): return 'no' if step == 3 else json.dumps(answer)");
+    let report = run(&spec(Task::Hit, 0..1), &agent, &sandboxed(), out.path()).unwrap();
+    let steps = read(&out.path().join("steps.parquet"));
+    assert_eq!(
+        steps.num_rows(),
+        3,
+        "the step without a valid answer is no row"
+    );
+    let times = floats(&steps, "computation_time_s");
+    let time = report.outcomes[0].computation_time;
+    assert_eq!(
+        times.values().iter().copied().fold(0.0, f64::max),
+        time.max_s
+    );
+    assert_eq!(times.values().iter().sum::<f64>() / 3.0, time.mean_s);
+    let cpu = floats(&steps, "cpu_time_s");
+    assert_eq!(cpu.null_count(), 0, "the sandbox tells CPU times here");
+    assert!(cpu.values().iter().all(|time| *time >= 0.0));
+
+    let episodes = read(&out.path().join("episodes.parquet"));
+    assert_eq!(texts(&episodes, "end").value(0), "agent_fault");
+    let fault: faceoff_types::AgentFault =
+        serde_json::from_str(texts(&episodes, "fault").value(0)).unwrap();
+    assert_eq!(Some(&fault), report.outcomes[0].fault.as_ref());
+    assert_eq!(
+        floats(&episodes, "penalty_points").value(0),
+        faceoff_scoring::episode_penalty(&report.outcomes[0])
+    );
+}

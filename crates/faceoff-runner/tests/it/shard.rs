@@ -1,0 +1,241 @@
+use crate::agents::{Agent, sandboxed};
+use faceoff_runner::{
+    AgentEnvironment, Observer, PlatformFault, ShardReport, ShardSpec, run_shard,
+};
+use faceoff_types::{AgentFaultKind, EpisodeEnd, EpisodeOutcome, Profile, Seed, Task};
+use std::{ops::Range, path::Path};
+
+/// Watches, and stops after a number of episodes.
+#[derive(Default)]
+pub struct Watcher {
+    pub seen: Vec<u32>,
+    pub logs: Vec<String>,
+    pub stop_after: Option<usize>,
+}
+
+impl Observer for Watcher {
+    fn episode_done(&mut self, outcome: &EpisodeOutcome) {
+        self.seen.push(outcome.episode);
+    }
+
+    fn log(&mut self, log: &str) {
+        self.logs.push(log.to_owned());
+    }
+
+    fn cancelled(&self) -> bool {
+        self.stop_after
+            .is_some_and(|count| self.seen.len() >= count)
+    }
+}
+
+pub fn spec(task: Task, episodes: Range<u32>) -> ShardSpec {
+    let seed = Seed::from_number(7);
+    ShardSpec {
+        task,
+        episodes,
+        profile: Profile::Evaluation,
+        seed,
+        mismatch_seed: seed.model_mismatch(),
+        max_faults: 2,
+    }
+}
+
+pub fn run(
+    spec: &ShardSpec,
+    agent: &Agent,
+    env: &AgentEnvironment,
+    out: &Path,
+) -> Result<ShardReport, PlatformFault> {
+    run_shard(spec, &agent.bundle, env, out, &mut Watcher::default())
+}
+
+/// What must not depend on the machine: all but the times.
+pub fn timeless(outcomes: &[EpisodeOutcome]) -> Vec<EpisodeOutcome> {
+    outcomes
+        .iter()
+        .map(|outcome| EpisodeOutcome {
+            computation_time: Default::default(),
+            ..outcome.clone()
+        })
+        .collect()
+}
+
+#[test]
+fn a_behaving_agent_plays_all_tasks_with_every_interpolation_it_says() {
+    let out = tempfile::tempdir().unwrap();
+    for (task, hooks) in [
+        (Task::Hit, ""),
+        (Task::Defend, "INTERPOLATION = 1"),
+        (Task::Prepare, ""),
+    ] {
+        let agent = Agent::with(hooks);
+        let dir = out.path().join(task.as_str());
+        let report = run(&spec(task, 0..2), &agent, &sandboxed(), &dir).unwrap();
+        assert!(!report.stopped_by_faults);
+        assert_eq!(
+            report
+                .outcomes
+                .iter()
+                .map(|o| o.episode)
+                .collect::<Vec<_>>(),
+            [0, 1]
+        );
+        for outcome in &report.outcomes {
+            assert_eq!((outcome.task, &outcome.fault), (task, &None), "{outcome:?}");
+            assert!(outcome.steps > 0 && outcome.steps <= faceoff_sim::EPISODE_STEPS);
+            let time = outcome.computation_time;
+            assert!(time.mean_s > 0.0 && time.mean_s <= time.max_s, "{time:?}");
+        }
+        assert_eq!(report.log, "goodbye\n");
+    }
+}
+
+#[test]
+fn results_do_not_depend_on_how_episodes_are_divided() {
+    let out = tempfile::tempdir().unwrap();
+    let agent = Agent::behaving();
+    let env = sandboxed();
+    let whole = run(
+        &spec(Task::Defend, 0..5),
+        &agent,
+        &env,
+        &out.path().join("whole"),
+    )
+    .unwrap();
+    let mut parts = Vec::new();
+    for range in [3..5, 0..1, 1..3] {
+        let dir = out.path().join(format!("from-{}", range.start));
+        parts.extend(
+            run(&spec(Task::Defend, range), &agent, &env, &dir)
+                .unwrap()
+                .outcomes,
+        );
+    }
+    parts.sort_by_key(|outcome| outcome.episode);
+    assert_eq!(timeless(&parts), timeless(&whole.outcomes));
+}
+
+#[test]
+fn a_fault_ends_its_episode_and_the_agent_is_restarted() {
+    let out = tempfile::tempdir().unwrap();
+    let agent = Agent::with(
+        "count = 0\n\
+         def on_reset(episode):\n    global count; count += 1; print('reset', episode, count, file=sys.stderr)\n    \
+         global now; now = episode\n\
+         def on_step(step, answer):\n    \
+         return 'oops' if (now, step) == (1, 2) else json.dumps(answer)",
+    );
+    let report = run(&spec(Task::Prepare, 0..3), &agent, &sandboxed(), out.path()).unwrap();
+    let [first, second, third] = &report.outcomes[..] else {
+        panic!("three episodes: {report:?}");
+    };
+    assert_eq!((&first.fault, &third.fault), (&None, &None));
+    assert_eq!(
+        (second.end, second.success, second.steps),
+        (EpisodeEnd::AgentFault, false, 2)
+    );
+    let fault = second.fault.as_ref().unwrap();
+    assert!(
+        matches!(fault.fault, AgentFaultKind::NotJson { .. }),
+        "{fault}"
+    );
+    assert_eq!(
+        (fault.task, fault.episode, fault.step),
+        (Task::Prepare, Some(1), Some(2))
+    );
+    assert_eq!(fault.line.as_deref(), Some("oops"));
+    // The counter shows the new process, the note the reason.
+    assert!(
+        report
+            .log
+            .starts_with("reset 0 1\nreset 1 2\n[faceoff] prepare, episode 1, step 2: ")
+    );
+    assert!(
+        report.log.ends_with("reset 2 1\ngoodbye\n"),
+        "{}",
+        report.log
+    );
+    // Others' episodes are what they would have been.
+    let undisturbed = run(
+        &spec(Task::Prepare, 2..3),
+        &Agent::behaving(),
+        &sandboxed(),
+        &out.path().join("x"),
+    );
+    assert_eq!(
+        timeless(&undisturbed.unwrap().outcomes),
+        timeless(std::slice::from_ref(third))
+    );
+}
+
+#[test]
+fn too_many_faults_stop_the_shard() {
+    let out = tempfile::tempdir().unwrap();
+    let agent = Agent::with("def on_step(step, answer): sys.exit(3)");
+    let report = run(&spec(Task::Hit, 0..9), &agent, &sandboxed(), out.path()).unwrap();
+    assert!(report.stopped_by_faults);
+    assert_eq!(
+        report.outcomes.len(),
+        3,
+        "two are allowed, the third ends it"
+    );
+    for outcome in &report.outcomes {
+        let fault = outcome.fault.as_ref().unwrap();
+        assert_eq!(fault.fault, AgentFaultKind::Exited { code: 3 });
+    }
+}
+
+#[test]
+fn an_agent_that_does_not_start_faults_without_an_episode() {
+    let out = tempfile::tempdir().unwrap();
+    let agent = Agent::script("import sys\nsys.exit('no model')");
+    let report = run(&spec(Task::Hit, 0..1), &agent, &sandboxed(), out.path()).unwrap();
+    let fault = report.outcomes[0].fault.as_ref().unwrap();
+    assert_eq!(fault.fault, AgentFaultKind::Exited { code: 1 });
+    assert_eq!((fault.episode, fault.step), (None, None));
+    assert_eq!(report.outcomes[0].episode, 0);
+    assert!(report.log.starts_with("no model\n"), "{}", report.log);
+}
+
+#[test]
+fn a_cancelled_shard_leaves_no_recording() {
+    let out = tempfile::tempdir().unwrap();
+    let agent = Agent::with("print('started', file=sys.stderr)");
+    let mut watcher = Watcher {
+        stop_after: Some(1),
+        ..Watcher::default()
+    };
+    let dir = out.path().join("shard");
+    let result = run_shard(
+        &spec(Task::Defend, 0..3),
+        &agent.bundle,
+        &sandboxed(),
+        &dir,
+        &mut watcher,
+    );
+    assert!(
+        matches!(result, Err(PlatformFault::Cancelled)),
+        "{result:?}"
+    );
+    assert_eq!(watcher.seen, [0]);
+    assert_eq!(watcher.logs, ["started\n"]);
+    assert!(!dir.join("shard.json").exists());
+    // The same folder serves the next try.
+    run(&spec(Task::Defend, 0..1), &agent, &sandboxed(), &dir).unwrap();
+    let mut names: Vec<_> = dir
+        .read_dir()
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name())
+        .collect();
+    names.sort();
+    assert_eq!(
+        names,
+        [
+            "agent.log",
+            "episodes.parquet",
+            "report.json",
+            "shard.json",
+            "steps.parquet"
+        ]
+    );
+}

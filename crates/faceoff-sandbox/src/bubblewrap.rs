@@ -1,0 +1,287 @@
+//! Finds bubblewrap and writes its command line.
+
+use crate::{
+    Layer, SandboxError, SpawnSpec,
+    seccomp::{self, Filters},
+    stage::Stage,
+};
+use rustix::fs::{MemfdFlags, SeekFrom, memfd_create, seek};
+use std::{
+    ffi::OsString,
+    fs,
+    io::Write,
+    os::fd::{AsRawFd, OwnedFd},
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+    sync::OnceLock,
+};
+
+const CANDIDATES: [&str; 3] = ["/usr/bin/bwrap", "/usr/local/bin/bwrap", "/bin/bwrap"];
+pub(crate) const CURE_INSTALL: &str = "apt-get install bubblewrap";
+
+/// User and group id inside; nobody special.
+const INNER_ID: &str = "1000";
+const PASSWD: &str = "agent:x:1000:1000:agent:/tmp:/bin/sh\n";
+const GROUP: &str = "agent:x:1000:\n";
+
+/// An installed bubblewrap and what it can do.
+#[derive(Debug, Clone)]
+pub(crate) struct Bubblewrap {
+    pub program: PathBuf,
+    /// e.g. `bubblewrap 0.8.0`
+    pub version: String,
+    /// Forbids further user namespaces inside, beside the filter.
+    disables_user_namespaces: bool,
+}
+
+impl Bubblewrap {
+    /// The host's bubblewrap; asked once per process.
+    pub(crate) fn find() -> Result<&'static Self, SandboxError> {
+        static FOUND: OnceLock<Bubblewrap> = OnceLock::new();
+        if let Some(found) = FOUND.get() {
+            return Ok(found);
+        }
+        let program = CANDIDATES
+            .iter()
+            .map(Path::new)
+            .find(|path| path.is_file())
+            .ok_or_else(|| SandboxError::Unavailable {
+                layer: Layer::Namespaces,
+                why: format!(
+                    "bubblewrap is not installed ({}); install it: {CURE_INSTALL}",
+                    CANDIDATES.join(", ")
+                ),
+            })?;
+        let ask = |option: &str| {
+            Command::new(program)
+                .arg(option)
+                .env_clear()
+                .stdin(Stdio::null())
+                .output()
+                .map(|output| String::from_utf8_lossy(&output.stdout).into_owned())
+                .map_err(|source| {
+                    SandboxError::io(format!("cannot run {}", program.display()), source)
+                })
+        };
+        let help = ask("--help")?;
+        for option in [
+            "--add-seccomp-fd",
+            "--size ",
+            "--as-pid-1",
+            "--json-status-fd",
+        ] {
+            if !help.contains(option) {
+                return Err(SandboxError::Unavailable {
+                    layer: Layer::Namespaces,
+                    why: format!(
+                        "{} lacks {}; bubblewrap 0.8 or newer is needed",
+                        program.display(),
+                        option.trim()
+                    ),
+                });
+            }
+        }
+        Ok(FOUND.get_or_init(|| Self {
+            program: program.to_path_buf(),
+            version: ask("--version")
+                .map(|text| text.trim().to_owned())
+                .unwrap_or_default(),
+            disables_user_namespaces: help.contains("--disable-userns"),
+        }))
+    }
+
+    /// The command line for `spec`, with what the child needs for it. `staged`: bubblewrap runs as a user
+    /// who may be unable to reach the files by name.
+    pub(crate) fn command(
+        &self,
+        spec: &SpawnSpec,
+        status: OwnedFd,
+        filters: Option<&Filters>,
+        staged: bool,
+    ) -> Result<Invocation, SandboxError> {
+        let mut line = CommandLine {
+            args: Vec::new(),
+            inherit: Vec::new(),
+            stage: staged.then(Stage::default),
+        };
+        line.args([
+            "--unshare-user",
+            "--unshare-ipc",
+            "--unshare-pid",
+            "--unshare-net",
+            "--unshare-uts",
+        ]);
+        line.args([
+            "--unshare-cgroup",
+            "--uid",
+            INNER_ID,
+            "--gid",
+            INNER_ID,
+            "--hostname",
+            "agent",
+        ]);
+        if self.disables_user_namespaces {
+            line.args(["--disable-userns"]);
+        }
+        // The agent is its namespace's first process: when it ends, all it left behind ends with it. And
+        // no helper of bubblewrap, which no filter binds, is inside to be taken over.
+        line.args([
+            "--as-pid-1",
+            "--die-with-parent",
+            "--new-session",
+            "--cap-drop",
+            "ALL",
+            "--clearenv",
+        ]);
+        line.fd("--json-status-fd", status);
+        for path in mount_order(&spec.runtime.read_only_paths) {
+            line.read_only(&path, &path)?;
+        }
+        line.args(["--proc", "/proc", "--dev", "/dev"]);
+        let scratch = spec.limits.scratch_bytes.max(4096).to_string();
+        for folder in ["/dev/shm", "/tmp"] {
+            line.args(["--perms", "0700", "--size", &scratch, "--tmpfs", folder]);
+        }
+        line.file("/etc/passwd", PASSWD.as_bytes())?;
+        line.file("/etc/group", GROUP.as_bytes())?;
+        line.read_only(&spec.bundle_dir, Path::new("/agent"))?;
+        line.args([
+            "--chdir",
+            "/agent",
+            "--remount-ro",
+            "/dev",
+            "--remount-ro",
+            "/",
+        ]);
+        for (name, value) in environment(spec, "/tmp") {
+            line.args(["--setenv", &name, &value]);
+        }
+        if let Some(filters) = filters {
+            for program in filters.in_order() {
+                let fd = memory_file(&seccomp::to_bytes(program))?;
+                line.fd("--add-seccomp-fd", fd);
+            }
+        }
+        line.args(["--"]);
+        line.args(spec.command.iter().map(String::as_str));
+        let mut command = Command::new(&self.program);
+        // bubblewrap itself sees nothing of the bundle's variables: LD_PRELOAD would work on it outside.
+        command.args(line.args).env_clear().current_dir("/");
+        Ok(Invocation {
+            command,
+            inherit: line.inherit,
+            stage: line.stage,
+        })
+    }
+}
+
+/// bubblewrap's command, and what its process needs before the exec.
+#[derive(Debug)]
+pub(crate) struct Invocation {
+    pub command: Command,
+    pub inherit: Vec<OwnedFd>,
+    pub stage: Option<Stage>,
+}
+
+/// The agent's variables; the bundle's own come last.
+pub(crate) fn environment(spec: &SpawnSpec, home: &str) -> Vec<(String, String)> {
+    let mut variables = std::collections::BTreeMap::from([
+        ("PATH".to_owned(), spec.runtime.path.clone()),
+        ("HOME".to_owned(), home.to_owned()),
+        ("TMPDIR".to_owned(), home.to_owned()),
+        ("USER".to_owned(), "agent".to_owned()),
+        ("LOGNAME".to_owned(), "agent".to_owned()),
+        ("LANG".to_owned(), "C.UTF-8".to_owned()),
+    ]);
+    variables.extend(spec.env.clone());
+    variables.into_iter().collect()
+}
+
+struct CommandLine {
+    args: Vec<OsString>,
+    inherit: Vec<OwnedFd>,
+    stage: Option<Stage>,
+}
+
+impl CommandLine {
+    fn args<'a>(&mut self, args: impl IntoIterator<Item = &'a str>) {
+        self.args.extend(args.into_iter().map(OsString::from));
+    }
+
+    fn fd(&mut self, option: &str, fd: OwnedFd) {
+        self.args.push(option.into());
+        self.args.push(fd.as_raw_fd().to_string().into());
+        self.inherit.push(fd);
+    }
+
+    fn file(&mut self, inside: &str, content: &[u8]) -> Result<(), SandboxError> {
+        let fd = memory_file(content)?;
+        self.args(["--perms", "0444"]);
+        self.fd("--file", fd);
+        self.args([inside]);
+        Ok(())
+    }
+
+    /// Shows `host` as `inside`: a link as the same link, all else as a read-only mount.
+    fn read_only(&mut self, host: &Path, inside: &Path) -> Result<(), SandboxError> {
+        let failed = |source| {
+            SandboxError::io(
+                format!("cannot show {} to the agent", host.display()),
+                source,
+            )
+        };
+        if host == inside
+            && let Ok(target) = fs::read_link(host)
+        {
+            self.args
+                .extend(["--symlink".into(), target.into_os_string(), inside.into()]);
+            return Ok(());
+        }
+        let source = match &mut self.stage {
+            Some(stage) => stage.add(host)?,
+            None => fs::canonicalize(host).map_err(failed)?.into_os_string(),
+        };
+        self.args.extend(["--ro-bind".into(), source]);
+        self.args.push(inside.into());
+        Ok(())
+    }
+}
+
+/// Parents before what is inside them, and nothing that an earlier mount shows already.
+fn mount_order(paths: &[PathBuf]) -> Vec<PathBuf> {
+    let mut sorted = paths.to_vec();
+    sorted.sort();
+    sorted.dedup();
+    let mut mounts: Vec<PathBuf> = Vec::new();
+    for path in sorted {
+        if !mounts.iter().any(|mounted| path.starts_with(mounted)) {
+            mounts.push(path);
+        }
+    }
+    mounts
+}
+
+/// A file without a name, at its start.
+fn memory_file(content: &[u8]) -> Result<OwnedFd, SandboxError> {
+    let failed = |source| SandboxError::io("cannot make a file in memory", source);
+    let fd = memfd_create("faceoff", MemfdFlags::CLOEXEC).map_err(|error| failed(error.into()))?;
+    let mut file = fs::File::from(fd);
+    file.write_all(content).map_err(failed)?;
+    let fd = OwnedFd::from(file);
+    seek(&fd, SeekFrom::Start(0)).map_err(|error| failed(error.into()))?;
+    Ok(fd)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_inside_a_mounted_one_is_not_mounted_again() {
+        let paths = ["/usr/lib/python3", "/usr/lib", "/usr/lib64", "/usr/lib"].map(PathBuf::from);
+        assert_eq!(
+            mount_order(&paths),
+            ["/usr/lib", "/usr/lib64"].map(PathBuf::from)
+        );
+    }
+}

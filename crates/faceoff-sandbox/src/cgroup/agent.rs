@@ -1,0 +1,387 @@
+//! The cgroup of one agent, in every hierarchy that is needed.
+
+use super::{
+    files,
+    hierarchy::{Home, Version},
+};
+use crate::{Isolation, Layer, Limits, SandboxError, affinity::cpu_list, owner::Owner};
+use rustix::process::{Pid, Signal, kill_process};
+use std::{
+    collections::BTreeMap,
+    fs::{self, File},
+    io,
+    os::{fd::OwnedFd, unix::fs::FileExt},
+    path::{Path, PathBuf},
+    sync::atomic::{AtomicU64, Ordering},
+    time::{Duration, Instant},
+};
+
+/// Over which the CPU quota is enforced: the longest that an agent over its quota is held up is this,
+/// half a control step.
+const CPU_PERIOD_US: u64 = 10_000;
+/// The kernel charges memory in batches, so the peak may stay this far below the limit.
+const PEAK_SLACK_BYTES: u64 = 1 << 20;
+/// bubblewrap's own process is in the agent's cgroup.
+const OUR_PROCESSES: u64 = 1;
+pub(super) const LEAF_PREFIX: &str = "agent-";
+static NEXT: AtomicU64 = AtomicU64::new(0);
+
+/// A limit that the tree ran into, as the kernel counted it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Trespass {
+    /// The kernel killed for want of memory.
+    Memory { peak_bytes: Option<u64> },
+    /// Processes or threads were refused this often.
+    Pids { refused: u64 },
+}
+
+/// The cgroup of one agent. Removed, with whatever lives in it, by [`AgentCgroup::remove`] or drop.
+#[derive(Debug)]
+pub(crate) struct AgentCgroup {
+    leaves: Vec<PathBuf>,
+    memory: Option<(Version, PathBuf)>,
+    pids: Option<PathBuf>,
+    cpu_usage: Option<(Version, File)>,
+    /// Does a cpuset hold the tree to its CPUs, whatever it asks for?
+    pub(crate) holds_cpus: bool,
+}
+
+impl AgentCgroup {
+    /// Makes the cgroup with the limits that `isolation` enforces; `None` when it enforces none.
+    pub(crate) fn create(
+        limits: &Limits,
+        isolation: &Isolation,
+        cpus: &[usize],
+    ) -> Result<Option<Self>, SandboxError> {
+        let layers = [
+            (Layer::CgroupMemory, "memory"),
+            (Layer::CgroupPids, "pids"),
+            (Layer::CgroupCpu, "cpu"),
+        ];
+        let wanted: Vec<_> = layers
+            .into_iter()
+            .filter(|(layer, _)| isolation.enforces(*layer))
+            .collect();
+        if wanted.is_empty() {
+            return Ok(None);
+        }
+        let hierarchies = Hierarchies::read()?;
+        let mut group = Self {
+            leaves: Vec::new(),
+            memory: None,
+            pids: None,
+            cpu_usage: None,
+            holds_cpus: false,
+        };
+        // Where a controller is known to be needed in the same v2 cgroup, all are enabled together.
+        let all: Vec<&str> = wanted.iter().map(|(_, controller)| *controller).collect();
+        let name = leaf_name();
+        for (layer, controller) in wanted {
+            let unavailable = |why: String| SandboxError::Unavailable { layer, why };
+            let home = hierarchies.find(controller).ok_or_else(|| {
+                unavailable(format!(
+                    "no cgroup hierarchy with the controller {controller} is mounted"
+                ))
+            })?;
+            let together: Vec<&str> = if home.version == Version::V2 {
+                all.iter()
+                    .copied()
+                    .filter(|name| hierarchies.find(name).as_ref() == Some(&home))
+                    .collect()
+            } else {
+                vec![controller]
+            };
+            let leaf = group.leaf(&home, &together, &name).map_err(|error| {
+                unavailable(format!(
+                    "cannot make a cgroup in {}: {error}",
+                    home.own.display()
+                ))
+            })?;
+            group
+                .limit(layer, home.version, &leaf, limits)
+                .map_err(|error| unavailable(error.to_string()))?;
+        }
+        group.measure_cpu(&hierarchies, &name);
+        if !cpus.is_empty() {
+            group.holds_cpus = group.hold_cpus(&hierarchies, &name, cpus);
+        }
+        Ok(Some(group))
+    }
+
+    /// The agent's folder below `home`, made if need be.
+    fn leaf(&mut self, home: &Home, controllers: &[&str], name: &str) -> io::Result<PathBuf> {
+        // Another service in the same cgroup may remove the empty folder between our two steps.
+        for _ in 0..8 {
+            let leaf = home.prepare_folder(controllers)?.join(name);
+            match fs::create_dir(&leaf) {
+                Ok(()) => self.leaves.push(leaf.clone()),
+                Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+                Err(error)
+                    if error.kind() == io::ErrorKind::AlreadyExists
+                        && self.leaves.contains(&leaf) => {}
+                Err(error) => return Err(error),
+            }
+            return Ok(leaf);
+        }
+        Err(io::Error::other(
+            "the folder for agents is being removed all the time",
+        ))
+    }
+
+    fn limit(
+        &mut self,
+        layer: Layer,
+        version: Version,
+        leaf: &Path,
+        limits: &Limits,
+    ) -> Result<(), SandboxError> {
+        let set = |file: &str, value: String| files::write(&leaf.join(file), &value);
+        let memory = limits.memory_bytes.to_string();
+        match (layer, version) {
+            (Layer::CgroupMemory, Version::V1) => {
+                set("memory.limit_in_bytes", memory.clone())?;
+                // Without swap accounting the second file is missing; then the tree must not swap at all.
+                if leaf.join("memory.memsw.limit_in_bytes").exists() {
+                    set("memory.memsw.limit_in_bytes", memory)?;
+                } else {
+                    set("memory.swappiness", "0".into())?;
+                }
+                self.memory = Some((version, leaf.to_path_buf()));
+            }
+            (Layer::CgroupMemory, Version::V2) => {
+                set("memory.max", memory)?;
+                if leaf.join("memory.swap.max").exists() {
+                    set("memory.swap.max", "0".into())?;
+                }
+                self.memory = Some((version, leaf.to_path_buf()));
+            }
+            (Layer::CgroupPids, _) => {
+                set(
+                    "pids.max",
+                    (u64::from(limits.pids) + OUR_PROCESSES).to_string(),
+                )?;
+                self.pids = Some(leaf.to_path_buf());
+            }
+            (Layer::CgroupCpu, version) => {
+                // The kernel's smallest quota is 1 ms.
+                let quota_us = ((limits.cpus * CPU_PERIOD_US as f64).round() as u64).max(1000);
+                match version {
+                    Version::V1 => {
+                        set("cpu.cfs_period_us", CPU_PERIOD_US.to_string())?;
+                        set("cpu.cfs_quota_us", quota_us.to_string())?;
+                    }
+                    Version::V2 => set("cpu.max", format!("{quota_us} {CPU_PERIOD_US}"))?,
+                }
+            }
+            (Layer::Namespaces | Layer::Seccomp | Layer::Rlimits, _) => {}
+        }
+        Ok(())
+    }
+
+    /// Opens the file that tells the tree's CPU time, where there is one.
+    fn measure_cpu(&mut self, hierarchies: &Hierarchies, name: &str) {
+        let Some(home) = hierarchies
+            .find("cpuacct")
+            .or_else(|| hierarchies.find("cpu"))
+        else {
+            return;
+        };
+        let (controllers, file): (&[&str], _) = match home.version {
+            Version::V1 => (&["cpuacct"], "cpuacct.usage"),
+            Version::V2 => (&[], "cpu.stat"),
+        };
+        let Ok(leaf) = self.leaf(&home, controllers, name) else {
+            return;
+        };
+        self.cpu_usage = File::open(leaf.join(file))
+            .ok()
+            .map(|file| (home.version, file));
+    }
+
+    /// Confines the tree to `cpus` by a cpuset, where the host offers one; tells whether it does.
+    fn hold_cpus(&mut self, hierarchies: &Hierarchies, name: &str, cpus: &[usize]) -> bool {
+        let before = self.leaves.len();
+        let held = self.set_cpus(hierarchies, name, cpus).is_some();
+        if !held {
+            // A half-made cpuset lets nobody in.
+            for leaf in self.leaves.drain(before..) {
+                remove_leaf(&leaf);
+            }
+        }
+        held
+    }
+
+    fn set_cpus(&mut self, hierarchies: &Hierarchies, name: &str, cpus: &[usize]) -> Option<()> {
+        let home = hierarchies.find("cpuset")?;
+        let leaf = self.leaf(&home, &["cpuset"], name).ok()?;
+        if home.version == Version::V1 {
+            let memory_nodes = files::read(&leaf.parent()?.join("cpuset.mems")).ok()?;
+            files::write(&leaf.join("cpuset.mems"), memory_nodes.trim()).ok()?;
+        }
+        files::write(&leaf.join("cpuset.cpus"), &cpu_list(cpus)).ok()
+    }
+
+    /// The files by which a process enters: it writes `0` to each.
+    pub(crate) fn entrances(&self) -> Result<Vec<OwnedFd>, SandboxError> {
+        self.leaves
+            .iter()
+            .map(|leaf| {
+                let path = leaf.join("cgroup.procs");
+                fs::OpenOptions::new()
+                    .write(true)
+                    .open(&path)
+                    .map(OwnedFd::from)
+                    .map_err(|source| {
+                        SandboxError::io(format!("cannot open {}", path.display()), source)
+                    })
+            })
+            .collect()
+    }
+
+    /// CPU time of everything that ever ran in it, seconds.
+    pub(crate) fn cpu_time_s(&self) -> Option<f64> {
+        let (version, file) = self.cpu_usage.as_ref()?;
+        let mut text = [0; 256];
+        let count = file.read_at(&mut text, 0).ok()?;
+        let text = std::str::from_utf8(&text[..count]).ok()?;
+        match version {
+            Version::V1 => Some(text.trim().parse::<u64>().ok()? as f64 * 1e-9),
+            Version::V2 => {
+                let usage = text
+                    .lines()
+                    .find_map(|line| line.strip_prefix("usage_usec "))?;
+                Some(usage.parse::<u64>().ok()? as f64 * 1e-6)
+            }
+        }
+    }
+
+    /// The most memory it had at a time, bytes.
+    pub(crate) fn peak_memory_bytes(&self) -> Option<u64> {
+        let (version, leaf) = self.memory.as_ref()?;
+        files::read_number(&leaf.join(match version {
+            Version::V1 => "memory.max_usage_in_bytes",
+            Version::V2 => "memory.peak",
+        }))
+    }
+
+    /// The limit that the tree ran into, memory first. A kill because the whole host ran out of memory
+    /// is not the tree's doing: its own limit must have been hit as well.
+    pub(crate) fn trespass(&self) -> Option<Trespass> {
+        if let Some((version, leaf)) = &self.memory {
+            let killed_and_full = match version {
+                Version::V1 => {
+                    let killed = files::read_keyed(&leaf.join("memory.oom_control"), "oom_kill");
+                    // Recent kernels leave `failcnt` at zero; how full it was they all tell.
+                    let limit = files::read_number(&leaf.join("memory.limit_in_bytes"));
+                    let full = limit.zip(self.peak_memory_bytes());
+                    killed.unwrap_or(0) > 0
+                        && full.is_some_and(|(limit, peak)| peak + PEAK_SLACK_BYTES >= limit)
+                }
+                Version::V2 => {
+                    let events = leaf.join("memory.events");
+                    let count = |key| files::read_keyed(&events, key).unwrap_or(0);
+                    count("oom_kill") > 0 && count("oom") > 0
+                }
+            };
+            if killed_and_full {
+                return Some(Trespass::Memory {
+                    peak_bytes: self.peak_memory_bytes(),
+                });
+            }
+        }
+        let refused = files::read_keyed(&self.pids.as_ref()?.join("pids.events"), "max")?;
+        (refused > 0).then_some(Trespass::Pids { refused })
+    }
+
+    /// Every process in it, bubblewrap's own included.
+    pub(crate) fn processes(&self) -> Vec<Pid> {
+        let pids = self
+            .leaves
+            .first()
+            .map(|leaf| files::processes(leaf))
+            .unwrap_or_default();
+        pids.into_iter().filter_map(Pid::from_raw).collect()
+    }
+
+    /// Kills what still lives in it and removes it.
+    pub(crate) fn remove(&mut self) {
+        self.cpu_usage = None;
+        for leaf in std::mem::take(&mut self.leaves) {
+            remove_leaf(&leaf);
+        }
+    }
+}
+
+impl Drop for AgentCgroup {
+    fn drop(&mut self) {
+        self.remove();
+    }
+}
+
+/// Kills the processes of `leaf`, waits for their end and removes it, and the folder above it with the
+/// last one. What cannot be removed is logged and left for the next start's sweep.
+pub(super) fn remove_leaf(leaf: &Path) {
+    /// The kernel lets go of a dead process's cgroup a moment after its parent has seen it end.
+    const PATIENCE: Duration = Duration::from_secs(5);
+    let deadline = Instant::now() + PATIENCE;
+    loop {
+        kill_all(leaf);
+        match fs::remove_dir(leaf) {
+            Ok(()) => break,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => break,
+            Err(error) if Instant::now() >= deadline => {
+                tracing::error!(cgroup = %leaf.display(), %error, "an agent's cgroup could not be removed");
+                return;
+            }
+            Err(_) => std::thread::sleep(Duration::from_millis(1)),
+        }
+    }
+    if let Some(folder) = leaf.parent() {
+        // Fails while other agents are in it, as it should.
+        let _ = fs::remove_dir(folder);
+    }
+}
+
+fn kill_all(leaf: &Path) {
+    if fs::write(leaf.join("cgroup.kill"), "1").is_ok() {
+        return;
+    }
+    for pid in files::processes(leaf).into_iter().filter_map(Pid::from_raw) {
+        let _ = kill_process(pid, Signal::KILL);
+    }
+}
+
+/// `agent-<pid>-<start time>-<namespace>-<number>`: whose it is can be told after that service has died.
+fn leaf_name() -> String {
+    let number = NEXT.fetch_add(1, Ordering::Relaxed);
+    format!("{}{number}", Owner::this_process().name(LEAF_PREFIX))
+}
+
+/// The host's hierarchies, read once per agent.
+pub(super) struct Hierarchies {
+    mountinfo: String,
+    own: String,
+    found: std::cell::RefCell<BTreeMap<String, Option<Home>>>,
+}
+
+impl Hierarchies {
+    pub(super) fn read() -> Result<Self, SandboxError> {
+        let read = |path: &str| {
+            fs::read_to_string(path)
+                .map_err(|source| SandboxError::io(format!("cannot read {path}"), source))
+        };
+        Ok(Self {
+            mountinfo: read("/proc/self/mountinfo")?,
+            own: read("/proc/self/cgroup")?,
+            found: std::cell::RefCell::default(),
+        })
+    }
+
+    pub(super) fn find(&self, controller: &str) -> Option<Home> {
+        let mut found = self.found.borrow_mut();
+        found
+            .entry(controller.to_owned())
+            .or_insert_with(|| Home::find(controller, &self.mountinfo, &self.own))
+            .clone()
+    }
+}

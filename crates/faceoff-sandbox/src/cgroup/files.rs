@@ -1,0 +1,40 @@
+//! Small reads and writes of cgroup files.
+
+use crate::SandboxError;
+use std::{fs, io, path::Path};
+
+pub(super) fn read(path: &Path) -> io::Result<String> {
+    fs::read_to_string(path)
+}
+
+/// A file that holds one number.
+pub(super) fn read_number(path: &Path) -> Option<u64> {
+    read(path).ok()?.trim().parse().ok()
+}
+
+/// The number after `key` in a file of `key number` lines.
+pub(super) fn read_keyed(path: &Path, key: &str) -> Option<u64> {
+    let text = read(path).ok()?;
+    text.lines().find_map(|line| {
+        line.strip_prefix(key)?
+            .strip_prefix(' ')?
+            .trim()
+            .parse()
+            .ok()
+    })
+}
+
+pub(super) fn write(path: &Path, value: &str) -> Result<(), SandboxError> {
+    fs::write(path, value).map_err(|source| {
+        SandboxError::io(
+            format!("cannot write {value:?} to {}", path.display()),
+            source,
+        )
+    })
+}
+
+/// The processes directly in the cgroup `dir`.
+pub(super) fn processes(dir: &Path) -> Vec<i32> {
+    let text = read(&dir.join("cgroup.procs")).unwrap_or_default();
+    text.lines().filter_map(|line| line.parse().ok()).collect()
+}

@@ -1,0 +1,232 @@
+//! What the child does between fork and exec.
+
+use crate::{Limits, agent_user::AgentUser, seccomp::Filters, stage::Stage};
+use rustix::{
+    fs::{Mode, OFlags, open},
+    io::{Errno, FdFlags, fcntl_setfd, write},
+    pipe::{PipeFlags, pipe_with},
+    process::{self, Resource, Rlimit, Signal},
+    thread::{CpuSet, sched_setaffinity},
+};
+use std::{
+    io::{self, Read},
+    os::{fd::OwnedFd, unix::process::CommandExt},
+    process::Command,
+};
+
+/// Everything that is prepared before the fork, because afterwards only system calls are allowed.
+#[derive(Debug, Default)]
+pub(crate) struct ChildSetup {
+    /// `cgroup.procs` files to enter by writing `0`.
+    pub cgroup_procs: Vec<OwnedFd>,
+    pub cpus: Option<CpuSet>,
+    pub rlimits: Vec<(Resource, Rlimit)>,
+    /// Files to show to that user, bound while the child is still root.
+    pub stage: Option<Stage>,
+    pub user: Option<AgentUser>,
+    /// Descriptors that survive the exec.
+    pub inherit: Vec<OwnedFd>,
+    /// Filters to install here, when no bubblewrap does it.
+    pub filters: Option<Filters>,
+    /// Make the agent the first victim when the whole host runs out of memory.
+    pub yield_memory: bool,
+}
+
+/// The step that failed, sent as one byte.
+#[derive(Debug, Clone, Copy)]
+enum Step {
+    CloseDescriptors,
+    EnterCgroup,
+    SetCpus,
+    Stage,
+    SetRlimits,
+    BecomeUser,
+    Inherit,
+    DieWithParent,
+    InstallFilters,
+}
+
+impl Step {
+    const ALL: [Self; 9] = [
+        Self::CloseDescriptors,
+        Self::EnterCgroup,
+        Self::SetCpus,
+        Self::Stage,
+        Self::SetRlimits,
+        Self::BecomeUser,
+        Self::Inherit,
+        Self::DieWithParent,
+        Self::InstallFilters,
+    ];
+
+    fn what(self) -> &'static str {
+        match self {
+            Self::CloseDescriptors => {
+                "cannot close what the service has open (close_range, Linux 5.11, is needed)"
+            }
+            Self::EnterCgroup => "cannot enter the agent's cgroup",
+            Self::SetCpus => "cannot bind the agent to its CPUs",
+            Self::Stage => {
+                "cannot show files to the agent's user in a mount namespace (a root service needs \
+                 CAP_SYS_ADMIN for it; without, run it as an ordinary user)"
+            }
+            Self::SetRlimits => "cannot set the agent's resource limits",
+            Self::BecomeUser => "cannot become the agent's user",
+            Self::Inherit => "cannot pass a descriptor to bubblewrap",
+            Self::DieWithParent => "cannot tie the agent to the service",
+            Self::InstallFilters => "cannot install the seccomp filter",
+        }
+    }
+}
+
+/// Tells which step failed when the spawn did.
+#[derive(Debug)]
+pub(crate) struct StepReport(OwnedFd);
+
+impl StepReport {
+    /// The failed step in words; `None` if it was the exec itself.
+    pub(crate) fn failed_step(self) -> Option<&'static str> {
+        let mut byte = [0];
+        std::fs::File::from(self.0).read_exact(&mut byte).ok()?;
+        Step::ALL
+            .iter()
+            .find(|step| **step as u8 == byte[0])
+            .map(|step| step.what())
+    }
+}
+
+impl ChildSetup {
+    /// Arranges for `command` to do all this in the child.
+    pub(crate) fn install(mut self, command: &mut Command) -> io::Result<StepReport> {
+        let (reader, writer) = pipe_with(PipeFlags::CLOEXEC)?;
+        let parent = process::getpid();
+        let hook = move || {
+            self.run(parent).map_err(|(step, error)| {
+                let _ = write(&writer, &[step as u8]);
+                io::Error::from(error)
+            })
+        };
+        #[expect(
+            unsafe_code,
+            reason = "the kernel offers no other moment to enter a cgroup or drop root"
+        )]
+        // SAFETY: between fork and exec only async-signal-safe work is allowed. `run` makes raw system
+        // calls on memory prepared beforehand; it neither allocates nor locks.
+        unsafe {
+            command.pre_exec(hook);
+        }
+        Ok(StepReport(reader))
+    }
+
+    fn run(&mut self, parent: process::Pid) -> Result<(), (Step, Errno)> {
+        close_rest_on_exec().map_err(|error| (Step::CloseDescriptors, error))?;
+        for procs in &self.cgroup_procs {
+            write(procs, b"0").map_err(|error| (Step::EnterCgroup, error))?;
+        }
+        if let Some(cpus) = &self.cpus {
+            sched_setaffinity(None, cpus).map_err(|error| (Step::SetCpus, error))?;
+        }
+        if self.yield_memory {
+            // A courtesy to the host, not a limit: some containers hide the file.
+            let file = open(
+                c"/proc/self/oom_score_adj",
+                OFlags::WRONLY | OFlags::CLOEXEC,
+                Mode::empty(),
+            );
+            let _ = file.and_then(|file| write(&file, b"800"));
+        }
+        if let Some(stage) = &mut self.stage {
+            stage.build().map_err(|error| (Step::Stage, error))?;
+        }
+        for &(resource, limit) in &self.rlimits {
+            process::setrlimit(resource, limit).map_err(|error| (Step::SetRlimits, error))?;
+        }
+        if let Some(user) = self.user {
+            user.assume().map_err(|error| (Step::BecomeUser, error))?;
+        }
+        for fd in &self.inherit {
+            fcntl_setfd(fd, FdFlags::empty()).map_err(|error| (Step::Inherit, error))?;
+        }
+        // After the change of user, which clears it. If the service died before this, nobody would tell
+        // us: then our parent is another one by now.
+        process::set_parent_process_death_signal(Some(Signal::KILL))
+            .map_err(|error| (Step::DieWithParent, error))?;
+        if process::getppid() != Some(parent) {
+            return Err((Step::DieWithParent, Errno::SRCH));
+        }
+        if let Some(filters) = &self.filters {
+            for program in filters.in_order() {
+                seccompiler::apply_filter(program)
+                    .map_err(|error| (Step::InstallFilters, errno_of(&error)))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whatever the service was started with, or a library opened carelessly, is not for the agent.
+fn close_rest_on_exec() -> Result<(), Errno> {
+    const FIRST: libc::c_uint = 3;
+    #[expect(unsafe_code, reason = "rustix has no close_range")]
+    // SAFETY: takes three numbers; marks descriptors and closes none, so nobody's descriptor goes away.
+    let result = unsafe {
+        libc::syscall(
+            libc::SYS_close_range,
+            FIRST,
+            libc::c_uint::MAX,
+            libc::CLOSE_RANGE_CLOEXEC,
+        )
+    };
+    if result == 0 {
+        return Ok(());
+    }
+    let error = io::Error::last_os_error();
+    Err(Errno::from_io_error(&error).unwrap_or(Errno::INVAL))
+}
+
+fn errno_of(error: &seccompiler::Error) -> Errno {
+    match error {
+        seccompiler::Error::Prctl(source) | seccompiler::Error::Seccomp(source) => {
+            Errno::from_io_error(source).unwrap_or(Errno::INVAL)
+        }
+        _ => Errno::INVAL,
+    }
+}
+
+/// The resource limits of an agent; each is also lowered to what the service itself may have at most.
+pub(crate) fn rlimits(limits: &Limits, own_user: bool) -> Vec<(Resource, Rlimit)> {
+    const LOCKED_BYTES: u64 = 8 << 20;
+    const STACK_BYTES: u64 = 8 << 20;
+    /// Not 0: a host whose core dumps go to a program starts it, as root, even at 0, but not at 1, which no
+    /// dump fits either.
+    const CORE_BYTES: u64 = 1;
+    let mut wanted = vec![
+        (Resource::Nofile, u64::from(limits.open_files)),
+        (Resource::Fsize, limits.file_size_bytes),
+        (Resource::Core, CORE_BYTES),
+        (Resource::Memlock, LOCKED_BYTES),
+        (Resource::Stack, STACK_BYTES),
+        (Resource::Nice, 0),
+        (Resource::Rtprio, 0),
+    ];
+    if own_user {
+        // Counted by user, so of use only where each agent has its own. A little above the cgroup's
+        // limit, which is to be met first, because it is counted and reported.
+        wanted.push((Resource::Nproc, u64::from(limits.pids) + 8));
+    }
+    wanted
+        .into_iter()
+        .map(|(resource, value)| {
+            let value = process::getrlimit(resource)
+                .maximum
+                .map_or(value, |maximum| maximum.min(value));
+            (
+                resource,
+                Rlimit {
+                    current: Some(value),
+                    maximum: Some(value),
+                },
+            )
+        })
+        .collect()
+}

@@ -1,0 +1,73 @@
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// One layer between an agent and the host.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Layer {
+    /// bubblewrap: no network, own processes, own files, no capabilities.
+    Namespaces,
+    /// System calls that an agent has no use for are refused.
+    Seccomp,
+    /// Memory of the whole tree, swap and scratch included.
+    CgroupMemory,
+    /// Processes and threads of the whole tree.
+    CgroupPids,
+    /// CPU time of the whole tree.
+    CgroupCpu,
+    /// Open files, file size, core dumps, locked memory, priorities.
+    Rlimits,
+}
+
+impl Layer {
+    /// All layers, outermost first.
+    pub const ALL: [Self; 6] = [
+        Self::Namespaces,
+        Self::Seccomp,
+        Self::CgroupMemory,
+        Self::CgroupPids,
+        Self::CgroupCpu,
+        Self::Rlimits,
+    ];
+
+    /// The layer's name in configuration files and messages, e.g. `cgroup-memory`.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Namespaces => "namespaces",
+            Self::Seccomp => "seccomp",
+            Self::CgroupMemory => "cgroup-memory",
+            Self::CgroupPids => "cgroup-pids",
+            Self::CgroupCpu => "cgroup-cpu",
+            Self::Rlimits => "rlimits",
+        }
+    }
+}
+
+impl fmt::Display for Layer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.as_str())
+    }
+}
+
+/// Which isolation to apply.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Isolation {
+    /// All layers but the ones named.
+    Sandboxed {
+        /// What is not enforced because the organiser said so. Empty = everything is.
+        given_up: Vec<Layer>,
+    },
+    /// A developer's own agent: no namespaces, no seccomp, no cgroup, no resource limits and the
+    /// environment of the caller; still an own process group, deadlines, line caps and reaping.
+    None,
+}
+
+impl Isolation {
+    /// Is `layer` to be enforced?
+    pub fn enforces(&self, layer: Layer) -> bool {
+        match self {
+            Self::Sandboxed { given_up } => !given_up.contains(&layer),
+            Self::None => false,
+        }
+    }
+}

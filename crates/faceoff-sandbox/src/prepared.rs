@@ -1,0 +1,257 @@
+//! From what to start to what has been started.
+
+use crate::{
+    Isolation, Layer, SandboxError, SpawnError, SpawnSpec,
+    affinity::cpu_set,
+    agent_user::AgentUser,
+    bubblewrap::{Bubblewrap, environment},
+    cgroup::AgentCgroup,
+    child_setup::{ChildSetup, StepReport, rlimits},
+    line_pipe::LinePipe,
+    owner::Owner,
+    process_tree::ProcessTree,
+    seccomp::Filters,
+    spawner,
+    status_pipe::StatusPipe,
+    stderr_tail::StderrTail,
+    sweep::SCRATCH_PREFIX,
+};
+use faceoff_types::AgentFaultKind;
+use std::{
+    fs, io,
+    os::unix::{fs::PermissionsExt, process::CommandExt},
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+    time::{Duration, Instant},
+};
+
+/// How long bubblewrap may take to make a sandbox before that is a failure of the host.
+const SET_UP_PATIENCE: Duration = Duration::from_secs(20);
+
+/// What runs, and our ends of it.
+pub(crate) struct Started {
+    pub lines: LinePipe,
+    pub stderr: StderrTail,
+    pub tree: ProcessTree,
+}
+
+/// What is made before the fork.
+pub(crate) struct Prepared {
+    command: Command,
+    setup: ChildSetup,
+    status: Option<StatusPipe>,
+    cgroup: Option<AgentCgroup>,
+    scratch: Option<tempfile::TempDir>,
+}
+
+impl Prepared {
+    /// Makes the cgroup, the filters and the command line.
+    pub(crate) fn new(spec: &SpawnSpec) -> Result<Self, SandboxError> {
+        if spec.isolation == Isolation::None {
+            return Ok(Self::unsandboxed(spec));
+        }
+        let enforces = |layer| spec.isolation.enforces(layer);
+        let user = AgentUser::for_next_agent()?;
+        let cgroup = AgentCgroup::create(&spec.limits, &spec.isolation, &spec.cpus)?;
+        let held_by_cpuset = cgroup.as_ref().is_some_and(|cgroup| cgroup.holds_cpus);
+        let filters = if enforces(Layer::Seccomp) {
+            Some(Filters::build(!spec.cpus.is_empty() && !held_by_cpuset)?)
+        } else {
+            None
+        };
+        let mut setup = ChildSetup {
+            cgroup_procs: cgroup
+                .as_ref()
+                .map(AgentCgroup::entrances)
+                .transpose()?
+                .unwrap_or_default(),
+            cpus: (!spec.cpus.is_empty()).then(|| cpu_set(&spec.cpus)),
+            rlimits: if enforces(Layer::Rlimits) {
+                rlimits(&spec.limits, user.is_some())
+            } else {
+                Vec::new()
+            },
+            user,
+            yield_memory: true,
+            ..ChildSetup::default()
+        };
+        if enforces(Layer::Namespaces) {
+            let failed = |source| SandboxError::io("cannot make a pipe", source);
+            let (status, writer) = StatusPipe::new().map_err(failed)?;
+            let invocation =
+                Bubblewrap::find()?.command(spec, writer, filters.as_ref(), user.is_some())?;
+            setup.inherit = invocation.inherit;
+            setup.stage = invocation.stage;
+            let command = invocation.command;
+            return Ok(Self {
+                command,
+                setup,
+                status: Some(status),
+                cgroup,
+                scratch: None,
+            });
+        }
+        if user.is_some() {
+            check_reachable(&spec.bundle_dir)?;
+        }
+        setup.filters = filters;
+        let scratch = scratch_folder(user)?;
+        let mut command = direct_command(spec);
+        command
+            .env_clear()
+            .envs(environment(spec, &scratch.path().display().to_string()));
+        Ok(Self {
+            command,
+            setup,
+            status: None,
+            cgroup,
+            scratch: Some(scratch),
+        })
+    }
+
+    fn unsandboxed(spec: &SpawnSpec) -> Self {
+        let mut command = direct_command(spec);
+        command.envs(&spec.env);
+        let cpus = (!spec.cpus.is_empty()).then(|| cpu_set(&spec.cpus));
+        let setup = ChildSetup {
+            cpus,
+            ..ChildSetup::default()
+        };
+        Self {
+            command,
+            setup,
+            status: None,
+            cgroup: None,
+            scratch: None,
+        }
+    }
+
+    /// Forks; returns when the sandbox exists.
+    pub(crate) fn start(self, spec: &SpawnSpec) -> Result<Started, SpawnError> {
+        let Self {
+            mut command,
+            setup,
+            status,
+            cgroup,
+            scratch,
+        } = self;
+        command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .process_group(0);
+        let sandboxed = status.is_some();
+        let report = setup
+            .install(&mut command)
+            .map_err(|source| SandboxError::io("cannot make a pipe", source))?;
+        let mut child = match spawner::spawn(command) {
+            Ok(child) => child,
+            Err(source) => return Err(start_failure(report, source, sandboxed, spec)),
+        };
+        let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
+        let failed = |source| SandboxError::io("cannot watch the agent", source);
+        let mut tree = ProcessTree::new(child, status, cgroup, scratch).map_err(failed)?;
+        let (Some(stdin), Some(stdout), Some(stderr)) = pipes else {
+            return Err(
+                SandboxError::other("cannot watch the agent", "its pipes are missing").into(),
+            );
+        };
+        let lines = LinePipe::new(stdin.into(), stdout.into()).map_err(failed)?;
+        let mut stderr =
+            StderrTail::drain(stderr.into(), spec.limits.stderr_tail_bytes).map_err(failed)?;
+        if let Some(status) = &mut tree.status {
+            match status.wait_for_child(Instant::now() + SET_UP_PATIENCE)? {
+                Some(init) => tree.watch_init(init),
+                None => {
+                    tree.kill();
+                    stderr.close();
+                    let why = stderr.text().trim().to_owned();
+                    return Err(SandboxError::Unavailable {
+                        layer: Layer::Namespaces,
+                        why,
+                    }
+                    .into());
+                }
+            }
+        }
+        Ok(Started {
+            lines,
+            stderr,
+            tree,
+        })
+    }
+}
+
+/// The agent's own command, for the modes without bubblewrap.
+fn direct_command(spec: &SpawnSpec) -> Command {
+    let program = spec.command.first().map(String::as_str).unwrap_or_default();
+    let program = match program.strip_prefix("/agent/") {
+        // Relative to the working folder, which is entered before: the agent's user may be unable to reach
+        // it by its whole name.
+        Some(rest) => Path::new("./").join(rest),
+        None if program.contains('/') => Path::new("./").join(program),
+        None => PathBuf::from(program),
+    };
+    let mut command = Command::new(program);
+    command
+        .args(spec.command.iter().skip(1))
+        .current_dir(&spec.bundle_dir);
+    command
+}
+
+/// Without a mount namespace the agent's user must be able to walk to the bundle. If it cannot, that must
+/// not look like a mistake of the bundle's.
+fn check_reachable(bundle_dir: &Path) -> Result<(), SandboxError> {
+    for folder in bundle_dir.ancestors() {
+        let meta = fs::metadata(folder)
+            .map_err(|source| SandboxError::io("cannot look at the bundle", source))?;
+        if meta.permissions().mode() & 0o001 == 0 {
+            return Err(SandboxError::Unavailable {
+                layer: Layer::Namespaces,
+                why: format!(
+                    "it is given up, so an agent of this root service, which is another user, would have to \
+                     reach its bundle through {}, which is closed to others; run the service as an ordinary \
+                     user, or keep the layer",
+                    folder.display()
+                ),
+            });
+        }
+    }
+    Ok(())
+}
+
+fn scratch_folder(user: Option<AgentUser>) -> Result<tempfile::TempDir, SandboxError> {
+    let failed = |source| SandboxError::io("cannot make a scratch folder", source);
+    let folder = tempfile::Builder::new()
+        .prefix(&Owner::this_process().name(SCRATCH_PREFIX))
+        .tempdir()
+        .map_err(failed)?;
+    if let Some(user) = user {
+        std::os::unix::fs::chown(folder.path(), Some(user.id), Some(user.id)).map_err(failed)?;
+    }
+    Ok(folder)
+}
+
+/// Without bubblewrap the exec that fails is the agent's.
+fn start_failure(
+    report: StepReport,
+    source: io::Error,
+    sandboxed: bool,
+    spec: &SpawnSpec,
+) -> SpawnError {
+    match report.failed_step() {
+        Some(step) => SandboxError::io(step, source).into(),
+        None if sandboxed => SandboxError::io("cannot start bubblewrap", source).into(),
+        None if matches!(
+            source.raw_os_error(),
+            Some(libc::ENOENT | libc::EACCES | libc::ENOEXEC)
+        ) =>
+        {
+            let program = spec.command.first().map(String::as_str).unwrap_or_default();
+            SpawnError::Agent(AgentFaultKind::CannotStart {
+                detail: format!("`{program}`: {source}"),
+            })
+        }
+        None => SandboxError::io("cannot start the agent", source).into(),
+    }
+}

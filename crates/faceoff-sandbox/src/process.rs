@@ -1,0 +1,249 @@
+use crate::{
+    Isolation, Limits, ReadLine, SandboxError, SpawnError, SpawnSpec, WriteError,
+    cgroup::AgentCgroup,
+    command_check::check_command,
+    end::{End, Evidence},
+    line_pipe::{LinePipe, Written},
+    output_holders,
+    prepared::{Prepared, Started},
+    process_tree::ProcessTree,
+    status_pipe::StatusPipe,
+    stderr_tail::StderrTail,
+    sweep,
+};
+use faceoff_types::AgentFaultKind;
+use std::{
+    fs,
+    sync::Once,
+    time::{Duration, Instant},
+};
+
+/// When to look for the first time whether a silent agent has closed its output; then ever more rarely.
+const FIRST_LOOK: Duration = Duration::from_millis(100);
+/// How long to wait for the exit status once the pipes are closed.
+const END_PATIENCE: Duration = Duration::from_millis(500);
+
+/// A running agent. Dropping it kills and reaps the whole tree and removes its cgroup and scratch.
+#[derive(Debug)]
+pub struct AgentProcess {
+    lines: LinePipe,
+    stderr: StderrTail,
+    tree: ProcessTree,
+    limits: Limits,
+    end: Option<End>,
+}
+
+/// What an agent used, and how it ended.
+#[derive(Debug, Clone, Default)]
+pub struct Usage {
+    /// The most memory the tree had at a time, in bytes; `None` where the host does not tell.
+    pub peak_memory_bytes: Option<u64>,
+    /// CPU time of the tree in seconds; `None` where the host does not tell.
+    pub cpu_time_s: Option<f64>,
+    /// The end of standard error, lossy UTF-8.
+    pub stderr_tail: String,
+    /// How it ended by itself, unless with status 0; `None` also when it had to be killed.
+    pub exit: Option<AgentFaultKind>,
+}
+
+impl AgentProcess {
+    /// Starts the agent. Returns when its sandbox exists; that its program cannot be executed may show
+    /// only then, as a closed pipe and [`AgentFaultKind::CannotStart`] from [`Self::diagnose_end`].
+    ///
+    /// # Errors
+    /// [`SpawnError::Agent`] if the bundle's command cannot be started, [`SpawnError::Platform`] if the
+    /// host lacks a layer that is not given up or something of ours fails.
+    pub fn spawn(spec: &SpawnSpec) -> Result<Self, SpawnError> {
+        static SWEEP: Once = Once::new();
+        if matches!(spec.isolation, Isolation::Sandboxed { .. }) {
+            SWEEP.call_once(|| {
+                sweep::sweep_stale();
+            });
+        }
+        let bundle_dir = fs::canonicalize(&spec.bundle_dir).map_err(|source| {
+            SandboxError::io(
+                format!("cannot find the bundle {}", spec.bundle_dir.display()),
+                source,
+            )
+        })?;
+        check_command(&bundle_dir, &spec.command, &spec.env).map_err(SpawnError::Agent)?;
+        let spec = SpawnSpec {
+            bundle_dir,
+            ..spec.clone()
+        };
+        let Started {
+            lines,
+            stderr,
+            tree,
+        } = Prepared::new(&spec)?.start(&spec)?;
+        Ok(Self {
+            lines,
+            stderr,
+            tree,
+            limits: spec.limits,
+            end: None,
+        })
+    }
+
+    /// Writes all of `line` (which ends in `\n`) before `deadline`; returns the time right after its
+    /// last byte was taken.
+    ///
+    /// # Errors
+    /// [`WriteError::Closed`] and [`WriteError::TimedOut`] are the agent's doing, the rest is ours.
+    pub fn write_line(&mut self, line: &[u8], deadline: Instant) -> Result<Instant, WriteError> {
+        match self.lines.write(line, deadline) {
+            Ok(Written::At(at)) => Ok(at),
+            Ok(Written::TimedOut) => Err(WriteError::TimedOut),
+            Ok(Written::Closed) => {
+                self.check_platform()?;
+                Err(WriteError::Closed)
+            }
+            Err(source) => Err(SandboxError::io("cannot write to the agent", source).into()),
+        }
+    }
+
+    /// Waits for the agent's next line, of at most `max_bytes` without its newline, until `deadline`.
+    ///
+    /// # Errors
+    /// When the pipe or the sandbox itself failed; never for what the agent does.
+    pub fn read_line(
+        &mut self,
+        max_bytes: usize,
+        deadline: Instant,
+    ) -> Result<ReadLine, SandboxError> {
+        let mut pause = FIRST_LOOK;
+        let outcome = loop {
+            let until = if self.tree.is_sandboxed() {
+                deadline.min(Instant::now() + pause)
+            } else {
+                deadline
+            };
+            let outcome = self
+                .lines
+                .read_line(max_bytes, until)
+                .map_err(|source| SandboxError::io("cannot read from the agent", source))?;
+            if !matches!(outcome, ReadLine::TimedOut) || until == deadline {
+                break outcome;
+            }
+            if self.output_is_abandoned()? {
+                break ReadLine::Closed;
+            }
+            pause *= 2;
+        };
+        if matches!(outcome, ReadLine::Closed) {
+            self.check_platform()?;
+        }
+        Ok(outcome)
+    }
+
+    /// Is there unread output already (an answer before the question)?
+    ///
+    /// # Errors
+    /// When the pipe cannot be asked.
+    pub fn has_pending_output(&mut self) -> Result<bool, SandboxError> {
+        self.lines
+            .has_pending_output()
+            .map_err(|source| SandboxError::io("cannot look at the agent's output", source))
+    }
+
+    /// Why it ended, if it ends by itself within `wait`: exit, signal, or the limit that ended it.
+    /// `None` while it runs, after we have killed it, and when the end was a failure of ours.
+    pub fn diagnose_end(&mut self, wait: Duration) -> Option<AgentFaultKind> {
+        match self.observe_end(wait) {
+            Some(End::Agent(fault)) => Some(fault.clone()),
+            _ => None,
+        }
+    }
+
+    /// Last bytes of standard error, lossy UTF-8.
+    pub fn stderr_tail(&self) -> String {
+        self.stderr.text()
+    }
+
+    /// CPU time of the whole tree so far, in seconds; `None` where the host does not tell (no cgroup).
+    pub fn cpu_time_s(&self) -> Option<f64> {
+        self.tree.cgroup.as_ref()?.cpu_time_s()
+    }
+
+    /// Closes the agent's input, waits up to `grace` for it to exit, then kills the tree; always reaps.
+    ///
+    /// # Errors
+    /// When the sandbox failed under the agent.
+    pub fn finish(mut self, grace: Duration) -> Result<Usage, SandboxError> {
+        self.lines.close_input();
+        if self.observe_end(grace).is_none() {
+            self.kill();
+        }
+        let usage = Usage {
+            peak_memory_bytes: self
+                .tree
+                .cgroup
+                .as_ref()
+                .and_then(AgentCgroup::peak_memory_bytes),
+            cpu_time_s: self.cpu_time_s(),
+            stderr_tail: self.stderr.text(),
+            exit: match &self.end {
+                Some(End::Agent(fault)) if *fault != (AgentFaultKind::Exited { code: 0 }) => {
+                    Some(fault.clone())
+                }
+                _ => None,
+            },
+        };
+        self.tree.clean_up();
+        match self.end.take() {
+            Some(End::Platform(why)) => Err(SandboxError::other("the sandbox failed", why)),
+            _ => Ok(usage),
+        }
+    }
+
+    /// Ends the whole tree now and reaps it.
+    pub fn kill(&mut self) {
+        if !self.tree.has_ended() {
+            self.tree.kill();
+            self.end.get_or_insert(End::Killed);
+        }
+        self.stderr.close();
+    }
+
+    /// Has the agent, though alive, closed its output, with nothing left in it?
+    fn output_is_abandoned(&self) -> Result<bool, SandboxError> {
+        let held =
+            output_holders::any_holds(self.lines.output(), &self.tree.processes(), self.tree.pid());
+        if held {
+            return Ok(false);
+        }
+        let pending = self.lines.has_pending_output();
+        Ok(!pending
+            .map_err(|source| SandboxError::io("cannot look at the agent's output", source))?)
+    }
+
+    /// After a closed pipe: was it the sandbox that failed?
+    fn check_platform(&mut self) -> Result<(), SandboxError> {
+        match self.observe_end(END_PATIENCE) {
+            Some(End::Platform(why)) => Err(SandboxError::other("the sandbox failed", why.clone())),
+            _ => Ok(()),
+        }
+    }
+
+    fn observe_end(&mut self, wait: Duration) -> Option<&End> {
+        if self.end.is_none() {
+            let status = match self.tree.wait(Instant::now() + wait) {
+                Ok(status) => status?,
+                Err(error) => {
+                    self.end = Some(End::Platform(format!("cannot wait for the agent: {error}")));
+                    return self.end.as_ref();
+                }
+            };
+            self.stderr.close();
+            let evidence = Evidence {
+                status,
+                sandboxed: self.tree.status.as_mut().map(StatusPipe::exit_code),
+                trespass: self.tree.cgroup.as_ref().and_then(AgentCgroup::trespass),
+                stderr: &self.stderr.text(),
+                limits: &self.limits,
+            };
+            self.end = Some(evidence.end());
+        }
+        self.end.as_ref()
+    }
+}

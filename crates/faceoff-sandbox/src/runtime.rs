@@ -1,0 +1,243 @@
+use crate::SandboxError;
+use serde::{Deserialize, Serialize};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+};
+
+/// Folders of shared libraries and of the dynamic loader, as distributions lay them out. On hosts with
+/// a merged /usr the short ones are links and appear inside as the same links.
+const LIBRARY_PATHS: [&str; 9] = [
+    "/usr/lib",
+    "/usr/lib32",
+    "/usr/lib64",
+    "/usr/libx32",
+    "/lib",
+    "/lib32",
+    "/lib64",
+    "/libx32",
+    "/etc/ld.so.cache",
+];
+
+/// Where `python3` is looked for, in this order.
+const PYTHON_CANDIDATES: [&str; 4] = [
+    "/usr/local/bin/python3",
+    "/usr/bin/python3",
+    "/bin/python3",
+    "/opt/python/bin/python3",
+];
+
+/// What a script's first line usually names.
+const SCRIPT_HELPERS: [&str; 5] = [
+    "/bin",
+    "/bin/sh",
+    "/usr/bin/sh",
+    "/usr/bin/dash",
+    "/usr/bin/env",
+];
+
+/// A runtime the organiser offers (`runtime` in `agent.toml`): which paths of the host an agent sees,
+/// read-only and under the same names, and its PATH.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Runtime {
+    /// Absolute host paths. A symbolic link appears as the same link, so its target must be named too.
+    /// Files must be readable by everybody when the service runs as root, for agents do not.
+    pub read_only_paths: Vec<PathBuf>,
+    /// The agent's `PATH`.
+    pub path: String,
+}
+
+impl Runtime {
+    /// For self-contained binaries: the host's shared libraries and nothing else.
+    pub fn native() -> Self {
+        Self {
+            read_only_paths: existing(&LIBRARY_PATHS),
+            path: "/usr/bin:/bin".into(),
+        }
+    }
+
+    /// The host's Python: the first `python3` of the usual places that starts, with its own libraries,
+    /// the system's and `/bin/sh` and `/usr/bin/env` for scripts. `None` if there is none.
+    pub fn python3() -> Option<Self> {
+        PYTHON_CANDIDATES
+            .iter()
+            .find_map(|candidate| Self::python3_at(Path::new(candidate)).ok())
+    }
+
+    /// A Python the organiser names, e.g. one built in `/opt` or a virtual environment.
+    ///
+    /// # Errors
+    /// When `interpreter` does not start or does not tell where its libraries are.
+    pub fn python3_at(interpreter: &Path) -> Result<Self, SandboxError> {
+        let python = PythonLayout::ask(interpreter)?;
+        let mut paths = existing(&LIBRARY_PATHS);
+        paths.extend(existing(&SCRIPT_HELPERS));
+        let folder = interpreter
+            .parent()
+            .unwrap_or(Path::new("/usr/bin"))
+            .to_path_buf();
+        for link in link_chain(interpreter) {
+            push_new(&mut paths, link);
+        }
+        for path in python.paths() {
+            push_new(&mut paths, path);
+        }
+        let mut path = folder.display().to_string();
+        for folder in ["/usr/bin", "/bin"] {
+            if !path.split(':').any(|known| known == folder) {
+                path.push(':');
+                path.push_str(folder);
+            }
+        }
+        paths.sort();
+        Ok(Self {
+            read_only_paths: paths,
+            path,
+        })
+    }
+
+    /// The host path of the first `python3` this runtime's PATH leads to, for messages.
+    pub fn interpreter(&self) -> Option<PathBuf> {
+        self.path
+            .split(':')
+            .map(|folder| Path::new(folder).join("python3"))
+            .find(|path| path.is_file())
+    }
+}
+
+/// Where an interpreter keeps its files, as it says itself.
+struct PythonLayout {
+    executable: PathBuf,
+    /// Installation prefix; for a virtual environment the one of the Python behind it.
+    base_prefix: PathBuf,
+    /// The virtual environment, or the same.
+    prefix: PathBuf,
+    standard_library: PathBuf,
+    packages: Vec<PathBuf>,
+}
+
+impl PythonLayout {
+    fn ask(interpreter: &Path) -> Result<Self, SandboxError> {
+        const QUESTION: &str = "import sys, os, site, sysconfig\n\
+            print(os.path.realpath(sys.executable))\n\
+            print(sys.base_prefix)\n\
+            print(sys.prefix)\n\
+            print(sysconfig.get_path('stdlib'))\n\
+            for p in dict.fromkeys(site.getsitepackages() + [sysconfig.get_path('platstdlib')]): print(p)";
+        let what = || format!("cannot ask {} for its layout", interpreter.display());
+        let answer = Command::new(interpreter)
+            .args(["-I", "-c", QUESTION])
+            .env_clear()
+            .stdin(Stdio::null())
+            .stderr(Stdio::null())
+            .output()
+            .map_err(|source| SandboxError::io(what(), source))?;
+        if !answer.status.success() {
+            return Err(SandboxError::other(what(), answer.status.to_string()));
+        }
+        let text = String::from_utf8_lossy(&answer.stdout);
+        let mut lines = text.lines().map(PathBuf::from);
+        let mut next = || {
+            lines
+                .next()
+                .ok_or_else(|| SandboxError::other(what(), "its answer is too short"))
+        };
+        Ok(Self {
+            executable: next()?,
+            base_prefix: next()?,
+            prefix: next()?,
+            standard_library: next()?,
+            packages: lines.collect(),
+        })
+    }
+
+    /// A prefix of its own is shown as a whole; from `/usr` and `/usr/local` only what belongs to Python.
+    fn paths(&self) -> Vec<PathBuf> {
+        let mut paths = vec![self.executable.clone()];
+        for prefix in [&self.base_prefix, &self.prefix] {
+            if !is_shared_prefix(prefix) {
+                paths.push(prefix.clone());
+            }
+        }
+        paths.push(self.standard_library.clone());
+        paths.extend(self.packages.iter().cloned());
+        // A Python below /usr/local links its own libpython from there.
+        if self.base_prefix == Path::new("/usr/local") {
+            paths.push("/usr/local/lib".into());
+        }
+        paths.retain(|path| path.is_absolute() && path.exists());
+        paths
+    }
+}
+
+fn is_shared_prefix(prefix: &Path) -> bool {
+    ["/", "/usr", "/usr/local"]
+        .iter()
+        .any(|shared| prefix == Path::new(shared))
+}
+
+fn existing(paths: &[&str]) -> Vec<PathBuf> {
+    let mut found: Vec<PathBuf> = Vec::new();
+    for path in paths {
+        let path = PathBuf::from(path);
+        // `/bin` matters only where it is a link; a real folder of programs is not shown.
+        let wanted =
+            path != Path::new("/bin") || fs::symlink_metadata(&path).is_ok_and(|m| m.is_symlink());
+        if wanted && path.exists() {
+            for link in link_chain(&path) {
+                push_new(&mut found, link);
+            }
+        }
+    }
+    // A link's target may be a folder of programs (`/bin`): the link is wanted, the folder is not.
+    found.retain(|path| path != Path::new("/usr/bin"));
+    found
+}
+
+/// `path` and, while it is a link, what it points to, links in its folders excluded.
+fn link_chain(path: &Path) -> Vec<PathBuf> {
+    let mut chain = vec![path.to_path_buf()];
+    // Longer chains than this end in ELOOP for the kernel as well.
+    for _ in 0..40 {
+        let last = chain.last().cloned().unwrap_or_default();
+        let Ok(target) = fs::read_link(&last) else {
+            break;
+        };
+        let next = last.parent().unwrap_or(Path::new("/")).join(target);
+        let Some(parent) = next.parent().and_then(|parent| parent.canonicalize().ok()) else {
+            break;
+        };
+        let Some(name) = next.file_name() else { break };
+        chain.push(parent.join(name));
+    }
+    chain
+}
+
+fn push_new(paths: &mut Vec<PathBuf>, path: PathBuf) {
+    if !paths.contains(&path) {
+        paths.push(path);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_runtime_shows_no_folder_of_users_or_configuration() {
+        let mut runtimes = vec![Runtime::native()];
+        runtimes.extend(Runtime::python3());
+        for path in runtimes.iter().flat_map(|runtime| &runtime.read_only_paths) {
+            for hidden in [
+                "/home", "/root", "/var", "/run", "/sys", "/proc", "/srv", "/mnt",
+            ] {
+                assert!(!path.starts_with(hidden), "{} is shown", path.display());
+            }
+            assert!(
+                path != Path::new("/") && path != Path::new("/usr") && path != Path::new("/etc")
+            );
+            assert!(!path.starts_with("/etc") || path == Path::new("/etc/ld.so.cache"));
+        }
+    }
+}

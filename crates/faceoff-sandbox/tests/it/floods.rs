@@ -1,0 +1,56 @@
+use crate::harness::{LINE_CAP, PATIENCE, Subject, expect_echo, expect_line};
+use faceoff_sandbox::ReadLine;
+use std::time::Instant;
+
+#[test]
+fn a_line_without_end_is_cut() {
+    let subject = Subject::new("floods", &["endless"]);
+    let mut agent = subject.spawn();
+    match agent
+        .read_line(LINE_CAP, Instant::now() + PATIENCE)
+        .unwrap()
+    {
+        ReadLine::TooLong { head } => {
+            assert!(head.len() <= 1024 && head.iter().all(|byte| *byte == b'x'))
+        }
+        other => panic!("{other:?}"),
+    }
+    subject.finish(agent);
+}
+
+#[test]
+fn a_flood_of_output_is_read_as_far_as_it_is_asked_for() {
+    let subject = Subject::new("floods", &["both"]);
+    let mut agent = subject.spawn();
+    for _ in 0..1000 {
+        assert_eq!(expect_line(&mut agent).len(), 99);
+    }
+    assert!(agent.has_pending_output().unwrap());
+    assert!(agent.stderr_tail().len() <= 64 << 10);
+    subject.finish(agent);
+}
+
+#[test]
+fn a_flood_of_log_neither_blocks_the_agent_nor_fills_the_service() {
+    let subject =
+        Subject::new("floods", &["stderr"]).limits(|limits| limits.stderr_tail_bytes = 1000);
+    let mut agent = subject.spawn();
+    for number in 0..200 {
+        expect_echo(&mut agent, &number.to_string());
+    }
+    let usage = subject.finish(agent);
+    assert_eq!(usage.stderr_tail.len(), 1000);
+}
+
+#[test]
+fn an_agent_that_does_not_read_meets_its_deadline() {
+    use faceoff_sandbox::WriteError;
+    use std::time::Duration;
+    let subject = Subject::new("ends", &["deaf"]);
+    let mut agent = subject.spawn();
+    assert_eq!(expect_line(&mut agent), "ready");
+    let line = vec![b'x'; 1 << 20];
+    let outcome = agent.write_line(&line, Instant::now() + Duration::from_millis(50));
+    assert!(matches!(outcome, Err(WriteError::TimedOut)), "{outcome:?}");
+    subject.finish(agent);
+}

@@ -1,0 +1,230 @@
+//! Starts the programs of `tests/agents` and checks that nothing of them is left.
+
+use faceoff_sandbox::{
+    AgentProcess, Isolation, Layer, Limits, ReadLine, Runtime, SpawnSpec, Usage, probe_host,
+};
+use faceoff_types::AgentFaultKind;
+use std::{
+    collections::BTreeMap,
+    fs,
+    os::unix::fs::PermissionsExt,
+    path::{Path, PathBuf},
+    sync::OnceLock,
+    time::{Duration, Instant},
+};
+
+/// Long enough for a loaded machine; no test waits for it unless something is broken.
+pub const PATIENCE: Duration = Duration::from_secs(60);
+pub const LINE_CAP: usize = 64 << 10;
+
+/// An agent under test, with a bundle of its own and a mark by which its processes are known.
+pub struct Subject {
+    pub bundle: tempfile::TempDir,
+    pub spec: SpawnSpec,
+    pub mark: String,
+}
+
+impl Subject {
+    /// The program `tests/agents/NAME.py` with `arguments` in a bundle of its own, in the full sandbox
+    /// that this host offers.
+    pub fn new(name: &str, arguments: &[&str]) -> Self {
+        let bundle = tempfile::Builder::new()
+            .prefix("bundle-")
+            .tempdir()
+            .unwrap();
+        fs::set_permissions(bundle.path(), fs::Permissions::from_mode(0o755)).unwrap();
+        let file = format!("{name}.py");
+        fs::copy(agents_dir().join(&file), bundle.path().join(&file)).unwrap();
+        let mark = format!(
+            "mark-{}",
+            bundle.path().file_name().unwrap().to_str().unwrap()
+        );
+        let mut command = vec!["python3".to_owned(), file, mark.clone()];
+        command.extend(arguments.iter().map(|&argument| argument.to_owned()));
+        let spec = SpawnSpec {
+            bundle_dir: bundle.path().to_path_buf(),
+            command,
+            env: BTreeMap::new(),
+            runtime: Runtime::python3().expect("the tests need a python3"),
+            limits: Limits {
+                memory_bytes: 256 << 20,
+                scratch_bytes: 16 << 20,
+                file_size_bytes: 64 << 20,
+                ..Limits::default()
+            },
+            isolation: Isolation::Sandboxed {
+                given_up: missing_layers().to_vec(),
+            },
+            cpus: Vec::new(),
+        };
+        Self { bundle, spec, mark }
+    }
+
+    pub fn limits(mut self, change: impl FnOnce(&mut Limits)) -> Self {
+        change(&mut self.spec.limits);
+        self
+    }
+
+    pub fn spawn(&self) -> AgentProcess {
+        AgentProcess::spawn(&self.spec).unwrap()
+    }
+
+    /// The one line it prints; afterwards it must have ended by itself and left nothing.
+    pub fn report(&self) -> serde_json::Value {
+        let mut agent = self.spawn();
+        let line = expect_line(&mut agent);
+        let usage = agent.finish(PATIENCE).unwrap();
+        assert_eq!(usage.exit, None, "{}", usage.stderr_tail);
+        self.assert_nothing_left();
+        serde_json::from_str(&line).unwrap()
+    }
+
+    /// How it ends by itself.
+    pub fn end(&self, agent: &mut AgentProcess) -> AgentFaultKind {
+        agent
+            .diagnose_end(PATIENCE)
+            .unwrap_or_else(|| panic!("no end; {}", agent.stderr_tail()))
+    }
+
+    /// Kills it at once and checks that nothing is left.
+    pub fn finish(&self, agent: AgentProcess) -> Usage {
+        let usage = agent.finish(Duration::ZERO).unwrap();
+        self.assert_nothing_left();
+        usage
+    }
+
+    pub fn assert_nothing_left(&self) {
+        assert_eq!(
+            processes_marked(&self.mark),
+            [] as [i32; 0],
+            "processes are left"
+        );
+        let mounts = fs::read_to_string("/proc/self/mountinfo").unwrap();
+        let bundle = self.bundle.path().to_str().unwrap();
+        assert!(!mounts.contains(bundle), "a mount is left: {mounts}");
+        let ours = format!("agent-{}-", std::process::id());
+        let cgroups: Vec<_> = agent_cgroups()
+            .into_iter()
+            .filter(|path| name_of(path).starts_with(&ours))
+            .collect();
+        assert_eq!(cgroups, [] as [PathBuf; 0], "cgroups are left");
+        let files: Vec<_> = walk(&std::env::temp_dir(), 1)
+            .into_iter()
+            .filter(|path| {
+                name_of(path).starts_with(&format!("faceoff-scratch-{}-", std::process::id()))
+            })
+            .collect();
+        assert_eq!(files, [] as [PathBuf; 0], "scratch folders are left");
+    }
+}
+
+pub fn agents_dir() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/agents")
+}
+
+/// The next line as text; panics with what came instead.
+pub fn expect_line(agent: &mut AgentProcess) -> String {
+    match agent
+        .read_line(LINE_CAP, Instant::now() + PATIENCE)
+        .unwrap()
+    {
+        ReadLine::Line { bytes, .. } => String::from_utf8(bytes).unwrap(),
+        other => {
+            let end = agent.diagnose_end(Duration::from_secs(1));
+            panic!("{other:?}; {end:?}; {}", agent.stderr_tail())
+        }
+    }
+}
+
+/// Sends `line` and expects it back.
+pub fn expect_echo(agent: &mut AgentProcess, line: &str) {
+    agent
+        .write_line(format!("{line}\n").as_bytes(), Instant::now() + PATIENCE)
+        .unwrap();
+    assert_eq!(expect_line(agent), line);
+}
+
+/// The layers this host lacks. None may be missing for root; an ordinary user may lack cgroups.
+pub fn missing_layers() -> &'static [Layer] {
+    static MISSING: OnceLock<Vec<Layer>> = OnceLock::new();
+    MISSING.get_or_init(|| {
+        let missing: Vec<_> = probe_host()
+            .into_iter()
+            .filter(|feature| !feature.available)
+            .collect();
+        for feature in &missing {
+            let may_be_missing = !is_root()
+                && matches!(
+                    feature.layer,
+                    Layer::CgroupMemory | Layer::CgroupPids | Layer::CgroupCpu
+                );
+            assert!(may_be_missing, "this host should have {feature:?}");
+            println!("not tested here: {}: {}", feature.layer, feature.found);
+        }
+        missing.into_iter().map(|feature| feature.layer).collect()
+    })
+}
+
+/// Is the layer there? Says so when what depends on it cannot be shown.
+pub fn has(layer: Layer) -> bool {
+    let there = !missing_layers().contains(&layer);
+    if !there {
+        println!("this test shows nothing on this host: it needs the layer {layer}");
+    }
+    there
+}
+
+pub fn is_root() -> bool {
+    rustix::process::geteuid().is_root()
+}
+
+/// Processes whose command line or environment holds `mark`. A zombie has neither.
+pub fn processes_marked(mark: &str) -> Vec<i32> {
+    let holds = |pid: i32, file: &str| {
+        fs::read(format!("/proc/{pid}/{file}")).is_ok_and(|text| {
+            text.windows(mark.len())
+                .any(|window| window == mark.as_bytes())
+        })
+    };
+    let pids = fs::read_dir("/proc")
+        .unwrap()
+        .flatten()
+        .filter_map(|entry| name_of(&entry.path()).parse().ok());
+    pids.filter(|&pid| holds(pid, "cmdline") || holds(pid, "environ"))
+        .collect()
+}
+
+/// All cgroups of agents on this host.
+pub fn agent_cgroups() -> Vec<PathBuf> {
+    walk(Path::new("/sys/fs/cgroup"), 12)
+        .into_iter()
+        .filter(|path| {
+            name_of(path).starts_with("agent-")
+                && path
+                    .parent()
+                    .is_some_and(|folder| folder.ends_with("faceoff"))
+        })
+        .collect()
+}
+
+/// Folders below `root`, down to `depth`.
+fn walk(root: &Path, depth: usize) -> Vec<PathBuf> {
+    let entries = fs::read_dir(root).into_iter().flatten().flatten();
+    let folders: Vec<_> = entries
+        .filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_dir()))
+        .map(|entry| entry.path())
+        .collect();
+    let deeper = folders
+        .iter()
+        .filter(|_| depth > 1)
+        .flat_map(|folder| walk(folder, depth - 1));
+    let mut found: Vec<_> = deeper.collect();
+    found.extend(folders);
+    found
+}
+
+fn name_of(path: &Path) -> String {
+    path.file_name()
+        .map(|name| name.to_string_lossy().into_owned())
+        .unwrap_or_default()
+}

@@ -1,0 +1,82 @@
+use crate::harness::{Subject, expect_echo};
+use faceoff_sandbox::Runtime;
+use std::{fs, os::unix::fs::PermissionsExt, path::Path};
+
+#[test]
+fn a_native_program_finds_its_libraries_and_no_interpreter() {
+    let mut subject = Subject::new("echo", &[]);
+    let program = subject.bundle.path().join("agent");
+    fs::copy("/usr/bin/cat", &program).unwrap();
+    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+    subject.spec.runtime = Runtime::native();
+    subject.spec.command = vec!["./agent".into()];
+    let mut agent = subject.spawn();
+    expect_echo(&mut agent, "hello");
+    subject.finish(agent);
+    assert!(
+        !subject
+            .spec
+            .runtime
+            .read_only_paths
+            .iter()
+            .any(|path| path.starts_with("/usr/bin"))
+    );
+}
+
+#[test]
+fn a_script_finds_its_interpreter() {
+    let mut subject = Subject::new("echo", &[]);
+    let text = fs::read_to_string(subject.bundle.path().join("echo.py")).unwrap();
+    for (name, first_line) in [("env", "#!/usr/bin/env python3"), ("direct", "#!/bin/sh")] {
+        let program = subject.bundle.path().join(name);
+        let body = if name == "env" {
+            text.clone()
+        } else {
+            "exec python3 echo.py \"$@\"".into()
+        };
+        fs::write(&program, format!("{first_line}\n{body}\n")).unwrap();
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+        subject.spec.command = vec![format!("./{name}"), subject.mark.clone()];
+        let mut agent = subject.spawn();
+        expect_echo(&mut agent, "hello");
+        subject.finish(agent);
+    }
+}
+
+#[test]
+fn a_python_outside_of_usr_brings_its_own_prefix_and_nothing_beside_it() {
+    // A copy of the host's Python in a prefix of its own, as pyenv and the like lay it out.
+    let host = tempfile::tempdir().unwrap();
+    fs::set_permissions(host.path(), fs::Permissions::from_mode(0o755)).unwrap();
+    let prefix = host.path().join("python");
+    fs::write(host.path().join("secret"), "secret").unwrap();
+    let usual = Runtime::python3().unwrap().interpreter().unwrap();
+    let venv = std::process::Command::new(&usual)
+        .args(["-m", "venv", "--without-pip", prefix.to_str().unwrap()])
+        .output()
+        .unwrap();
+    assert!(venv.status.success(), "{venv:?}");
+    let runtime = Runtime::python3_at(&prefix.join("bin/python3")).unwrap();
+    assert!(
+        runtime.read_only_paths.iter().any(|path| path == &prefix),
+        "{runtime:?}"
+    );
+    assert!(
+        !runtime
+            .read_only_paths
+            .iter()
+            .any(|path| host.path().starts_with(path)),
+        "{runtime:?}"
+    );
+    let mut subject = Subject::new("echo", &[]);
+    subject.spec.runtime = runtime;
+    let mut agent = subject.spawn();
+    expect_echo(&mut agent, "hello");
+    subject.finish(agent);
+}
+
+#[test]
+fn an_interpreter_that_is_none_is_refused() {
+    assert!(Runtime::python3_at(Path::new("/no/such/python3")).is_err());
+    assert!(Runtime::python3_at(Path::new("/usr/bin/cat")).is_err());
+}

@@ -1,0 +1,81 @@
+#![cfg(target_arch = "x86_64")]
+//! The program knows the numbers of this architecture only.
+
+use crate::harness::Subject;
+use faceoff_sandbox::{Isolation, Layer};
+use std::collections::BTreeMap;
+
+fn answers(subject: &Subject) -> BTreeMap<String, String> {
+    serde_json::from_value(subject.report()).unwrap()
+}
+
+#[test]
+fn dangerous_system_calls_are_refused() {
+    let mut answers = answers(&Subject::new("system_calls", &[]));
+    for unknown in ["clone3", "newer_than_known", "x32_getpid"] {
+        assert_eq!(
+            answers.remove(unknown).as_deref(),
+            Some("ENOSYS"),
+            "{unknown}"
+        );
+    }
+    // Success without effect: it stays tied to the service.
+    assert_eq!(answers.remove("parent_death_signal").as_deref(), Some("9"));
+    assert!(answers.len() > 40);
+    for (call, answer) in answers {
+        assert_eq!(answer, "EPERM", "{call}");
+    }
+}
+
+#[test]
+fn it_is_the_filter_that_refuses_them() {
+    // What any user may do, or is refused for another reason, when only the filter is missing.
+    let mut subject = Subject::new("system_calls", &[]);
+    let Isolation::Sandboxed { given_up } = &mut subject.spec.isolation else {
+        unreachable!()
+    };
+    given_up.push(Layer::Seccomp);
+    let answers = answers(&subject);
+    assert_eq!(answers["parent_death_signal"], "0");
+    for call in [
+        "ptrace",
+        "process_vm_readv",
+        "process_vm_writev",
+        "kcmp",
+        "keyctl",
+        "personality",
+        "name_to_handle_at",
+        "seccomp",
+        "socket_inet",
+        "socket_netlink",
+        "clone3",
+        "newer_than_known",
+    ] {
+        assert!(
+            !["EPERM", "ENOSYS"].contains(&answers[call].as_str()),
+            "{call}: {}",
+            answers[call]
+        );
+    }
+}
+
+#[test]
+fn the_filter_works_without_namespaces() {
+    let mut subject = Subject::new("system_calls", &[]);
+    let Isolation::Sandboxed { given_up } = &mut subject.spec.isolation else {
+        unreachable!()
+    };
+    given_up.push(Layer::Namespaces);
+    let answers = answers(&subject);
+    for call in [
+        "ptrace",
+        "unshare_user",
+        "clone_newuser",
+        "mount",
+        "bpf",
+        "keyctl",
+        "socket_inet",
+    ] {
+        assert_eq!(answers[call], "EPERM", "{call}");
+    }
+}

@@ -1,0 +1,99 @@
+//! The number of heads among fair coin tosses, which is all that the paired tests need.
+
+/// The distribution of the number of heads in `n` fair tosses.
+#[derive(Debug)]
+pub(crate) struct FairTosses {
+    /// `at[k]` = P(K = k), k from 0 to n.
+    at: Vec<f64>,
+    /// `at_least[k]` = P(K ≥ k), k from 0 to n + 1.
+    at_least: Vec<f64>,
+}
+
+impl FairTosses {
+    pub(crate) fn new(n: u32) -> Self {
+        let n = n as usize;
+        // Outwards from the middle, where nothing underflows that matters: C(n, k) relative to the
+        // middle one. (Probabilities below 1e-308 of the middle's become 0.)
+        let mut at = vec![0.0; n + 1];
+        let middle = n / 2;
+        at[middle] = 1.0;
+        for k in (0..middle).rev() {
+            at[k] = at[k + 1] * (k + 1) as f64 / (n - k) as f64;
+        }
+        for k in middle + 1..=n {
+            at[k] = at[n - k];
+        }
+        let total: f64 = at.iter().sum();
+        for probability in &mut at {
+            *probability /= total;
+        }
+        let mut at_least = vec![0.0; n + 2];
+        for k in (0..=n).rev() {
+            at_least[k] = at_least[k + 1] + at[k];
+        }
+        Self { at, at_least }
+    }
+
+    /// P(K = k) for k = 0, 1, … n.
+    pub(crate) fn probabilities(&self) -> impl Iterator<Item = f64> + '_ {
+        self.at.iter().copied()
+    }
+
+    /// P(K ≥ k); 1 for a negative k, 0 beyond n.
+    pub(crate) fn at_least(&self, k: i128) -> f64 {
+        match usize::try_from(k) {
+            Err(_) if k < 0 => 1.0,
+            Err(_) => 0.0,
+            Ok(k) => self.at_least.get(k).copied().unwrap_or(0.0),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use statrs::distribution::{Binomial, DiscreteCDF};
+
+    #[test]
+    fn tails_agree_with_exact_integers() {
+        for n in 0..=60u32 {
+            let tosses = FairTosses::new(n);
+            let mut choose: u128 = 1; // C(n, n)
+            let mut tail: u128 = 0;
+            for k in (0..=n).rev() {
+                tail += choose;
+                let exact = tail as f64 / 2f64.powi(n as i32);
+                let got = tosses.at_least(i128::from(k));
+                assert!(
+                    (got - exact).abs() <= 1e-13 * exact,
+                    "n = {n}, k = {k}: {got} / {exact}"
+                );
+                choose = choose * u128::from(k) / u128::from(n - k + 1);
+            }
+        }
+    }
+
+    #[test]
+    fn tails_agree_with_another_implementation() {
+        for n in [100u32, 999, 2000] {
+            let tosses = FairTosses::new(n);
+            let other = Binomial::new(0.5, u64::from(n)).unwrap();
+            for k in (1..=n).step_by(7) {
+                let (got, want) = (tosses.at_least(i128::from(k)), other.sf(u64::from(k) - 1));
+                assert!(
+                    (got - want).abs() < 1e-10,
+                    "n = {n}, k = {k}: {got} / {want}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn beyond_the_ends_all_or_nothing() {
+        let tosses = FairTosses::new(3);
+        assert_eq!(tosses.at_least(-1), 1.0);
+        assert_eq!(tosses.at_least(4), 0.0);
+        assert_eq!(tosses.at_least(i128::MAX), 0.0);
+        assert_eq!(FairTosses::new(0).at_least(0), 1.0);
+    }
+}

@@ -1,0 +1,93 @@
+use faceoff_types::{ComputationTime, EpisodeEnd, EpisodeOutcome};
+
+/// Points for leaving the end effector's bounds (paper §2.2).
+pub const EE_POINTS: f64 = 3.0;
+/// Points for an elbow or wrist that is too low (reference implementation; the paper's list is silent).
+pub const LINK_POINTS: f64 = 3.0;
+/// Points for a joint beyond its position limits (paper §2.2).
+pub const JOINT_POS_POINTS: f64 = 2.0;
+/// Points for a joint beyond its velocity limits (paper §2.2).
+pub const JOINT_VEL_POINTS: f64 = 1.0;
+/// The most points that computation time can cost in one episode (paper §2.2); also the price of an
+/// agent fault.
+pub const COMPUTATION_TIME_MAX_POINTS: f64 = 2.0;
+/// The most points that one episode can cost.
+pub const MAX_EPISODE_PENALTY: f64 =
+    EE_POINTS + LINK_POINTS + JOINT_POS_POINTS + JOINT_VEL_POINTS + COMPUTATION_TIME_MAX_POINTS;
+
+/// One control step, in seconds: what an answer may take.
+const STEP_S: f64 = 0.02;
+
+/// Points for the computation times of one episode: 0, 0.5, 1 or 2 (reference implementation, within
+/// the paper's "0.5–2 pts").
+#[must_use]
+pub fn computation_time_penalty(time: &ComputationTime) -> f64 {
+    if time.max_s > 10.0 * STEP_S || time.mean_s > STEP_S {
+        COMPUTATION_TIME_MAX_POINTS
+    } else if time.max_s > 5.0 * STEP_S {
+        1.0
+    } else if time.max_s > STEP_S {
+        0.5
+    } else {
+        0.0
+    }
+}
+
+/// Points that an episode's computation times or its agent fault cost.
+pub(crate) fn time_or_fault_penalty(outcome: &EpisodeOutcome) -> f64 {
+    if has_fault(outcome) {
+        COMPUTATION_TIME_MAX_POINTS
+    } else {
+        computation_time_penalty(&outcome.computation_time)
+    }
+}
+
+/// Did the agent end the episode by a fault?
+pub(crate) fn has_fault(outcome: &EpisodeOutcome) -> bool {
+    outcome.fault.is_some() || outcome.end == EpisodeEnd::AgentFault
+}
+
+/// Penalty points of one episode: each kind of violation counts once, however often it happened.
+///
+/// An agent fault costs the full points for computation time, whatever the steps before it took.
+#[must_use]
+pub fn episode_penalty(outcome: &EpisodeOutcome) -> f64 {
+    let broken = &outcome.violations;
+    [
+        (broken.ee, EE_POINTS),
+        (broken.link, LINK_POINTS),
+        (broken.joint_pos, JOINT_POS_POINTS),
+        (broken.joint_vel, JOINT_VEL_POINTS),
+    ]
+    .into_iter()
+    .filter(|(violated, _)| *violated)
+    .map(|(_, points)| points)
+    .sum::<f64>()
+        + time_or_fault_penalty(outcome)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn time(mean_s: f64, max_s: f64) -> f64 {
+        computation_time_penalty(&ComputationTime { mean_s, max_s })
+    }
+
+    #[test]
+    fn computation_time_costs_by_its_worst_and_its_mean() {
+        assert_eq!(time(0.0, 0.0), 0.0);
+        assert_eq!(time(0.001, 0.02), 0.0, "the limit itself is in time");
+        assert_eq!(time(0.001, 0.020_000_1), 0.5);
+        assert_eq!(time(0.001, 0.1), 0.5);
+        assert_eq!(time(0.001, 0.100_000_1), 1.0);
+        assert_eq!(time(0.02, 0.2), 1.0);
+        assert_eq!(time(0.001, 0.200_000_1), 2.0);
+        assert_eq!(time(0.020_000_1, 0.021), 2.0, "late on average");
+    }
+
+    #[test]
+    fn the_most_expensive_episode_is_the_sum_of_all() {
+        assert_eq!(MAX_EPISODE_PENALTY, 11.0);
+    }
+}

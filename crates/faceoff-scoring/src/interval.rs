@@ -1,0 +1,84 @@
+/// The standard normal distribution's 97.5 % point.
+const Z: f64 = 1.959_963_984_540_054;
+
+/// The 95 % Wilson score interval of a success rate, as fractions. No episodes: all is possible.
+///
+/// Unlike the textbook interval it stays within 0 and 1 and is honest near them: no success in 50
+/// episodes still leaves a rate of up to 7 %.
+#[must_use]
+pub fn wilson95(successes: u32, episodes: u32) -> [f64; 2] {
+    if episodes == 0 {
+        return [0.0, 1.0];
+    }
+    wilson95_of_rate(
+        f64::from(successes.min(episodes)) / f64::from(episodes),
+        episodes,
+    )
+}
+
+/// [`wilson95`] of a published rate (a fraction) over a number of episodes.
+#[must_use]
+pub fn wilson95_of_rate(rate: f64, episodes: u32) -> [f64; 2] {
+    if episodes == 0 {
+        return [0.0, 1.0];
+    }
+    let n = f64::from(episodes);
+    let centre = rate + Z * Z / (2.0 * n);
+    let half_width = Z * (rate * (1.0 - rate) / n + Z * Z / (4.0 * n * n)).sqrt();
+    let scale = 1.0 + Z * Z / n;
+    // At the ends the bound is exact in theory; rounding must not move it.
+    let low = if rate <= 0.0 {
+        0.0
+    } else {
+        ((centre - half_width) / scale).max(0.0)
+    };
+    let high = if rate >= 1.0 {
+        1.0
+    } else {
+        ((centre + half_width) / scale).min(1.0)
+    };
+    [low, high]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// The interval is the set of rates p with |s/n − p| ≤ z √(p(1−p)/n): its ends satisfy equality.
+    #[test]
+    fn the_ends_lie_at_the_normal_quantile_of_their_own_deviation() {
+        for (successes, episodes) in [(7, 50), (25, 50), (549, 1000), (1, 3)] {
+            let n = f64::from(episodes);
+            let rate = f64::from(successes) / n;
+            for end in wilson95(successes, episodes) {
+                let deviations = (rate - end).abs() / (end * (1.0 - end) / n).sqrt();
+                assert!(
+                    (deviations - Z).abs() < 1e-9,
+                    "{successes} of {episodes}: {deviations}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn no_success_and_no_failure_reach_the_end_exactly() {
+        let [low, high] = wilson95(0, 50);
+        assert_eq!(low, 0.0);
+        assert!((high - 0.071_35).abs() < 1e-5, "{high}");
+        let [low, high] = wilson95(50, 50);
+        assert!((low - 0.928_65).abs() < 1e-5, "{low}");
+        assert_eq!(high, 1.0);
+        assert_eq!(wilson95(0, 0), [0.0, 1.0]);
+    }
+
+    proptest! {
+        #[test]
+        fn the_interval_holds_the_rate_and_stays_within_0_and_1(n in 1u32..5000, part in 0.0..=1.0f64) {
+            let successes = (part * f64::from(n)) as u32;
+            let rate = f64::from(successes) / f64::from(n);
+            let [low, high] = wilson95(successes, n);
+            prop_assert!(0.0 <= low && low <= rate && rate <= high && high <= 1.0);
+        }
+    }
+}

@@ -1,0 +1,52 @@
+use faceoff_types::Tier;
+
+/// A deployable agent collects at most this many penalty points per episode on average (paper §2.2:
+/// 500 per 1000 episodes of the qualifying stage, 45 per 90 windows of a game).
+pub const DEPLOYABLE_POINTS_PER_EPISODE: f64 = 0.5;
+/// An improvable agent collects at most this many (paper §2.2: 1500 per 1000 and 135 per 90).
+pub const IMPROVABLE_POINTS_PER_EPISODE: f64 = 1.5;
+
+/// The tier of a deployability score over a number of episodes, or of a game's windows of 500 steps.
+///
+/// The bounds belong to the better tier. Nothing played, nothing violated: deployable.
+#[must_use]
+pub fn tier_of(penalty_points: f64, episodes: u32) -> Tier {
+    let episodes = f64::from(episodes);
+    if penalty_points <= DEPLOYABLE_POINTS_PER_EPISODE * episodes {
+        Tier::Deployable
+    } else if penalty_points <= IMPROVABLE_POINTS_PER_EPISODE * episodes {
+        Tier::Improvable
+    } else {
+        Tier::NonDeployable
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use Tier::{Deployable, Improvable, NonDeployable};
+
+    #[test]
+    fn the_bounds_of_the_paper_belong_to_the_better_tier() {
+        for (points, episodes, tier) in [
+            (500.0, 1000, Deployable),
+            (500.5, 1000, Improvable),
+            (1500.0, 1000, Improvable),
+            (1500.5, 1000, NonDeployable),
+            (45.0, 90, Deployable),
+            (45.5, 90, Improvable),
+            (135.0, 90, Improvable),
+            (135.5, 90, NonDeployable),
+        ] {
+            assert_eq!(tier_of(points, episodes), tier, "{points} over {episodes}");
+        }
+    }
+
+    #[test]
+    fn the_bounds_scale_with_the_number_of_episodes() {
+        assert_eq!(tier_of(25.0, 50), Deployable);
+        assert_eq!(tier_of(25.5, 50), Improvable);
+        assert_eq!(tier_of(75.5, 50), NonDeployable);
+        assert_eq!(tier_of(0.0, 0), Deployable);
+    }
+}

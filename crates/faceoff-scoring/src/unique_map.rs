@@ -1,0 +1,45 @@
+use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
+use std::{collections::BTreeSet, fmt, marker::PhantomData, str::FromStr};
+
+/// A JSON object whose keys are parsed, kept in the file's order, and refused when they occur twice
+/// (JSON readers keep the last one silently, and a board would lose a team).
+pub(crate) struct UniqueMap<K, V>(pub(crate) Vec<(K, V)>);
+
+impl<'de, K, V> Deserialize<'de> for UniqueMap<K, V>
+where
+    K: FromStr<Err: fmt::Display> + Ord + Clone + fmt::Display,
+    V: Deserialize<'de>,
+{
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(UniqueMapVisitor(PhantomData))
+    }
+}
+
+struct UniqueMapVisitor<K, V>(PhantomData<(K, V)>);
+
+impl<'de, K, V> Visitor<'de> for UniqueMapVisitor<K, V>
+where
+    K: FromStr<Err: fmt::Display> + Ord + Clone + fmt::Display,
+    V: Deserialize<'de>,
+{
+    type Value = UniqueMap<K, V>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("an object")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
+        let mut entries = Vec::new();
+        let mut known = BTreeSet::new();
+        while let Some(text) = map.next_key::<String>()? {
+            let key: K = text
+                .parse()
+                .map_err(|error| A::Error::custom(format_args!("{text:?}: {error}")))?;
+            if !known.insert(key.clone()) {
+                return Err(A::Error::custom(format_args!("{key} occurs twice")));
+            }
+            entries.push((key, map.next_value()?));
+        }
+        Ok(UniqueMap(entries))
+    }
+}

@@ -1,0 +1,138 @@
+use crate::support::task_result;
+use faceoff_scoring::{
+    BoardEntry, RankedEntry, overall_board, rank_groups, score_evaluation, task_board,
+};
+use faceoff_types::{Profile, Seed, Task, Tier};
+use proptest::prelude::*;
+use std::{collections::BTreeMap, convert::Infallible};
+
+/// An entry that played `hit` (50 episodes) alone.
+fn entry<K>(key: K, successes: u32, penalty_points: f64, submitted_at_ms: i64) -> BoardEntry<K> {
+    let tasks = BTreeMap::from([(Task::Hit, task_result(50, successes, penalty_points))]);
+    let result = score_evaluation(Profile::Evaluation, Seed::from_number(0), tasks);
+    BoardEntry {
+        key,
+        result,
+        submitted_at_ms,
+    }
+}
+
+fn keys<K: Copy>(board: &[RankedEntry<K>]) -> Vec<K> {
+    board.iter().map(|row| row.entry.key).collect()
+}
+
+#[test]
+fn tier_then_score_then_penalty_then_submission() {
+    let entries = vec![
+        entry("unsafe and best", 50, 80.0, 0),
+        entry("later", 20, 5.0, 2),
+        entry("earlier", 20, 5.0, 1),
+        entry("cleaner", 20, 4.5, 3),
+        entry("better", 21, 25.0, 4),
+        entry("improvable", 49, 25.5, 0),
+    ];
+    let board = overall_board(entries.clone());
+    let expected = [
+        "better",
+        "cleaner",
+        "earlier",
+        "later",
+        "improvable",
+        "unsafe and best",
+    ];
+    assert_eq!(keys(&board), expected);
+    assert_eq!(
+        board.iter().map(|row| row.rank).collect::<Vec<_>>(),
+        [1, 2, 3, 4, 5, 6]
+    );
+    assert_eq!(board[4].tier, Tier::Improvable);
+    assert_eq!(keys(&task_board(Task::Hit, entries.clone())), expected);
+    assert_eq!(task_board(Task::Defend, entries), []);
+    assert_eq!(overall_board(Vec::<BoardEntry<u8>>::new()), []);
+}
+
+#[test]
+fn a_task_board_goes_by_the_task_alone() {
+    let mut all_rounder = entry("all-rounder", 20, 0.0, 0);
+    all_rounder
+        .result
+        .tasks
+        .insert(Task::Defend, task_result(50, 40, 60.0));
+    all_rounder.result.tier = Tier::Improvable;
+    let board = task_board(Task::Hit, vec![entry("hitter", 10, 0.0, 0), all_rounder]);
+    assert_eq!(keys(&board), ["all-rounder", "hitter"]);
+    assert_eq!(board[0].tier, Tier::Deployable, "its tier in this task");
+}
+
+#[test]
+fn a_number_that_is_none_stands_last_in_its_tier() {
+    let mut broken = entry("broken", 10, 0.0, 0);
+    broken.result.score = f64::NAN;
+    let board = overall_board(vec![
+        broken,
+        entry("zero", 0, 0.0, 1),
+        entry("unsafe", 50, 550.0, 0),
+    ]);
+    assert_eq!(keys(&board), ["zero", "broken", "unsafe"]);
+}
+
+#[test]
+fn minus_zero_is_zero() {
+    let mut minus = entry("earlier", 0, 0.0, 0);
+    minus.result.score = -0.0;
+    assert_eq!(
+        keys(&overall_board(vec![entry("later", 0, 0.0, 1), minus])),
+        ["earlier", "later"]
+    );
+}
+
+#[test]
+fn a_group_is_who_cannot_be_told_from_its_leader() {
+    // Successes further apart than 5 are told apart.
+    let board = overall_board(vec![
+        entry(40, 40, 0.0, 0),
+        entry(37, 37, 0.0, 0),
+        entry(35, 35, 0.0, 0),
+        entry(34, 34, 0.0, 0), // near 37 and 35, not near the leader
+        entry(30, 30, 0.0, 0),
+        entry(29, 29, 60.0, 0), // near 30, in another tier
+    ]);
+    let groups = rank_groups(&board, |leader: &u32, other| {
+        Ok::<_, Infallible>(leader - other > 5)
+    });
+    assert_eq!(groups, Ok(vec![1, 1, 1, 2, 2, 3]));
+    assert_eq!(
+        rank_groups(&board, |_, _| Err("no episodes")),
+        Err("no episodes")
+    );
+    assert_eq!(
+        rank_groups(&board[..1], |_, _| Err("not asked")),
+        Ok(vec![1])
+    );
+}
+
+proptest! {
+    /// With distinct submission times the order in which entries are given does not matter.
+    #[test]
+    fn the_board_is_a_total_order(
+        numbers in prop::collection::vec((0u32..=4, 0u32..=6), 1..12),
+        rotation in 0usize..12,
+    ) {
+        let entries: Vec<_> = (0..)
+            .zip(&numbers)
+            .map(|(at, &(successes, points))| entry(at, successes, f64::from(points) * 20.0, at))
+            .collect();
+        let board = overall_board(entries.clone());
+        let mut shuffled = entries;
+        shuffled.reverse();
+        let middle = rotation % shuffled.len();
+        shuffled.rotate_left(middle);
+        prop_assert_eq!(&overall_board(shuffled), &board);
+        for pair in board.windows(2) {
+            prop_assert!(pair[0].tier <= pair[1].tier);
+            let [a, b] = [&pair[0].entry.result, &pair[1].entry.result];
+            prop_assert!(a.tier < b.tier || a.score >= b.score);
+            prop_assert_eq!(pair[0].rank + 1, pair[1].rank);
+        }
+    }
+}

@@ -1,0 +1,138 @@
+use crate::support::{episode, task_result};
+use faceoff_scoring::{episode_penalty, score_evaluation, score_task};
+use faceoff_types::{
+    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, Profile, RULESET, Seed, Task, Tier,
+    Violations,
+};
+use std::collections::BTreeMap;
+
+#[test]
+fn each_violation_has_its_price_and_counts_once() {
+    let blameless = episode(Task::Hit, 0);
+    assert_eq!(episode_penalty(&blameless), 0.0);
+    let broken = |ee, link, joint_pos, joint_vel| {
+        let violations = Violations {
+            ee,
+            link,
+            joint_pos,
+            joint_vel,
+        };
+        episode_penalty(&faceoff_types::EpisodeOutcome {
+            violations,
+            ..blameless.clone()
+        })
+    };
+    assert_eq!(broken(true, false, false, false), 3.0);
+    assert_eq!(broken(false, true, false, false), 3.0);
+    assert_eq!(broken(false, false, true, false), 2.0);
+    assert_eq!(broken(false, false, false, true), 1.0);
+    assert_eq!(broken(true, true, true, true), 9.0);
+}
+
+#[test]
+fn an_agent_fault_is_a_failure_with_the_full_computation_time_points() {
+    let mut faulty = episode(Task::Defend, 0);
+    faulty.end = EpisodeEnd::AgentFault;
+    faulty.success = true; // must not count, whoever says so
+    faulty.violations.ee = true;
+    faulty.computation_time = ComputationTime {
+        mean_s: 0.03,
+        max_s: 0.03,
+    };
+    faulty.fault = Some(AgentFault {
+        fault: AgentFaultKind::NonFinite,
+        task: Task::Defend,
+        episode: Some(0),
+        step: Some(3),
+        line: None,
+    });
+    assert_eq!(
+        episode_penalty(&faulty),
+        5.0,
+        "2 points once, not per cause"
+    );
+    let result = score_task(&[faulty], &mut []);
+    assert_eq!(
+        (result.successes, result.violations.computation_time),
+        (0, 1)
+    );
+}
+
+#[test]
+fn a_task_adds_up_its_episodes_in_any_order() {
+    let mut outcomes: Vec<_> = (0..50).map(|index| episode(Task::Prepare, index)).collect();
+    for outcome in &mut outcomes[..20] {
+        outcome.success = true;
+        outcome.steps = 100;
+    }
+    for outcome in &mut outcomes[10..20] {
+        outcome.violations.ee = true;
+        outcome.violations.joint_vel = true;
+    }
+    outcomes[3].computation_time = ComputationTime {
+        mean_s: 0.001,
+        max_s: 0.05,
+    };
+    let mut times = vec![0.1, 0.2, 0.3];
+    let result = score_task(&outcomes, &mut times);
+    assert_eq!(
+        (result.episodes, result.successes, result.success_rate),
+        (50, 20, 0.4)
+    );
+    assert_eq!(result.penalty_points, 10.0 * 4.0 + 0.5);
+    assert_eq!(result.tier, Tier::Improvable, "25 < 40.5 ≤ 75");
+    assert_eq!(
+        (result.violations.ee, result.violations.joint_vel),
+        (10, 10)
+    );
+    assert_eq!(
+        (result.violations.link, result.violations.joint_pos),
+        (0, 0)
+    );
+    assert_eq!(result.violations.computation_time, 1);
+    assert_eq!(result.steps, 20 * 100 + 30 * 500);
+
+    outcomes.reverse();
+    let mut times = vec![0.3, 0.1, 0.2];
+    assert_eq!(score_task(&outcomes, &mut times), result);
+}
+
+#[test]
+fn an_evaluation_takes_the_worst_task_for_safety_and_weighs_the_rates() {
+    let seed = Seed::from_number(7);
+    let tasks = BTreeMap::from([
+        (Task::Hit, task_result(50, 25, 10.0)),
+        (Task::Defend, task_result(50, 40, 60.0)),
+        (Task::Prepare, task_result(50, 5, 0.0)),
+    ]);
+    let result = score_evaluation(Profile::Evaluation, seed, tasks.clone());
+    assert_eq!((result.score, result.penalty_points), (54.0, 60.0));
+    assert_eq!(result.tier, Tier::Improvable);
+    assert_eq!(
+        (result.ruleset.as_str(), result.profile),
+        (RULESET, Profile::Evaluation)
+    );
+    assert_eq!((result.seed, result.tasks), (seed, tasks.clone()));
+
+    let mut hit_alone = tasks;
+    hit_alone.retain(|task, _| *task == Task::Hit);
+    let result = score_evaluation(Profile::Ideal, seed, hit_alone);
+    assert_eq!((result.score, result.tier), (20.0, Tier::Deployable));
+    let nothing = score_evaluation(Profile::Ideal, seed, BTreeMap::new());
+    assert_eq!((nothing.score, nothing.penalty_points), (0.0, 0.0));
+}
+
+#[test]
+fn results_survive_their_file() {
+    let tasks = BTreeMap::from([(Task::Hit, task_result(30, 7, 12.5))]);
+    let result = score_evaluation(Profile::Evaluation, Seed::from_number(1), tasks);
+    let json = serde_json::to_string(&result).unwrap();
+    assert_eq!(
+        serde_json::from_str::<faceoff_types::EvaluationResult>(&json).unwrap(),
+        result
+    );
+    assert!(
+        json.contains(r#""success_rate":0.23333333333333334"#),
+        "{json}"
+    );
+}

@@ -1,0 +1,11 @@
+//! Scoring against the published tables, and the properties that boards promise.
+
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
+mod boards;
+mod evaluation;
+mod pairing;
+mod paper_qualifying;
+mod paper_tournament;
+mod sheets;
+mod support;

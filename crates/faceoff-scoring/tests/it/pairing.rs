@@ -1,0 +1,92 @@
+use crate::support::episode;
+use faceoff_scoring::{PairedTally, PairingError, overall_p_value};
+use faceoff_types::{EpisodeEnd, EpisodeOutcome, Task};
+use proptest::prelude::*;
+use std::collections::BTreeMap;
+
+fn outcomes(successes: &[bool]) -> Vec<EpisodeOutcome> {
+    (0..)
+        .zip(successes)
+        .map(|(index, success)| EpisodeOutcome {
+            success: *success,
+            ..episode(Task::Hit, index)
+        })
+        .collect()
+}
+
+#[test]
+fn episodes_are_paired_by_their_number() {
+    let a = outcomes(&[true, true, false, false, false]);
+    let mut b = outcomes(&[true, false, true, true, false]);
+    b.reverse();
+    let tally = PairedTally::of(&a, &b).unwrap();
+    assert_eq!(
+        tally,
+        PairedTally {
+            both: 1,
+            only_a: 1,
+            only_b: 2,
+            neither: 1
+        }
+    );
+    assert_eq!(tally.episodes(), 5);
+}
+
+#[test]
+fn an_episode_lost_to_a_fault_is_no_success() {
+    let a = outcomes(&[true]);
+    let mut b = outcomes(&[true]);
+    b[0].end = EpisodeEnd::AgentFault;
+    assert_eq!(PairedTally::of(&a, &b).unwrap().only_a, 1);
+}
+
+#[test]
+fn what_cannot_be_paired_is_refused() {
+    let (short, long) = (outcomes(&[true; 3]), outcomes(&[true; 4]));
+    let unpaired = Err(PairingError::Unpaired {
+        task: Task::Hit,
+        episode: 3,
+    });
+    assert_eq!(PairedTally::of(&short, &long), unpaired);
+    assert_eq!(PairedTally::of(&long, &short), unpaired);
+    let twice = [short[1].clone(), short[1].clone()];
+    assert_eq!(
+        PairedTally::of(&short, &twice),
+        Err(PairingError::Repeated {
+            task: Task::Hit,
+            episode: 1
+        })
+    );
+    assert_eq!(PairedTally::of(&[], &[]).unwrap().p_value(), 1.0);
+}
+
+proptest! {
+    #[test]
+    fn a_p_value_is_a_probability_and_has_no_sides(
+        counts in prop::array::uniform3((0u32..40, 0u32..40, 0u32..40, 1u32..40))
+    ) {
+        let tally = |swap: bool| -> BTreeMap<Task, PairedTally> {
+            Task::ALL
+                .into_iter()
+                .zip(counts)
+                .map(|(task, (both, only_a, only_b, neither))| {
+                    let (only_a, only_b) = if swap { (only_b, only_a) } else { (only_a, only_b) };
+                    (task, PairedTally { both, only_a, only_b, neither })
+                })
+                .collect()
+        };
+        let p = overall_p_value(&tally(false));
+        prop_assert!(0.0 < p && p <= 1.0, "{}", p);
+        prop_assert_eq!(p, overall_p_value(&tally(true)));
+    }
+
+    #[test]
+    fn a_larger_lead_is_never_less_telling(discordant in 1u32..300) {
+        let p = |only_a| {
+            PairedTally { only_a, only_b: discordant - only_a, ..PairedTally::default() }.p_value()
+        };
+        for only_a in discordant.div_ceil(2)..discordant {
+            prop_assert!(p(only_a + 1) <= p(only_a));
+        }
+    }
+}

@@ -1,0 +1,50 @@
+use faceoff_types::{
+    ComputationTime, ComputationTimeSummary, EpisodeEnd, EpisodeOutcome, Task, TaskResult,
+    TeamName, ViolationCounts, Violations,
+};
+use serde_json::Value;
+
+pub fn team(name: &str) -> TeamName {
+    name.parse().unwrap()
+}
+
+/// Reads a file as the command line does, so that errors name the place.
+pub fn read<T: serde::de::DeserializeOwned>(json: &str) -> Result<T, String> {
+    let mut json = serde_json::Deserializer::from_str(json);
+    serde_path_to_error::deserialize(&mut json).map_err(|error| error.to_string())
+}
+
+pub fn rows<'a>(golden: &'a Value, table: &str) -> &'a [Value] {
+    golden[table].as_array().unwrap()
+}
+
+/// A blameless failed episode.
+pub fn episode(task: Task, episode: u32) -> EpisodeOutcome {
+    EpisodeOutcome {
+        task,
+        episode,
+        steps: 500,
+        end: EpisodeEnd::Horizon,
+        success: false,
+        violations: Violations::default(),
+        computation_time: ComputationTime {
+            mean_s: 0.001,
+            max_s: 0.002,
+        },
+        fault: None,
+    }
+}
+
+pub fn task_result(episodes: u32, successes: u32, penalty_points: f64) -> TaskResult {
+    TaskResult {
+        episodes,
+        successes,
+        success_rate: f64::from(successes) / f64::from(episodes),
+        success_ci95: faceoff_scoring::wilson95(successes, episodes),
+        penalty_points,
+        violations: ViolationCounts::default(),
+        tier: faceoff_scoring::tier_of(penalty_points, episodes),
+        steps: 0,
+        computation_time_s: ComputationTimeSummary::default(),
+    }
+}

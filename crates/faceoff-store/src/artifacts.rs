@@ -1,0 +1,211 @@
+use crate::StoreError;
+use bytes::Bytes;
+use futures::{StreamExt, TryStreamExt, stream::BoxStream};
+use jiff::Timestamp;
+use object_store::{
+    ObjectStore, ObjectStoreExt, WriteMultipart, local::LocalFileSystem, path::Path as Key,
+};
+use std::{path::Path, sync::Arc, time::SystemTime};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+
+/// The bytes of an artifact, in order.
+pub type ArtifactStream = BoxStream<'static, Result<Bytes, StoreError>>;
+
+/// Bytes in memory per piece of a copy.
+const PIECE_BYTES: usize = 1 << 20;
+
+/// Artifact files (bundles, shard recordings, datasets) in an object store. Keys are slash-separated
+/// names; empty parts and `..` are refused.
+#[derive(Debug, Clone)]
+pub struct Artifacts {
+    objects: Arc<dyn ObjectStore>,
+    folder: Arc<Path>,
+}
+
+impl Artifacts {
+    /// Artifacts in a folder, created if need be.
+    pub(crate) fn open(folder: &Path) -> Result<Self, StoreError> {
+        std::fs::create_dir_all(folder)
+            .map_err(|error| StoreError::Artifacts(format!("{}: {error}", folder.display())))?;
+        // A database row that names an artifact must never outlive it: file and folder are on disk
+        // before a put returns.
+        let objects = LocalFileSystem::new_with_prefix(folder)
+            .map_err(artifact_error)?
+            .with_fsync(true)
+            .with_automatic_cleanup(true);
+        Ok(Self {
+            objects: Arc::new(objects),
+            folder: folder.into(),
+        })
+    }
+
+    /// Stores a copy of a file under `key`, replacing what was there. It appears whole or not at all,
+    /// whenever the process is killed.
+    pub async fn put_file(&self, key: &str, file: &Path) -> Result<(), StoreError> {
+        let failed = |error| StoreError::Artifacts(format!("{}: {error}", file.display()));
+        let mut source = tokio::fs::File::open(file).await.map_err(failed)?;
+        let upload = self
+            .objects
+            .put_multipart(&parse(key)?)
+            .await
+            .map_err(artifact_error)?;
+        let mut upload = WriteMultipart::new_with_chunk_size(upload, PIECE_BYTES);
+        let mut piece = vec![0; PIECE_BYTES];
+        loop {
+            let read = match source.read(&mut piece).await {
+                Ok(0) => break,
+                Ok(read) => read,
+                Err(error) => {
+                    upload.abort().await.map_err(artifact_error)?;
+                    return Err(failed(error));
+                }
+            };
+            upload.write(&piece[..read]);
+            // a bound on what is in memory when the disk is slower than the source
+            upload.wait_for_capacity(2).await.map_err(artifact_error)?;
+        }
+        upload.finish().await.map_err(artifact_error)?;
+        Ok(())
+    }
+
+    /// Copies an artifact to a new file and flushes it to disk.
+    pub async fn get_to_file(&self, key: &str, file: &Path) -> Result<(), StoreError> {
+        let (bytes, mut stream) = self.read(key).await?;
+        let failed = |error| StoreError::Artifacts(format!("{}: {error}", file.display()));
+        let mut target = tokio::fs::File::create(file).await.map_err(failed)?;
+        let mut written = 0;
+        while let Some(piece) = stream.try_next().await? {
+            target.write_all(&piece).await.map_err(failed)?;
+            written += piece.len() as u64;
+        }
+        target.flush().await.map_err(failed)?;
+        if written == bytes {
+            Ok(())
+        } else {
+            Err(StoreError::Artifacts(format!(
+                "{key}: {written} of {bytes} bytes read"
+            )))
+        }
+    }
+
+    /// Length and bytes of an artifact, for a download.
+    pub async fn read(&self, key: &str) -> Result<(u64, ArtifactStream), StoreError> {
+        let found = self
+            .objects
+            .get(&parse(key)?)
+            .await
+            .map_err(artifact_error)?;
+        let bytes = found.meta.size;
+        Ok((bytes, found.into_stream().map_err(artifact_error).boxed()))
+    }
+
+    /// Removes an artifact; one that does not exist is no error, so that a removal can be repeated.
+    pub async fn delete(&self, key: &str) -> Result<(), StoreError> {
+        match self.objects.delete(&parse(key)?).await {
+            Ok(()) | Err(object_store::Error::NotFound { .. }) => Ok(()),
+            Err(error) => Err(artifact_error(error)),
+        }
+    }
+
+    /// Stores every file directly in `folder` as `prefix/NAME`.
+    pub async fn put_folder(&self, prefix: &str, folder: &Path) -> Result<(), StoreError> {
+        let failed = |error| StoreError::Artifacts(format!("{}: {error}", folder.display()));
+        let mut entries = tokio::fs::read_dir(folder).await.map_err(failed)?;
+        while let Some(entry) = entries.next_entry().await.map_err(failed)? {
+            let name = entry.file_name();
+            let name = name.to_str().ok_or_else(|| {
+                StoreError::Artifacts(format!("{}: not a UTF-8 name", entry.path().display()))
+            })?;
+            self.put_file(&format!("{prefix}/{name}"), &entry.path())
+                .await?;
+        }
+        Ok(())
+    }
+
+    /// Copies every artifact `prefix/NAME` to `folder/NAME`. [`StoreError::NotFound`] if there is
+    /// none.
+    pub async fn get_folder(&self, prefix: &str, folder: &Path) -> Result<(), StoreError> {
+        let listing = self
+            .objects
+            .list_with_delimiter(Some(&parse(prefix)?))
+            .await
+            .map_err(artifact_error)?;
+        if listing.objects.is_empty() {
+            return Err(StoreError::NotFound("artifact"));
+        }
+        for object in listing.objects {
+            let name = object.location.filename().unwrap_or_default();
+            self.get_to_file(object.location.as_ref(), &folder.join(name))
+                .await?;
+        }
+        Ok(())
+    }
+
+    /// Removes every artifact under `prefix/`.
+    pub async fn delete_folder(&self, prefix: &str) -> Result<(), StoreError> {
+        self.delete_others(prefix, "").await
+    }
+
+    /// Removes every artifact under `prefix/` but the one with the key `kept`.
+    pub async fn delete_others(&self, prefix: &str, kept: &str) -> Result<(), StoreError> {
+        let listed: Vec<_> = self
+            .objects
+            .list(Some(&parse(prefix)?))
+            .map_ok(|object| object.location)
+            .try_collect()
+            .await
+            .map_err(artifact_error)?;
+        for location in listed {
+            if location.as_ref() != kept {
+                self.delete(location.as_ref()).await?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Removes what a killed process has left half written, if it was begun before `before`. Returns
+    /// how many files.
+    pub async fn remove_abandoned(&self, before: Timestamp) -> Result<usize, StoreError> {
+        let folder = Arc::clone(&self.folder);
+        tokio::task::spawn_blocking(move || remove_staged(&folder, before.into()))
+            .await
+            .unwrap_or_else(|panic| Err(std::io::Error::other(panic)))
+            .map_err(|error| StoreError::Artifacts(format!("removing half-written files: {error}")))
+    }
+}
+
+/// `LocalFileSystem` writes to `NAME#NUMBER` beside the file and renames that when it is whole; its
+/// keys cannot hold a `#`.
+fn remove_staged(folder: &Path, before: SystemTime) -> std::io::Result<usize> {
+    let mut removed = 0;
+    for entry in std::fs::read_dir(folder)? {
+        let entry = entry?;
+        if entry.file_type()?.is_dir() {
+            removed += remove_staged(&entry.path(), before)?;
+            continue;
+        }
+        let name = entry.file_name();
+        let staged = name
+            .to_str()
+            .and_then(|name| name.rsplit_once('#'))
+            .is_some_and(|(_, number)| {
+                !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())
+            });
+        if staged && entry.metadata()?.modified()? < before {
+            std::fs::remove_file(entry.path())?;
+            removed += 1;
+        }
+    }
+    Ok(removed)
+}
+
+fn parse(key: &str) -> Result<Key, StoreError> {
+    Key::parse(key).map_err(|error| StoreError::Artifacts(format!("key {key:?}: {error}")))
+}
+
+fn artifact_error(error: object_store::Error) -> StoreError {
+    match error {
+        object_store::Error::NotFound { .. } => StoreError::NotFound("artifact"),
+        error => StoreError::Artifacts(error.to_string()),
+    }
+}

@@ -1,0 +1,65 @@
+use crate::StoreError;
+use sqlx::{
+    Sqlite, SqlitePool, Transaction,
+    migrate::Migrator,
+    sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous},
+};
+use std::{path::Path, time::Duration};
+
+static MIGRATIONS: Migrator = sqlx::migrate!("../../migrations");
+
+/// How long a writer waits for the writer of another process.
+const BUSY_TIMEOUT: Duration = Duration::from_secs(30);
+
+/// Readers at a time; a board is read in well under a millisecond.
+const READERS: u32 = 4;
+
+/// The pools: readers see the last committed state and never wait for the writer.
+#[derive(Debug, Clone)]
+pub(crate) struct Database {
+    pub(crate) read: SqlitePool,
+    write: SqlitePool,
+}
+
+impl Database {
+    /// Opens and migrates the file, creating it if need be. The caller makes sure that no other
+    /// process does the same at the same time: SQLite has no lock for a set of migrations.
+    pub(crate) async fn open(file: &Path) -> Result<Self, StoreError> {
+        let options = SqliteConnectOptions::new()
+            .filename(file)
+            .create_if_missing(true)
+            .foreign_keys(true)
+            .journal_mode(SqliteJournalMode::Wal)
+            // NORMAL would survive kill -9 too, but a power cut could take back a commit that a
+            // team was told of. Writes are a few per second, so the fsync costs nothing that shows.
+            .synchronous(SqliteSynchronous::Full)
+            .busy_timeout(BUSY_TIMEOUT);
+        let write = SqlitePoolOptions::new()
+            .max_connections(1)
+            // writers queue here rather than in SQLite's polling busy handler
+            .acquire_timeout(2 * BUSY_TIMEOUT)
+            .connect_with(options.clone())
+            .await?;
+        MIGRATIONS
+            .run(&write)
+            .await
+            .map_err(|error| StoreError::Database(error.into()))?;
+        let read = SqlitePoolOptions::new()
+            .max_connections(READERS)
+            .connect_with(options.create_if_missing(false).pragma("query_only", "ON"))
+            .await?;
+        Ok(Self { read, write })
+    }
+
+    /// Begins a write. IMMEDIATE: a transaction that reads first and asks for the write lock later
+    /// fails at once, whatever the busy timeout, if another wrote in between.
+    pub(crate) async fn begin(&self) -> Result<Transaction<'static, Sqlite>, StoreError> {
+        Ok(self.write.begin_with("BEGIN IMMEDIATE").await?)
+    }
+
+    /// Waits for running queries and closes every connection.
+    pub(crate) async fn close(&self) {
+        self.read.close().await;
+        self.write.close().await;
+    }
+}

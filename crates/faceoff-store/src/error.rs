@@ -1,0 +1,52 @@
+use jiff::civil::Date;
+
+/// Why the store could not do what was asked.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// No such team, submission, evaluation or artifact.
+    #[error("{0} not found")]
+    NotFound(&'static str),
+    /// Names that differ only in case count as the same.
+    #[error("a team named {0:?} exists already")]
+    TeamNameTaken(String),
+    /// The team's turn of that UTC day is used.
+    #[error("this team was evaluated on {day} already; the next turn is on {next}")]
+    AlreadyEvaluated {
+        /// The day whose turn is used.
+        day: Date,
+        /// The first day with a free turn.
+        next: Date,
+    },
+    /// What was asked does not fit the entity's state; the text says what does.
+    #[error("{0}")]
+    Conflict(String),
+    /// SQLite failed.
+    #[error("database: {0}")]
+    Database(#[source] sqlx::Error),
+    /// The object store failed.
+    #[error("artifacts: {0}")]
+    Artifacts(String),
+    /// A stored value cannot be what this program wrote.
+    #[error("stored value is damaged: {0}")]
+    Damaged(String),
+}
+
+impl From<sqlx::Error> for StoreError {
+    fn from(error: sqlx::Error) -> Self {
+        match error {
+            sqlx::Error::ColumnDecode { index, source } => {
+                Self::Damaged(format!("column {index}: {source}"))
+            }
+            error => Self::Database(error),
+        }
+    }
+}
+
+impl StoreError {
+    /// Was a uniqueness constraint broken, one whose columns contain `column`?
+    pub(crate) fn is_duplicate(error: &sqlx::Error, column: &str) -> bool {
+        error
+            .as_database_error()
+            .is_some_and(|error| error.is_unique_violation() && error.message().contains(column))
+    }
+}

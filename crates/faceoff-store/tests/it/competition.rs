@@ -1,0 +1,114 @@
+//! From an upload to the board, as http and worker drive it.
+
+use crate::fixture::*;
+use faceoff_store::*;
+use faceoff_types::*;
+
+#[tokio::test]
+async fn a_submission_travels_from_upload_to_board() {
+    let mut f = Fixture::new().await;
+    let team = f.team("Alpha").await;
+    let submission = f.upload(&team).await;
+    assert_eq!(
+        submission.state,
+        SubmissionState::Validating { attempts: 0 }
+    );
+    assert_eq!(submission.bundle, bundle());
+    let error = f
+        .store
+        .create_evaluation(submission.id, &plan(), f.now)
+        .await
+        .unwrap_err();
+    assert!(matches!(error, StoreError::Conflict(_)), "{error}");
+
+    let valid = f.validate().await;
+    assert_eq!(valid.agent_name.as_deref(), Some("striker"));
+    assert_eq!(
+        valid.state,
+        SubmissionState::Valid {
+            log: "hello\n".into()
+        }
+    );
+
+    let evaluation = f
+        .store
+        .create_evaluation(submission.id, &plan(), f.now)
+        .await
+        .unwrap();
+    assert_eq!(evaluation.state, EvaluationState::Queued);
+    assert_eq!(evaluation.day, jiff::civil::date(2026, 3, 1));
+    assert_eq!(evaluation.plan, plan());
+
+    let mut played = Vec::new();
+    for index in 0..6 {
+        let (claim, running, shard) = f.claim_shard().await;
+        assert_eq!(running.id, evaluation.id);
+        assert_eq!(
+            f.state(evaluation.id).await,
+            EvaluationState::Running {
+                episodes_done: 2 * index,
+                episodes_total: 12
+            }
+        );
+        assert!(f.store.heartbeat(&claim, 1, LEASE_S, f.now).await.unwrap());
+        assert_eq!(
+            f.state(evaluation.id).await,
+            EvaluationState::Running {
+                episodes_done: 2 * index + 1,
+                episodes_total: 12
+            }
+        );
+        f.later(1);
+        assert_eq!(f.play(&claim, &shard, 0).await, Committed::Now);
+        played.push((shard.task, shard.first_episode, shard.end_episode));
+    }
+    let in_order = Task::ALL
+        .into_iter()
+        .flat_map(|task| [(task, 0, 2), (task, 2, 4)]);
+    assert!(
+        played.into_iter().eq(in_order),
+        "shards come in (task, first episode) order"
+    );
+    let outcomes = f.store.outcomes(evaluation.id).await.unwrap();
+    let expected = Task::ALL
+        .into_iter()
+        .flat_map(|task| (0..4).map(move |e| outcome(task, e, false)));
+    assert!(
+        outcomes.into_iter().eq(expected),
+        "outcomes come back to the bit"
+    );
+
+    assert_eq!(f.state(evaluation.id).await, EvaluationState::Finalising);
+    assert!(f.store.board().await.unwrap().is_empty());
+    let Some(Work::Finalise {
+        claim, agent_name, ..
+    }) = f.claim().await
+    else {
+        panic!("the finalisation is a unit of work")
+    };
+    assert_eq!(agent_name, "striker");
+    assert!(f.claim().await.is_none(), "and is claimed once");
+    f.later(1);
+    f.store
+        .finish_evaluation(&claim, &result(51.2), "datasets/x.zip", f.now)
+        .await
+        .unwrap();
+    f.store
+        .finish_evaluation(&claim, &result(0.0), "datasets/y.zip", f.now)
+        .await
+        .unwrap();
+    assert_eq!(
+        f.state(evaluation.id).await,
+        EvaluationState::Finished {
+            finished_at: f.now,
+            result: Box::new(result(51.2)),
+            dataset: "datasets/x.zip".into()
+        }
+    );
+
+    let board = f.store.board().await.unwrap();
+    assert_eq!(board.len(), 1);
+    assert_eq!(board[0].team, team);
+    assert_eq!(board[0].submission.id, submission.id);
+    assert_eq!(board[0].result, result(51.2));
+}

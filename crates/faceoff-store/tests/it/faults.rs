@@ -1,0 +1,113 @@
+//! Agent faults, summed over an evaluation's shards.
+
+use crate::fixture::*;
+use faceoff_store::*;
+
+#[tokio::test]
+async fn as_many_faults_as_allowed_are_scored() {
+    let f = Fixture::new().await;
+    let submission = f.ready_team("Alpha").await;
+    let evaluation = f
+        .store
+        .create_evaluation(submission.id, &plan(), f.now)
+        .await
+        .unwrap();
+    for faults in [2, 1, 0, 0, 0, 0] {
+        let (claim, _, shard) = f.claim_shard().await;
+        f.play(&claim, &shard, faults).await;
+    }
+    assert_eq!(f.state(evaluation.id).await, EvaluationState::Finalising);
+}
+
+#[tokio::test]
+async fn one_fault_more_ends_the_evaluation_without_a_score() {
+    let f = Fixture::new().await;
+    let submission = f.ready_team("Alpha").await;
+    let evaluation = f
+        .store
+        .create_evaluation(submission.id, &plan(), f.now)
+        .await
+        .unwrap();
+    let (first, _, first_shard) = f.claim_shard().await;
+    let (running, _, running_shard) = f.claim_shard().await;
+    let (third, _, third_shard) = f.claim_shard().await;
+    // committed out of order: the verdict lists them in order of play
+    f.play(&third, &third_shard, 2).await;
+    assert!(!f.state(evaluation.id).await.is_over());
+    f.play(&first, &first_shard, 2).await;
+
+    let EvaluationState::AgentFailed {
+        finished_at,
+        faults,
+        log,
+    } = f.state(evaluation.id).await
+    else {
+        panic!("four faults are one too many")
+    };
+    assert_eq!(finished_at, f.now);
+    let places: Vec<_> = faults
+        .iter()
+        .map(|fault| (fault.task, fault.episode))
+        .collect();
+    assert_eq!(
+        places,
+        [&first_shard, &third_shard]
+            .map(|s| [0, 1].map(|i| (s.task, Some(s.first_episode + i))))
+            .concat()
+    );
+    assert!(
+        log.contains("log of hit 0\n") && log.contains("log of defend 0\n"),
+        "{log}"
+    );
+
+    assert!(
+        !f.store
+            .heartbeat(&running, 1, LEASE_S, f.now)
+            .await
+            .unwrap()
+    );
+    assert_eq!(
+        f.play(&running, &running_shard, 0).await,
+        Committed::LeaseLost
+    );
+    assert!(
+        f.claim().await.is_none(),
+        "the remaining shards are dropped"
+    );
+    assert!(f.store.board().await.unwrap().is_empty());
+    let again = f
+        .store
+        .create_evaluation(submission.id, &plan(), f.now)
+        .await;
+    assert!(
+        matches!(again, Err(StoreError::AlreadyEvaluated { .. })),
+        "its own fault costs the turn"
+    );
+}
+
+#[tokio::test]
+async fn a_shard_stopped_by_faults_ends_the_evaluation() {
+    let f = Fixture::new().await;
+    let submission = f.ready_team("Alpha").await;
+    let strict = EvaluationPlan {
+        max_faults: 0,
+        ..plan()
+    };
+    let evaluation = f
+        .store
+        .create_evaluation(submission.id, &strict, f.now)
+        .await
+        .unwrap();
+    let (claim, _, shard) = f.claim_shard().await;
+    let mut stopped = commit(&shard, 1);
+    stopped.outcomes.truncate(1);
+    stopped.stopped_by_faults = true;
+    assert_eq!(
+        f.store.commit_shard(&claim, stopped, f.now).await.unwrap(),
+        Committed::Now
+    );
+    let EvaluationState::AgentFailed { faults, .. } = f.state(evaluation.id).await else {
+        panic!()
+    };
+    assert_eq!(faults.len(), 1);
+}

@@ -1,0 +1,176 @@
+//! A store in a temporary folder, a clock that tests turn, and shorthands for a competition's steps.
+
+use faceoff_store::*;
+use faceoff_types::*;
+use jiff::{SignedDuration, Timestamp};
+use std::collections::BTreeMap;
+
+pub const LEASE_S: u32 = 15;
+
+pub struct Fixture {
+    pub store: Store,
+    pub folder: tempfile::TempDir,
+    pub now: Timestamp,
+}
+
+impl Fixture {
+    pub async fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path()).await.unwrap();
+        Self {
+            store,
+            folder,
+            now: "2026-03-01T10:00:00Z".parse().unwrap(),
+        }
+    }
+
+    /// Another handle on the same folder, as another process would have.
+    pub async fn reopen(&self) -> Store {
+        Store::open(self.folder.path()).await.unwrap()
+    }
+
+    pub fn later(&mut self, seconds: i64) {
+        self.now += SignedDuration::from_secs(seconds);
+    }
+
+    pub async fn team(&self, name: &str) -> Team {
+        let token_hash = *blake3::hash(name.as_bytes()).as_bytes();
+        self.store
+            .create_team(&name.parse().unwrap(), token_hash, self.now)
+            .await
+            .unwrap()
+    }
+
+    pub async fn upload(&self, team: &Team) -> Submission {
+        self.store
+            .create_submission(team.id, bundle(), self.now)
+            .await
+            .unwrap()
+    }
+
+    pub async fn claim(&self) -> Option<Work> {
+        self.store.claim("slot 0", LEASE_S, self.now).await.unwrap()
+    }
+
+    /// Claims the next unit, which must be a smoke run, and finds the agent valid.
+    pub async fn validate(&self) -> Submission {
+        let Some(Work::Smoke { claim, submission }) = self.claim().await else {
+            panic!("no smoke run is queued")
+        };
+        let outcome = SmokeOutcome::Valid {
+            agent_name: "striker".into(),
+            log: "hello\n".into(),
+        };
+        self.store
+            .commit_smoke(&claim, outcome, self.now)
+            .await
+            .unwrap();
+        self.store.submission(submission.id).await.unwrap()
+    }
+
+    /// A team with a valid submission.
+    pub async fn ready_team(&self, name: &str) -> Submission {
+        let team = self.team(name).await;
+        self.upload(&team).await;
+        self.validate().await
+    }
+
+    pub async fn claim_shard(&self) -> (Claim, Evaluation, Shard) {
+        match self.claim().await {
+            Some(Work::Shard {
+                claim,
+                evaluation,
+                shard,
+                ..
+            }) => (claim, evaluation, shard),
+            other => panic!("expected a shard, claimed {other:?}"),
+        }
+    }
+
+    pub async fn play(&self, claim: &Claim, shard: &Shard, faults: u32) -> Committed {
+        self.store
+            .commit_shard(claim, commit(shard, faults), self.now)
+            .await
+            .unwrap()
+    }
+
+    pub async fn state(&self, id: EvaluationId) -> EvaluationState {
+        self.store.evaluation(id).await.unwrap().state
+    }
+}
+
+pub fn bundle() -> BundleRef {
+    BundleRef {
+        key: "bundles/abc".into(),
+        bytes: 3,
+        blake3: blake3::hash(b"abc").to_string(),
+        file_name: "agent.tar.gz".into(),
+    }
+}
+
+/// 3 tasks of 4 episodes in shards of 2: six shards.
+pub fn plan() -> EvaluationPlan {
+    EvaluationPlan {
+        profile: Profile::Evaluation,
+        tasks: vec![Task::Prepare, Task::Hit, Task::Defend],
+        episodes_per_task: 4,
+        episodes_per_shard: 2,
+        max_faults: 3,
+    }
+}
+
+/// What a worker that played `shard` commits; its first `faults` episodes ended by an agent fault.
+pub fn commit(shard: &Shard, faults: u32) -> ShardCommit {
+    let outcomes = (shard.first_episode..shard.end_episode)
+        .enumerate()
+        .map(|(index, episode)| outcome(shard.task, episode, (index as u32) < faults))
+        .collect();
+    ShardCommit {
+        outcomes,
+        log: format!("log of {} {}\n", shard.task, shard.first_episode),
+        stopped_by_faults: false,
+        recording: format!("recordings/{}", shard.id),
+    }
+}
+
+pub fn outcome(task: Task, episode: u32, faulty: bool) -> EpisodeOutcome {
+    let fault = faulty.then(|| AgentFault {
+        fault: AgentFaultKind::NonFinite,
+        task,
+        episode: Some(episode),
+        step: Some(3),
+        line: Some("{\"type\":\"act\"}".into()),
+    });
+    EpisodeOutcome {
+        task,
+        episode,
+        steps: 17,
+        end: if faulty {
+            EpisodeEnd::AgentFault
+        } else {
+            EpisodeEnd::LeftTable
+        },
+        success: !faulty,
+        violations: Violations {
+            ee: true,
+            ..Violations::default()
+        },
+        computation_time: ComputationTime {
+            mean_s: 0.1 + 0.2,
+            max_s: 1e-3 / 3.0,
+        },
+        fault,
+    }
+}
+
+pub fn result(score: f64) -> EvaluationResult {
+    EvaluationResult {
+        ruleset: RULESET.into(),
+        profile: Profile::Evaluation,
+        seed: Seed::from_number(1),
+        tasks: BTreeMap::new(),
+        score,
+        penalty_points: 0.1 + 0.2,
+        tier: Tier::Improvable,
+    }
+}

@@ -1,0 +1,205 @@
+//! `kill -9` in the middle of writes: what was acknowledged is there, and nothing is half there.
+
+use crate::fixture::*;
+use faceoff_store::*;
+use faceoff_types::*;
+use sqlx::{Connection, SqliteConnection};
+use std::{
+    collections::HashSet,
+    io::{BufRead, BufReader, Write},
+    path::Path,
+    process::{Command, Stdio},
+};
+
+const FOLDER: &str = "FACEOFF_STORE_TEST_FOLDER";
+
+/// Writes until it is killed, telling of every acknowledged write. Started by the test below.
+#[tokio::test]
+#[ignore = "the child process of survives_kill_9"]
+async fn child() {
+    let Ok(folder) = std::env::var(FOLDER) else {
+        return;
+    };
+    let folder = Path::new(&folder);
+    let store = Store::open(folder).await.unwrap();
+    let mut now: jiff::Timestamp = "2026-03-01T10:00:00Z".parse().unwrap();
+    let file = tempfile::NamedTempFile::new().unwrap();
+    // longer than one write, so that a kill can hit its middle
+    std::fs::write(file.path(), vec![b'x'; 300_000]).unwrap();
+    let tell = |text: String| {
+        let mut out = std::io::stdout().lock();
+        writeln!(out, "\n{text}")
+            .and_then(|()| out.flush())
+            .unwrap();
+    };
+    let run = uuid::Uuid::now_v7();
+    for round in 0.. {
+        let mut token_hash = [0; 32];
+        token_hash[..16].copy_from_slice(uuid::Uuid::now_v7().as_bytes());
+        let name: TeamName = format!("t {} {round}", run.simple()).parse().unwrap();
+        let team = store.create_team(&name, token_hash, now).await.unwrap();
+        tell(format!("team {}", team.id));
+        store
+            .create_submission(team.id, bundle(), now)
+            .await
+            .unwrap();
+        let small = EvaluationPlan {
+            episodes_per_task: 2,
+            episodes_per_shard: 1,
+            ..plan()
+        };
+        now += jiff::SignedDuration::from_secs(3600); // leases of earlier lives are over
+        loop {
+            match store.claim("child", LEASE_S, now).await.unwrap() {
+                Some(Work::Smoke { claim, submission }) => {
+                    let outcome = SmokeOutcome::Valid {
+                        agent_name: "a".into(),
+                        log: String::new(),
+                    };
+                    store.commit_smoke(&claim, outcome, now).await.unwrap();
+                    tell(format!("valid {}", submission.id));
+                    let evaluation = store.create_evaluation(submission.id, &small, now).await;
+                    tell(format!("evaluation {}", evaluation.unwrap().id));
+                }
+                Some(Work::Shard {
+                    claim,
+                    evaluation,
+                    shard,
+                    ..
+                }) => {
+                    let mut commit = commit(&shard, 0);
+                    commit.recording = claim.recording_key(evaluation.id);
+                    let key = format!("{}/steps", commit.recording);
+                    store.artifacts().put_file(&key, file.path()).await.unwrap();
+                    let committed = store.commit_shard(&claim, commit, now).await.unwrap();
+                    assert_eq!(committed, Committed::Now);
+                    tell(format!("shard {}", shard.id));
+                }
+                Some(Work::Finalise {
+                    claim, evaluation, ..
+                }) => {
+                    store
+                        .finish_evaluation(&claim, &result(1.0), "d", now)
+                        .await
+                        .unwrap();
+                    tell(format!("finished {}", evaluation.id));
+                }
+                None => break,
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn survives_kill_9() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut acknowledged = HashSet::new();
+    // the kill comes while the child writes on; where, differs from life to life
+    for lines_to_live in [1, 3, 5, 8, 2, 13, 4, 21, 7, 17, 6, 30] {
+        let mut child = Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", "kill::child", "--ignored", "--nocapture"])
+            .env(FOLDER, folder.path())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let lines = BufReader::new(child.stdout.take().unwrap())
+            .lines()
+            .map_while(Result::ok);
+        let told = lines.filter(|line| {
+            line.split_once(' ').is_some_and(|(what, id)| {
+                id.parse::<uuid::Uuid>().is_ok()
+                    && ["team", "valid", "evaluation", "shard", "finished"].contains(&what)
+            })
+        });
+        let seen: Vec<String> = told.take(lines_to_live).collect();
+        child.kill().unwrap();
+        child.wait().unwrap();
+        assert_eq!(seen.len(), lines_to_live, "the child ended by itself");
+        acknowledged.extend(seen);
+
+        let store = Store::open(folder.path()).await.unwrap();
+        check_consistency(folder.path(), &store).await;
+        let stored = stored(folder.path()).await;
+        for write in &acknowledged {
+            assert!(
+                stored.contains(write),
+                "{write} was acknowledged and is gone"
+            );
+        }
+    }
+}
+
+/// The writes that the database has, in the child's words.
+async fn stored(folder: &Path) -> HashSet<String> {
+    let mut connection = connect(folder).await;
+    let rows: Vec<String> = sqlx::query_scalar(
+        "SELECT 'team ' || id FROM teams
+         UNION SELECT 'valid ' || id FROM submissions WHERE state = 'valid'
+         UNION SELECT 'evaluation ' || id FROM evaluations
+         UNION SELECT 'shard ' || id FROM shards WHERE committed_at IS NOT NULL
+         UNION SELECT 'finished ' || id FROM evaluations WHERE state = 'finished'",
+    )
+    .fetch_all(&mut connection)
+    .await
+    .unwrap();
+    rows.into_iter().collect()
+}
+
+async fn connect(folder: &Path) -> SqliteConnection {
+    let url = format!("sqlite://{}", folder.join("faceoff.sqlite3").display());
+    SqliteConnection::connect(&url).await.unwrap()
+}
+
+/// What must hold at any time, whoever was killed.
+async fn check_consistency(folder: &Path, store: &Store) {
+    let mut connection = connect(folder).await;
+    let integrity: String = sqlx::query_scalar("PRAGMA integrity_check")
+        .fetch_one(&mut connection)
+        .await
+        .unwrap();
+    assert_eq!(integrity, "ok");
+    let orphans = sqlx::query("PRAGMA foreign_key_check")
+        .fetch_all(&mut connection)
+        .await
+        .unwrap();
+    assert!(orphans.is_empty());
+    let rules = [
+        ("a submission without its smoke run",
+         "SELECT COUNT(*) FROM submissions s WHERE (SELECT COUNT(*) FROM work_units u
+              WHERE u.submission_id = s.id AND u.kind = 'smoke') <> 1"),
+        ("an evaluation without all of its shards",
+         "SELECT COUNT(*) FROM evaluations e WHERE (SELECT COUNT(*) FROM shards s JOIN work_units u
+              ON u.shard_id = s.id WHERE s.evaluation_id = e.id) <> 6"),
+        ("a shard committed but not done, or done but not committed",
+         "SELECT COUNT(*) FROM shards s JOIN work_units u ON u.shard_id = s.id
+              WHERE (s.committed_at IS NOT NULL) <> (u.state = 'done')"),
+        ("a finalisation too early or missing",
+         "SELECT COUNT(*) FROM evaluations e
+              WHERE EXISTS (SELECT 1 FROM work_units u WHERE u.evaluation_id = e.id AND u.kind = 'finalise')
+                 = EXISTS (SELECT 1 FROM shards s WHERE s.evaluation_id = e.id AND s.committed_at IS NULL)"),
+        ("a finished evaluation whose finalisation is open",
+         "SELECT COUNT(*) FROM evaluations e JOIN work_units u ON u.evaluation_id = e.id
+              WHERE u.kind = 'finalise' AND (e.state = 'finished') <> (u.state = 'done')"),
+    ];
+    for (breach, sql) in rules {
+        let count: i64 = sqlx::query_scalar(sql)
+            .fetch_one(&mut connection)
+            .await
+            .unwrap();
+        assert_eq!(count, 0, "{breach}");
+    }
+    let recordings: Vec<String> =
+        sqlx::query_scalar("SELECT recording FROM shards WHERE recording IS NOT NULL")
+            .fetch_all(&mut connection)
+            .await
+            .unwrap();
+    for recording in recordings {
+        let (bytes, _) = store
+            .artifacts()
+            .read(&format!("{recording}/steps"))
+            .await
+            .unwrap();
+        assert_eq!(bytes, 300_000, "a committed shard's recording is whole");
+    }
+}

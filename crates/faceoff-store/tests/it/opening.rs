@@ -1,0 +1,161 @@
+use crate::fixture::*;
+use faceoff_store::*;
+use sqlx::{Connection, SqliteConnection};
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 4)]
+async fn openers_that_race_agree_on_one_season() {
+    let folder = tempfile::tempdir().unwrap();
+    let openers: Vec<_> = (0..8)
+        .map(|_| {
+            let path = folder.path().to_owned();
+            tokio::spawn(async move { Store::open(&path).await.unwrap().season().await.unwrap() })
+        })
+        .collect();
+    let mut commitments = Vec::new();
+    for opener in openers {
+        let season = opener.await.unwrap();
+        assert_eq!(
+            season.commitment,
+            blake3::hash(season.secret.as_bytes()).to_string(),
+            "the published hash is the secret's"
+        );
+        commitments.push(season.commitment);
+    }
+    commitments.dedup();
+    assert_eq!(commitments.len(), 1);
+    let another = Fixture::new().await.store.season().await.unwrap();
+    assert_ne!(
+        another.commitment, commitments[0],
+        "secrets are drawn, not fixed"
+    );
+}
+
+#[tokio::test]
+async fn everything_is_there_after_reopening() {
+    let f = Fixture::new().await;
+    let submission = f.ready_team("Alpha").await;
+    let evaluation = f
+        .store
+        .create_evaluation(submission.id, &plan(), f.now)
+        .await
+        .unwrap();
+    let (claim, _, shard) = f.claim_shard().await;
+    f.play(&claim, &shard, 1).await;
+    let (held, ..) = f.claim_shard().await;
+    let before = f.store.evaluation(evaluation.id).await.unwrap();
+    let season = f.store.season().await.unwrap();
+    f.store.close().await;
+    let reopened = f.reopen().await;
+    assert_eq!(reopened.evaluation(evaluation.id).await.unwrap(), before);
+    assert_eq!(
+        reopened.submission(submission.id).await.unwrap(),
+        submission
+    );
+    assert_eq!(reopened.season().await.unwrap().secret, season.secret);
+    assert!(
+        reopened.heartbeat(&held, 1, LEASE_S, f.now).await.unwrap(),
+        "leases outlive the process"
+    );
+}
+
+/// Changes the file behind the store's back.
+async fn vandalise(f: &Fixture, sql: &'static str) {
+    let url = format!(
+        "sqlite://{}",
+        f.folder.path().join("faceoff.sqlite3").display()
+    );
+    let mut connection = SqliteConnection::connect(&url).await.unwrap();
+    sqlx::raw_sql(sql).execute(&mut connection).await.unwrap();
+    connection.close().await.unwrap();
+}
+
+#[tokio::test]
+async fn damaged_values_are_named_and_do_not_panic() {
+    let f = Fixture::new().await;
+    let submission = f.ready_team("Alpha").await;
+    let evaluation = f
+        .store
+        .create_evaluation(submission.id, &plan(), f.now)
+        .await
+        .unwrap();
+    let damages = [
+        "UPDATE evaluations SET day = 'someday'",
+        "UPDATE evaluations SET profile = 'dream'",
+        "UPDATE evaluations SET tasks = '[\"hit\"'",
+        "UPDATE evaluations SET created_at = 9223372036854775807",
+        "UPDATE evaluations SET max_faults = 5000000000",
+    ];
+    for sql in damages {
+        vandalise(&f, sql).await;
+        let error = f.store.evaluation(evaluation.id).await.unwrap_err();
+        assert!(matches!(&error, StoreError::Damaged(_)), "{sql}: {error:?}");
+        let error = f.store.evaluations_of(submission.team).await.unwrap_err();
+        assert!(matches!(&error, StoreError::Damaged(_)), "{sql}: {error:?}");
+    }
+    vandalise(&f, "UPDATE teams SET name = '<b>'").await;
+    assert!(matches!(f.store.teams().await, Err(StoreError::Damaged(_))));
+    vandalise(&f, "PRAGMA foreign_keys = OFF; UPDATE teams SET id = 'x'").await;
+    assert!(matches!(f.store.teams().await, Err(StoreError::Damaged(_))));
+}
+
+#[tokio::test]
+async fn damaged_work_does_not_hold_up_the_others() {
+    let f = Fixture::new().await;
+    let alpha = f.ready_team("Alpha").await;
+    let beta = f.ready_team("Beta").await;
+    f.store
+        .create_evaluation(alpha.id, &plan(), f.now)
+        .await
+        .unwrap();
+    vandalise(&f, "UPDATE evaluations SET profile = 'dream'").await;
+    let sound = f
+        .store
+        .create_evaluation(beta.id, &plan(), f.now)
+        .await
+        .unwrap();
+    let (_, evaluation, _) = f.claim_shard().await;
+    assert_eq!(evaluation.id, sound.id);
+    vandalise(
+        &f,
+        "UPDATE evaluations SET profile = 'ideal' WHERE profile = 'dream'",
+    )
+    .await;
+    let evaluations = f.store.evaluations_of(alpha.team).await.unwrap();
+    let state = &evaluations[0].state;
+    assert!(
+        matches!(state, EvaluationState::PlatformFailed { .. }),
+        "{state:?}"
+    );
+}
+
+#[tokio::test]
+async fn half_made_states_cannot_be_stored() {
+    let f = Fixture::new().await;
+    let submission = f.ready_team("Alpha").await;
+    f.store
+        .create_evaluation(submission.id, &plan(), f.now)
+        .await
+        .unwrap();
+    let url = format!(
+        "sqlite://{}",
+        f.folder.path().join("faceoff.sqlite3").display()
+    );
+    let mut connection = SqliteConnection::connect(&url).await.unwrap();
+    for sql in [
+        "UPDATE evaluations SET state = 'finished', finished_at = 1, dataset = 'd'",
+        "UPDATE evaluations SET state = 'platform_failed', finished_at = 1",
+        "UPDATE submissions SET state = 'invalid'",
+        "UPDATE shards SET committed_at = 1, recording = 'r'",
+        "UPDATE work_units SET state = 'leased'",
+        "INSERT INTO teams (id, name, token_hash, created_at) VALUES ('a', 'b', x'00', 0)",
+    ] {
+        let error = sqlx::raw_sql(sql)
+            .execute(&mut connection)
+            .await
+            .unwrap_err();
+        assert!(
+            error.to_string().contains("CHECK constraint failed"),
+            "{sql}: {error}"
+        );
+    }
+}

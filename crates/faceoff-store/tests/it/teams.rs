@@ -1,0 +1,82 @@
+use crate::fixture::*;
+use faceoff_store::*;
+use faceoff_types::TeamId;
+
+#[tokio::test]
+async fn a_name_is_taken_whatever_its_case() {
+    let f = Fixture::new().await;
+    f.team("Air-HocKIT").await;
+    let name = "AIR-hockit".parse().unwrap();
+    let error = f
+        .store
+        .create_team(&name, [1; 32], f.now)
+        .await
+        .unwrap_err();
+    assert!(matches!(error, StoreError::TeamNameTaken(taken) if taken == "AIR-hockit"));
+    let teams = f.store.teams().await.unwrap();
+    assert_eq!(teams.len(), 1);
+}
+
+#[tokio::test]
+async fn a_team_is_found_by_its_token_until_that_is_replaced() {
+    let f = Fixture::new().await;
+    let name = "Zoë".parse().unwrap();
+    let team = f.store.create_team(&name, [7; 32], f.now).await.unwrap();
+    assert_eq!(f.store.team(team.id).await.unwrap(), team);
+    assert_eq!(
+        f.store.team_by_token_hash([7; 32]).await.unwrap(),
+        Some(team.clone())
+    );
+    f.store.set_team_token(team.id, [8; 32]).await.unwrap();
+    assert_eq!(f.store.team_by_token_hash([7; 32]).await.unwrap(), None);
+    assert_eq!(
+        f.store.team_by_token_hash([8; 32]).await.unwrap(),
+        Some(team)
+    );
+}
+
+#[tokio::test]
+async fn two_teams_cannot_share_a_token() {
+    let f = Fixture::new().await;
+    f.store
+        .create_team(&"A".parse().unwrap(), [7; 32], f.now)
+        .await
+        .unwrap();
+    let b = f
+        .store
+        .create_team(&"B".parse().unwrap(), [8; 32], f.now)
+        .await
+        .unwrap();
+    let error = f
+        .store
+        .create_team(&"C".parse().unwrap(), [7; 32], f.now)
+        .await
+        .unwrap_err();
+    assert!(matches!(error, StoreError::Conflict(_)), "{error}");
+    let error = f.store.set_team_token(b.id, [7; 32]).await.unwrap_err();
+    assert!(matches!(error, StoreError::Conflict(_)), "{error}");
+}
+
+#[tokio::test]
+async fn unknown_ids_are_not_found() {
+    let f = Fixture::new().await;
+    let id = TeamId::new();
+    assert!(matches!(
+        f.store.team(id).await,
+        Err(StoreError::NotFound("team"))
+    ));
+    assert!(matches!(
+        f.store.set_team_token(id, [1; 32]).await,
+        Err(StoreError::NotFound("team"))
+    ));
+    let upload = f.store.create_submission(id, bundle(), f.now).await;
+    assert!(matches!(upload, Err(StoreError::NotFound("team"))));
+    let submission = uuid::Uuid::now_v7().into();
+    let created = f.store.create_evaluation(submission, &plan(), f.now).await;
+    assert!(matches!(created, Err(StoreError::NotFound("submission"))));
+    let evaluation = uuid::Uuid::now_v7().into();
+    assert!(matches!(
+        f.store.evaluation(evaluation).await,
+        Err(StoreError::NotFound("evaluation"))
+    ));
+}

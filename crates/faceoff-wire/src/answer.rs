@@ -1,0 +1,111 @@
+//! What an agent answers, parsed strictly: `ready` and `act`.
+//!
+//! One pass over the line, without an intermediate tree: an action's numbers go straight into the
+//! caller's buffer. Only a line that is refused is looked at again, to say what was wrong with it.
+//! Unknown fields are skipped without recursion, and known fields refuse to nest, so that no line
+//! can exhaust the stack.
+
+use crate::{InterpolationCode, MAX_LINE_BYTES, PROTOCOL_VERSION};
+use faceoff_types::AgentFaultKind;
+use fields::Fields;
+
+mod action;
+mod diagnosis;
+mod fields;
+mod scalar;
+
+pub use scalar::Scalar;
+
+/// The answer to `hello`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Ready {
+    /// How the agent's actions become a trajectory.
+    pub interpolation: InterpolationCode,
+    /// The agent's name for itself, if it gave one as a string.
+    pub name: Option<String>,
+    /// Its version, likewise.
+    pub version: Option<String>,
+}
+
+/// Parses the answer to `hello`. The line comes without its newline.
+///
+/// # Errors
+/// The agent's fault: not a JSON object, another message, another protocol, no or an unknown
+/// interpolation, a key given twice.
+pub fn parse_ready(line: &[u8]) -> Result<Ready, AgentFaultKind> {
+    const EXPECTED: &str = "ready with protocol 1 and an interpolation";
+    let fields = Fields::parse(line, None)?;
+    fields.require_type("ready", EXPECTED)?;
+    fields.require_integer("protocol", &fields.protocol, PROTOCOL_VERSION, EXPECTED)?;
+    let wrong = |got: String| AgentFaultKind::WrongMessage {
+        expected: format!("{EXPECTED} (1, 2, 3, 4, 5, -1 or null)"),
+        got,
+    };
+    let code = match &fields.interpolation {
+        None => return Err(wrong("ready without interpolation".to_owned())),
+        Some(Scalar::Null) => None,
+        Some(Scalar::Integer(code)) => Some(*code),
+        Some(other) => return Err(wrong(format!("ready with interpolation {other}"))),
+    };
+    let interpolation = InterpolationCode::new(code)
+        .map_err(|unknown| wrong(format!("ready with interpolation {}", unknown.0)))?;
+    let text = |field: &Option<Scalar<'_>>| match field {
+        Some(Scalar::Text(text)) => Some(text.chars().take(100).collect()),
+        _ => None,
+    };
+    Ok(Ready {
+        interpolation,
+        name: text(&fields.name),
+        version: text(&fields.version),
+    })
+}
+
+/// Parses the answer to `reset`. The line comes without its newline.
+///
+/// # Errors
+/// The agent's fault: not a JSON object, another message or episode, a key given twice.
+pub fn parse_reset_ready(line: &[u8], episode: u32) -> Result<(), AgentFaultKind> {
+    let expected = || format!("ready with episode {episode}");
+    let fields = Fields::parse(line, None)?;
+    fields.require_type("ready", &expected())?;
+    fields.require_integer("episode", &fields.episode, episode, &expected())
+}
+
+/// Parses the answer to `step` into `action`, row-major. The line comes without its newline.
+///
+/// On success `action` holds exactly [`InterpolationCode::action_len`] finite numbers; after an
+/// error its content is meaningless.
+///
+/// # Errors
+/// The agent's fault: not a JSON object, another message or step, another shape, a number that is
+/// not finite, a key given twice.
+pub fn parse_act(
+    line: &[u8],
+    step: u32,
+    interpolation: InterpolationCode,
+    action: &mut Vec<f64>,
+) -> Result<(), AgentFaultKind> {
+    action.clear();
+    let fields = Fields::parse(line, Some((interpolation, &mut *action)))?;
+    if !fields.is_act(step) {
+        let expected = format!("act with step {step}");
+        fields.require_type("act", &expected)?;
+        fields.require_integer("step", &fields.step, step, &expected)?;
+    }
+    if fields.has_action {
+        Ok(())
+    } else {
+        Err(AgentFaultKind::WrongMessage {
+            expected: format!("act with step {step} and an action"),
+            got: "act without action".to_owned(),
+        })
+    }
+}
+
+/// The fault of a line longer than the protocol allows.
+#[must_use]
+pub const fn too_long() -> AgentFaultKind {
+    AgentFaultKind::LineTooLong {
+        limit_bytes: MAX_LINE_BYTES as u64,
+    }
+}

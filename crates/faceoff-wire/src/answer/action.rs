@@ -1,0 +1,82 @@
+use serde::de::{DeserializeSeed, Deserializer, Error as _, SeqAccess, Visitor};
+use std::fmt;
+
+/// Reads nested arrays of exactly `shape` into `out`, row-major.
+///
+/// Recursion ends with the shape: an array where a number belongs is refused before it is entered.
+pub(super) struct ActionSeed<'s> {
+    pub shape: &'static [usize],
+    pub out: &'s mut Vec<f64>,
+}
+
+/// serde carries only text in its errors; this one marks "well-formed so far, but another shape".
+pub(super) const SHAPE_MARK: &str = "faceoff: shape";
+
+impl<'de> DeserializeSeed<'de> for ActionSeed<'_> {
+    type Value = ();
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
+        deserializer.deserialize_any(self)
+    }
+}
+
+impl<'de> Visitor<'de> for ActionSeed<'_> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(SHAPE_MARK)
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<(), A::Error> {
+        let Some((&expected, inner)) = self.shape.split_first() else {
+            return Err(A::Error::custom(SHAPE_MARK));
+        };
+        if inner.is_empty() {
+            for _ in 0..expected {
+                let Some(Number(value)) = seq.next_element()? else {
+                    return Err(A::Error::custom(SHAPE_MARK));
+                };
+                self.out.push(value);
+            }
+        } else {
+            for _ in 0..expected {
+                let seed = ActionSeed {
+                    shape: inner,
+                    out: self.out,
+                };
+                if seq.next_element_seed(seed)?.is_none() {
+                    return Err(A::Error::custom(SHAPE_MARK));
+                }
+            }
+        }
+        // serde_json itself refuses what follows the last element that was asked for, but with an
+        // error of its own; asking once more names it as the shape.
+        match seq.next_element::<serde::de::IgnoredAny>()? {
+            None => Ok(()),
+            Some(_) => Err(A::Error::custom(SHAPE_MARK)),
+        }
+    }
+}
+
+struct Number(f64);
+
+impl<'de> serde::Deserialize<'de> for Number {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct NumberVisitor;
+        impl Visitor<'_> for NumberVisitor {
+            type Value = Number;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(SHAPE_MARK)
+            }
+            fn visit_f64<E>(self, value: f64) -> Result<Number, E> {
+                Ok(Number(value))
+            }
+            fn visit_i64<E>(self, value: i64) -> Result<Number, E> {
+                Ok(Number(value as f64))
+            }
+            fn visit_u64<E>(self, value: u64) -> Result<Number, E> {
+                Ok(Number(value as f64))
+            }
+        }
+        deserializer.deserialize_any(NumberVisitor)
+    }
+}

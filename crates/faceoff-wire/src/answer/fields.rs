@@ -1,0 +1,174 @@
+use super::{Scalar, action::ActionSeed, diagnosis};
+use crate::{InterpolationCode, MAX_LINE_BYTES};
+use faceoff_types::AgentFaultKind;
+use serde::{
+    Deserializer as _,
+    de::{Error as _, IgnoredAny, MapAccess, Visitor},
+};
+use std::fmt;
+
+/// The fields of an answer that the protocol knows; `None` where the key is absent.
+#[derive(Debug, Default)]
+pub(super) struct Fields<'a> {
+    pub kind: Option<Scalar<'a>>,
+    pub protocol: Option<Scalar<'a>>,
+    pub interpolation: Option<Scalar<'a>>,
+    pub episode: Option<Scalar<'a>>,
+    pub step: Option<Scalar<'a>>,
+    pub name: Option<Scalar<'a>>,
+    pub version: Option<Scalar<'a>>,
+    /// The action was read into the caller's buffer.
+    pub has_action: bool,
+}
+
+/// Where an expected action goes.
+pub(super) type ActionSink<'s> = Option<(InterpolationCode, &'s mut Vec<f64>)>;
+
+/// serde carries only text in its errors; this one marks a repeated key, which follows it.
+pub(super) const TWICE_MARK: &str = "faceoff: twice ";
+
+impl<'a> Fields<'a> {
+    /// Parses one line. Without a sink an `action` is skipped like any unknown field.
+    pub fn parse(line: &'a [u8], sink: ActionSink<'_>) -> Result<Self, AgentFaultKind> {
+        if line.len() > MAX_LINE_BYTES {
+            return Err(super::too_long());
+        }
+        let text = std::str::from_utf8(line).map_err(|error| AgentFaultKind::NotJson {
+            detail: format!("not UTF-8 after byte {}", error.valid_up_to()),
+        })?;
+        let interpolation = sink.as_ref().map(|(code, _)| *code);
+        let mut json = serde_json::Deserializer::from_str(text);
+        json.deserialize_map(FieldsVisitor { sink })
+            .and_then(|fields| json.end().map(|()| fields))
+            .map_err(|error| diagnosis::diagnose(text, &error, interpolation))
+    }
+
+    /// Is this what the hot path hopes for?
+    pub fn is_act(&self, step: u32) -> bool {
+        matches!(&self.kind, Some(Scalar::Text(kind)) if kind == "act")
+            && self.step == Some(Scalar::Integer(i64::from(step)))
+    }
+
+    /// The `type` must be this one.
+    pub fn require_type(&self, kind: &str, expected: &str) -> Result<(), AgentFaultKind> {
+        let got = match &self.kind {
+            Some(Scalar::Text(got)) if got == kind => return Ok(()),
+            Some(Scalar::Text(got)) => got.chars().take(60).collect(),
+            Some(other) => format!("an object whose type is {other}"),
+            None => "an object without type".to_owned(),
+        };
+        Err(AgentFaultKind::WrongMessage {
+            expected: expected.to_owned(),
+            got,
+        })
+    }
+
+    /// The named field must be this integer.
+    pub fn require_integer(
+        &self,
+        name: &str,
+        field: &Option<Scalar<'_>>,
+        value: u32,
+        expected: &str,
+    ) -> Result<(), AgentFaultKind> {
+        let kind = match &self.kind {
+            Some(Scalar::Text(kind)) => kind,
+            _ => "an object",
+        };
+        let got = match field {
+            Some(Scalar::Integer(got)) if *got == i64::from(value) => return Ok(()),
+            Some(other) => format!("{kind} with {name} {other}"),
+            None => format!("{kind} without {name}"),
+        };
+        Err(AgentFaultKind::WrongMessage {
+            expected: expected.to_owned(),
+            got,
+        })
+    }
+}
+
+struct FieldsVisitor<'s> {
+    sink: ActionSink<'s>,
+}
+
+impl<'de> Visitor<'de> for FieldsVisitor<'_> {
+    type Value = Fields<'de>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("an object")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(mut self, mut map: A) -> Result<Fields<'de>, A::Error> {
+        let mut fields = Fields::default();
+        while let Some(key) = map.next_key::<Key>()? {
+            let field = match key {
+                Key::Type => &mut fields.kind,
+                Key::Protocol => &mut fields.protocol,
+                Key::Interpolation => &mut fields.interpolation,
+                Key::Episode => &mut fields.episode,
+                Key::Step => &mut fields.step,
+                Key::Name => &mut fields.name,
+                Key::Version => &mut fields.version,
+                Key::Action => match &mut self.sink {
+                    Some(_) if fields.has_action => {
+                        return Err(A::Error::custom(format_args!("{TWICE_MARK}action")));
+                    }
+                    Some((code, out)) => {
+                        map.next_value_seed(ActionSeed {
+                            shape: code.shape(),
+                            out,
+                        })?;
+                        fields.has_action = true;
+                        continue;
+                    }
+                    None => {
+                        map.next_value::<IgnoredAny>()?;
+                        continue;
+                    }
+                },
+                Key::Unknown => {
+                    map.next_value::<IgnoredAny>()?;
+                    continue;
+                }
+            };
+            if field.replace(map.next_value()?).is_some() {
+                return Err(A::Error::custom(format_args!(
+                    "{TWICE_MARK}{}",
+                    key.as_str()
+                )));
+            }
+        }
+        Ok(fields)
+    }
+}
+
+#[derive(Clone, Copy, serde::Deserialize)]
+#[serde(field_identifier, rename_all = "lowercase")]
+enum Key {
+    Type,
+    Protocol,
+    Interpolation,
+    Episode,
+    Step,
+    Action,
+    Name,
+    Version,
+    #[serde(other)]
+    Unknown,
+}
+
+impl Key {
+    const fn as_str(self) -> &'static str {
+        match self {
+            Self::Type => "type",
+            Self::Protocol => "protocol",
+            Self::Interpolation => "interpolation",
+            Self::Episode => "episode",
+            Self::Step => "step",
+            Self::Action => "action",
+            Self::Name => "name",
+            Self::Version => "version",
+            Self::Unknown => "unknown",
+        }
+    }
+}

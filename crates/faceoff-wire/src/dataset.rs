@@ -1,0 +1,92 @@
+//! Files of a dataset: what an evaluation leaves behind beside its Parquet tables.
+//!
+//! A dataset is a zip archive with `manifest.json`, `results.json`, `violations.json`,
+//! `episodes.parquet`, `steps.parquet` and `agent.log`. The layout is versioned by
+//! [`DATASET_SCHEMA`]; `docs/dataset.md` describes every column.
+
+use faceoff_types::{Profile, Seed, Task};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Name and version of the layout described here. Another meaning of a column is another version.
+pub const DATASET_SCHEMA: &str = "faceoff-dataset/1";
+
+/// `manifest.json`: what the dataset is and what its files must hash to.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DatasetManifest {
+    /// [`DATASET_SCHEMA`].
+    pub schema: String,
+    /// The ruleset's name.
+    pub ruleset: String,
+    /// The perturbation profile.
+    pub profile: Profile,
+    /// The evaluation's seed.
+    pub seed: Seed,
+    /// The seed of the season's model mismatch.
+    pub mismatch_seed: Seed,
+    /// The agent's name.
+    pub agent: String,
+    /// The tasks and how many episodes of each.
+    pub episodes: BTreeMap<Task, u32>,
+    /// Every other file of the archive.
+    pub files: BTreeMap<String, FileDigest>,
+}
+
+/// Size and hash of a file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FileDigest {
+    /// Its size.
+    pub bytes: u64,
+    /// Its BLAKE3 hash, 64 hexadecimal digits.
+    pub blake3: String,
+}
+
+/// `violations.json`: where each constraint was broken.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct ViolationsFile {
+    /// [`DATASET_SCHEMA`].
+    pub schema: String,
+    /// Per task, in order of the episodes.
+    pub tasks: BTreeMap<Task, TaskViolations>,
+}
+
+/// The violations of one task, per constraint.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct TaskViolations {
+    /// End-effector position, metres beyond the bound.
+    pub ee: Vec<ConstraintViolation>,
+    /// Height of elbow and wrist, metres beyond the bound.
+    pub link: Vec<ConstraintViolation>,
+    /// Joint position, rad beyond 95 % of the limit.
+    pub joint_pos: Vec<ConstraintViolation>,
+    /// Joint velocity, rad/s beyond 95 % of the limit.
+    pub joint_vel: Vec<ConstraintViolation>,
+    /// Computation time: episodes with penalty points for it.
+    pub computation_time: Vec<SlowEpisode>,
+}
+
+/// A constraint broken in one episode.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ConstraintViolation {
+    /// The episode.
+    pub episode: u32,
+    /// The first control step at which it was broken.
+    pub first_step: u32,
+    /// Control steps at which it was broken.
+    pub steps: u32,
+    /// The largest value of the constraint; violated when above 0.
+    pub max: f64,
+}
+
+/// An episode with penalty points for computation time.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SlowEpisode {
+    /// The episode.
+    pub episode: u32,
+    /// Mean computation time in seconds.
+    pub mean_s: f64,
+    /// Maximum computation time in seconds.
+    pub max_s: f64,
+    /// The points.
+    pub points: f64,
+}

@@ -1,0 +1,216 @@
+use crate::{InterpolationCode, UnknownInterpolation};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Largest `agent.toml`, in bytes.
+pub const MANIFEST_MAX_BYTES: u64 = 64 * 1024;
+
+/// `agent.toml`: what a bundle is and how its agent is started.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// The agent's name, as shown on the board.
+    pub name: String,
+    /// Program and arguments, run in the bundle's folder.
+    pub command: Vec<String>,
+    /// The runtime that it needs; whether the organiser offers it is the runner's question.
+    pub runtime: String,
+    /// The interpolation that `ready` must state, if stated here. TOML has no null: an agent that
+    /// sends whole trajectories leaves the key out and says `null` in `ready`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interpolation: Option<i64>,
+    /// Environment variables for the agent.
+    #[serde(default)]
+    pub env: BTreeMap<String, String>,
+}
+
+/// Why an `agent.toml` is refused; shown to the team.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ManifestError {
+    /// Not TOML, or a key is missing, unknown or of another type.
+    #[error("agent.toml: {0}")]
+    Toml(String),
+    /// A value that cannot be.
+    #[error("agent.toml: {key} {problem}")]
+    Value {
+        /// The key.
+        key: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+}
+
+impl Manifest {
+    /// Parses and checks the text of an `agent.toml`.
+    ///
+    /// # Errors
+    /// Says which key is wrong and what would be right.
+    pub fn parse(text: &str) -> Result<Self, ManifestError> {
+        if text.len() as u64 > MANIFEST_MAX_BYTES {
+            return Err(ManifestError::Toml(format!(
+                "longer than {MANIFEST_MAX_BYTES} bytes"
+            )));
+        }
+        let manifest: Self =
+            toml::from_str(text).map_err(|error| ManifestError::Toml(error.to_string()))?;
+        manifest.check()?;
+        Ok(manifest)
+    }
+
+    /// The interpolation stated here, if any.
+    ///
+    /// # Errors
+    /// The number is none of the protocol's; [`Manifest::parse`] has excluded that.
+    pub fn stated_interpolation(&self) -> Result<Option<InterpolationCode>, UnknownInterpolation> {
+        self.interpolation
+            .map(|code| InterpolationCode::new(Some(code)))
+            .transpose()
+    }
+
+    fn check(&self) -> Result<(), ManifestError> {
+        let chars = self.name.chars().count();
+        require(
+            (1..=60).contains(&chars) && !self.name.chars().any(char::is_control),
+            "name",
+            "must have 1 to 60 characters and no control characters",
+        )?;
+        require(
+            !self.command.is_empty(),
+            "command",
+            "must name a program, e.g. [\"python3\", \"agent.py\"]",
+        )?;
+        require(
+            !self.command[0].is_empty(),
+            "command",
+            "must not start with an empty word",
+        )?;
+        require(
+            self.command.len() <= 64 && self.command.iter().all(|word| word.len() <= 4096),
+            "command",
+            "must have at most 64 words of at most 4096 bytes",
+        )?;
+        require(
+            !self.command.iter().any(|word| word.contains('\0')),
+            "command",
+            "must not contain NUL characters",
+        )?;
+        let runtime_ok = (1..=40).contains(&self.runtime.len())
+            && self
+                .runtime
+                .bytes()
+                .all(|b| b.is_ascii_alphanumeric() || b"._-".contains(&b));
+        require(
+            runtime_ok,
+            "runtime",
+            "must be a runtime's name: letters, digits, dots, dashes and underscores",
+        )?;
+        self.stated_interpolation()
+            .map_err(|unknown| ManifestError::Value {
+                key: "interpolation".to_owned(),
+                problem: format!(
+                    "is {}: expected 1, 2, 3, 4, 5 or -1; for whole trajectories leave it out \
+                     and answer hello with null",
+                    unknown.0
+                ),
+            })?;
+        require(
+            self.env.len() <= 64,
+            "env",
+            "must have at most 64 variables",
+        )?;
+        for (name, value) in &self.env {
+            let name_ok = name.len() <= 128
+                && name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
+                && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_');
+            let key: String = format!("env.{name}").chars().take(80).collect();
+            require(
+                name_ok,
+                &key,
+                "must be a name of letters, digits and underscores",
+            )?;
+            require(
+                value.len() <= 4096 && !value.contains('\0'),
+                &key,
+                "must have at most 4096 bytes and no NUL characters",
+            )?;
+        }
+        Ok(())
+    }
+}
+
+fn require(holds: bool, key: &str, problem: &str) -> Result<(), ManifestError> {
+    if holds {
+        Ok(())
+    } else {
+        Err(ManifestError::Value {
+            key: key.to_owned(),
+            problem: problem.to_owned(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GOOD: &str = r#"
+        name = "striker"
+        command = ["python3", "agent.py"]
+        runtime = "python3"
+        interpolation = 3
+        [env]
+        OMP_NUM_THREADS = "1"
+    "#;
+
+    #[test]
+    fn the_protocols_example_is_read() {
+        let manifest = Manifest::parse(GOOD).unwrap();
+        assert_eq!(manifest.name, "striker");
+        assert_eq!(manifest.command, ["python3", "agent.py"]);
+        assert_eq!(manifest.interpolation, Some(3));
+        assert_eq!(manifest.env["OMP_NUM_THREADS"], "1");
+        let again = Manifest::parse(&toml::to_string(&manifest).unwrap()).unwrap();
+        assert_eq!(again, manifest);
+    }
+
+    #[test]
+    fn a_refusal_names_the_key() {
+        for (from, to, needle) in [
+            ("name = \"striker\"", "", "missing field `name`"),
+            ("name = \"striker\"", "name = \"\"", "name must have"),
+            (
+                "[\"python3\", \"agent.py\"]",
+                "[]",
+                "command must name a program",
+            ),
+            (
+                "[\"python3\", \"agent.py\"]",
+                "\"python3 agent.py\"",
+                "expected a sequence",
+            ),
+            (
+                "runtime = \"python3\"",
+                "runtime = \"../x\"",
+                "runtime must be",
+            ),
+            (
+                "interpolation = 3",
+                "interpolation = 0",
+                "interpolation is 0: expected",
+            ),
+            (
+                "interpolation = 3",
+                "interpretation = 3",
+                "unknown field `interpretation`",
+            ),
+            ("OMP_NUM_THREADS", "\"A=B\"", "env.A=B must be a name"),
+        ] {
+            assert!(GOOD.contains(from), "{from}");
+            let message = Manifest::parse(&GOOD.replace(from, to))
+                .unwrap_err()
+                .to_string();
+            assert!(message.contains(needle), "{message:?} lacks {needle:?}");
+        }
+        assert!(Manifest::parse(&" ".repeat(70_000)).is_err());
+    }
+}

@@ -1,0 +1,301 @@
+use faceoff_types::AgentFaultKind;
+use faceoff_wire::{
+    InterpolationCode, MAX_LINE_BYTES,
+    answer::{parse_act, parse_ready, parse_reset_ready},
+};
+
+fn cubic() -> InterpolationCode {
+    InterpolationCode::new(Some(3)).unwrap()
+}
+
+fn row(value: &str) -> String {
+    format!("[{}]", [value; 7].join(","))
+}
+
+fn act(step: &str, action: &str) -> String {
+    format!("{{\"type\":\"act\",\"step\":{step},\"action\":{action}}}")
+}
+
+fn good() -> String {
+    act("4", &format!("[{},{}]", row("0.5"), row("-0")))
+}
+
+fn parse(line: &str) -> Result<Vec<f64>, AgentFaultKind> {
+    let mut action = vec![9.0; 3];
+    parse_act(line.as_bytes(), 4, cubic(), &mut action).map(|()| action)
+}
+
+#[track_caller]
+fn wrong_message(line: &str, expected_got: &str) {
+    match parse(line) {
+        Err(AgentFaultKind::WrongMessage { got, .. }) => assert_eq!(got, expected_got),
+        other => panic!("{line}: {other:?}"),
+    }
+}
+
+#[track_caller]
+fn wrong_shape(action: &str, expected_got: &str) {
+    match parse(&act("4", action)) {
+        Err(AgentFaultKind::WrongShape { expected, got }) => {
+            assert_eq!((expected.as_str(), got.as_str()), ("[2][7]", expected_got));
+        }
+        other => panic!("{action}: {other:?}"),
+    }
+}
+
+#[track_caller]
+fn not_json(line: &str, needle: &str) {
+    match parse(line) {
+        Err(AgentFaultKind::NotJson { detail }) => {
+            assert!(detail.contains(needle), "{detail:?} lacks {needle:?}");
+        }
+        other => panic!("{line}: {other:?}"),
+    }
+}
+
+#[test]
+fn an_action_is_read_row_major_with_its_bits() {
+    let action = parse(&good()).unwrap();
+    assert_eq!(action.len(), 14);
+    assert_eq!(action[..7], [0.5; 7]);
+    assert!(
+        action[7..]
+            .iter()
+            .all(|v| *v == 0.0 && v.is_sign_negative())
+    );
+}
+
+#[test]
+fn order_spaces_and_extra_fields_do_not_matter() {
+    let line = format!(
+        " {{ \"note\" : {{\"deep\":[[[1e999,\"NaN\"]]]}}, \"action\":[{},{}],\"x\":1,\"x\":2,\
+         \"step\":4,\"type\":\"a\\u0063t\"}} \r",
+        row("1"),
+        row("2e0"),
+    );
+    assert_eq!(parse(&line).unwrap()[6..8], [1.0, 2.0]);
+}
+
+#[test]
+fn every_shape_of_the_protocol_is_read() {
+    let nest = |n: usize, inner: &str| format!("[{}]", vec![inner; n].join(","));
+    for (code, text) in [
+        (Some(1), row("1")),
+        (Some(2), row("1")),
+        (Some(3), nest(2, &row("1"))),
+        (Some(4), nest(2, &row("1"))),
+        (Some(5), nest(3, &row("1"))),
+        (Some(-1), nest(2, &row("1"))),
+        (None, nest(20, &nest(3, &row("1")))),
+    ] {
+        let code = InterpolationCode::new(code).unwrap();
+        let mut action = Vec::new();
+        parse_act(act("0", &text).as_bytes(), 0, code, &mut action).unwrap();
+        assert_eq!(action.len(), code.action_len(), "{code}");
+    }
+}
+
+#[test]
+fn another_message_or_step_is_named() {
+    wrong_message(&good().replace("act", "ready"), "ready");
+    wrong_message(&good().replace("\"act\"", "7"), "an object whose type is 7");
+    wrong_message(
+        &good().replace("\"type\"", "\"kind\""),
+        "an object without type",
+    );
+    wrong_message(&good().replace(":4,", ":3,"), "act with step 3");
+    wrong_message(&good().replace(":4,", ":4.0,"), "act with step 4.0");
+    wrong_message(&good().replace(":4,", ":-1,"), "act with step -1");
+    wrong_message(&good().replace(":4,", ":[[4]],"), "act with step an array");
+    wrong_message(&good().replace("\"step\"", "\"Step\""), "act without step");
+    wrong_message("{\"type\":\"act\",\"step\":4}", "act without action");
+}
+
+#[test]
+fn another_shape_is_named() {
+    wrong_shape(&row("1"), "[7]");
+    wrong_shape(&format!("[{}]", row("1")), "[1][7]");
+    wrong_shape(&format!("[{0},{0},{0}]", row("1")), "[3][7]");
+    wrong_shape("[[1,2],[3,4]]", "[2][2]");
+    wrong_shape("[]", "[0]");
+    wrong_shape("3", "a number");
+    wrong_shape("null", "null");
+    wrong_shape(
+        &format!("[{},[1,2]]", row("1")),
+        "2 numbers or rows at action[1]",
+    );
+    wrong_shape(
+        &format!("[{},{}]", row("1"), row("\"1\"")),
+        "a string at action[1][0]",
+    );
+    wrong_shape(
+        &format!("[{},{}]", row("1"), row("[1]")),
+        "an array at action[1][0]",
+    );
+    wrong_shape(
+        &format!("[{},{}]", row("null"), row("1")),
+        "null at action[0][0]",
+    );
+}
+
+#[test]
+fn what_is_not_finite_is_refused_however_it_is_written() {
+    for word in [
+        "NaN",
+        "-Infinity",
+        "Infinity",
+        "1e999",
+        "-1e400",
+        "1e99999999999999999999",
+    ] {
+        let line = act("4", &format!("[{},{}]", row("0.1"), row(word)));
+        assert_eq!(parse(&line), Err(AgentFaultKind::NonFinite), "{word}");
+    }
+    assert_eq!(parse(&act("4", "NaN")), Err(AgentFaultKind::NonFinite));
+    // Tiny numbers are zero, huge integers are numbers.
+    let line = act(
+        "4",
+        &format!(
+            "[{},{}]",
+            row("1e-999"),
+            row("123456789012345678901234567890")
+        ),
+    );
+    assert_eq!(
+        parse(&line).unwrap()[6..8],
+        [0.0, 123_456_789_012_345_678_901_234_567_890.0]
+    );
+}
+
+#[test]
+fn rubbish_is_not_json() {
+    not_json("", "the line is empty");
+    not_json("   ", "the line is empty");
+    not_json("hello", "at character 1");
+    not_json("[1,2]", "expected an object");
+    not_json("null", "expected an object");
+    not_json("\"act\"", "expected an object");
+    not_json(&good()[..30], "EOF");
+    not_json(&format!("{}{}", good(), good()), "trailing characters");
+    not_json("{'type':'act'}", "key must be a string");
+    not_json("{\"type\":NaNsense}", "at character 9");
+    not_json("loss: NaN", "at character 1");
+    let mut action = Vec::new();
+    let fault = parse_act(b"{\"type\":\"\xff\"}", 0, cubic(), &mut action).unwrap_err();
+    assert_eq!(
+        fault,
+        AgentFaultKind::NotJson {
+            detail: "not UTF-8 after byte 9".into()
+        }
+    );
+}
+
+#[test]
+fn a_key_given_twice_is_refused() {
+    for key in ["type", "step", "action"] {
+        let line = good().replacen(
+            '{',
+            &format!(
+                "{{\"{key}\":{},",
+                match key {
+                    "type" => "\"act\"".to_owned(),
+                    "step" => "4".to_owned(),
+                    _ => format!("[{},{}]", row("1"), row("1")),
+                }
+            ),
+            1,
+        );
+        not_json(&line, &format!("the key \"{key}\" is given twice"));
+    }
+}
+
+#[test]
+fn a_line_over_64_kib_is_refused_and_one_of_64_kib_is_not() {
+    let pad = MAX_LINE_BYTES - good().len();
+    assert!(parse(&format!("{}{}", good(), " ".repeat(pad))).is_ok());
+    assert_eq!(
+        parse(&format!("{}{}", good(), " ".repeat(pad + 1))),
+        Err(AgentFaultKind::LineTooLong {
+            limit_bytes: 65_536
+        })
+    );
+}
+
+#[test]
+fn deep_nesting_does_not_exhaust_the_stack() {
+    let deep = MAX_LINE_BYTES - 200;
+    for opening in ["[", "{\"a\":"] {
+        let nested = opening.repeat(deep / opening.len());
+        for field in ["x", "type", "step", "action", "name"] {
+            let line = format!("{{\"{field}\":{nested}");
+            assert!(parse(&line).is_err(), "{field}");
+            assert!(parse_ready(line.as_bytes()).is_err(), "{field}");
+        }
+    }
+    let closed = format!("{}{}", "[".repeat(deep / 2), "]".repeat(deep / 2));
+    assert!(matches!(
+        parse(&act("4", &closed)),
+        Err(AgentFaultKind::WrongShape { .. })
+    ));
+    let ignored = good().replacen('{', &format!("{{\"x\":{closed},"), 1);
+    assert!(ignored.len() <= MAX_LINE_BYTES);
+    assert!(parse(&ignored).is_ok());
+}
+
+#[test]
+fn ready_answers_hello() {
+    let ready = |text: &str| parse_ready(text.as_bytes());
+    let full = r#"{"type":"ready","protocol":1,"interpolation":3,"name":"x","version":"2"}"#;
+    let parsed = ready(full).unwrap();
+    assert_eq!(parsed.interpolation, cubic());
+    assert_eq!(
+        (parsed.name.as_deref(), parsed.version.as_deref()),
+        (Some("x"), Some("2"))
+    );
+    let null = ready(r#"{"type":"ready","protocol":1,"interpolation":null,"name":7}"#).unwrap();
+    assert_eq!((null.interpolation.code(), null.name), (None, None));
+
+    for (line, expected_got) in [
+        (full.replace("ready", "act"), "act"),
+        (full.replace(":1,", ":2,"), "ready with protocol 2"),
+        (
+            full.replace("\"protocol\":1,", ""),
+            "ready without protocol",
+        ),
+        (
+            full.replace("\"interpolation\":3,", ""),
+            "ready without interpolation",
+        ),
+        (full.replace(":3,", ":7,"), "ready with interpolation 7"),
+        (
+            full.replace(":3,", ":\"3\","),
+            "ready with interpolation \"3\"",
+        ),
+    ] {
+        match ready(&line) {
+            Err(AgentFaultKind::WrongMessage { got, .. }) => assert_eq!(got, expected_got),
+            other => panic!("{line}: {other:?}"),
+        }
+    }
+}
+
+#[test]
+fn ready_answers_reset_with_its_episode() {
+    assert_eq!(
+        parse_reset_ready(br#"{"type":"ready","episode":17}"#, 17),
+        Ok(())
+    );
+    let got = |line: &str| match parse_reset_ready(line.as_bytes(), 17) {
+        Err(AgentFaultKind::WrongMessage { expected, got }) => {
+            assert_eq!(expected, "ready with episode 17");
+            got
+        }
+        other => panic!("{line}: {other:?}"),
+    };
+    assert_eq!(
+        got(r#"{"type":"ready","episode":16}"#),
+        "ready with episode 16"
+    );
+    assert_eq!(got(r#"{"type":"ready"}"#), "ready without episode");
+    assert_eq!(got(&good()), "act");
+}

@@ -1,0 +1,103 @@
+use faceoff_wire::{
+    InterpolationCode, Message,
+    answer::{parse_act, parse_ready, parse_reset_ready},
+    quote_line,
+};
+use proptest::prelude::*;
+
+fn interpolation() -> impl Strategy<Value = InterpolationCode> {
+    prop::sample::select(vec![
+        Some(1),
+        Some(2),
+        Some(3),
+        Some(4),
+        Some(5),
+        Some(-1),
+        None,
+    ])
+    .prop_map(|code| InterpolationCode::new(code).expect("a code of the protocol"))
+}
+
+fn finite() -> impl Strategy<Value = f64> {
+    any::<u64>()
+        .prop_map(f64::from_bits)
+        .prop_filter("finite", |value| value.is_finite())
+}
+
+/// The line of an action, as serde_json writes nested arrays.
+fn act_line(step: u32, shape: &[usize], values: &[f64]) -> String {
+    fn nest(shape: &[usize], values: &mut std::slice::Iter<'_, f64>) -> serde_json::Value {
+        match shape.split_first() {
+            None => (*values.next().expect("enough values")).into(),
+            Some((len, inner)) => (0..*len).map(|_| nest(inner, values)).collect(),
+        }
+    }
+    let action = nest(shape, &mut values.iter());
+    serde_json::json!({"type": "act", "step": step, "action": action}).to_string()
+}
+
+proptest! {
+    #[test]
+    fn actions_round_trip_bit_for_bit(
+        code in interpolation(),
+        step in any::<u32>(),
+        pool in prop::collection::vec(finite(), 420),
+    ) {
+        let values = &pool[..code.action_len()];
+        let mut action = Vec::new();
+        parse_act(act_line(step, code.shape(), values).as_bytes(), step, code, &mut action).unwrap();
+        prop_assert_eq!(
+            action.iter().map(|v| v.to_bits()).collect::<Vec<_>>(),
+            values.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
+        );
+    }
+
+    #[test]
+    fn observations_round_trip_bit_for_bit(
+        step in any::<u32>(), obs in prop::collection::vec(finite(), 0..24)
+    ) {
+        let mut line = Vec::new();
+        Message::step(step, &obs).write_line(&mut line);
+        prop_assert_eq!(line.iter().filter(|byte| **byte == b'\n').count(), 1);
+        let Message::Step { step: back, obs: read } = serde_json::from_slice(&line).unwrap() else {
+            return Err(TestCaseError::fail("not a step"));
+        };
+        prop_assert_eq!(back, step);
+        prop_assert_eq!(
+            read.iter().map(|v| v.to_bits()).collect::<Vec<_>>(),
+            obs.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
+        );
+    }
+
+    #[test]
+    fn any_bytes_are_survived(
+        bytes in prop::collection::vec(any::<u8>(), 0..300), code in interpolation()
+    ) {
+        let mut action = Vec::new();
+        prop_assert!(parse_act(&bytes, 0, code, &mut action).is_err());
+        let _ = parse_ready(&bytes);
+        let _ = parse_reset_ready(&bytes, 0);
+        prop_assert!(quote_line(&bytes).chars().count() <= 400);
+    }
+
+    /// A good line with one piece cut out or overwritten either still parses to a whole, finite
+    /// action or is refused; nothing in between.
+    #[test]
+    fn damaged_lines_give_a_whole_action_or_a_fault(
+        code in interpolation(),
+        pool in prop::collection::vec(-10.0..10.0f64, 420),
+        at in any::<prop::sample::Index>(),
+        len in 0..20usize,
+        insert in "[\\[\\]{}\",:0-9eE.NaInfity\\\\ -]{0,8}",
+    ) {
+        let mut line = act_line(5, code.shape(), &pool[..code.action_len()]);
+        let start = at.index(line.len());
+        let end = (start + len).min(line.len());
+        line.replace_range(start..end, &insert);
+        let mut action = Vec::new();
+        if parse_act(line.as_bytes(), 5, code, &mut action).is_ok() {
+            prop_assert_eq!(action.len(), code.action_len());
+            prop_assert!(action.iter().all(|value| value.is_finite()));
+        }
+    }
+}

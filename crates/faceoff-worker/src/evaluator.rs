@@ -1,0 +1,78 @@
+use faceoff_runner::{
+    AgentEnvironment, EvaluationMeta, Observer, PlatformFault, ShardReport, ShardSpec, SmokeReport,
+    bundle::{self, Bundle, BundleError, BundleLimits},
+};
+use faceoff_types::EvaluationResult;
+use std::path::{Path, PathBuf};
+
+/// What a slot does with its units. One implementation, the runner; tests put faults of ours in its
+/// place, which cannot be had from a healthy machine.
+pub(crate) trait Evaluator: Send + Sync {
+    /// Unpacks an uploaded archive.
+    fn unpack(
+        &self,
+        archive: &Path,
+        into: &Path,
+        limits: &BundleLimits,
+    ) -> Result<Bundle, BundleError>;
+
+    /// Does the agent start, answer and keep time?
+    fn smoke(&self, bundle: &Bundle, env: &AgentEnvironment) -> Result<SmokeReport, PlatformFault>;
+
+    /// Plays a shard; its recording is left in `out`.
+    fn play(
+        &self,
+        spec: &ShardSpec,
+        bundle: &Bundle,
+        env: &AgentEnvironment,
+        out: &Path,
+        observer: &mut dyn Observer,
+    ) -> Result<ShardReport, PlatformFault>;
+
+    /// Joins recordings into a dataset and scores them.
+    fn assemble(
+        &self,
+        meta: &EvaluationMeta,
+        recordings: &[PathBuf],
+        archive: &Path,
+    ) -> Result<EvaluationResult, PlatformFault>;
+}
+
+/// The evaluator that `faceoff eval` runs, too.
+#[derive(Debug)]
+pub(crate) struct Runner;
+
+impl Evaluator for Runner {
+    fn unpack(
+        &self,
+        archive: &Path,
+        into: &Path,
+        limits: &BundleLimits,
+    ) -> Result<Bundle, BundleError> {
+        bundle::unpack(archive, into, limits)
+    }
+
+    fn smoke(&self, bundle: &Bundle, env: &AgentEnvironment) -> Result<SmokeReport, PlatformFault> {
+        faceoff_runner::smoke(bundle, env)
+    }
+
+    fn play(
+        &self,
+        spec: &ShardSpec,
+        bundle: &Bundle,
+        env: &AgentEnvironment,
+        out: &Path,
+        observer: &mut dyn Observer,
+    ) -> Result<ShardReport, PlatformFault> {
+        faceoff_runner::run_shard(spec, bundle, env, out, observer)
+    }
+
+    fn assemble(
+        &self,
+        meta: &EvaluationMeta,
+        recordings: &[PathBuf],
+        archive: &Path,
+    ) -> Result<EvaluationResult, PlatformFault> {
+        faceoff_runner::assemble(meta, recordings, archive)
+    }
+}

@@ -1,0 +1,101 @@
+use crate::clock::Clock;
+use anyhow::Context as _;
+use faceoff_store::{EvaluationPlan, Store};
+use jiff::{Timestamp, civil::Time, tz::TimeZone};
+use std::time::Duration;
+use tokio_util::sync::CancellationToken;
+
+/// The longest sleep: a machine's clock may be set, or the machine suspended, while we wait.
+const LONGEST_SLEEP: Duration = Duration::from_secs(60);
+
+/// Starts the evaluations of each UTC day once, at `at`, until `shutdown` is cancelled. A day whose
+/// time passed while the server was down is started when it comes up, the same day still. A failing
+/// database is tried again every minute.
+pub async fn run_schedule(
+    store: Store,
+    plan: EvaluationPlan,
+    at: Time,
+    shutdown: CancellationToken,
+) -> anyhow::Result<()> {
+    let clock = Clock::system();
+    loop {
+        let now = clock.now();
+        let wait = match until_next(now, at).context("reckoning the time of the daily start")? {
+            Due::In(wait) => wait,
+            Due::Today { next } => match store.start_scheduled_day(&plan, now).await {
+                Ok(Some(started)) => {
+                    tracing::info!(evaluations = started.len(), "the day was started");
+                    next
+                }
+                Ok(None) => next,
+                Err(error) => {
+                    tracing::error!(%error, "the day could not be started; trying again");
+                    LONGEST_SLEEP
+                }
+            },
+        };
+        tokio::select! {
+            () = shutdown.cancelled() => return Ok(()),
+            () = tokio::time::sleep(wait.min(LONGEST_SLEEP)) => {}
+        }
+    }
+}
+
+/// How the day stands.
+#[derive(Debug, PartialEq, Eq)]
+enum Due {
+    /// Today's time has not come.
+    In(Duration),
+    /// Today's time has come; `next` is the way to tomorrow's.
+    Today { next: Duration },
+}
+
+fn until_next(now: Timestamp, at: Time) -> Result<Due, jiff::Error> {
+    let day = now.to_zoned(TimeZone::UTC).date();
+    let start = |day: jiff::civil::Date| day.to_datetime(at).to_zoned(TimeZone::UTC);
+    let wait = |until: jiff::Zoned| {
+        Duration::try_from(until.timestamp().duration_since(now)).unwrap_or(Duration::ZERO)
+    };
+    let today = start(day)?;
+    if now < today.timestamp() {
+        Ok(Due::In(wait(today)))
+    } else {
+        Ok(Due::Today {
+            next: wait(start(day.tomorrow()?)?),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn due(now: &str, at: &str) -> Due {
+        until_next(now.parse().unwrap(), at.parse().unwrap()).unwrap()
+    }
+
+    #[test]
+    fn a_day_is_due_from_its_time_on() {
+        assert_eq!(
+            due("2026-03-01T05:59:59Z", "06:00"),
+            Due::In(Duration::from_secs(1))
+        );
+        let day = Duration::from_secs(86_400);
+        assert_eq!(
+            due("2026-03-01T06:00:00Z", "06:00"),
+            Due::Today { next: day }
+        );
+        let hours = Duration::from_secs(7 * 3600);
+        assert_eq!(
+            due("2026-03-01T23:00:00Z", "06:00"),
+            Due::Today { next: hours }
+        );
+        // another zone's wall clock is no matter
+        assert_eq!(
+            due("2026-03-01T00:30:00+01:00", "00:00"),
+            Due::Today {
+                next: Duration::from_secs(1800)
+            }
+        );
+    }
+}

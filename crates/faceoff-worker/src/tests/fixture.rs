@@ -1,0 +1,316 @@
+//! The scripted evaluator and a server around it.
+
+use crate::{
+    clock::Clock,
+    evaluator::Evaluator,
+    service::{Pace, WorkerConfig, run_with},
+};
+use faceoff_runner::{
+    AgentEnvironment, EvaluationMeta, Observer, PlatformFault, ShardReport, ShardSpec, SmokeReport,
+    TimeLimits,
+    bundle::{Bundle, BundleError, BundleLimits},
+};
+use faceoff_sandbox::{Isolation, Limits};
+use faceoff_store::*;
+use faceoff_types::*;
+use jiff::{SignedDuration, Timestamp};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicI64, Ordering},
+    },
+    time::Duration,
+};
+use tokio::task::JoinHandle;
+use tokio_util::sync::CancellationToken;
+
+pub(super) type Play =
+    dyn Fn(&ShardSpec, &mut dyn Observer) -> Result<(), PlatformFault> + Send + Sync;
+
+/// Plays by a test's closure; records which episodes were played and what was assembled.
+pub(super) struct Scripted {
+    play: Box<Play>,
+    pub(super) played: Mutex<Vec<(Task, u32)>>,
+    pub(super) assembled: Mutex<Vec<String>>,
+}
+
+impl Scripted {
+    pub(super) fn new(
+        play: impl Fn(&ShardSpec, &mut dyn Observer) -> Result<(), PlatformFault>
+        + Send
+        + Sync
+        + 'static,
+    ) -> Arc<Self> {
+        Arc::new(Self {
+            play: Box::new(play),
+            played: Mutex::default(),
+            assembled: Mutex::default(),
+        })
+    }
+}
+
+pub(super) fn outcome(task: Task, episode: u32) -> EpisodeOutcome {
+    EpisodeOutcome {
+        task,
+        episode,
+        steps: 1,
+        end: EpisodeEnd::Horizon,
+        success: true,
+        violations: Violations::default(),
+        computation_time: ComputationTime::default(),
+        fault: None,
+    }
+}
+
+impl Evaluator for Scripted {
+    fn unpack(
+        &self,
+        archive: &Path,
+        into: &Path,
+        _limits: &BundleLimits,
+    ) -> Result<Bundle, BundleError> {
+        if std::fs::read(archive).unwrap() != b"archive" {
+            return Err(BundleError::Invalid("agent.toml is missing".into()));
+        }
+        let manifest = faceoff_wire::Manifest {
+            name: "scripted".into(),
+            command: vec!["./agent".into()],
+            runtime: "native".into(),
+            interpolation: None,
+            env: BTreeMap::new(),
+        };
+        Ok(Bundle {
+            dir: into.to_owned(),
+            manifest,
+        })
+    }
+
+    fn smoke(&self, _: &Bundle, _: &AgentEnvironment) -> Result<SmokeReport, PlatformFault> {
+        Ok(SmokeReport {
+            fault: None,
+            log: "smoke\n".into(),
+        })
+    }
+
+    fn play(
+        &self,
+        spec: &ShardSpec,
+        _bundle: &Bundle,
+        _env: &AgentEnvironment,
+        out: &Path,
+        observer: &mut dyn Observer,
+    ) -> Result<ShardReport, PlatformFault> {
+        (self.play)(spec, observer)?;
+        self.played
+            .lock()
+            .unwrap()
+            .push((spec.task, spec.episodes.start));
+        std::fs::write(
+            out.join("steps.parquet"),
+            format!("{} {}", spec.task, spec.episodes.start),
+        )
+        .unwrap();
+        let outcomes = spec
+            .episodes
+            .clone()
+            .map(|episode| outcome(spec.task, episode))
+            .collect();
+        Ok(ShardReport {
+            outcomes,
+            log: String::new(),
+            stopped_by_faults: false,
+        })
+    }
+
+    fn assemble(
+        &self,
+        meta: &EvaluationMeta,
+        recordings: &[PathBuf],
+        archive: &Path,
+    ) -> Result<EvaluationResult, PlatformFault> {
+        let parts = recordings
+            .iter()
+            .map(|folder| std::fs::read_to_string(folder.join("steps.parquet")).unwrap())
+            .collect::<Vec<_>>();
+        std::fs::write(archive, parts.join("\n")).unwrap();
+        *self.assembled.lock().unwrap() = parts;
+        Ok(EvaluationResult {
+            ruleset: meta.ruleset.clone(),
+            profile: meta.profile,
+            seed: meta.seed,
+            tasks: BTreeMap::new(),
+            score: 50.0,
+            penalty_points: 0.0,
+            tier: Tier::Deployable,
+        })
+    }
+}
+
+/// A store with one team's valid submission, and a clock that tests turn forward.
+pub(super) struct Server {
+    pub(super) store: Store,
+    pub(super) folder: tempfile::TempDir,
+    pub(super) ahead_s: Arc<AtomicI64>,
+}
+
+pub(super) const LEASE_S: u32 = 30;
+
+impl Server {
+    pub(super) async fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(folder.path()).await.unwrap();
+        Self {
+            store,
+            folder,
+            ahead_s: Arc::default(),
+        }
+    }
+
+    pub(super) fn clock(&self) -> Clock {
+        let ahead_s = Arc::clone(&self.ahead_s);
+        Clock::of(move || {
+            Timestamp::now() + SignedDuration::from_secs(ahead_s.load(Ordering::SeqCst))
+        })
+    }
+
+    pub(super) fn now(&self) -> Timestamp {
+        self.clock().now()
+    }
+
+    pub(super) async fn upload(&self, team: &str, content: &[u8]) -> Submission {
+        let archive = self.folder.path().join("upload");
+        std::fs::write(&archive, content).unwrap();
+        self.store
+            .artifacts()
+            .put_file(&format!("bundles/{team}"), &archive)
+            .await
+            .unwrap();
+        let bundle = BundleRef {
+            key: format!("bundles/{team}"),
+            bytes: content.len() as u64,
+            blake3: blake3::hash(content).to_string(),
+            file_name: "agent.tar.gz".into(),
+        };
+        let token_hash = *blake3::hash(team.as_bytes()).as_bytes();
+        let now = self.now();
+        let team = self
+            .store
+            .create_team(&team.parse().unwrap(), token_hash, now)
+            .await
+            .unwrap();
+        self.store
+            .create_submission(team.id, bundle, now)
+            .await
+            .unwrap()
+    }
+
+    /// An evaluation of six shards, all of them queued.
+    pub(super) async fn evaluation(&self) -> EvaluationId {
+        let submission = self.upload("Alpha", b"archive").await;
+        let Some(Work::Smoke { claim, .. }) =
+            self.store.claim("test", LEASE_S, self.now()).await.unwrap()
+        else {
+            panic!("a smoke run is queued")
+        };
+        let outcome = SmokeOutcome::Valid {
+            agent_name: "scripted".into(),
+            log: String::new(),
+        };
+        self.store
+            .commit_smoke(&claim, outcome, self.now())
+            .await
+            .unwrap();
+        let plan = EvaluationPlan {
+            profile: Profile::Evaluation,
+            tasks: Task::ALL.to_vec(),
+            episodes_per_task: 4,
+            episodes_per_shard: 2,
+            max_faults: 10,
+        };
+        self.store
+            .create_evaluation(submission.id, &plan, self.now())
+            .await
+            .unwrap()
+            .id
+    }
+
+    pub(super) fn work(&self, slots: usize, evaluator: &Arc<Scripted>) -> Running {
+        let config = WorkerConfig {
+            slots,
+            lease_s: LEASE_S,
+            scratch_dir: self.folder.path().join("scratch"),
+            agent: AgentEnvironment {
+                limits: limits(),
+                time: TimeLimits {
+                    startup_s: 1.0,
+                    reset_s: 1.0,
+                    step_s: 1.0,
+                    bye_s: 1.0,
+                },
+                isolation: Isolation::None,
+                runtimes: BTreeMap::new(),
+                agent_cpus: vec![0],
+            },
+            bundle_limits: BundleLimits {
+                packed_bytes: 1,
+                unpacked_bytes: 1,
+                files: 1,
+            },
+        };
+        let pace = Pace {
+            clock: self.clock(),
+            poll: Duration::from_millis(20),
+            tidy_every: Duration::from_millis(20),
+            ..Pace::default()
+        };
+        let shutdown = CancellationToken::new();
+        let evaluator = Arc::clone(evaluator) as Arc<dyn Evaluator>;
+        let task = tokio::spawn(run_with(
+            self.store.clone(),
+            config,
+            shutdown.clone(),
+            evaluator,
+            pace,
+        ));
+        Running { shutdown, task }
+    }
+
+    /// Waits for an evaluation's end by the store's events.
+    pub(super) async fn over(&self, id: EvaluationId) -> EvaluationState {
+        let mut events = self.store.events();
+        loop {
+            let state = self.store.evaluation(id).await.unwrap().state;
+            if state.is_over() {
+                return state;
+            }
+            // a lagging receiver has missed something: look again
+            let _ = events.recv().await;
+        }
+    }
+}
+
+pub(super) fn limits() -> Limits {
+    Limits {
+        memory_bytes: 1 << 30,
+        pids: 64,
+        scratch_bytes: 1 << 20,
+        open_files: 64,
+        file_size_bytes: 1 << 20,
+        cpus: 1.0,
+        stderr_tail_bytes: 1 << 16,
+    }
+}
+
+pub(super) struct Running {
+    pub(super) shutdown: CancellationToken,
+    pub(super) task: JoinHandle<anyhow::Result<()>>,
+}
+
+impl Running {
+    pub(super) async fn stop(self) {
+        self.shutdown.cancel();
+        self.task.await.unwrap().unwrap();
+    }
+}

@@ -1,0 +1,176 @@
+//! Shutdowns, lost leases, cancelled evaluations and successors.
+
+use super::fixture::*;
+use faceoff_runner::PlatformFault;
+use faceoff_store::*;
+use std::sync::{Arc, Mutex, atomic::Ordering};
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_shutdown_gives_the_unit_back_and_the_next_worker_finishes() {
+    let server = Server::new().await;
+    let id = server.evaluation().await;
+    let (begun, mut begins) = tokio::sync::mpsc::unbounded_channel();
+    let hanging = Scripted::new(move |_, observer| {
+        begun.send(()).unwrap();
+        while !observer.cancelled() {
+            std::thread::yield_now();
+        }
+        Err(PlatformFault::Cancelled)
+    });
+    let running = server.work(2, &hanging);
+    begins.recv().await.unwrap();
+    begins.recv().await.unwrap();
+    running.stop().await;
+    assert!(hanging.played.lock().unwrap().is_empty());
+
+    let healthy = Scripted::new(|_, _| Ok(()));
+    let running = server.work(1, &healthy);
+    assert!(matches!(
+        server.over(id).await,
+        EvaluationState::Finished { .. }
+    ));
+    assert_eq!(healthy.played.lock().unwrap().len(), 6);
+    running.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_cancelled_evaluation_stops_its_slots() {
+    let server = Server::new().await;
+    let id = server.evaluation().await;
+    let (begun, mut begins) = tokio::sync::mpsc::unbounded_channel();
+    let (stopped, mut stops) = tokio::sync::mpsc::unbounded_channel();
+    let hanging = Scripted::new(move |spec, observer| {
+        // progress makes the next look at the lease a matter of a second
+        observer.episode_done(&outcome(spec.task, spec.episodes.start));
+        begun.send(()).unwrap();
+        while !observer.cancelled() {
+            std::thread::yield_now();
+        }
+        stopped.send(()).unwrap();
+        Err(PlatformFault::Cancelled)
+    });
+    let running = server.work(1, &hanging);
+    begins.recv().await.unwrap();
+    server
+        .store
+        .cancel_evaluation(id, "rain", server.now())
+        .await
+        .unwrap();
+    stops.recv().await.unwrap();
+    running.stop().await;
+    assert!(matches!(
+        server.over(id).await,
+        EvaluationState::Cancelled { .. }
+    ));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn what_was_played_under_a_lost_lease_is_thrown_away() {
+    let server = Server::new().await;
+    let id = server.evaluation().await;
+    let (handle, clock) = (tokio::runtime::Handle::current(), server.clock());
+    let (store, ahead_s) = (server.store.clone(), Arc::clone(&server.ahead_s));
+    let stolen = Arc::new(Mutex::new(None));
+    let thief = Arc::clone(&stolen);
+    let evaluator = Scripted::new(move |spec, _| {
+        if thief.lock().unwrap().is_none() {
+            // the slot stalls until its lease is over, and another worker takes and plays the shard
+            ahead_s.fetch_add(i64::from(LEASE_S) + 1, Ordering::SeqCst);
+            let work = handle
+                .block_on(store.claim("thief", LEASE_S, clock.now()))
+                .unwrap();
+            let Some(Work::Shard { claim, shard, .. }) = work else {
+                panic!("{work:?}")
+            };
+            assert_eq!(
+                (shard.task, shard.first_episode),
+                (spec.task, spec.episodes.start)
+            );
+            *thief.lock().unwrap() = Some(claim);
+        }
+        Ok(())
+    });
+    let running = server.work(1, &evaluator);
+    let mut events = server.store.events();
+    while evaluator.played.lock().unwrap().len() < 6 {
+        let _ = events.recv().await;
+    }
+    let claim = stolen.lock().unwrap().clone().unwrap();
+    let scratch = tempfile::tempdir().unwrap();
+    std::fs::write(scratch.path().join("steps.parquet"), "by the thief").unwrap();
+    let recording = claim.recording_key(id);
+    server
+        .store
+        .artifacts()
+        .put_folder(&recording, scratch.path())
+        .await
+        .unwrap();
+    let recordings = server
+        .folder
+        .path()
+        .join("artifacts/recordings")
+        .join(id.to_string());
+    let of_the_shard = std::fs::read_dir(recordings.join(claim.unit.to_string())).unwrap();
+    assert_eq!(
+        of_the_shard.count(),
+        1,
+        "the stalled slot has removed its own"
+    );
+    let shard = server.store.shards(id).await.unwrap().remove(0);
+    let outcomes = (0..2).map(|episode| outcome(shard.task, episode)).collect();
+    let commit = ShardCommit {
+        outcomes,
+        log: String::new(),
+        stopped_by_faults: false,
+        recording,
+    };
+    let committed = server
+        .store
+        .commit_shard(&claim, commit, server.now())
+        .await
+        .unwrap();
+    assert_eq!(committed, Committed::Now);
+    assert!(matches!(
+        server.over(id).await,
+        EvaluationState::Finished { .. }
+    ));
+    assert_eq!(evaluator.assembled.lock().unwrap()[0], "by the thief");
+    running.stop().await;
+    server
+        .store
+        .remove_old_recordings(server.now())
+        .await
+        .unwrap();
+    assert!(!recordings.exists() || std::fs::read_dir(&recordings).unwrap().next().is_none());
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_new_life_takes_over_what_the_last_one_held() {
+    let server = Server::new().await;
+    let id = server.evaluation().await;
+    // a life that ended without a word: its scratch folder tells who it was
+    let scratch = crate::scratch::Scratch::take(&server.folder.path().join("scratch")).unwrap();
+    let worker = format!("{}/slot-0", scratch.worker());
+    server
+        .store
+        .claim(&worker, 100_000, server.now())
+        .await
+        .unwrap()
+        .unwrap();
+    drop(scratch);
+    let running = server.work(1, &Scripted::new(|_, _| Ok(())));
+    assert!(matches!(
+        server.over(id).await,
+        EvaluationState::Finished { .. }
+    ));
+    running.stop().await;
+}
+
+#[tokio::test]
+async fn two_processes_cannot_share_a_scratch_folder() {
+    let server = Server::new().await;
+    let _other = crate::scratch::Scratch::take(&server.folder.path().join("scratch")).unwrap();
+    let running = server.work(1, &Scripted::new(|_, _| Ok(())));
+    let error = running.task.await.unwrap().unwrap_err();
+    assert!(error.to_string().contains("another process"), "{error}");
+}

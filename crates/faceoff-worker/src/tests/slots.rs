@@ -1,0 +1,195 @@
+//! Units from claim to commit, and faults of ours.
+
+use super::fixture::*;
+use faceoff_runner::PlatformFault;
+use faceoff_store::*;
+use faceoff_types::*;
+use std::sync::{
+    Arc,
+    atomic::{AtomicU32, Ordering},
+};
+use tokio_util::sync::CancellationToken;
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn slots_play_every_shard_once_and_publish_the_dataset() {
+    let server = Server::new().await;
+    let id = server.evaluation().await;
+    let evaluator = Scripted::new(|spec, observer| {
+        for episode in spec.episodes.clone() {
+            observer.episode_done(&outcome(spec.task, episode));
+        }
+        Ok(())
+    });
+    let running = server.work(3, &evaluator);
+    let EvaluationState::Finished {
+        result, dataset, ..
+    } = server.over(id).await
+    else {
+        panic!("it finishes")
+    };
+    let mut played = evaluator.played.lock().unwrap().clone();
+    played.sort_unstable();
+    let all: Vec<_> = Task::ALL
+        .into_iter()
+        .flat_map(|task| [(task, 0), (task, 2)])
+        .collect();
+    assert_eq!(played, all);
+    let in_order: Vec<_> = all
+        .iter()
+        .map(|(task, first)| format!("{task} {first}"))
+        .collect();
+    assert_eq!(
+        *evaluator.assembled.lock().unwrap(),
+        in_order,
+        "recordings in order of play"
+    );
+    let file = server.folder.path().join("dataset");
+    server
+        .store
+        .artifacts()
+        .get_to_file(&dataset, &file)
+        .await
+        .unwrap();
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), in_order.join("\n"));
+    let season = server.store.season().await.unwrap();
+    let day = server.store.evaluation(id).await.unwrap().day;
+    assert_eq!(result.seed, season.secret.day(day));
+    running.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn an_upload_is_checked_by_an_idle_worker() {
+    let server = Server::new().await;
+    let running = server.work(1, &Scripted::new(|_, _| Ok(())));
+    let mut events = server.store.events();
+    let good = server.upload("Alpha", b"archive").await.id;
+    let bad = server.upload("Beta", b"no archive").await.id;
+    let state = async |id, events: &mut tokio::sync::broadcast::Receiver<Event>| loop {
+        let state = server.store.submission(id).await.unwrap().state;
+        if state.is_settled() {
+            break state;
+        }
+        let _ = events.recv().await;
+    };
+    assert_eq!(
+        state(good, &mut events).await,
+        SubmissionState::Valid {
+            log: "smoke\n".into()
+        }
+    );
+    let reason = "agent.toml is missing".to_owned();
+    let invalid = SubmissionState::Invalid {
+        reason,
+        log: String::new(),
+    };
+    assert_eq!(state(bad, &mut events).await, invalid);
+    running.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_panic_and_a_fault_of_ours_cost_nothing_but_time() {
+    let server = Server::new().await;
+    let id = server.evaluation().await;
+    let (calls, ahead_s) = (AtomicU32::new(0), Arc::clone(&server.ahead_s));
+    let evaluator = Scripted::new(move |_, _| {
+        match calls.fetch_add(1, Ordering::SeqCst) {
+            0 => panic!("a defect of ours"),
+            1 => {
+                let source = std::io::Error::other("disk full");
+                Err(PlatformFault::Io {
+                    what: "writing".into(),
+                    source,
+                })
+            }
+            // the pause after a failure passes
+            _ => {
+                ahead_s.fetch_add(10, Ordering::SeqCst);
+                Ok(())
+            }
+        }
+    });
+    let running = server.work(1, &evaluator);
+    assert!(matches!(
+        server.over(id).await,
+        EvaluationState::Finished { .. }
+    ));
+    assert_eq!(evaluator.played.lock().unwrap().len(), 6);
+    running.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_lasting_fault_of_ours_gives_the_turn_back() {
+    let server = Server::new().await;
+    let id = server.evaluation().await;
+    let ahead_s = Arc::clone(&server.ahead_s);
+    let evaluator = Scripted::new(move |_, _| {
+        ahead_s.fetch_add(61, Ordering::SeqCst);
+        Err(PlatformFault::Recording("no space left".into()))
+    });
+    let running = server.work(1, &evaluator);
+    let state = server.over(id).await;
+    let EvaluationState::PlatformFailed { reason, .. } = &state else {
+        panic!("{state:?}")
+    };
+    assert!(
+        reason.starts_with("the recording could not be made"),
+        "{reason}"
+    );
+    assert!(
+        !reason.contains("no space left"),
+        "the cause is for the log: {reason}"
+    );
+    assert!(!state.takes_turn());
+    running.stop().await;
+}
+
+#[tokio::test]
+async fn the_schedule_starts_a_missed_day_once() {
+    let server = Server::new().await;
+    let submission = server.upload("Alpha", b"archive").await;
+    let work = server
+        .store
+        .claim("test", LEASE_S, server.now())
+        .await
+        .unwrap()
+        .unwrap();
+    let outcome = SmokeOutcome::Valid {
+        agent_name: "a".into(),
+        log: String::new(),
+    };
+    server
+        .store
+        .commit_smoke(work.claim(), outcome, server.now())
+        .await
+        .unwrap();
+    let plan = EvaluationPlan {
+        profile: Profile::Ideal,
+        tasks: vec![Task::Hit],
+        episodes_per_task: 1,
+        episodes_per_shard: 1,
+        max_faults: 0,
+    };
+    for _ in 0..2 {
+        let mut events = server.store.events();
+        let shutdown = CancellationToken::new();
+        let at = jiff::civil::Time::midnight();
+        let schedule =
+            crate::run_schedule(server.store.clone(), plan.clone(), at, shutdown.clone());
+        let schedule = tokio::spawn(schedule);
+        if server.store.last_scheduled_day().await.unwrap().is_none() {
+            let event = events.recv().await.unwrap();
+            assert!(matches!(event, Event::Evaluation(_)));
+        }
+        shutdown.cancel();
+        schedule.await.unwrap().unwrap();
+        assert_eq!(
+            server
+                .store
+                .evaluations_of(submission.team)
+                .await
+                .unwrap()
+                .len(),
+            1
+        );
+    }
+}

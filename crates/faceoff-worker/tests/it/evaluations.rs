@@ -1,0 +1,146 @@
+use crate::server::Server;
+use faceoff_store::*;
+use faceoff_types::*;
+use jiff::Timestamp;
+
+pub fn plan(episodes_per_shard: u32) -> EvaluationPlan {
+    EvaluationPlan {
+        profile: Profile::Evaluation,
+        tasks: Task::ALL.to_vec(),
+        episodes_per_task: 2,
+        episodes_per_shard,
+        max_faults: 2,
+    }
+}
+
+/// What must not depend on how the work was shared out: all but the measured times.
+pub fn without_times(mut outcomes: Vec<EpisodeOutcome>) -> Vec<EpisodeOutcome> {
+    for outcome in &mut outcomes {
+        outcome.computation_time = ComputationTime::default();
+    }
+    outcomes
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn two_teams_meet_the_same_episodes_however_the_work_is_shared_out() {
+    let server = Server::new().await;
+    let worker = server.work(2);
+    let mut evaluations = Vec::new();
+    for (team, episodes_per_shard) in [("Alpha", 1), ("Beta", 2)] {
+        let submission = server.upload(team, "").await;
+        let state = server.settled(submission).await;
+        let SubmissionState::Valid { log } = &state else {
+            panic!("{state:?}")
+        };
+        assert!(log.contains("an agent's log"), "{log}");
+        let now = Timestamp::now();
+        let evaluation = server
+            .store
+            .create_evaluation(submission, &plan(episodes_per_shard), now)
+            .await
+            .unwrap();
+        evaluations.push(evaluation.id);
+    }
+    let mut outcomes = Vec::new();
+    for id in evaluations {
+        let state = server.over(id).await;
+        let EvaluationState::Finished {
+            result, dataset, ..
+        } = state
+        else {
+            panic!("{state:?}")
+        };
+        assert_eq!(result.tasks.len(), 3);
+        assert!(
+            result
+                .tasks
+                .values()
+                .all(|task| task.episodes == 2 && task.steps > 0)
+        );
+        let archive = server.path().join("dataset.zip");
+        server
+            .store
+            .artifacts()
+            .get_to_file(&dataset, &archive)
+            .await
+            .unwrap();
+        assert!(std::fs::read(&archive).unwrap().starts_with(b"PK"));
+        outcomes.push(without_times(server.store.outcomes(id).await.unwrap()));
+    }
+    assert_eq!(outcomes[0], outcomes[1]);
+    assert_eq!(server.store.board().await.unwrap().len(), 2);
+    worker.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn an_agent_that_breaks_off_is_told_why() {
+    let server = Server::new().await;
+    let worker = server.work(1);
+    let broken = server.upload("Broken", "FAULTY_FROM = \"0\"").await;
+    let state = server.settled(broken).await;
+    let SubmissionState::Invalid { reason, log } = &state else {
+        panic!("{state:?}")
+    };
+    assert!(reason.contains("exited with status 3"), "{reason}");
+    assert!(log.contains("an agent's log"), "{log}");
+
+    // well in its smoke run, but not later: the faults of all shards add up
+    let late = server.upload("Late", "FAULTY_FROM = \"1\"").await;
+    assert!(matches!(
+        server.settled(late).await,
+        SubmissionState::Valid { .. }
+    ));
+    let now = Timestamp::now();
+    let evaluation = server
+        .store
+        .create_evaluation(late, &plan(1), now)
+        .await
+        .unwrap();
+    let state = server.over(evaluation.id).await;
+    let EvaluationState::AgentFailed { faults, log, .. } = &state else {
+        panic!("{state:?}")
+    };
+    assert_eq!(faults.len(), 3);
+    assert!(
+        faults.iter().all(|fault| fault.episode == Some(1)),
+        "{faults:?}"
+    );
+    assert!(log.contains("an agent's log"), "{log}");
+    worker.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn an_evaluation_outlives_its_workers() {
+    let server = Server::new().await;
+    let worker = server.work(1);
+    let submission = server.upload("Alpha", "").await;
+    assert!(matches!(
+        server.settled(submission).await,
+        SubmissionState::Valid { .. }
+    ));
+    worker.stop().await;
+    let now = Timestamp::now();
+    let id = server
+        .store
+        .create_evaluation(submission, &plan(1), now)
+        .await
+        .unwrap()
+        .id;
+    for committed in 1..4 {
+        let worker = server.work(1);
+        let mut events = server.store.events();
+        while server.store.outcomes(id).await.unwrap().len() < committed {
+            let _ = events.recv().await;
+        }
+        // in the middle of the next shard
+        worker.stop().await;
+    }
+    let worker = server.work(1);
+    let state = server.over(id).await;
+    assert!(
+        matches!(state, EvaluationState::Finished { .. }),
+        "{state:?}"
+    );
+    assert_eq!(server.store.outcomes(id).await.unwrap().len(), 6);
+    worker.stop().await;
+}

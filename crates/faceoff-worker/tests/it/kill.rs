@@ -1,0 +1,111 @@
+//! `kill -9` of a working process, again and again, and what the evaluation says in the end.
+
+use crate::{
+    evaluations::{plan, without_times},
+    server::Server,
+};
+use faceoff_store::*;
+use jiff::Timestamp;
+use std::{
+    io::{BufRead as _, BufReader, Write as _},
+    path::Path,
+    process::{Command, Stdio},
+};
+
+const FOLDER: &str = "FACEOFF_WORKER_TEST_FOLDER";
+const EVALUATION: &str = "FACEOFF_WORKER_TEST_EVALUATION";
+const TOLD: &str = "something happened";
+
+/// Works until it is killed or the evaluation is over, telling of every event. Started by the test below.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[ignore = "the child process of a_killed_evaluation_ends_as_an_undisturbed_one"]
+async fn child() {
+    let Ok(folder) = std::env::var(FOLDER) else {
+        return;
+    };
+    let server = Server::at(Path::new(&folder)).await;
+    let id = std::env::var(EVALUATION).unwrap().parse().unwrap();
+    let mut events = server.store.events();
+    let worker = server.work(1);
+    while !server.store.evaluation(id).await.unwrap().state.is_over() {
+        let _ = events.recv().await;
+        let mut out = std::io::stdout().lock();
+        writeln!(out, "\n{TOLD}")
+            .and_then(|()| out.flush())
+            .unwrap();
+    }
+    worker.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_killed_evaluation_ends_as_an_undisturbed_one() {
+    let server = Server::new().await;
+    let worker = server.work(1);
+    let mut submissions = Vec::new();
+    for team in ["Calm", "Troubled"] {
+        let submission = server.upload(team, "").await;
+        assert!(matches!(
+            server.settled(submission).await,
+            SubmissionState::Valid { .. }
+        ));
+        submissions.push(submission);
+    }
+    let now = Timestamp::now();
+    let calm = server
+        .store
+        .create_evaluation(submissions[0], &plan(1), now)
+        .await
+        .unwrap();
+    let finished = server.over(calm.id).await;
+    assert!(
+        matches!(finished, EvaluationState::Finished { .. }),
+        "{finished:?}"
+    );
+    worker.stop().await;
+
+    let troubled = server
+        .store
+        .create_evaluation(submissions[1], &plan(1), now)
+        .await
+        .unwrap();
+    for events_to_live in [1, 2, 3, 1, 4, 2] {
+        let mut child = Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", "kill::child", "--ignored", "--nocapture"])
+            .env(FOLDER, server.path())
+            .env(EVALUATION, troubled.id.to_string())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let lines = BufReader::new(child.stdout.take().unwrap())
+            .lines()
+            .map_while(Result::ok);
+        let told = lines
+            .filter(|line| line == TOLD)
+            .take(events_to_live)
+            .count();
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let over = server
+            .store
+            .evaluation(troubled.id)
+            .await
+            .unwrap()
+            .state
+            .is_over();
+        assert!(over || told == events_to_live, "the child ended by itself");
+    }
+    let worker = server.work(1);
+    let state = server.over(troubled.id).await;
+    let EvaluationState::Finished { dataset, .. } = state else {
+        panic!("{state:?}")
+    };
+    worker.stop().await;
+
+    let undisturbed = without_times(server.store.outcomes(calm.id).await.unwrap());
+    let survived = without_times(server.store.outcomes(troubled.id).await.unwrap());
+    assert_eq!(survived, undisturbed);
+    let published = server.path().join("data/artifacts").join(dataset);
+    let datasets = std::fs::read_dir(published.parent().unwrap()).unwrap();
+    assert_eq!(datasets.count(), 1, "no unpublished dataset is left");
+}

@@ -1,0 +1,6 @@
+//! The worker as the server runs it: real store, real runner, real sandbox, a Python agent.
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+mod evaluations;
+mod kill;
+mod server;

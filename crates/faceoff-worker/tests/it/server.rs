@@ -1,0 +1,162 @@
+//! A store, a worker, and teams that upload the agent beside this file.
+
+use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::BundleLimits};
+use faceoff_sandbox::{Isolation, Limits, Runtime};
+use faceoff_store::*;
+use faceoff_types::*;
+use faceoff_worker::WorkerConfig;
+use jiff::Timestamp;
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+use tokio::task::JoinHandle;
+use tokio_util::sync::CancellationToken;
+
+pub struct Server {
+    pub store: Store,
+    folder: PathBuf,
+    /// removes the folder in the end, if it is this server's own
+    _guard: Option<tempfile::TempDir>,
+}
+
+pub struct Worker {
+    shutdown: CancellationToken,
+    task: JoinHandle<anyhow::Result<()>>,
+}
+
+impl Worker {
+    pub async fn stop(self) {
+        self.shutdown.cancel();
+        self.task.await.unwrap().unwrap();
+    }
+}
+
+impl Server {
+    pub async fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let server = Self::at(folder.path()).await;
+        Self {
+            _guard: Some(folder),
+            ..server
+        }
+    }
+
+    /// On a folder that is another process's, too.
+    pub async fn at(folder: &Path) -> Self {
+        let store = Store::open(&folder.join("data")).await.unwrap();
+        Self {
+            store,
+            folder: folder.to_owned(),
+            _guard: None,
+        }
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.folder
+    }
+
+    pub fn work(&self, slots: usize) -> Worker {
+        let runtimes = BTreeMap::from([(
+            "python3".to_owned(),
+            Runtime::python3().expect("this machine has Python"),
+        )]);
+        let config = WorkerConfig {
+            slots,
+            lease_s: 30,
+            scratch_dir: self.path().join("scratch"),
+            agent: AgentEnvironment {
+                limits: Limits::default(),
+                time: TimeLimits::default(),
+                isolation: Isolation::Sandboxed {
+                    given_up: Vec::new(),
+                },
+                runtimes,
+                agent_cpus: Vec::new(),
+            },
+            bundle_limits: BundleLimits::default(),
+        };
+        let shutdown = CancellationToken::new();
+        let run = faceoff_worker::run(self.store.clone(), config, shutdown.clone());
+        Worker {
+            shutdown,
+            task: tokio::spawn(run),
+        }
+    }
+
+    /// Uploads the agent with these lines in its manifest's `[env]`, as http does.
+    pub async fn upload(&self, team: &str, env: &str) -> SubmissionId {
+        let archive = self.path().join("upload.tar.gz");
+        write_bundle(&archive, env);
+        let content = std::fs::read(&archive).unwrap();
+        let hash = blake3::hash(&content);
+        let bundle = BundleRef {
+            key: format!("bundles/{hash}"),
+            bytes: content.len() as u64,
+            blake3: hash.to_string(),
+            file_name: "agent.tar.gz".into(),
+        };
+        self.store
+            .artifacts()
+            .put_file(&bundle.key, &archive)
+            .await
+            .unwrap();
+        let token_hash = *blake3::hash(team.as_bytes()).as_bytes();
+        let now = Timestamp::now();
+        let team = self
+            .store
+            .create_team(&team.parse().unwrap(), token_hash, now)
+            .await
+            .unwrap();
+        self.store
+            .create_submission(team.id, bundle, now)
+            .await
+            .unwrap()
+            .id
+    }
+
+    /// The smoke run's verdict.
+    pub async fn settled(&self, id: SubmissionId) -> SubmissionState {
+        let mut events = self.store.events();
+        loop {
+            let state = self.store.submission(id).await.unwrap().state;
+            if state.is_settled() {
+                return state;
+            }
+            // a lagging receiver has missed something: look again
+            let _ = events.recv().await;
+        }
+    }
+
+    /// The evaluation's end.
+    pub async fn over(&self, id: EvaluationId) -> EvaluationState {
+        let mut events = self.store.events();
+        loop {
+            let state = self.store.evaluation(id).await.unwrap().state;
+            if state.is_over() {
+                return state;
+            }
+            let _ = events.recv().await;
+        }
+    }
+}
+
+fn write_bundle(archive: &Path, env: &str) {
+    let manifest = format!(
+        "name = \"hold\"\ncommand = [\"python3\", \"agent.py\"]\nruntime = \"python3\"\n[env]\n{env}\n"
+    );
+    let file = std::fs::File::create(archive).unwrap();
+    let gzip = flate2::write::GzEncoder::new(file, flate2::Compression::fast());
+    let mut tar = tar::Builder::new(gzip);
+    for (name, content) in [
+        ("agent.toml", manifest.as_str()),
+        ("agent.py", include_str!("agent.py")),
+    ] {
+        let mut header = tar::Header::new_gnu();
+        header.set_size(content.len() as u64);
+        header.set_mode(0o644);
+        tar.append_data(&mut header, name, content.as_bytes())
+            .unwrap();
+    }
+    tar.into_inner().unwrap().finish().unwrap();
+}

@@ -1,0 +1,312 @@
+//! A client of the REST API. It reads the very types that the server writes.
+
+mod bundle_file;
+
+use anyhow::{Context, bail};
+use bundle_file::BundleFile;
+use faceoff_http::api::{
+    BASE,
+    board::BoardView,
+    days::{DayView, StartDay},
+    evaluations::{Cancellation, EvaluationView},
+    me::MeView,
+    submissions::SubmissionView,
+    teams::{NewTeam, TeamView, TeamWithToken},
+};
+use faceoff_types::{EvaluationId, SubmissionId, TeamId};
+use futures::StreamExt;
+use indicatif::ProgressBar;
+use jiff::civil::Date;
+use reqwest::{Method, RequestBuilder, Response, StatusCode, header};
+use serde::{Deserialize, de::DeserializeOwned};
+use std::{path::Path, time::Duration};
+use tokio::io::AsyncWriteExt;
+use tokio_util::io::ReaderStream;
+
+/// Longest silence of the server.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A problem that the server reported (RFC 9457).
+#[derive(Debug, Clone, thiserror::Error)]
+#[error("the server refused ({status}, {title}): {detail}")]
+pub struct ApiError {
+    /// HTTP status.
+    pub status: StatusCode,
+    /// The kind of problem in words.
+    pub title: String,
+    /// What was expected, what came and what to do.
+    pub detail: String,
+}
+
+/// A server, and who we are to it.
+#[derive(Debug, Clone)]
+pub struct Client {
+    http: reqwest::Client,
+    base: String,
+    token: Option<String>,
+}
+
+impl Client {
+    /// A client of `server` (e.g. `http://127.0.0.1:8080`), with a bearer token or without.
+    ///
+    /// # Errors
+    /// If `server` is no `http://` address.
+    pub fn new(server: &str, token: Option<&str>) -> anyhow::Result<Self> {
+        let url = reqwest::Url::parse(server).with_context(|| {
+            format!("{server:?} is no address; expected e.g. http://127.0.0.1:8080")
+        })?;
+        if url.scheme() != "http" {
+            bail!(
+                "{server}: this program speaks http only; for a server behind TLS, tunnel to it \
+                 (e.g. ssh -L) or upload with another client, as docs/api.md shows"
+            );
+        }
+        let http = reqwest::Client::builder()
+            .user_agent(concat!("faceoff/", env!("CARGO_PKG_VERSION")))
+            .connect_timeout(Duration::from_secs(10))
+            .read_timeout(PATIENCE)
+            // The server is named by the user; a proxy of the environment is meant for other hosts.
+            .no_proxy()
+            .build()
+            .context("setting up the HTTP client")?;
+        Ok(Self {
+            http,
+            base: server.trim_end_matches('/').to_owned(),
+            token: token.map(str::to_owned),
+        })
+    }
+
+    /// The same server, as somebody else.
+    #[must_use]
+    pub fn with_token(&self, token: &str) -> Self {
+        Self {
+            token: Some(token.to_owned()),
+            ..self.clone()
+        }
+    }
+
+    /// Does the server answer?
+    ///
+    /// # Errors
+    /// If it does not, or not well.
+    pub async fn health(&self) -> anyhow::Result<()> {
+        self.send(self.request(Method::GET, "/health"))
+            .await
+            .map(drop)
+    }
+
+    /// The overall board.
+    ///
+    /// # Errors
+    /// As [`ApiError`], or when the server cannot be reached; so for all calls below.
+    pub async fn board(&self) -> anyhow::Result<BoardView> {
+        self.get("/board").await
+    }
+
+    /// Organiser: creates a team; its token comes this once.
+    pub async fn create_team(&self, name: &str) -> anyhow::Result<TeamWithToken> {
+        let request = self.request(Method::POST, "/teams").json(&NewTeam {
+            name: name.to_owned(),
+        });
+        read(self.send(request).await?).await
+    }
+
+    /// Organiser: all teams.
+    pub async fn teams(&self) -> anyhow::Result<Vec<TeamView>> {
+        self.get("/teams").await
+    }
+
+    /// Organiser: a new token for a team; the old one is worth nothing from then on.
+    pub async fn replace_token(&self, team: TeamId) -> anyhow::Result<TeamWithToken> {
+        let request = self.request(Method::POST, &format!("/teams/{team}/token"));
+        read(self.send(request).await?).await
+    }
+
+    /// Organiser: starts today's evaluations, with another number of episodes if one is given.
+    pub async fn start_day(&self, episodes_per_task: Option<u32>) -> anyhow::Result<DayView> {
+        self.start_day_as(&StartDay {
+            episodes_per_task,
+            profile: None,
+        })
+        .await
+    }
+
+    /// Organiser: starts today's evaluations.
+    pub async fn start_day_as(&self, wanted: &StartDay) -> anyhow::Result<DayView> {
+        read(
+            self.send(self.request(Method::POST, "/days").json(wanted))
+                .await?,
+        )
+        .await
+    }
+
+    /// Organiser: stops an evaluation and gives the turn back.
+    pub async fn cancel(&self, id: EvaluationId, reason: &str) -> anyhow::Result<EvaluationView> {
+        let request = self
+            .request(Method::POST, &format!("/evaluations/{id}/cancel"))
+            .json(&Cancellation {
+                reason: reason.to_owned(),
+            });
+        read(self.send(request).await?).await
+    }
+
+    /// Team: who we are and whether today's turn is free.
+    pub async fn me(&self) -> anyhow::Result<MeView> {
+        self.get("/me").await
+    }
+
+    /// Team: uploads a bundle, an archive or a folder (packed on the way).
+    pub async fn upload(&self, bundle: &Path) -> anyhow::Result<SubmissionView> {
+        self.upload_with(bundle, &ProgressBar::hidden()).await
+    }
+
+    /// Team: uploads a bundle and shows how far it is.
+    pub async fn upload_with(
+        &self,
+        bundle: &Path,
+        progress: &ProgressBar,
+    ) -> anyhow::Result<SubmissionView> {
+        let path = bundle.to_owned();
+        let bundle = tokio::task::spawn_blocking(move || BundleFile::open(&path))
+            .await
+            .context("packing the bundle")??;
+        let bytes = bundle.bytes();
+        let limit = self.me().await?.max_bundle_bytes;
+        if bytes > limit {
+            bail!(
+                "the bundle has {bytes} bytes, the server takes at most {limit}; leave out what the \
+                 agent does not need to run"
+            );
+        }
+        progress.set_length(bytes);
+        let file = tokio::fs::File::open(bundle.path())
+            .await
+            .with_context(|| format!("opening {}", bundle.path().display()))?;
+        let counted = progress.clone();
+        let stream = ReaderStream::with_capacity(file, 256 * 1024).inspect(move |chunk| {
+            counted.inc(chunk.as_ref().map_or(0, |chunk| chunk.len() as u64));
+        });
+        let request = self
+            .request(Method::POST, "/submissions")
+            .query(&[("file_name", bundle.name())])
+            .header(header::CONTENT_TYPE, "application/octet-stream")
+            .header(header::CONTENT_LENGTH, bytes)
+            .body(reqwest::Body::wrap_stream(stream));
+        read(self.send(request).await?).await
+    }
+
+    /// Team or organiser: one submission.
+    pub async fn submission(&self, id: SubmissionId) -> anyhow::Result<SubmissionView> {
+        self.get(&format!("/submissions/{id}")).await
+    }
+
+    /// Team or organiser: uses the team's turn of today for a submission.
+    pub async fn evaluate(&self, id: SubmissionId) -> anyhow::Result<EvaluationView> {
+        let request = self.request(Method::POST, &format!("/submissions/{id}/evaluations"));
+        read(self.send(request).await?).await
+    }
+
+    /// Organiser: all evaluations of a day (today). Team: its own (all).
+    pub async fn evaluations(&self, day: Option<Date>) -> anyhow::Result<Vec<EvaluationView>> {
+        let request = self.request(Method::GET, "/evaluations");
+        let request = match day {
+            Some(day) => request.query(&[("day", day.to_string())]),
+            None => request,
+        };
+        read(self.send(request).await?).await
+    }
+
+    /// Team or organiser: one evaluation.
+    pub async fn evaluation(&self, id: EvaluationId) -> anyhow::Result<EvaluationView> {
+        self.get(&format!("/evaluations/{id}")).await
+    }
+
+    /// Team or organiser: downloads a dataset to `file`; returns its size in bytes.
+    pub async fn download_dataset(&self, id: EvaluationId, file: &Path) -> anyhow::Result<u64> {
+        let request = self.request(Method::GET, &format!("/evaluations/{id}/dataset"));
+        let response = self.send(request).await?;
+        let announced = response.content_length();
+        // A download that breaks off must not leave a file that looks whole.
+        let partial = file.with_extension("part");
+        let mut writer = tokio::fs::File::create(&partial)
+            .await
+            .with_context(|| format!("making {}", partial.display()))?;
+        let mut bytes = 0;
+        let mut stream = response.bytes_stream();
+        while let Some(chunk) = stream.next().await {
+            let chunk = chunk.context("downloading the dataset")?;
+            bytes += chunk.len() as u64;
+            writer
+                .write_all(&chunk)
+                .await
+                .with_context(|| format!("writing {}", partial.display()))?;
+        }
+        writer
+            .flush()
+            .await
+            .with_context(|| format!("writing {}", partial.display()))?;
+        if announced.is_some_and(|announced| announced != bytes) {
+            bail!("the download broke off after {bytes} bytes; try again");
+        }
+        tokio::fs::rename(&partial, file)
+            .await
+            .with_context(|| format!("naming {}", file.display()))?;
+        Ok(bytes)
+    }
+
+    fn request(&self, method: Method, path: &str) -> RequestBuilder {
+        let request = self
+            .http
+            .request(method, format!("{}{BASE}{path}", self.base));
+        match &self.token {
+            Some(token) => request.bearer_auth(token),
+            None => request,
+        }
+    }
+
+    async fn get<T: DeserializeOwned>(&self, path: &str) -> anyhow::Result<T> {
+        read(self.send(self.request(Method::GET, path)).await?).await
+    }
+
+    async fn send(&self, request: RequestBuilder) -> anyhow::Result<Response> {
+        let response = request
+            .send()
+            .await
+            .map_err(reqwest::Error::without_url)
+            .with_context(|| format!("talking to {}", self.base))?;
+        let status = response.status();
+        if status.is_success() {
+            return Ok(response);
+        }
+        #[derive(Deserialize)]
+        struct Problem {
+            title: String,
+            detail: String,
+        }
+        let text = response.text().await.unwrap_or_default();
+        let Ok(Problem { title, detail }) = serde_json::from_str(&text) else {
+            bail!(
+                "{} answered {status}, and not as a Faceoff server would",
+                self.base
+            );
+        };
+        Err(ApiError {
+            status,
+            title,
+            detail,
+        }
+        .into())
+    }
+}
+
+async fn read<T: DeserializeOwned>(response: Response) -> anyhow::Result<T> {
+    let bytes = response
+        .bytes()
+        .await
+        .context("reading the server's answer")?;
+    serde_json::from_slice(&bytes)
+        .context("the server's answer is not understood; is it another version of Faceoff?")
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,174 @@
+//! The client against the real site on a loopback port.
+
+use super::*;
+use faceoff_http::{
+    Clock, HttpConfig, HttpLimits,
+    api::{evaluations::EvaluationStatus, submissions::SubmissionStatus},
+    token::hash_token,
+};
+use faceoff_store::{EvaluationPlan, SmokeOutcome, Store, Work};
+use faceoff_types::{Profile, Task};
+use jiff::Timestamp;
+use tempfile::TempDir;
+
+const ADMIN: &str = "fo_admin_test";
+
+struct Site {
+    organiser: Client,
+    store: Store,
+    folder: TempDir,
+}
+
+async fn site(max_bundle_bytes: u64) -> Site {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    let config = HttpConfig {
+        max_bundle_bytes,
+        plan: EvaluationPlan {
+            profile: Profile::Evaluation,
+            tasks: vec![Task::Hit],
+            episodes_per_task: 2,
+            episodes_per_shard: 2,
+            max_faults: 0,
+        },
+        admin_token_hash: hash_token(ADMIN),
+        upload_dir: folder.path().to_owned(),
+        season_name: None,
+        daily_at: None,
+        clock: Clock::new(Timestamp::now),
+        limits: HttpLimits::default(),
+    };
+    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let url = format!("http://{}/", listener.local_addr().unwrap());
+    let router = faceoff_http::router(store.clone(), config);
+    tokio::spawn(faceoff_http::serve(
+        listener,
+        router,
+        std::future::pending(),
+    ));
+    Site {
+        organiser: Client::new(&url, Some(ADMIN)).unwrap(),
+        store,
+        folder,
+    }
+}
+
+fn bundle(site: &Site) -> std::path::PathBuf {
+    let folder = site.folder.path().join("my-agent");
+    std::fs::create_dir(&folder).unwrap();
+    std::fs::write(folder.join("agent.toml"), "name = \"mine\"\n").unwrap();
+    std::fs::write(folder.join("agent.py"), "pass\n").unwrap();
+    folder
+}
+
+#[tokio::test]
+async fn a_folder_is_packed_uploaded_and_followed() {
+    let site = site(1 << 20).await;
+    site.organiser.health().await.unwrap();
+    let team = site.organiser.create_team("Alpha").await.unwrap();
+    let client = site.organiser.with_token(&team.token);
+    let uploaded = client.upload(&bundle(&site)).await.unwrap();
+    assert_eq!(uploaded.file_name, "my-agent.tar.gz");
+    assert_eq!(uploaded.status, SubmissionStatus::Validating);
+
+    // What arrived is the folder.
+    let stored = site.store.submission(uploaded.id).await.unwrap();
+    let archive = site.folder.path().join("arrived.tar.gz");
+    site.store
+        .artifacts()
+        .get_to_file(&stored.bundle.key, &archive)
+        .await
+        .unwrap();
+    let gzip = flate2::read::GzDecoder::new(std::fs::File::open(&archive).unwrap());
+    let mut files: Vec<_> = tar::Archive::new(gzip)
+        .entries()
+        .unwrap()
+        .map(|entry| entry.unwrap())
+        .filter(|entry| entry.header().entry_type().is_file())
+        .map(|entry| entry.path().unwrap().file_name().unwrap().to_owned())
+        .collect();
+    files.sort();
+    assert_eq!(files, ["agent.py", "agent.toml"]);
+
+    let Some(Work::Smoke { claim, .. }) = site
+        .store
+        .claim("slot 0", 60, Timestamp::now())
+        .await
+        .unwrap()
+    else {
+        panic!("the smoke run is queued");
+    };
+    let outcome = SmokeOutcome::Valid {
+        agent_name: "mine".into(),
+        log: "hello".into(),
+    };
+    site.store
+        .commit_smoke(&claim, outcome, Timestamp::now())
+        .await
+        .unwrap();
+    let valid = client.submission(uploaded.id).await.unwrap();
+    assert_eq!(
+        valid.status,
+        SubmissionStatus::Valid {
+            log: "hello".into()
+        }
+    );
+
+    let day = site.organiser.start_day(Some(1)).await.unwrap();
+    assert_eq!(day.created.len(), 1);
+    assert_eq!(day.created[0].progress.episodes_total, 1);
+    let listed = site.organiser.evaluations(Some(day.day)).await.unwrap();
+    assert_eq!(listed, day.created);
+    let id = day.created[0].id;
+    assert_eq!(
+        client.evaluation(id).await.unwrap().status,
+        EvaluationStatus::Queued
+    );
+    assert_eq!(site.organiser.board().await.unwrap().rows, []);
+
+    let dataset = site.folder.path().join("dataset.zip");
+    let error = client.download_dataset(id, &dataset).await.unwrap_err();
+    assert_eq!(
+        error.downcast_ref::<ApiError>().unwrap().status,
+        StatusCode::CONFLICT
+    );
+    assert!(!dataset.exists());
+    let cancelled = site.organiser.cancel(id, "enough").await.unwrap();
+    assert!(cancelled.status.is_final());
+}
+
+#[tokio::test]
+async fn what_cannot_be_uploaded_is_said_before_it_is_sent() {
+    let site = site(64).await;
+    let team = site.organiser.create_team("Alpha").await.unwrap();
+    let client = site.organiser.with_token(&team.token);
+    let folder = bundle(&site);
+    let error = client.upload(&folder).await.unwrap_err().to_string();
+    assert!(error.contains("at most 64"), "{error}");
+    std::fs::remove_file(folder.join("agent.toml")).unwrap();
+    let error = client.upload(&folder).await.unwrap_err().to_string();
+    assert!(error.contains("no agent.toml"), "{error}");
+    let error = client
+        .upload(&site.folder.path().join("gone"))
+        .await
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("cannot be found"), "{error}");
+}
+
+#[tokio::test]
+async fn a_refusal_keeps_the_servers_words() {
+    let site = site(64).await;
+    let stranger = site.organiser.with_token("fo_team_wrong");
+    let error = stranger.me().await.unwrap_err();
+    let refused = error.downcast_ref::<ApiError>().unwrap();
+    assert_eq!(refused.status, StatusCode::UNAUTHORIZED);
+    assert!(
+        error
+            .to_string()
+            .contains("Ask the organiser for a new one"),
+        "{error}"
+    );
+    assert!(Client::new("https://127.0.0.1", None).is_err());
+    assert!(Client::new("127.0.0.1:8080", None).is_err());
+}

@@ -1,0 +1,263 @@
+//! `faceoff admin`: organises a running competition through its API.
+#![expect(clippy::print_stdout, reason = "a command talks to the terminal")]
+
+use super::serve::ADMIN_TOKEN_FILE;
+use crate::{client::Client, config::Config};
+use anyhow::{Context, bail};
+use clap::{Args, Subcommand};
+use faceoff_http::api::{
+    days::StartDay,
+    evaluations::{EvaluationStatus, EvaluationView},
+};
+use faceoff_types::{EvaluationId, Profile, TeamId};
+use jiff::civil::Date;
+use std::path::{Path, PathBuf};
+
+/// Organises a running competition.
+#[derive(Debug, Args)]
+pub struct AdminCommand {
+    /// The server
+    #[arg(
+        long,
+        global = true,
+        value_name = "URL",
+        env = "FACEOFF_SERVER",
+        default_value = "http://127.0.0.1:8080"
+    )]
+    server: String,
+    /// The organiser's token [default: the file admin-token in the data folder]
+    #[arg(
+        long,
+        global = true,
+        env = "FACEOFF_ADMIN_TOKEN",
+        hide_env_values = true
+    )]
+    token: Option<String>,
+    /// The server's data folder, on this machine [default: server.data_dir of faceoff.toml]
+    #[arg(long, global = true, value_name = "FOLDER")]
+    data_dir: Option<PathBuf>,
+    /// Print the server's answer as JSON
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// Create a team and print its token, which is shown this once
+    CreateTeam {
+        /// 1 to 40 letters, digits, spaces and . _ -
+        name: String,
+    },
+    /// Replace a team's token; the old one is worth nothing from then on
+    NewToken {
+        /// The team's name or id
+        team: String,
+    },
+    /// Start today's evaluation of each team that has not had it; asking again is harmless
+    StartDay {
+        /// Episodes of each task [default: the server's configuration]
+        #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+        episodes: Option<u32>,
+        /// Perturbation profile [default: the server's configuration]
+        #[arg(long)]
+        profile: Option<Profile>,
+    },
+    /// Stop an evaluation that is not over and give the team's turn back
+    Cancel {
+        /// The evaluation's id
+        evaluation: EvaluationId,
+        /// Shown to the team
+        reason: String,
+    },
+    /// List the teams
+    Teams,
+    /// List the evaluations of a day with their progress
+    Evaluations {
+        /// UTC day, e.g. 2026-11-21 [default: today]
+        #[arg(long)]
+        day: Option<Date>,
+    },
+}
+
+impl AdminCommand {
+    /// Does what was asked.
+    ///
+    /// # Errors
+    /// If there is no token, or the server cannot be reached or refuses.
+    pub fn run(self) -> anyhow::Result<()> {
+        tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()
+            .context("starting the async runtime")?
+            .block_on(self.act())
+    }
+
+    async fn act(self) -> anyhow::Result<()> {
+        let token = match self.token {
+            Some(token) => token,
+            None => token_of(self.data_dir.as_deref())?,
+        };
+        let client = Client::new(&self.server, Some(token.trim()))?;
+        match self.action {
+            Action::CreateTeam { name } => {
+                let created = client.create_team(&name).await?;
+                print(self.json, &created, || {
+                    format!(
+                        "team {} ({})\ntoken {}\nIt is not shown again; give it to the team.",
+                        created.team.name, created.team.id, created.token
+                    )
+                })
+            }
+            Action::NewToken { team } => {
+                let team = find_team(&client, &team).await?;
+                let replaced = client.replace_token(team).await?;
+                print(self.json, &replaced, || {
+                    format!(
+                        "team {} ({})\ntoken {}\nThe old token is worth nothing from now on.",
+                        replaced.team.name, replaced.team.id, replaced.token
+                    )
+                })
+            }
+            Action::StartDay { episodes, profile } => {
+                let day = client
+                    .start_day_as(&StartDay {
+                        episodes_per_task: episodes,
+                        profile,
+                    })
+                    .await?;
+                print(self.json, &day, || {
+                    let mut lines = vec![format!(
+                        "{}: {} started, {} there before",
+                        day.day,
+                        day.created.len(),
+                        day.existing.len()
+                    )];
+                    lines.extend(day.created.iter().chain(&day.existing).map(line));
+                    lines.extend(
+                        day.without_submission
+                            .iter()
+                            .map(|team| format!("{:<40} no valid submission", team.name)),
+                    );
+                    lines.join("\n")
+                })
+            }
+            Action::Cancel { evaluation, reason } => {
+                let cancelled = client.cancel(evaluation, &reason).await?;
+                print(self.json, &cancelled, || line(&cancelled))
+            }
+            Action::Teams => {
+                let teams = client.teams().await?;
+                print(self.json, &teams, || {
+                    let lines: Vec<_> = teams
+                        .iter()
+                        .map(|team| {
+                            format!(
+                                "{:<40} {}  since {}",
+                                team.name,
+                                team.id,
+                                team.created_at.strftime("%Y-%m-%d")
+                            )
+                        })
+                        .collect();
+                    or_none(
+                        lines,
+                        "no team yet; create one with faceoff admin create-team NAME",
+                    )
+                })
+            }
+            Action::Evaluations { day } => {
+                let evaluations = client.evaluations(day).await?;
+                print(self.json, &evaluations, || {
+                    or_none(
+                        evaluations.iter().map(line).collect(),
+                        "no evaluation on that day",
+                    )
+                })
+            }
+        }
+    }
+}
+
+/// The token from the file that the server made.
+fn token_of(data_dir: Option<&Path>) -> anyhow::Result<String> {
+    let data_dir = match data_dir {
+        Some(data_dir) => data_dir.to_owned(),
+        None => Config::load(None)?.server.data_dir,
+    };
+    let file = data_dir.join(ADMIN_TOKEN_FILE);
+    std::fs::read_to_string(&file).with_context(|| {
+        format!(
+            "reading the organiser's token from {}; name the server's folder with --data-dir, or give \
+             the token with --token or FACEOFF_ADMIN_TOKEN",
+            file.display()
+        )
+    })
+}
+
+async fn find_team(client: &Client, wanted: &str) -> anyhow::Result<TeamId> {
+    if let Ok(id) = wanted.parse() {
+        return Ok(id);
+    }
+    let teams = client.teams().await?;
+    match teams.iter().find(|team| team.name.as_str() == wanted) {
+        Some(team) => Ok(team.id),
+        None => bail!("no team is named {wanted:?}; faceoff admin teams lists them"),
+    }
+}
+
+fn line(evaluation: &EvaluationView) -> String {
+    let progress = evaluation.progress;
+    let state = match &evaluation.status {
+        EvaluationStatus::Queued => "queued".to_owned(),
+        EvaluationStatus::Running => {
+            format!(
+                "running, {} of {} episodes",
+                progress.episodes_done, progress.episodes_total
+            )
+        }
+        EvaluationStatus::Finalising => "computing the score".to_owned(),
+        EvaluationStatus::Finished { result, .. } => format!(
+            "finished: score {:.1}, {:.1} penalty points, {}",
+            result.score,
+            result.penalty_points,
+            result.tier.title().to_lowercase()
+        ),
+        EvaluationStatus::AgentFailed { faults, .. } => format!(
+            "the agent failed: {}",
+            faults
+                .first()
+                .map_or("no fault is recorded", |fault| fault.message.as_str())
+        ),
+        EvaluationStatus::PlatformFailed { reason, .. } => {
+            format!("our fault: {reason}; the turn was given back")
+        }
+        EvaluationStatus::Cancelled { reason, .. } => format!("cancelled: {reason}"),
+    };
+    format!("{:<40} {}  {state}", evaluation.team_name, evaluation.id)
+}
+
+fn or_none(lines: Vec<String>, none: &str) -> String {
+    if lines.is_empty() {
+        none.to_owned()
+    } else {
+        lines.join("\n")
+    }
+}
+
+fn print<T: serde::Serialize>(
+    json: bool,
+    value: &T,
+    text: impl FnOnce() -> String,
+) -> anyhow::Result<()> {
+    if json {
+        println!(
+            "{}",
+            serde_json::to_string_pretty(value).context("writing JSON")?
+        );
+    } else {
+        println!("{}", text());
+    }
+    Ok(())
+}

@@ -1,0 +1,256 @@
+//! `faceoff doctor`: what this host offers to agents and their sandbox, what is missing, and the cure.
+
+use crate::config::Config;
+use anyhow::{Context as _, bail};
+use clap::Args;
+use faceoff_sandbox::{HostFeature, Layer, Runtime, probe_host};
+use serde::Serialize;
+use std::{io::Write, path::PathBuf};
+
+/// Checks what this host offers and what is missing.
+#[derive(Debug, Args)]
+pub struct DoctorCommand {
+    /// Configuration file [default: faceoff.toml in the working folder, if there is one]
+    #[arg(long, value_name = "FILE", env = "FACEOFF_CONFIG")]
+    config: Option<PathBuf>,
+    /// Print one JSON object instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+/// Everything that was found.
+#[derive(Debug, Serialize)]
+struct Findings {
+    /// Can agents run here, with what the configuration gives up given up?
+    ok: bool,
+    features: Vec<Feature>,
+    runtimes: Vec<RuntimeFound>,
+    cpus: Cpus,
+}
+
+#[derive(Debug, Serialize)]
+struct Feature {
+    #[serde(flatten)]
+    host: HostFeature,
+    /// Named in `[sandbox] given_up`.
+    given_up: bool,
+}
+
+impl Feature {
+    const fn mark(&self) -> &'static str {
+        match (self.host.available, self.given_up) {
+            (_, true) => "given up",
+            (true, false) => "ok",
+            (false, false) => "MISSING",
+        }
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct RuntimeFound {
+    name: String,
+    available: bool,
+    found: String,
+    cure: Option<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct Cpus {
+    /// CPUs this process may use.
+    usable: usize,
+    /// Worker slots, as configured or by the number of CPUs.
+    slots: usize,
+    /// CPUs that agents are bound to; empty = all.
+    agent_cpus: Vec<usize>,
+    /// What keeps computation times from being fair, if anything.
+    advice: Option<String>,
+}
+
+impl DoctorCommand {
+    /// Probes the host and prints what was found.
+    ///
+    /// # Errors
+    /// If a layer of the sandbox is missing that the configuration does not give up; if the
+    /// configuration cannot be read.
+    pub fn run(self) -> anyhow::Result<()> {
+        let config = Config::load(self.config.as_deref())?;
+        let findings = Findings::gather(&config);
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            serde_json::to_writer_pretty(&mut out, &findings).context("standard output")?;
+            writeln!(out)?;
+        } else {
+            findings.print(&mut out)?;
+        }
+        let missing: Vec<_> = missing(&findings.features).map(Layer::as_str).collect();
+        if !missing.is_empty() {
+            bail!(
+                "agents cannot run here: {} missing; see the cures above, or name what you do without \
+                 in the configuration: [sandbox] given_up = {missing:?}",
+                missing.join(", ")
+            );
+        }
+        Ok(())
+    }
+}
+
+impl Findings {
+    fn gather(config: &Config) -> Self {
+        let given_up = &config.sandbox.given_up;
+        let features: Vec<_> = probe_host()
+            .into_iter()
+            .map(|host| Feature {
+                given_up: given_up.contains(&host.layer),
+                host,
+            })
+            .collect();
+        let ok = missing(&features).next().is_none();
+        Self {
+            ok,
+            features,
+            runtimes: runtimes(config),
+            cpus: cpus(config),
+        }
+    }
+
+    fn print(&self, out: &mut impl Write) -> std::io::Result<()> {
+        writeln!(out, "Sandbox")?;
+        for feature in &self.features {
+            let HostFeature {
+                layer, found, cure, ..
+            } = &feature.host;
+            writeln!(
+                out,
+                "  {:<9} {:<14} {found}",
+                feature.mark(),
+                layer.as_str()
+            )?;
+            print_cure(out, cure.as_deref())?;
+        }
+        writeln!(out, "Runtimes")?;
+        for runtime in &self.runtimes {
+            let mark = if runtime.available { "ok" } else { "none" };
+            writeln!(out, "  {mark:<9} {:<14} {}", runtime.name, runtime.found)?;
+            print_cure(out, runtime.cure.as_deref())?;
+        }
+        let cpus = &self.cpus;
+        writeln!(out, "CPUs")?;
+        let bound = match cpus.agent_cpus.as_slice() {
+            [] => "all".to_owned(),
+            list => format!("{list:?}"),
+        };
+        writeln!(
+            out,
+            "  {} usable, {} worker slot(s), agents on: {bound}",
+            cpus.usable, cpus.slots
+        )?;
+        print_cure(out, cpus.advice.as_deref())
+    }
+}
+
+/// Layers that are neither there nor given up.
+fn missing(features: &[Feature]) -> impl Iterator<Item = Layer> {
+    features
+        .iter()
+        .filter(|feature| !feature.host.available && !feature.given_up)
+        .map(|feature| feature.host.layer)
+}
+
+fn print_cure(out: &mut impl Write, cure: Option<&str>) -> std::io::Result<()> {
+    match cure {
+        Some(cure) => writeln!(out, "  {:<9} -> {cure}", ""),
+        None => Ok(()),
+    }
+}
+
+fn runtimes(config: &Config) -> Vec<RuntimeFound> {
+    let offered = config.agent_environment().runtimes;
+    let mut found: Vec<_> = offered
+        .iter()
+        .map(|(name, runtime)| {
+            let missing = runtime.read_only_paths.iter().find(|path| !path.exists());
+            RuntimeFound {
+                name: name.clone(),
+                available: missing.is_none(),
+                found: match missing {
+                    Some(path) => format!("{} does not exist", path.display()),
+                    None => describe(name, runtime),
+                },
+                cure: missing.map(|_| {
+                    format!("correct read_only_paths of [runtimes.{name}] in the configuration")
+                }),
+            }
+        })
+        .collect();
+    if !offered.contains_key("python3") {
+        found.push(RuntimeFound {
+            name: "python3".into(),
+            available: false,
+            found: "no python3 in the usual places".into(),
+            cure: Some("apt-get install python3".into()),
+        });
+    }
+    found
+}
+
+fn describe(name: &str, runtime: &Runtime) -> String {
+    match runtime.interpreter() {
+        Some(interpreter) if name == "python3" => interpreter.display().to_string(),
+        _ => format!("{} host paths, read-only", runtime.read_only_paths.len()),
+    }
+}
+
+fn cpus(config: &Config) -> Cpus {
+    let usable = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let slots = config.slots();
+    // An agent and the simulator that waits for it take turns, but two agents on one CPU disturb each
+    // other's computation times.
+    let advice = (slots * 2 > usable && usable > 1).then(|| {
+        format!("{slots} slots on {usable} CPUs disturb each other's computation times; set workers.slots = {}", usable / 2)
+    });
+    Cpus {
+        usable,
+        slots,
+        agent_cpus: config.workers.agent_cpus.clone(),
+        advice,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn findings(available: bool, given_up: bool) -> Findings {
+        let host = HostFeature {
+            layer: Layer::CgroupMemory,
+            available,
+            found: "what was seen".into(),
+            cure: (!available).then(|| "what to type".into()),
+        };
+        Findings {
+            ok: available || given_up,
+            features: vec![Feature { host, given_up }],
+            runtimes: Vec::new(),
+            cpus: cpus(&Config::default()),
+        }
+    }
+
+    #[test]
+    fn a_missing_layer_is_shown_with_its_cure_and_a_given_up_one_is_not_missing() {
+        let found = findings(false, false);
+        assert_eq!(
+            missing(&found.features).collect::<Vec<_>>(),
+            [Layer::CgroupMemory]
+        );
+        let mut text = Vec::new();
+        found.print(&mut text).unwrap();
+        let text = String::from_utf8(text).unwrap();
+        assert!(
+            text.contains("MISSING   cgroup-memory  what was seen"),
+            "{text}"
+        );
+        assert!(text.contains("-> what to type"), "{text}");
+        assert_eq!(missing(&findings(false, true).features).count(), 0);
+        assert_eq!(missing(&findings(true, false).features).count(), 0);
+    }
+}

@@ -1,0 +1,232 @@
+//! `faceoff eval`: the server's evaluator, run locally.
+#![expect(clippy::print_stdout, reason = "a command talks to the terminal")]
+
+mod board;
+mod table;
+
+use crate::config::Config;
+use anyhow::{Context, bail, ensure};
+use board::{Job, Verdict, play_all};
+use clap::Args;
+use faceoff_runner::{
+    AgentEnvironment, EvaluationMeta, ShardSpec, assemble,
+    bundle::{self, Bundle, BundleError, BundleLimits},
+};
+use faceoff_sandbox::{Isolation, Runtime};
+use faceoff_types::{AgentFault, Profile, RULESET, Seed, Task};
+use faceoff_worker::CpuLayout;
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+/// Plays a bundle through the very evaluator that the server runs, prints the result and writes
+/// `results.json` and `dataset.zip` to a folder. Exit status 0 only if there is a result.
+#[derive(Debug, Args)]
+pub struct EvalCommand {
+    /// The agent: a folder with agent.toml, or a .tar.gz, .tar.zst or .zip
+    bundle: PathBuf,
+    /// Tasks to play
+    #[arg(
+        long = "task",
+        value_name = "TASKS",
+        value_delimiter = ',',
+        default_value = "hit,defend,prepare"
+    )]
+    tasks: Vec<Task>,
+    /// Episodes of each task
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    episodes: u32,
+    /// Perturbations: ideal, one factor's name, or evaluation
+    #[arg(long, default_value = "evaluation")]
+    profile: Profile,
+    /// A number, or 64 hexadecimal digits; the same seed gives the same episodes everywhere
+    #[arg(long, default_value = "0")]
+    seed: Seed,
+    /// Seed of the season's model mismatch; derived from the seed if left out
+    #[arg(long, value_name = "HEX")]
+    mismatch_seed: Option<Seed>,
+    /// Agents that play at the same time; results do not depend on it, computation times may
+    #[arg(long, value_name = "W", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
+    workers: u16,
+    /// Folder for results.json and dataset.zip; those of an earlier run are replaced
+    #[arg(long, value_name = "DIR", default_value = "faceoff-eval")]
+    out: PathBuf,
+    /// Run your own agent without isolation, with your own environment
+    #[arg(long)]
+    no_sandbox: bool,
+    /// Limits, runtimes and given-up layers as a server's configuration states them
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+}
+
+/// What an earlier run may have left in the folder.
+const RESULTS: &str = "results.json";
+const DATASET: &str = "dataset.zip";
+const LOG: &str = "agent.log";
+
+impl EvalCommand {
+    /// Plays, scores, prints and writes.
+    ///
+    /// # Errors
+    /// If the bundle is refused, the agent fails too often, or the platform fails; the error says
+    /// which.
+    pub fn run(mut self) -> anyhow::Result<()> {
+        self.tasks.sort_unstable();
+        self.tasks.dedup();
+        ensure!(
+            !self.tasks.is_empty(),
+            "--task: expected hit, defend or prepare"
+        );
+        let config = Config::load(self.config.as_deref())?;
+        fs::create_dir_all(&self.out)
+            .with_context(|| format!("creating {}", self.out.display()))?;
+        for name in [RESULTS, DATASET, LOG] {
+            remove(&self.out.join(name))?;
+        }
+        // Beside the results, not in /tmp: a recording may be larger than a memory file system. An
+        // agent of another user must be able to pass through.
+        let scratch = tempfile::Builder::new()
+            .prefix(".eval-")
+            .permissions(std::os::unix::fs::PermissionsExt::from_mode(0o755))
+            .tempdir_in(&self.out)
+            .with_context(|| format!("making a folder in {}", self.out.display()))?;
+        let bundle = self.open(scratch.path(), &config.bundle)?;
+        let envs = self.environments(&config, &bundle.manifest.runtime)?;
+
+        let mismatch_seed = self
+            .mismatch_seed
+            .unwrap_or_else(|| self.seed.model_mismatch());
+        let jobs = self.jobs(mismatch_seed, config.evaluation.max_faults, scratch.path());
+        let dirs: Vec<PathBuf> = jobs.iter().map(|job| job.out.clone()).collect();
+        match play_all(&bundle, &envs, jobs)? {
+            Verdict::Played { faults } => print_faults(&faults),
+            Verdict::Failed { faults, log } => {
+                let path = self.out.join(LOG);
+                fs::write(&path, &log).with_context(|| format!("writing {}", path.display()))?;
+                print_faults(&faults);
+                print_log_tail(&log);
+                let last = faults.last().map(ToString::to_string).unwrap_or_default();
+                bail!(
+                    "the agent failed: more than {} faults, so there is no score; the last one: \
+                     {last}; its log is in {}",
+                    config.evaluation.max_faults,
+                    path.display()
+                );
+            }
+        }
+        let meta = EvaluationMeta {
+            profile: self.profile,
+            seed: self.seed,
+            mismatch_seed,
+            agent: bundle.manifest.name.clone(),
+            ruleset: RULESET.to_owned(),
+        };
+        let dataset = self.out.join(DATASET);
+        let result = assemble(&meta, &dirs, &dataset).context("joining the recordings")?;
+        let mut json = serde_json::to_string_pretty(&result).context("writing the result")?;
+        json.push('\n');
+        let path = self.out.join(RESULTS);
+        fs::write(&path, json).with_context(|| format!("writing {}", path.display()))?;
+        print!("{}", table::of(&meta.agent, &result));
+        println!("\n{}\n{}", path.display(), dataset.display());
+        Ok(())
+    }
+
+    /// A folder is copied under the rules of an archive, so that it is refused here if the server
+    /// would refuse it; without a sandbox it is used in place.
+    fn open(&self, scratch: &Path, limits: &BundleLimits) -> Result<Bundle, BundleError> {
+        if self.bundle.is_dir() && !self.no_sandbox {
+            bundle::copy(&self.bundle, &scratch.join("bundle"), limits)
+        } else {
+            bundle::open(&self.bundle, scratch, limits)
+        }
+    }
+
+    /// One environment per worker: the server's limits, on CPUs of its own where there are enough.
+    fn environments(
+        &self,
+        config: &Config,
+        runtime: &str,
+    ) -> anyhow::Result<Vec<AgentEnvironment>> {
+        let mut env = config.agent_environment();
+        if self.no_sandbox {
+            env.isolation = Isolation::None;
+            // The developer's own machine offers whatever the developer's PATH finds.
+            let path = std::env::var("PATH").unwrap_or_default();
+            env.runtimes.insert(
+                runtime.to_owned(),
+                Runtime {
+                    read_only_paths: Vec::new(),
+                    path,
+                },
+            );
+        }
+        let workers = usize::from(self.workers);
+        let cpus = std::thread::available_parallelism()
+            .context("asking for the number of CPUs")?
+            .get();
+        let layout = CpuLayout::for_slots(cpus, workers);
+        if layout.shared && workers > 1 {
+            println!(
+                "note: {workers} workers share {cpus} CPUs; results are the same, computation \
+                 times may be longer"
+            );
+        }
+        Ok(layout
+            .slots
+            .into_iter()
+            .map(|cpus| AgentEnvironment {
+                agent_cpus: cpus.agent,
+                ..env.clone()
+            })
+            .collect())
+    }
+
+    /// One shard per task and worker, so that each agent is started as seldom as possible.
+    fn jobs(&self, mismatch_seed: Seed, max_faults: u32, scratch: &Path) -> Vec<Job> {
+        let per_shard = self.episodes.div_ceil(u32::from(self.workers));
+        let mut jobs = Vec::new();
+        for task in &self.tasks {
+            for start in (0..self.episodes).step_by(per_shard as usize) {
+                let end = self.episodes.min(start + per_shard);
+                jobs.push(Job {
+                    out: scratch.join(format!("{task}-{start}")),
+                    spec: ShardSpec {
+                        task: *task,
+                        episodes: start..end,
+                        profile: self.profile,
+                        seed: self.seed,
+                        mismatch_seed,
+                        max_faults,
+                    },
+                });
+            }
+        }
+        jobs
+    }
+}
+
+fn remove(path: &Path) -> anyhow::Result<()> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(error).with_context(|| format!("removing {}", path.display()))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn print_faults(faults: &[AgentFault]) {
+    for fault in faults {
+        println!("fault: {fault}");
+    }
+}
+
+fn print_log_tail(log: &str) {
+    const LINES: usize = 20;
+    let lines: Vec<&str> = log.lines().collect();
+    println!("the end of the agent's log:");
+    for line in &lines[lines.len().saturating_sub(LINES)..] {
+        println!("  {line}");
+    }
+}

@@ -1,0 +1,160 @@
+use anyhow::Context;
+use faceoff_runner::{
+    AgentEnvironment, Observer, PlatformFault, ShardSpec, bundle::Bundle, run_shard,
+};
+use faceoff_types::{AgentFault, EpisodeOutcome};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::{
+    collections::VecDeque,
+    path::PathBuf,
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicBool, AtomicU32, Ordering},
+    },
+    thread,
+};
+
+/// A shard and where it is recorded.
+#[derive(Debug)]
+pub(super) struct Job {
+    pub out: PathBuf,
+    pub spec: ShardSpec,
+}
+
+/// How all shards together ended.
+pub(super) enum Verdict {
+    /// All episodes were played, with no more faults than allowed.
+    Played { faults: Vec<AgentFault> },
+    /// Too many faults.
+    Failed {
+        faults: Vec<AgentFault>,
+        log: String,
+    },
+}
+
+/// What the workers share.
+struct Board {
+    jobs: Mutex<VecDeque<Job>>,
+    faults: Mutex<Vec<AgentFault>>,
+    logs: Mutex<String>,
+    fault_count: AtomicU32,
+    max_faults: u32,
+    stop: AtomicBool,
+    bar: ProgressBar,
+}
+
+/// Plays all shards, one thread and one agent process per environment.
+pub(super) fn play_all(
+    bundle: &Bundle,
+    envs: &[AgentEnvironment],
+    jobs: Vec<Job>,
+) -> anyhow::Result<Verdict> {
+    let episodes: u64 = jobs.iter().map(|job| job.spec.episodes.len() as u64).sum();
+    let max_faults = jobs.first().map_or(0, |job| job.spec.max_faults);
+    // indicatif draws nothing where standard error is no terminal.
+    let bar = ProgressBar::new(episodes).with_style(
+        ProgressStyle::with_template(
+            "{msg:8} {bar:40} {pos}/{len} episodes, {per_sec}, {eta} left",
+        )
+        .context("the progress bar's template")?,
+    );
+    let board = Board {
+        jobs: Mutex::new(jobs.into()),
+        faults: Mutex::default(),
+        logs: Mutex::default(),
+        fault_count: AtomicU32::new(0),
+        max_faults,
+        stop: AtomicBool::new(false),
+        bar,
+    };
+    let results: Vec<Result<(), PlatformFault>> = thread::scope(|scope| {
+        let workers: Vec<_> = envs
+            .iter()
+            .enumerate()
+            .map(|(index, env)| {
+                thread::Builder::new()
+                    .name(format!("worker-{index}"))
+                    .spawn_scoped(scope, || board.work(bundle, env))
+            })
+            .collect();
+        workers
+            .into_iter()
+            .map(|worker| match worker {
+                Ok(worker) => worker
+                    .join()
+                    .unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
+                Err(source) => Err(PlatformFault::Io {
+                    what: "starting a worker".to_owned(),
+                    source,
+                }),
+            })
+            .collect()
+    });
+    board.bar.finish_and_clear();
+    for result in results {
+        match result {
+            Ok(()) | Err(PlatformFault::Cancelled) => {}
+            Err(fault) => return Err(fault).context("the evaluation failed, not by the agent"),
+        }
+    }
+    let mut faults = board
+        .faults
+        .into_inner()
+        .unwrap_or_else(PoisonError::into_inner);
+    faults.sort_by_key(|fault| (fault.task, fault.episode));
+    let log = board
+        .logs
+        .into_inner()
+        .unwrap_or_else(PoisonError::into_inner);
+    if faults.len() > max_faults as usize {
+        Ok(Verdict::Failed { faults, log })
+    } else {
+        Ok(Verdict::Played { faults })
+    }
+}
+
+impl Board {
+    fn work(&self, bundle: &Bundle, env: &AgentEnvironment) -> Result<(), PlatformFault> {
+        loop {
+            let job = lock(&self.jobs).pop_front();
+            let Some(Job { out, mut spec }) = job else {
+                return Ok(());
+            };
+            // The limit is the evaluation's, not the shard's.
+            let faults_so_far = self.fault_count.load(Ordering::Relaxed);
+            spec.max_faults = self.max_faults.saturating_sub(faults_so_far);
+            self.bar.set_message(spec.task.as_str());
+            if let Err(fault) = run_shard(&spec, bundle, env, &out, &mut Seat(self)) {
+                self.stop.store(true, Ordering::Relaxed);
+                return Err(fault);
+            }
+        }
+    }
+}
+
+/// One worker's view of the board.
+struct Seat<'a>(&'a Board);
+
+impl Observer for Seat<'_> {
+    fn episode_done(&mut self, outcome: &EpisodeOutcome) {
+        self.0.bar.inc(1);
+        if let Some(fault) = &outcome.fault {
+            lock(&self.0.faults).push(fault.clone());
+            if self.0.fault_count.fetch_add(1, Ordering::Relaxed) >= self.0.max_faults {
+                self.0.stop.store(true, Ordering::Relaxed);
+            }
+        }
+    }
+
+    fn log(&mut self, log: &str) {
+        lock(&self.0.logs).push_str(log);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.0.stop.load(Ordering::Relaxed)
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,36 @@
+//! One file per subcommand.
+
+pub mod admin;
+pub mod demo;
+pub mod doctor;
+pub mod eval;
+pub mod score;
+pub mod serve;
+pub mod sim;
+pub mod submit;
+
+use std::process::ExitCode;
+
+/// Success, or the error with its causes on standard error and status 1.
+#[expect(
+    clippy::print_stderr,
+    reason = "this is where a command's error meets the terminal"
+)]
+pub fn exit_code(outcome: anyhow::Result<()>) -> ExitCode {
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        // The reader of our output went away, as in `faceoff sim trace | head`: nothing to report.
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    error
+        .chain()
+        .filter_map(|cause| cause.downcast_ref::<std::io::Error>())
+        .any(|cause| cause.kind() == std::io::ErrorKind::BrokenPipe)
+}

@@ -1,0 +1,281 @@
+//! `faceoff score`: scoring alone, for organisers who score again by hand.
+
+use anyhow::{Context as _, bail, ensure};
+use clap::{Args, Subcommand};
+use faceoff_scoring::{
+    QualifyingSheet,
+    tournament::{Game, score_tournament},
+};
+use serde::de::DeserializeOwned;
+use std::io::{IsTerminal as _, Read, Write};
+
+/// Far more than any competition's results; a limit so that a wrong file cannot fill the memory.
+const INPUT_LIMIT_BYTES: u64 = 64 << 20;
+
+/// Score results by hand: a qualifying board or a tournament.
+#[derive(Debug, Args)]
+pub struct ScoreCommand {
+    #[command(subcommand)]
+    stage: Stage,
+}
+
+#[derive(Debug, Clone, Copy, Subcommand)]
+enum Stage {
+    /// Read tasks.json from standard input and print the board, one JSON object per row, best first
+    ///
+    /// Input: {"TEAM": {"hit": {"success_rate": 0.549, "penalty_points": 327.5}, "defend": {…},
+    /// "prepare": {…}}, …}. Rates are fractions. "episodes" beside them is 1000 unless given; the tasks
+    /// of a results.json may stand there as they are. Teams that are level keep the order of the file.
+    Qualifying,
+    /// Read games.json from standard input and print winners and standings as one JSON object
+    ///
+    /// Input: [{"round": 1, "home": "A", "away": "B", "goals": [10, 0], "fouls": [0, 0],
+    /// "penalty_points": [62.0, 384.0]}, …], or the final "score" in place of "fouls". "windows" is 90
+    /// unless given.
+    Tournament,
+}
+
+impl ScoreCommand {
+    /// Scores what stands on standard input.
+    ///
+    /// # Errors
+    /// If the input is not what the rules allow, naming the team or game and the field; if reading or
+    /// writing fails.
+    pub fn run(self) -> anyhow::Result<()> {
+        let stdin = std::io::stdin();
+        ensure!(
+            !stdin.is_terminal(),
+            "expected {} on standard input, as in `faceoff score {} < {}`",
+            self.stage.file(),
+            self.stage.name(),
+            self.stage.file()
+        );
+        let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+        self.stage
+            .score(stdin.lock(), &mut out, &mut std::io::stderr())?;
+        out.flush().context("standard output")
+    }
+}
+
+impl Stage {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Qualifying => "qualifying",
+            Self::Tournament => "tournament",
+        }
+    }
+
+    const fn file(self) -> &'static str {
+        match self {
+            Self::Qualifying => "tasks.json",
+            Self::Tournament => "games.json",
+        }
+    }
+
+    fn score(
+        self,
+        input: impl Read,
+        out: &mut impl Write,
+        warnings: &mut impl Write,
+    ) -> anyhow::Result<()> {
+        let input = read_all(input, self.file())?;
+        match self {
+            Self::Qualifying => {
+                let sheet: QualifyingSheet = parse(&input, self.file())?;
+                for row in sheet.board() {
+                    write_line(out, &row)?;
+                }
+            }
+            Self::Tournament => {
+                let games: Vec<Game> = parse(&input, self.file())?;
+                let tournament = score_tournament(&games);
+                for repeated in &tournament.repeated_pairings {
+                    let [a, b] = &repeated.teams;
+                    writeln!(
+                        warnings,
+                        "warning: {a} and {b} meet {} times in round {}; every game counts",
+                        repeated.games, repeated.round
+                    )?;
+                }
+                write_line(out, &tournament)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn read_all(input: impl Read, file: &str) -> anyhow::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    input
+        .take(INPUT_LIMIT_BYTES + 1)
+        .read_to_end(&mut bytes)
+        .context("standard input")?;
+    ensure!(
+        bytes.len() as u64 <= INPUT_LIMIT_BYTES,
+        "{file}: expected at most {INPUT_LIMIT_BYTES} bytes, got more"
+    );
+    if bytes.iter().all(u8::is_ascii_whitespace) {
+        bail!("{file}: expected JSON on standard input, got nothing");
+    }
+    Ok(bytes)
+}
+
+/// Parses JSON; an error names the place by team or game, field, line and column.
+fn parse<T: DeserializeOwned>(json: &[u8], file: &str) -> anyhow::Result<T> {
+    let mut deserializer = serde_json::Deserializer::from_slice(json);
+    let value = serde_path_to_error::deserialize(&mut deserializer)
+        .map_err(|error| anyhow::anyhow!("{file}: {error}"))?;
+    deserializer
+        .end()
+        .with_context(|| format!("{file}: after the end of the data"))?;
+    Ok(value)
+}
+
+fn write_line(out: &mut impl Write, value: &impl serde::Serialize) -> anyhow::Result<()> {
+    let mut line = serde_json::to_vec(value)?;
+    line.push(b'\n');
+    // With its io::Error as the cause: a reader that goes away is no failure of ours.
+    out.write_all(&line).context("standard output")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::{Value, json};
+
+    fn score(stage: Stage, input: &str) -> (anyhow::Result<()>, Vec<Value>, String) {
+        let (mut out, mut warnings) = (Vec::new(), Vec::new());
+        let outcome = stage.score(input.as_bytes(), &mut out, &mut warnings);
+        let lines = String::from_utf8(out).unwrap();
+        let rows = lines
+            .lines()
+            .map(|line| serde_json::from_str(line).unwrap())
+            .collect();
+        (outcome, rows, String::from_utf8(warnings).unwrap())
+    }
+
+    fn error(stage: Stage, input: &str) -> String {
+        let (outcome, rows, _) = score(stage, input);
+        assert_eq!(rows, Vec::<Value>::new(), "no half of a board is printed");
+        format!("{:#}", outcome.unwrap_err())
+    }
+
+    fn tasks(hit: f64, penalty_points: f64) -> Value {
+        let other = json!({"success_rate": 0.5, "penalty_points": 0});
+        let hit = json!({"success_rate": hit, "penalty_points": penalty_points});
+        json!({"hit": hit, "defend": other, "prepare": other})
+    }
+
+    #[test]
+    fn the_board_is_one_object_per_row_in_board_order() {
+        let input = json!({"A": tasks(0.9, 501.0), "B": tasks(0.1, 0.0), "C": tasks(0.2, 10.0)});
+        let (outcome, rows, _) = score(Stage::Qualifying, &input.to_string());
+        outcome.unwrap();
+        let brief: Vec<_> = rows
+            .iter()
+            .map(|row| json!([row["rank"], row["team"], row["tier"], row["score"]]))
+            .collect();
+        assert_eq!(
+            Value::from(brief),
+            json!([
+                [1, "C", "deployable", 38.0],
+                [2, "B", "deployable", 34.0],
+                [3, "A", "improvable", 66.0]
+            ])
+        );
+        let task = &rows[2]["tasks"]["hit"];
+        assert_eq!(
+            (&task["success_rate"], &task["penalty_points"]),
+            (&json!(0.9), &json!(501.0))
+        );
+        assert_eq!(
+            (&task["tier"], &task["rank"]),
+            (&json!("improvable"), &json!(3))
+        );
+    }
+
+    #[test]
+    fn the_tournament_is_one_object_with_games_and_standings() {
+        let game = json!({"round": 1, "home": "A", "away": "B", "goals": [1, 4], "fouls": [0, 9],
+            "penalty_points": [136.0, 12]});
+        let (outcome, rows, warnings) = score(Stage::Tournament, &json!([game, game]).to_string());
+        outcome.unwrap();
+        assert_eq!(rows.len(), 1);
+        assert_eq!(rows[0]["games"][0]["winner"], "B");
+        assert_eq!(rows[0]["games"][1]["score"], json!([4, 4]));
+        assert_eq!(rows[0]["standings"][0]["team"], "B");
+        assert_eq!(rows[0]["standings"][0]["points_per_round"], json!([6]));
+        assert_eq!(
+            warnings,
+            "warning: A and B meet 2 times in round 1; every game counts\n"
+        );
+    }
+
+    #[test]
+    fn errors_name_the_file_the_place_and_what_came() {
+        let wrong = json!({"Alpha": tasks(54.9, 0.0)}).to_string();
+        let got = error(Stage::Qualifying, &wrong);
+        assert!(
+            got.starts_with("tasks.json: Alpha.hit: success_rate: expected"),
+            "{got}"
+        );
+        assert!(got.contains("got 54.9"), "{got}");
+        for (stage, input, expected) in [
+            (
+                Stage::Qualifying,
+                "",
+                "tasks.json: expected JSON on standard input, got nothing",
+            ),
+            (
+                Stage::Tournament,
+                " \n",
+                "games.json: expected JSON on standard input, got nothing",
+            ),
+            (
+                Stage::Qualifying,
+                "{} {}",
+                "tasks.json: after the end of the data: trailing",
+            ),
+            (Stage::Qualifying, "{\"A\"", "tasks.json: "),
+            (
+                Stage::Tournament,
+                "{}",
+                "games.json: invalid type: map, expected a sequence",
+            ),
+            (
+                Stage::Tournament,
+                "\u{0}\u{1}",
+                "games.json: expected value at line 1 column 1",
+            ),
+        ] {
+            let got = error(stage, input);
+            assert!(got.starts_with(expected), "{input:?}: {got}");
+        }
+        let deep = "[".repeat(100_000);
+        assert!(error(Stage::Tournament, &deep).starts_with("games.json: "));
+        let not_utf8 = score_bytes(b"{\"\xff\": 1}");
+        assert!(not_utf8.starts_with("tasks.json: "), "{not_utf8}");
+    }
+
+    fn score_bytes(input: &[u8]) -> String {
+        let outcome = Stage::Qualifying.score(input, &mut Vec::new(), &mut Vec::new());
+        format!("{:#}", outcome.unwrap_err())
+    }
+
+    #[test]
+    fn an_input_without_end_is_refused() {
+        let endless = std::io::repeat(b' ');
+        let outcome = Stage::Qualifying.score(endless, &mut Vec::new(), &mut Vec::new());
+        assert!(format!("{:#}", outcome.unwrap_err()).contains("at most 67108864 bytes"));
+    }
+
+    #[test]
+    fn nothing_to_score_is_an_empty_board() {
+        let (outcome, rows, _) = score(Stage::Qualifying, "{}");
+        outcome.unwrap();
+        assert_eq!(rows, Vec::<Value>::new());
+        let (outcome, rows, _) = score(Stage::Tournament, "[]");
+        outcome.unwrap();
+        assert_eq!(rows, [json!({"games": [], "standings": []})]);
+    }
+}

@@ -1,0 +1,371 @@
+//! `faceoff serve`: API, pages, worker slots and the daily schedule in one process.
+
+use crate::config::Config;
+use anyhow::{Context, bail};
+use clap::{Args, ValueEnum};
+use faceoff_http::{
+    Clock, HttpConfig, HttpLimits,
+    token::{Token, TokenKind, hash_token},
+};
+use faceoff_sandbox::{HostFeature, Layer, probe_host};
+use faceoff_store::Store;
+use faceoff_worker::WorkerConfig;
+use jiff::Timestamp;
+use std::{
+    fs::{self, OpenOptions},
+    io::{IsTerminal as _, Write as _},
+    net::SocketAddr,
+    os::unix::fs::{DirBuilderExt, OpenOptionsExt},
+    path::{Path, PathBuf},
+    time::Duration,
+};
+use tokio::{net::TcpListener, signal::unix::SignalKind, task::JoinSet};
+use tokio_util::sync::CancellationToken;
+use tracing_subscriber::EnvFilter;
+
+/// The file in the data folder that holds the organiser's token.
+pub const ADMIN_TOKEN_FILE: &str = "admin-token";
+/// How long open connections may go on after the signal to end.
+const GRACE: Duration = Duration::from_secs(10);
+
+/// Starts the competition server.
+#[derive(Debug, Args)]
+pub struct ServeCommand {
+    /// Configuration file [default: faceoff.toml in the working folder, if there is one]
+    #[arg(long, value_name = "FILE", env = "FACEOFF_CONFIG")]
+    config: Option<PathBuf>,
+    /// Address of API and pages; replaces server.listen of the configuration
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    listen: Option<SocketAddr>,
+    /// Folder of database and artifacts; replaces server.data_dir of the configuration
+    #[arg(long, value_name = "FOLDER")]
+    data_dir: Option<PathBuf>,
+    /// How the log is written, to standard error; RUST_LOG sets what is logged
+    #[arg(long, value_enum, default_value_t = LogFormat::Text)]
+    log_format: LogFormat,
+}
+
+/// How log lines look.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum LogFormat {
+    /// For people.
+    Text,
+    /// One JSON object per line.
+    Json,
+}
+
+impl ServeCommand {
+    /// Serves until SIGINT or SIGTERM.
+    ///
+    /// # Errors
+    /// If the configuration, the data folder, the address or the sandbox is not as it must be.
+    pub fn run(self) -> anyhow::Result<()> {
+        start_log(self.log_format);
+        let mut config = Config::load(self.config.as_deref())?;
+        if let Some(listen) = self.listen {
+            config.server.listen = listen;
+        }
+        if let Some(data_dir) = self.data_dir {
+            config.server.data_dir = data_dir;
+        }
+        // Before anything is opened: a host that cannot hold agents must not look as if it could.
+        check_sandbox(&probe_host(), &config.sandbox.given_up)?;
+        tokio::runtime::Builder::new_multi_thread()
+            .enable_all()
+            .thread_name("http")
+            .build()
+            .context("starting the async runtime")?
+            .block_on(serve(config))
+    }
+}
+
+fn start_log(format: LogFormat) {
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
+    let log = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal());
+    match format {
+        LogFormat::Text => log.init(),
+        LogFormat::Json => log.json().init(),
+    }
+}
+
+async fn serve(config: Config) -> anyhow::Result<()> {
+    let data_dir = config.server.data_dir.clone();
+    private_folder(&data_dir)?;
+    let upload_dir = data_dir.join("uploads");
+    // What a crash left half uploaded belongs to no submission.
+    empty_folder(&upload_dir)?;
+    let scratch_dir = config.scratch_dir();
+    private_folder(&scratch_dir)?;
+    let admin_token_hash = admin_token(&data_dir)?;
+
+    let store = Store::open(&data_dir)
+        .await
+        .with_context(|| format!("opening the data folder {}", data_dir.display()))?;
+    let listener = TcpListener::bind(config.server.listen)
+        .await
+        .with_context(|| {
+            format!(
+                "listening on {}; choose another address with --listen",
+                config.server.listen
+            )
+        })?;
+    let plan = config.plan();
+    let router = faceoff_http::router(
+        store.clone(),
+        HttpConfig {
+            max_bundle_bytes: config.bundle.packed_bytes,
+            plan: plan.clone(),
+            admin_token_hash,
+            upload_dir,
+            season_name: config.season.name.clone(),
+            daily_at: config.evaluation.at,
+            clock: Clock::new(Timestamp::now),
+            limits: HttpLimits::default(),
+        },
+    );
+    let workers = WorkerConfig {
+        slots: config.slots(),
+        lease_s: config.workers.lease_s,
+        scratch_dir,
+        agent: config.agent_environment(),
+        bundle_limits: config.bundle,
+    };
+    tracing::info!(
+        address = %config.server.listen,
+        data_dir = %data_dir.display(),
+        slots = workers.slots,
+        daily_at = config.evaluation.at.map(|at| at.to_string()),
+        "serving"
+    );
+
+    let shutdown = CancellationToken::new();
+    let mut parts = JoinSet::new();
+    parts.spawn(faceoff_worker::run(
+        store.clone(),
+        workers,
+        shutdown.clone(),
+    ));
+    if let Some(at) = config.evaluation.at {
+        parts.spawn(faceoff_worker::run_schedule(
+            store.clone(),
+            plan,
+            at,
+            shutdown.clone(),
+        ));
+    }
+    parts.spawn(answer(listener, router, shutdown.clone()));
+
+    let signal = signalled()?;
+    let mut outcome = Ok(());
+    tokio::select! {
+        name = signal => tracing::info!(signal = name, "ending: slots give their work back"),
+        Some(part) = parts.join_next() => outcome = ended_early(part),
+    }
+    shutdown.cancel();
+    let rest = async {
+        while let Some(part) = parts.join_next().await {
+            let ended = part
+                .context("a part of the server panicked")
+                .and_then(|part| part);
+            if outcome.is_ok() {
+                outcome = ended;
+            }
+        }
+    };
+    // The second signal is for the impatient; leases make that safe.
+    let second = signalled()?;
+    tokio::select! {
+        () = rest => {
+            store.close().await;
+            tracing::info!("ended");
+        }
+        name = second => tracing::warn!(signal = name, "ending at once"),
+    }
+    outcome
+}
+
+/// A part of the server came to its end although nobody asked it to.
+fn ended_early(part: Result<anyhow::Result<()>, tokio::task::JoinError>) -> anyhow::Result<()> {
+    match part {
+        Ok(Ok(())) => bail!("a part of the server ended by itself"),
+        Ok(Err(error)) => Err(error),
+        Err(panic) => Err(panic).context("a part of the server panicked"),
+    }
+}
+
+async fn answer(
+    listener: TcpListener,
+    router: faceoff_http::Router,
+    shutdown: CancellationToken,
+) -> anyhow::Result<()> {
+    let asked = shutdown.clone();
+    let serving = faceoff_http::serve(listener, router, async move { asked.cancelled().await });
+    let late = async {
+        shutdown.cancelled().await;
+        tokio::time::sleep(GRACE).await;
+    };
+    tokio::select! {
+        served = serving => served.context("serving HTTP"),
+        () = late => {
+            tracing::warn!("connections still open after {} s are cut", GRACE.as_secs());
+            Ok(())
+        }
+    }
+}
+
+/// The future ends with the name of the signal that asks the server to end.
+fn signalled() -> anyhow::Result<impl Future<Output = &'static str>> {
+    let listen = |kind| tokio::signal::unix::signal(kind).context("listening for signals");
+    let mut interrupt = listen(SignalKind::interrupt())?;
+    let mut terminate = listen(SignalKind::terminate())?;
+    Ok(async move {
+        tokio::select! {
+            _ = interrupt.recv() => "SIGINT",
+            _ = terminate.recv() => "SIGTERM",
+        }
+    })
+}
+
+/// Refuses a host that lacks a layer which the organiser has not given up by name.
+fn check_sandbox(features: &[HostFeature], given_up: &[Layer]) -> anyhow::Result<()> {
+    let mut missing = Vec::new();
+    for feature in features.iter().filter(|feature| !feature.available) {
+        if given_up.contains(&feature.layer) {
+            tracing::warn!(layer = ?feature.layer, found = feature.found, "given up by configuration");
+        } else {
+            let cure = feature
+                .cure
+                .as_deref()
+                .unwrap_or("none is known for this host");
+            missing.push(format!(
+                "{}: {}\n    cure: {cure}",
+                name(feature.layer),
+                feature.found
+            ));
+        }
+    }
+    if missing.is_empty() {
+        return Ok(());
+    }
+    bail!(
+        "this host cannot isolate agents as it must:\n  {}\n\
+         `faceoff doctor` tells more. To run without a layer, at your own risk, name it in the \
+         configuration: [sandbox] given_up = [\"…\"]",
+        missing.join("\n  ")
+    )
+}
+
+/// A layer's name as the configuration spells it.
+fn name(layer: Layer) -> String {
+    serde_json::to_value(layer)
+        .ok()
+        .and_then(|value| value.as_str().map(str::to_owned))
+        .unwrap_or_else(|| format!("{layer:?}"))
+}
+
+/// Makes a folder that only its owner can read: it holds the season's secret and the teams' agents.
+fn private_folder(folder: &Path) -> anyhow::Result<()> {
+    fs::DirBuilder::new()
+        .recursive(true)
+        .mode(0o700)
+        .create(folder)
+        .with_context(|| format!("making the folder {}", folder.display()))
+}
+
+fn empty_folder(folder: &Path) -> anyhow::Result<()> {
+    match fs::remove_dir_all(folder) {
+        Ok(()) => {}
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+        Err(error) => {
+            return Err(error).with_context(|| format!("emptying {}", folder.display()));
+        }
+    }
+    private_folder(folder)
+}
+
+/// Hash of the organiser's token; makes the token at the first start.
+fn admin_token(data_dir: &Path) -> anyhow::Result<[u8; 32]> {
+    let file = data_dir.join(ADMIN_TOKEN_FILE);
+    match fs::read_to_string(&file) {
+        Ok(token) if token.trim().is_empty() => bail!(
+            "{} is empty; remove it, then the next start makes a new token",
+            file.display()
+        ),
+        Ok(token) => return Ok(hash_token(token.trim())),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+        Err(error) => return Err(error).with_context(|| format!("reading {}", file.display())),
+    }
+    let token = Token::generate(TokenKind::Admin).context("drawing the organiser's token")?;
+    // Written beside and renamed, so that a crash cannot leave half a token behind.
+    let fresh = data_dir.join(format!("{ADMIN_TOKEN_FILE}.new"));
+    let write = || -> std::io::Result<()> {
+        let mut writer = OpenOptions::new()
+            .write(true)
+            .create(true)
+            .truncate(true)
+            .mode(0o600)
+            .open(&fresh)?;
+        writeln!(writer, "{}", token.as_str())?;
+        writer.sync_all()?;
+        fs::rename(&fresh, &file)
+    };
+    write().with_context(|| format!("writing {}", file.display()))?;
+    tracing::info!(file = %file.display(), "made the organiser's token; keep the file secret");
+    Ok(token.hash())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::PermissionsExt;
+
+    fn feature(layer: Layer, available: bool) -> HostFeature {
+        HostFeature {
+            layer,
+            available,
+            found: "what was found".into(),
+            cure: Some("what to do".into()),
+        }
+    }
+
+    #[test]
+    fn a_missing_layer_stops_the_start_unless_it_is_given_up_by_name() {
+        let features = [
+            feature(Layer::Seccomp, true),
+            feature(Layer::CgroupMemory, false),
+        ];
+        let error = check_sandbox(&features, &[]).unwrap_err().to_string();
+        for part in [
+            "cgroup-memory",
+            "what was found",
+            "what to do",
+            "faceoff doctor",
+            "given_up",
+        ] {
+            assert!(error.contains(part), "{part} is not in: {error}");
+        }
+        assert!(!error.contains("seccomp"));
+        assert!(check_sandbox(&features, &[Layer::Seccomp]).is_err());
+        check_sandbox(&features, &[Layer::CgroupMemory]).unwrap();
+    }
+
+    #[test]
+    fn the_organisers_token_is_made_once_and_is_private() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = admin_token(folder.path()).unwrap();
+        assert_eq!(admin_token(folder.path()).unwrap(), first);
+        let file = folder.path().join(ADMIN_TOKEN_FILE);
+        assert_eq!(file.metadata().unwrap().permissions().mode() & 0o777, 0o600);
+        let token = fs::read_to_string(&file).unwrap();
+        assert!(token.starts_with("fo_admin_"));
+        assert_eq!(hash_token(token.trim()), first);
+        fs::write(&file, "\n").unwrap();
+        assert!(
+            admin_token(folder.path()).is_err(),
+            "an empty token lets nobody in, or everybody"
+        );
+    }
+}

@@ -1,0 +1,330 @@
+//! The scenario of `faceoff sim trace`, parsed once and checked field by field.
+
+use anyhow::{Context as _, Result, bail, ensure};
+use faceoff_sim::{Interpolation, JOINTS, MalletState, robot::model::INITIAL_Q};
+use faceoff_types::{Profile, Seed, Task};
+use serde::Deserialize;
+use serde_json::Value;
+use std::io::Read;
+
+/// A scenario file is at most this long: more than a whole game's trajectories at 1 kHz.
+const INPUT_LIMIT_BYTES: u64 = 512 << 20;
+
+/// A scenario lasts at most this long: a game is 900 s.
+const DURATION_LIMIT_MS: u64 = 1_000_000;
+
+/// Numbers beyond this, in SI units, describe no air-hockey table.
+const NUMBER_LIMIT: f64 = 1e4;
+
+/// What is written in the file.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Raw {
+    task: Option<Task>,
+    profile: Option<Profile>,
+    seed: Option<Value>,
+    robots: Option<u32>,
+    puck: Vec<f64>,
+    joints: Option<Vec<Vec<f64>>>,
+    interpolation: Option<Vec<Option<i64>>>,
+    actions: Option<Vec<Vec<Value>>>,
+    mallet: Option<Vec<Vec<f64>>>,
+    duration_ms: u64,
+    every_ms: Option<u64>,
+}
+
+/// A checked scenario.
+#[derive(Debug)]
+pub struct Scenario {
+    /// Adds its opponent, terminations and success.
+    pub task: Option<Task>,
+    /// Perturbations of the world.
+    pub profile: Profile,
+    /// Evaluation seed and episode seed at once.
+    pub seed: Seed,
+    /// [x, y, yaw, vx, vy, yaw rate].
+    pub puck: [f64; 6],
+    /// Initial joint positions, one per robot.
+    pub joints: Vec<[f64; JOINTS]>,
+    /// One per robot.
+    pub interpolation: Vec<Interpolation>,
+    /// Per robot and control step, row-major.
+    pub actions: Vec<Vec<Vec<f64>>>,
+    /// Robot 1's mallet per ms, where it is imposed.
+    pub mallet: Vec<MalletState>,
+    /// ms.
+    pub duration_ms: u64,
+    /// ms between two lines.
+    pub every_ms: u64,
+}
+
+impl Scenario {
+    /// Reads one scenario.
+    pub fn read(input: impl Read) -> Result<Self> {
+        let mut text = String::new();
+        let length = input
+            .take(INPUT_LIMIT_BYTES + 1)
+            .read_to_string(&mut text)
+            .context("standard input: expected a scenario in UTF-8")? as u64;
+        ensure!(
+            length <= INPUT_LIMIT_BYTES,
+            "the scenario is longer than {INPUT_LIMIT_BYTES} bytes"
+        );
+        let mut json = serde_json::Deserializer::from_str(&text);
+        let raw: Raw = serde_path_to_error::deserialize(&mut json)
+            .map_err(|error| match error.path().to_string().as_str() {
+                "." => anyhow::anyhow!("{}", error.inner()),
+                path => anyhow::anyhow!("{path}: {}", error.inner()),
+            })
+            .context("expected a scenario, one JSON object")?;
+        json.end()
+            .context("expected one scenario, got more after it")?;
+        Self::check(raw)
+    }
+
+    fn check(raw: Raw) -> Result<Self> {
+        let robots = match (raw.task, raw.robots) {
+            (Some(Task::Hit), None | Some(2)) | (None, Some(2)) => 2,
+            (Some(Task::Hit), Some(other)) => {
+                bail!("robots: expected 2, as hit has an opponent, got {other}")
+            }
+            (Some(_) | None, None | Some(1)) => 1,
+            (Some(task), Some(other)) => bail!("robots: expected 1 with task {task}, got {other}"),
+            (None, Some(other)) => bail!("robots: expected 1 or 2, got {other}"),
+        };
+        let own = if raw.task == Some(Task::Hit) {
+            1
+        } else {
+            robots
+        };
+        let joints = joints(raw.joints.unwrap_or_default(), robots)?;
+        let interpolation = interpolations(&raw.interpolation.unwrap_or_default(), own)?;
+        let actions = actions(&raw.actions.unwrap_or_default(), &interpolation)?;
+        let mallet = raw
+            .mallet
+            .unwrap_or_default()
+            .iter()
+            .enumerate()
+            .map(|(k, row)| {
+                let [x, y, z, vx, vy] = numbers(row, || format!("mallet[{k}]"))?;
+                Ok(MalletState {
+                    position: [x, y, z],
+                    velocity: [vx, vy],
+                })
+            })
+            .collect::<Result<_>>()?;
+        ensure!(
+            (1..=DURATION_LIMIT_MS).contains(&raw.duration_ms),
+            "duration_ms: expected 1 to {DURATION_LIMIT_MS}, got {}",
+            raw.duration_ms
+        );
+        let every_ms = raw.every_ms.unwrap_or(1);
+        ensure!(every_ms >= 1, "every_ms: expected at least 1, got 0");
+        Ok(Self {
+            task: raw.task,
+            profile: raw.profile.unwrap_or(Profile::Ideal),
+            seed: seed(raw.seed)?,
+            puck: numbers(&raw.puck, || "puck".to_owned())?,
+            joints,
+            interpolation,
+            actions,
+            mallet,
+            duration_ms: raw.duration_ms,
+            every_ms,
+        })
+    }
+}
+
+fn seed(value: Option<Value>) -> Result<Seed> {
+    let text = match value {
+        None | Some(Value::Null) => "0".to_owned(),
+        Some(Value::Number(number)) => number.to_string(),
+        Some(Value::String(text)) => text,
+        Some(other) => bail!(
+            "seed: expected a number or 64 hexadecimal digits, got {}",
+            kind(&other)
+        ),
+    };
+    text.parse().with_context(|| format!("seed: {text}"))
+}
+
+fn joints(given: Vec<Vec<f64>>, robots: usize) -> Result<Vec<[f64; JOINTS]>> {
+    ensure!(
+        given.len() <= robots,
+        "joints: expected at most {robots} robots, got {}",
+        given.len()
+    );
+    let mut joints = vec![INITIAL_Q; robots];
+    for (robot, q) in given.iter().enumerate() {
+        joints[robot] = numbers(q, || format!("joints[{robot}]"))?;
+    }
+    Ok(joints)
+}
+
+fn interpolations(given: &[Option<i64>], robots: usize) -> Result<Vec<Interpolation>> {
+    ensure!(
+        given.len() <= robots,
+        "interpolation: expected at most {robots} robots with actions, got {}",
+        given.len()
+    );
+    let mut all = vec![Interpolation::Cubic; robots];
+    for (robot, code) in given.iter().enumerate() {
+        all[robot] = Interpolation::from_code(*code).with_context(|| {
+            format!(
+                "interpolation[{robot}]: expected 1, 2, 3, 4, 5, -1 or null, got {}",
+                code.map_or("null".to_owned(), |code| code.to_string())
+            )
+        })?;
+    }
+    Ok(all)
+}
+
+fn actions(given: &[Vec<Value>], interpolation: &[Interpolation]) -> Result<Vec<Vec<Vec<f64>>>> {
+    ensure!(
+        given.len() <= interpolation.len(),
+        "actions: expected at most {} robots with actions, got {}",
+        interpolation.len(),
+        given.len()
+    );
+    let mut all = vec![Vec::new(); interpolation.len()];
+    for (robot, steps) in given.iter().enumerate() {
+        for (step, action) in steps.iter().enumerate() {
+            let field = || format!("actions[{robot}][{step}]");
+            let shape = interpolation[robot].shape();
+            let mut flat = Vec::with_capacity(interpolation[robot].len());
+            flatten(action, shape, &mut flat).with_context(|| {
+                let shape: String = shape.iter().map(|n| format!("[{n}]")).collect();
+                format!("{}: expected numbers of shape {shape}", field())
+            })?;
+            check_finite(&flat, field)?;
+            all[robot].push(flat);
+        }
+    }
+    Ok(all)
+}
+
+fn flatten(value: &Value, shape: &[usize], into: &mut Vec<f64>) -> Result<()> {
+    match (value, shape) {
+        (Value::Number(number), []) => {
+            into.push(number.as_f64().context("a number beyond what fits")?);
+            Ok(())
+        }
+        (Value::Array(items), [length, inner @ ..]) => {
+            ensure!(
+                items.len() == *length,
+                "got {} items instead of {length}",
+                items.len()
+            );
+            items.iter().try_for_each(|item| flatten(item, inner, into))
+        }
+        (other, []) => bail!("got {} instead of a number", kind(other)),
+        (other, _) => bail!("got {} instead of a list", kind(other)),
+    }
+}
+
+fn numbers<const N: usize>(given: &[f64], field: impl Fn() -> String) -> Result<[f64; N]> {
+    check_finite(given, &field)?;
+    given
+        .try_into()
+        .ok()
+        .with_context(|| format!("{}: expected {N} numbers, got {}", field(), given.len()))
+}
+
+fn check_finite(numbers: &[f64], field: impl Fn() -> String) -> Result<()> {
+    // Written so that a number that is none fails.
+    match numbers
+        .iter()
+        .find(|number| !(number.abs() <= NUMBER_LIMIT))
+    {
+        None => Ok(()),
+        Some(number) => {
+            bail!(
+                "{}: expected finite numbers within ±{NUMBER_LIMIT}, got {number}",
+                field()
+            )
+        }
+    }
+}
+
+fn kind(value: &Value) -> &'static str {
+    match value {
+        Value::Null => "null",
+        Value::Bool(_) => "a boolean",
+        Value::Number(_) => "a number",
+        Value::String(_) => "a string",
+        Value::Array(_) => "a list",
+        Value::Object(_) => "an object",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn error(json: &str) -> String {
+        format!("{:#}", Scenario::read(json.as_bytes()).unwrap_err())
+    }
+
+    #[test]
+    fn the_least_scenario_holds_one_robot() {
+        let scenario =
+            Scenario::read(r#"{"puck": [0, 0, 0, 1, 0, 0], "duration_ms": 10}"#.as_bytes())
+                .unwrap();
+        assert_eq!(scenario.joints, [INITIAL_Q]);
+        assert_eq!(scenario.interpolation, [Interpolation::Cubic]);
+        assert_eq!(scenario.every_ms, 1);
+    }
+
+    #[test]
+    fn errors_name_the_field_and_what_was_expected() {
+        let puck = r#""puck": [0, 0, 0, 0, 0, 0], "duration_ms": 10"#;
+        for (json, expected) in [
+            (
+                r#"{"puck": [0, 0], "duration_ms": 10}"#.to_owned(),
+                "puck: expected 6 numbers, got 2",
+            ),
+            (
+                r#"{"puck": [0, 0, 0, 0, 0, 1e999], "duration_ms": 1}"#.to_owned(),
+                "puck",
+            ),
+            (r#"{"duration_ms": 10}"#.to_owned(), "missing field `puck`"),
+            (
+                r#"{"puck": [0, 0, 0, 0, 0, 0], "duration_ms": -1}"#.to_owned(),
+                "duration_ms",
+            ),
+            (format!(r#"{{{puck}, "task": "juggle"}}"#), "task"),
+            (
+                format!(r#"{{{puck}, "robots": 3}}"#),
+                "robots: expected 1 or 2, got 3",
+            ),
+            (
+                format!(r#"{{{puck}, "interpolation": [6]}}"#),
+                "interpolation[0]: expected 1, 2, 3",
+            ),
+            (
+                format!(r#"{{{puck}, "actions": [[[[1, 2]]]]}}"#),
+                "actions[0][0]: expected numbers of shape [2][7]",
+            ),
+            (
+                format!(r#"{{{puck}, "actions": [[], []]}}"#),
+                "actions: expected at most 1 robots",
+            ),
+            (
+                format!(r#"{{{puck}, "mallet": [[1, 2, 3]]}}"#),
+                "mallet[0]: expected 5 numbers, got 3",
+            ),
+            (
+                format!(r#"{{{puck}, "every_ms": 0}}"#),
+                "every_ms: expected at least 1",
+            ),
+            (
+                format!(r#"{{{puck}, "pucks": 2}}"#),
+                "unknown field `pucks`",
+            ),
+            ("[".to_owned(), "one JSON object"),
+        ] {
+            let message = error(&json);
+            assert!(message.contains(expected), "{json}: {message}");
+        }
+    }
+}

@@ -1,0 +1,218 @@
+//! `faceoff sim trace`: open-loop simulation, for comparison with other simulators.
+
+use super::scenario::Scenario;
+use anyhow::{Context as _, Result, ensure};
+use faceoff_sim::{
+    ConstraintValues, EPISODE_STEPS, Interpolation, JOINTS, MalletState, PerturbationSettings,
+    Plant, SUBSTEPS, World,
+    episode::{opponent::Opponent, task},
+    perturbation::{disturbance::Disturbance, stream::Stream},
+};
+use faceoff_types::{EpisodeEnd, Factor};
+use serde::Serialize;
+use std::io::{IsTerminal as _, Write};
+
+/// One line: the state at a time. One entry per robot in each list.
+#[derive(Debug, Serialize)]
+struct Line {
+    t_ms: u64,
+    puck: [f64; 6],
+    q: Vec<[f64; JOINTS]>,
+    dq: Vec<[f64; JOINTS]>,
+    dq_filtered: Vec<[f64; JOINTS]>,
+    universal: Vec<[f64; 2]>,
+    torque: Vec<[f64; JOINTS]>,
+    ee: Vec<[f64; 3]>,
+    mallet: Vec<[f64; 5]>,
+    constraints: Vec<Constraints>,
+}
+
+#[derive(Debug, Serialize)]
+struct Constraints {
+    joint_pos: f64,
+    joint_vel: f64,
+    ee: f64,
+    link: f64,
+}
+
+/// The last line of a scenario with a task.
+#[derive(Debug, Serialize)]
+struct Done {
+    done: bool,
+    steps: u32,
+    /// `null` where the scenario's time was over first.
+    reason: Option<EpisodeEnd>,
+    success: bool,
+}
+
+/// Reads a scenario from standard input and writes its trace to standard output.
+pub fn run() -> Result<()> {
+    let stdin = std::io::stdin();
+    ensure!(
+        !stdin.is_terminal(),
+        "expected a scenario on standard input, as in `faceoff sim trace < scenario.json`"
+    );
+    let scenario = Scenario::read(stdin.lock())?;
+    let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+    trace(&scenario, &mut out)?;
+    out.flush().context("standard output")
+}
+
+fn trace(scenario: &Scenario, out: &mut impl Write) -> Result<()> {
+    let settings = PerturbationSettings::default();
+    let factors = scenario.profile.factors();
+    let plant = if factors.contains(Factor::ModelMismatch) {
+        Plant::mismatched(&settings, scenario.seed.model_mismatch())
+    } else {
+        Plant::nominal()
+    };
+    let mut disturbance = factors.contains(Factor::Disturbance).then(|| {
+        let stream = Stream::new(&scenario.seed, Factor::Disturbance.as_str());
+        Disturbance::new(&settings.disturbance, stream)
+    });
+    let mut world = World::new(&plant, &scenario.joints, scenario.puck);
+    let mut opponent = (scenario.task == Some(faceoff_types::Task::Hit)).then(Opponent::new);
+    let mut steps = 0;
+    let mut end = None;
+    impose(&mut world, scenario, 0);
+    write(&world, 0, out)?;
+    for t_ms in 0..scenario.duration_ms {
+        if t_ms % SUBSTEPS as u64 == 0 {
+            let step = usize::try_from(t_ms).unwrap_or(usize::MAX) / SUBSTEPS;
+            for robot in 0..scenario.interpolation.len() {
+                let interpolation = scenario.interpolation[robot];
+                world.command(robot, interpolation, &action(scenario, robot, step));
+            }
+            if let Some(opponent) = &mut opponent {
+                world.command(1, Interpolation::LinearBoth, &opponent.action());
+            }
+        }
+        if let Some(disturbance) = &mut disturbance {
+            let force = disturbance.force(world.puck());
+            world.set_air_force(force);
+        }
+        world.substep();
+        let t_ms = t_ms + 1;
+        impose(&mut world, scenario, t_ms);
+        if t_ms % scenario.every_ms == 0 {
+            write(&world, t_ms, out)?;
+        }
+        if t_ms % SUBSTEPS as u64 == 0 {
+            steps += 1;
+            end = scenario.task.and_then(|task| {
+                task::end(task, world.puck())
+                    .or((steps >= EPISODE_STEPS).then_some(EpisodeEnd::Horizon))
+            });
+            if end.is_some() {
+                break;
+            }
+        }
+    }
+    if let Some(task) = scenario.task {
+        let success = task::success(task, world.puck());
+        line(
+            &Done {
+                done: true,
+                steps,
+                reason: end,
+                success,
+            },
+            out,
+        )?;
+    }
+    Ok(())
+}
+
+/// The action of a control step: the given one, then the last position held, or the initial one.
+fn action(scenario: &Scenario, robot: usize, step: usize) -> Vec<f64> {
+    let given = &scenario.actions[robot];
+    if let Some(action) = given.get(step) {
+        return action.clone();
+    }
+    let interpolation = scenario.interpolation[robot];
+    let position: [f64; JOINTS] = match given.last() {
+        None => scenario.joints[robot],
+        // A trajectory ends with position, velocity and acceleration of the last millisecond.
+        Some(last) if interpolation == Interpolation::Trajectory => {
+            std::array::from_fn(|j| last[last.len() - 3 * JOINTS + j])
+        }
+        Some(last) => std::array::from_fn(|j| last[j]),
+    };
+    let rows_per_point = if interpolation == Interpolation::Trajectory {
+        3
+    } else {
+        interpolation.len() / JOINTS
+    };
+    let mut point = vec![0.0; rows_per_point * JOINTS];
+    point[..JOINTS].copy_from_slice(&position);
+    point.repeat(interpolation.len() / point.len())
+}
+
+/// Imposes the mallet of this millisecond, or the last one at rest.
+fn impose(world: &mut World, scenario: &Scenario, t_ms: u64) {
+    let row = usize::try_from(t_ms)
+        .ok()
+        .and_then(|t| scenario.mallet.get(t))
+        .copied();
+    let held = || {
+        scenario.mallet.last().map(|last| MalletState {
+            velocity: [0.0; 2],
+            ..*last
+        })
+    };
+    if let Some(mallet) = row.or_else(held) {
+        world.impose_mallet(Some(mallet));
+    }
+}
+
+fn write(world: &World, t_ms: u64, out: &mut impl Write) -> Result<()> {
+    let robots = 0..world.robots();
+    let mut state = Line {
+        t_ms,
+        puck: world.puck().state(),
+        q: robots.clone().map(|r| world.joints(r)).collect(),
+        dq: robots.clone().map(|r| world.joint_velocities(r)).collect(),
+        dq_filtered: robots
+            .clone()
+            .map(|r| *world.filtered_velocities(r))
+            .collect(),
+        universal: robots.clone().map(|r| world.universal(r)).collect(),
+        torque: robots.clone().map(|r| *world.torques(r)).collect(),
+        ee: Vec::new(),
+        mallet: Vec::new(),
+        constraints: Vec::new(),
+    };
+    for robot in robots {
+        let kinematics = world.kinematics(robot);
+        state.ee.push(kinematics.end_effector.origin.lane(0));
+        let MalletState {
+            position: [x, y, z],
+            velocity: [vx, vy],
+        } = world.mallet(robot);
+        state.mallet.push([x, y, z, vx, vy]);
+        let values = ConstraintValues::new(
+            &world.joints(robot),
+            world.filtered_velocities(robot),
+            &kinematics,
+        );
+        let ConstraintValues {
+            joint_pos,
+            joint_vel,
+            ee,
+            link,
+        } = values;
+        state.constraints.push(Constraints {
+            joint_pos,
+            joint_vel,
+            ee,
+            link,
+        });
+    }
+    line(&state, out)
+}
+
+fn line(value: &impl Serialize, out: &mut impl Write) -> Result<()> {
+    serde_json::to_writer(&mut *out, value).map_err(std::io::Error::from)?;
+    out.write_all(b"\n")?;
+    Ok(())
+}

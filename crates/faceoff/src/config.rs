@@ -1,0 +1,284 @@
+//! The configuration: one TOML file in which every field may be left out.
+//!
+//! The defaults are the `Default` implementations below and of the types that the sections hold, so
+//! that the file, the documentation (`docs/operating.md`, held to them by a test) and the code
+//! cannot state different ones.
+
+use anyhow::{Context, bail, ensure};
+use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::BundleLimits};
+use faceoff_sandbox::{Isolation, Layer, Limits, Runtime};
+use faceoff_store::EvaluationPlan;
+use faceoff_types::{Profile, Task};
+use jiff::civil::Time;
+use serde::{Deserialize, Serialize};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    net::SocketAddr,
+    path::{Path, PathBuf},
+};
+
+/// The file that is read when none is named and it exists.
+pub const DEFAULT_FILE: &str = "faceoff.toml";
+
+/// The whole file.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Address and data folder.
+    pub server: ServerConfig,
+    /// What the season is called.
+    pub season: SeasonConfig,
+    /// The daily evaluation.
+    pub evaluation: EvaluationConfig,
+    /// How this machine evaluates.
+    pub workers: WorkersConfig,
+    /// What an agent's process tree may use.
+    pub limits: Limits,
+    /// How long an agent may take.
+    pub time: TimeLimits,
+    /// What a bundle may hold.
+    pub bundle: BundleLimits,
+    /// What is not enforced.
+    pub sandbox: SandboxConfig,
+    /// Runtimes by the name that `agent.toml` gives; added to `python3` and `native`, or in their
+    /// place.
+    pub runtimes: BTreeMap<String, Runtime>,
+}
+
+/// `[server]`
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ServerConfig {
+    /// Address of API and pages. Bind a public address only behind a proxy that speaks TLS.
+    pub listen: SocketAddr,
+    /// Folder of the database, the artifacts and the organiser's token.
+    pub data_dir: PathBuf,
+}
+
+impl Default for ServerConfig {
+    fn default() -> Self {
+        Self {
+            listen: SocketAddr::from(([127, 0, 0, 1], 8080)),
+            data_dir: PathBuf::from("faceoff-data"),
+        }
+    }
+}
+
+/// `[season]`
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SeasonConfig {
+    /// Name on the pages; left out, the one of the data folder.
+    pub name: Option<String>,
+}
+
+/// `[evaluation]`
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EvaluationConfig {
+    /// The perturbation profile.
+    pub profile: Profile,
+    /// The tasks.
+    pub tasks: Vec<Task>,
+    /// Episodes of each task.
+    pub episodes_per_task: u32,
+    /// Episodes of one unit of work. Scores do not depend on it; smaller units lose less when a
+    /// worker dies, larger ones start fewer agents.
+    pub episodes_per_shard: u32,
+    /// UTC time of the daily evaluation; left out, the organiser starts each day.
+    pub at: Option<Time>,
+    /// More agent faults than this end an evaluation without a score.
+    pub max_faults: u32,
+}
+
+impl Default for EvaluationConfig {
+    fn default() -> Self {
+        Self {
+            profile: Profile::Evaluation,
+            tasks: Task::ALL.to_vec(),
+            episodes_per_task: 1000,
+            episodes_per_shard: 50,
+            at: None,
+            max_faults: 10,
+        }
+    }
+}
+
+/// `[workers]`
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct WorkersConfig {
+    /// Evaluations at the same time; left out, one per two CPUs, so that an agent and its simulator
+    /// have a CPU each.
+    pub slots: Option<usize>,
+    /// Seconds after which the work of a dead worker is given to another.
+    pub lease_s: u32,
+    /// CPUs of all agents; empty = every slot has its own, where there are two per slot.
+    pub agent_cpus: Vec<usize>,
+    /// Folder for unpacked bundles and recordings under way; left out, `scratch` in the data folder.
+    pub scratch_dir: Option<PathBuf>,
+}
+
+impl Default for WorkersConfig {
+    fn default() -> Self {
+        Self {
+            slots: None,
+            lease_s: 30,
+            agent_cpus: Vec::new(),
+            scratch_dir: None,
+        }
+    }
+}
+
+/// `[sandbox]`
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SandboxConfig {
+    /// Layers that this host cannot provide and the organiser does without.
+    pub given_up: Vec<Layer>,
+}
+
+impl Config {
+    /// Reads `file`; without one, [`DEFAULT_FILE`] of the working folder if it exists, else the
+    /// defaults.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or a field that is unknown or has a value that cannot be; the
+    /// error names the file and the field.
+    pub fn load(file: Option<&Path>) -> anyhow::Result<Self> {
+        let (file, text) = match file {
+            Some(file) => {
+                let text = std::fs::read_to_string(file)
+                    .with_context(|| format!("reading the configuration {}", file.display()))?;
+                (file, text)
+            }
+            None => {
+                let file = Path::new(DEFAULT_FILE);
+                match std::fs::read_to_string(file) {
+                    Ok(text) => (file, text),
+                    Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                        return Ok(Self::default());
+                    }
+                    Err(error) => {
+                        return Err(error).with_context(|| {
+                            format!("reading the configuration {}", file.display())
+                        });
+                    }
+                }
+            }
+        };
+        Self::parse(&text).with_context(|| format!("the configuration {}", file.display()))
+    }
+
+    fn parse(text: &str) -> anyhow::Result<Self> {
+        let config: Self = toml::from_str(text)?;
+        config.check()?;
+        Ok(config)
+    }
+
+    /// What types alone cannot say.
+    fn check(&self) -> anyhow::Result<()> {
+        let evaluation = &self.evaluation;
+        ensure!(
+            (1..=100_000).contains(&evaluation.episodes_per_task),
+            "evaluation.episodes_per_task: expected 1 to 100000, got {}",
+            evaluation.episodes_per_task
+        );
+        ensure!(
+            evaluation.episodes_per_shard >= 1,
+            "evaluation.episodes_per_shard: expected at least 1, got 0"
+        );
+        ensure!(
+            !evaluation.tasks.is_empty(),
+            "evaluation.tasks: expected at least one task"
+        );
+        let mut seen = BTreeSet::new();
+        if let Some(twice) = evaluation.tasks.iter().find(|task| !seen.insert(**task)) {
+            bail!("evaluation.tasks: {twice} is listed twice");
+        }
+        ensure!(
+            self.workers.slots != Some(0),
+            "workers.slots: expected at least 1, got 0"
+        );
+        ensure!(
+            (5..=3600).contains(&self.workers.lease_s),
+            "workers.lease_s: expected 5 to 3600 seconds, got {}",
+            self.workers.lease_s
+        );
+        if let Some(name) = &self.season.name {
+            let chars = name.chars().count();
+            ensure!(
+                (1..=80).contains(&chars),
+                "season.name: expected 1 to 80 characters, got {chars}"
+            );
+        }
+        for (name, seconds) in [
+            ("startup_s", self.time.startup_s),
+            ("reset_s", self.time.reset_s),
+            ("step_s", self.time.step_s),
+            ("bye_s", self.time.bye_s),
+        ] {
+            ensure!(
+                seconds.is_finite() && seconds > 0.0 && seconds <= 3600.0,
+                "time.{name}: expected more than 0 and at most 3600 seconds, got {seconds}"
+            );
+        }
+        ensure!(
+            self.limits.cpus.is_finite() && self.limits.cpus > 0.0,
+            "limits.cpus: expected more than 0, got {}",
+            self.limits.cpus
+        );
+        Ok(())
+    }
+
+    /// What an evaluation plays.
+    #[must_use]
+    pub fn plan(&self) -> EvaluationPlan {
+        let evaluation = &self.evaluation;
+        EvaluationPlan {
+            profile: evaluation.profile,
+            tasks: evaluation.tasks.clone(),
+            episodes_per_task: evaluation.episodes_per_task,
+            episodes_per_shard: evaluation.episodes_per_shard,
+            max_faults: evaluation.max_faults,
+        }
+    }
+
+    /// How agents are run here: all layers but those given up; `native`, `python3` where this host
+    /// has one, and the configured runtimes.
+    #[must_use]
+    pub fn agent_environment(&self) -> AgentEnvironment {
+        let mut runtimes = BTreeMap::from([("native".to_owned(), Runtime::native())]);
+        runtimes.extend(Runtime::python3().map(|python| ("python3".to_owned(), python)));
+        runtimes.extend(self.runtimes.clone());
+        AgentEnvironment {
+            limits: self.limits.clone(),
+            time: self.time.clone(),
+            isolation: Isolation::Sandboxed {
+                given_up: self.sandbox.given_up.clone(),
+            },
+            runtimes,
+            agent_cpus: self.workers.agent_cpus.clone(),
+        }
+    }
+
+    /// Worker slots: as configured, or one per two CPUs.
+    #[must_use]
+    pub fn slots(&self) -> usize {
+        self.workers.slots.unwrap_or_else(|| {
+            std::thread::available_parallelism().map_or(1, |cpus| (cpus.get() / 2).max(1))
+        })
+    }
+
+    /// Folder for unpacked bundles and recordings under way.
+    #[must_use]
+    pub fn scratch_dir(&self) -> PathBuf {
+        self.workers
+            .scratch_dir
+            .clone()
+            .unwrap_or_else(|| self.server.data_dir.join("scratch"))
+    }
+}
+
+#[cfg(test)]
+mod tests;

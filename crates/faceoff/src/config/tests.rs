@@ -1,0 +1,97 @@
+use super::*;
+
+fn error(text: &str) -> String {
+    format!("{:#}", Config::parse(text).unwrap_err())
+}
+
+#[test]
+fn an_empty_file_is_the_defaults_and_so_is_what_they_write() {
+    let default = Config::default();
+    assert_eq!(Config::parse("").unwrap(), default);
+    let written = toml::to_string(&default).unwrap();
+    assert_eq!(Config::parse(&written).unwrap(), default);
+}
+
+#[test]
+fn every_section_is_read() {
+    let config = Config::parse(
+        r#"
+        [server]
+        listen = "0.0.0.0:80"
+        data_dir = "/srv/faceoff"
+        [season]
+        name = "Practice"
+        [evaluation]
+        profile = "ideal"
+        tasks = ["hit"]
+        episodes_per_task = 7
+        at = "00:30"
+        [workers]
+        slots = 3
+        agent_cpus = [1]
+        [limits]
+        pids = 9
+        [time]
+        step_s = 0.5
+        [bundle]
+        files = 10
+        [sandbox]
+        given_up = ["cgroup-memory"]
+        [runtimes.julia]
+        read_only_paths = ["/opt/julia"]
+        path = "/opt/julia/bin"
+        "#,
+    )
+    .unwrap();
+    assert_eq!(config.server.listen.port(), 80);
+    assert_eq!(config.season.name.as_deref(), Some("Practice"));
+    assert_eq!(config.plan().episodes_per_task, 7);
+    assert_eq!(config.evaluation.at, Some(jiff::civil::time(0, 30, 0, 0)));
+    assert_eq!(config.slots(), 3);
+    assert_eq!(config.limits.pids, 9);
+    assert_eq!(config.limits.open_files, Limits::default().open_files);
+    assert_eq!(config.bundle.files, 10);
+    let environment = config.agent_environment();
+    assert_eq!(
+        environment.isolation,
+        Isolation::Sandboxed {
+            given_up: vec![Layer::CgroupMemory]
+        }
+    );
+    assert!(environment.runtimes.contains_key("julia"));
+    assert!(environment.runtimes.contains_key("native"));
+}
+
+#[test]
+fn an_error_names_the_field() {
+    assert!(error("[server]\nlisten_on = 1").contains("listen_on"));
+    assert!(error("[serve]").contains("serve"));
+    assert!(error("[evaluation]\nepisodes_per_task = 0").contains("evaluation.episodes_per_task"));
+    assert!(error("[evaluation]\ntasks = []").contains("evaluation.tasks"));
+    assert!(error("[evaluation]\ntasks = [\"hit\", \"hit\"]").contains("evaluation.tasks"));
+    assert!(error("[evaluation]\nprofile = \"easy\"").contains("easy"));
+    assert!(error("[workers]\nslots = 0").contains("workers.slots"));
+    assert!(error("[workers]\nlease_s = 1").contains("workers.lease_s"));
+    assert!(error("[time]\nstep_s = -1.0").contains("time.step_s"));
+    assert!(error("[limits]\npid = 1").contains("pid"));
+    assert!(error("[sandbox]\ngiven_up = [\"everything\"]").contains("everything"));
+}
+
+#[test]
+fn the_documentation_quotes_the_defaults() {
+    let documentation = include_str!("../../../../docs/operating.md");
+    let block = documentation
+        .split("```toml\n")
+        .nth(1)
+        .and_then(|rest| rest.split("```").next())
+        .expect("docs/operating.md shows the configuration in its first toml block");
+    // Fields whose default is “none” or of the host stand there as comments.
+    assert_eq!(Config::parse(block).unwrap(), Config::default());
+}
+
+#[test]
+fn a_named_file_must_exist() {
+    let missing = Path::new("/nonexistent/faceoff.toml");
+    let error = Config::load(Some(missing)).unwrap_err();
+    assert!(format!("{error:#}").contains("/nonexistent/faceoff.toml"));
+}

@@ -1,0 +1,155 @@
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output},
+};
+
+const MANIFEST: &str =
+    "name = \"test\"\ncommand = [\"python3\", \"agent.py\"]\nruntime = \"python3\"\n";
+
+fn hold() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../agents/hold")
+}
+
+fn eval(bundle: &Path, out: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_faceoff"))
+        .arg("eval")
+        .arg(bundle)
+        .args(args)
+        .arg("--out")
+        .arg(out)
+        // Another configuration in the working folder must not decide.
+        .current_dir(out.parent().unwrap())
+        .output()
+        .unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// `results.json` without what is measured.
+fn result(out: &Path) -> serde_json::Value {
+    let mut result: serde_json::Value =
+        serde_json::from_slice(&fs::read(out.join("results.json")).unwrap()).unwrap();
+    for key in ["penalty_points", "tier"] {
+        result.as_object_mut().unwrap().remove(key).unwrap();
+    }
+    for task in result["tasks"].as_object_mut().unwrap().values_mut() {
+        for key in ["computation_time_s", "penalty_points", "tier"] {
+            task.as_object_mut().unwrap().remove(key).unwrap();
+        }
+        task["violations"]["computation_time"] = 0.into();
+    }
+    result
+}
+
+#[test]
+fn the_result_does_not_depend_on_workers_sandbox_or_packing() {
+    let dir = tempfile::tempdir().unwrap();
+    let archive = dir.path().join("hold.tar.gz");
+    let packed = Command::new("tar")
+        .arg("-czf")
+        .arg(&archive)
+        .arg("-C")
+        .arg(hold().parent().unwrap())
+        .arg("hold")
+        .status()
+        .unwrap();
+    assert!(packed.success());
+    let common = ["--task", "hit,defend", "--episodes", "3", "--seed", "5"];
+    let mut results = Vec::new();
+    for (name, bundle, extra) in [
+        ("folder", hold(), &[][..]),
+        ("archive", archive, &["--workers", "3"]),
+        ("bare", hold(), &["--no-sandbox", "--workers", "2"]),
+    ] {
+        let out = dir.path().join(name);
+        let output = eval(&bundle, &out, &[&common[..], extra].concat());
+        assert!(output.status.success(), "{name}: {}", text(&output.stderr));
+        let table = text(&output.stdout);
+        assert!(
+            table.contains("hold: evaluation (airhockey-2023.1)"),
+            "{table}"
+        );
+        assert!(table.contains("\ndefend          3 "), "{table}");
+        results.push(result(&out));
+        let mut left: Vec<_> = out
+            .read_dir()
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name())
+            .collect();
+        left.sort();
+        assert_eq!(left, ["dataset.zip", "results.json"]);
+    }
+    assert_eq!(results[0], results[1]);
+    assert_eq!(results[0], results[2]);
+    assert_eq!(results[0]["tasks"]["hit"]["episodes"], 3);
+}
+
+#[test]
+fn an_agent_that_fails_is_told_with_fault_and_log_and_leaves_no_score() {
+    let dir = tempfile::tempdir().unwrap();
+    let bundle = dir.path().join("bundle");
+    fs::create_dir(&bundle).unwrap();
+    fs::write(bundle.join("agent.toml"), MANIFEST).unwrap();
+    fs::write(bundle.join("agent.py"), "import torch_of_olympia").unwrap();
+    let out = dir.path().join("out");
+    // The score of an earlier run must not be taken for this one's.
+    let first = eval(&hold(), &out, &["--task", "defend", "--episodes", "1"]);
+    assert!(first.status.success(), "{}", text(&first.stderr));
+
+    let output = eval(&bundle, &out, &["--episodes", "8", "--workers", "2"]);
+    assert_eq!(output.status.code(), Some(1));
+    let stderr = text(&output.stderr);
+    assert!(
+        stderr.contains("the agent failed: more than 10 faults"),
+        "{stderr}"
+    );
+    assert!(
+        stderr.contains("start-up: the agent exited with status 1"),
+        "{stderr}"
+    );
+    let stdout = text(&output.stdout);
+    assert!(
+        stdout.contains("No module named 'torch_of_olympia'"),
+        "{stdout}"
+    );
+    let log = fs::read_to_string(out.join("agent.log")).unwrap();
+    assert!(log.contains("No module named 'torch_of_olympia'"), "{log}");
+    assert!(!out.join("results.json").exists() && !out.join("dataset.zip").exists());
+}
+
+#[test]
+fn what_cannot_be_evaluated_is_refused_with_a_reason() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("out");
+    let refused = |bundle: &Path, args: &[&str], reason: &str| {
+        let output = eval(bundle, &out, args);
+        assert!(!output.status.success());
+        let stderr = text(&output.stderr);
+        assert!(stderr.contains(reason), "{stderr:?} lacks {reason:?}");
+    };
+    refused(&dir.path().join("nothing"), &[], "there is no bundle at");
+    refused(dir.path(), &[], "there is no agent.toml");
+    refused(&hold(), &["--task", "juggle"], "unknown task \"juggle\"");
+    refused(&hold(), &["--episodes", "0"], "0 is not in 1..=100000");
+    refused(&hold(), &["--profile", "easy"], "unknown profile \"easy\"");
+    refused(&hold(), &["--seed", "lucky"], "not a seed");
+    fs::write(
+        dir.path().join("agent.toml"),
+        MANIFEST.replace("python3\"\n", "fortran\"\n"),
+    )
+    .unwrap();
+    fs::create_dir(dir.path().join("b")).unwrap();
+    fs::rename(
+        dir.path().join("agent.toml"),
+        dir.path().join("b/agent.toml"),
+    )
+    .unwrap();
+    refused(
+        &dir.path().join("b"),
+        &["--episodes", "20"],
+        "\"fortran\" of agent.toml is not offered",
+    );
+}

@@ -1,0 +1,41 @@
+#!/bin/sh
+# Installs the system packages that are missing, on a host or in an image.
+#
+#   docker/setup.sh build    to compile and run the service (cc for the C parts of SQLite and zstd,
+#                            bubblewrap for the sandbox)
+#   docker/setup.sh test     also what the tests drive (a browser, so that pages are really opened)
+#
+# As root it installs them with apt-get; otherwise it prints the command and fails.
+set -eu
+
+purpose=${1:-build}
+missing=''
+need() { # need COMMAND PACKAGE
+    command -v "$1" >/dev/null 2>&1 || missing="$missing $2"
+}
+
+need cc build-essential
+need bwrap bubblewrap
+# Reference agents are interpreted by it.
+need python3 python3
+if [ "$purpose" = test ]; then
+    need chromium chromium
+fi
+
+if ! command -v cargo >/dev/null 2>&1; then
+    echo "error: cargo is not on the PATH; install Rust with rustup (https://rustup.rs), then run this again" >&2
+    exit 1
+fi
+
+[ -n "$missing" ] || exit 0
+
+if [ "$(id -u)" -ne 0 ]; then
+    echo "error: these Debian packages are missing:$missing" >&2
+    echo "run:   sudo apt-get update && sudo apt-get install -y --no-install-recommends$missing" >&2
+    exit 1
+fi
+echo "installing:$missing"
+export DEBIAN_FRONTEND=noninteractive
+apt-get update -qq
+# shellcheck disable=SC2086 # a list of words on purpose
+apt-get install -y -qq --no-install-recommends $missing >/dev/null

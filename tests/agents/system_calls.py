@@ -1,0 +1,84 @@
+"""Makes system calls by number (x86-64) and reports each one's error name, or `ok`."""
+import ctypes
+import errno
+import json
+import os
+
+libc = ctypes.CDLL(None, use_errno=True)
+libc.syscall.restype = ctypes.c_long
+memory = ctypes.create_string_buffer(4096)
+at = ctypes.addressof(memory)
+CLONE_NEWUSER, CLONE_NEWNS, CLONE_NEWNET, SIGCHLD = 0x10000000, 0x00020000, 0x40000000, 17
+
+calls = {
+    "ptrace": (101, 0, 0, 0, 0),
+    "process_vm_readv": (310, os.getpid(), at, 0, at, 0, 0),
+    "process_vm_writev": (311, os.getpid(), at, 0, at, 0, 0),
+    "kcmp": (312, os.getpid(), os.getpid(), 0, 0, 1),
+    "pidfd_getfd": (438, 0, 0, 0),
+    "mount": (165, at, at, at, 0, 0),
+    "umount2": (166, at, 0),
+    "pivot_root": (155, at, at),
+    "chroot": (161, at),
+    "fsopen": (430, at, 0),
+    "open_tree": (428, -100, at, 1),
+    "move_mount": (429, -100, at, -100, at, 0),
+    "mount_setattr": (442, -100, at, 0, at, 32),
+    "setns": (308, 0, 0),
+    "unshare_user": (272, CLONE_NEWUSER),
+    "unshare_net": (272, CLONE_NEWNET),
+    "clone_newuser": (56, CLONE_NEWUSER | SIGCHLD, 0, 0, 0, 0),
+    "clone_newns": (56, CLONE_NEWNS | SIGCHLD, 0, 0, 0, 0),
+    "clone3": (435, at, 0),
+    "keyctl": (250, 0, -3, 1),
+    "add_key": (248, at, at, at, 1, -2),
+    "request_key": (249, at, at, 0, -2),
+    "bpf": (321, 0, at, 120),
+    "perf_event_open": (298, at, 0, -1, -1, 0),
+    "io_uring_setup": (425, 4, at),
+    "io_uring_enter": (426, 0, 0, 0, 0, 0, 0),
+    "io_uring_register": (427, 0, 0, 0, 0),
+    "userfaultfd": (323, 1),
+    "fanotify_init": (300, 0, 0),
+    "open_by_handle_at": (304, -100, at, 0),
+    "name_to_handle_at": (303, -100, at, at, at, 0),
+    "kexec_load": (246, 0, 0, 0, 0),
+    "reboot": (169, 0, 0, 0, 0),
+    "swapon": (167, at, 0),
+    "init_module": (175, at, 0, at),
+    "delete_module": (176, at, 0),
+    "acct": (163, at),
+    "quotactl": (179, 0, at, 0, at),
+    "syslog": (103, 10, 0, 0),
+    "sethostname": (170, at, 1),
+    "settimeofday": (164, at, 0),
+    "personality": (135, 0xFFFFFFFF),
+    "seccomp": (317, 2, 0, at),
+    "modify_ldt": (154, 0, at, 0),
+    "iopl": (172, 3),
+    "socket_inet": (41, 2, 1, 0),
+    "socket_netlink": (41, 16, 3, 0),
+    "socketpair_inet": (53, 2, 1, 0, at),
+    "newer_than_known": (463, -100, at, 0, at, at, 0),
+    "x32_getpid": (0x40000000 | 39,),
+}
+
+
+def call(number, *arguments):
+    ctypes.set_errno(0)
+    result = libc.syscall(ctypes.c_long(number), *(ctypes.c_long(value) for value in arguments))
+    if result == 0 and number == 56:
+        os._exit(0)
+    return "ok" if result != -1 else errno.errorcode[ctypes.get_errno()]
+
+
+def untie():
+    """Asks not to be ended with its parent, and returns the signal that would still come."""
+    left = ctypes.c_int(-1)
+    libc.prctl(1, 0)
+    libc.prctl(2, ctypes.byref(left))
+    return str(left.value)
+
+
+answers = {name: call(*arguments) for name, arguments in calls.items()}
+print(json.dumps({**answers, "parent_death_signal": untie()}), flush=True)

@@ -1,0 +1,37 @@
+//! What the end-to-end tests share: the real `faceoff` program as a child process, bundles on disk
+//! and an HTTP client that knows nothing of the server's types.
+
+pub mod bundle;
+pub mod server;
+
+use std::path::PathBuf;
+
+/// The repository's root.
+#[must_use]
+pub fn repository() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .expect("tests/ lies in the repository's root")
+        .to_path_buf()
+}
+
+/// A program of this workspace, built beside the running test.
+///
+/// # Panics
+/// If it has not been built; `make test` builds all programs before it runs a test.
+#[must_use]
+pub fn program(name: &str) -> PathBuf {
+    let test = std::env::current_exe().expect("a running test has a path");
+    // <target>/<profile>/deps/<test>
+    let folder = test
+        .ancestors()
+        .nth(2)
+        .expect("a test lies two folders below the target folder");
+    let program = folder.join(name);
+    assert!(
+        program.is_file(),
+        "{} is not built; run `make test`, or `cargo build --workspace --bins` first",
+        program.display()
+    );
+    program
+}
