@@ -4,15 +4,16 @@
 //! at constant height. The command sent is the reference plus a slowly learnt *correction*, because
 //! the real arm is heavier or lighter than its controller believes and hangs up to a centimetre low.
 
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use nalgebra::Vector3;
 
 use crate::env::{Env, JOINTS, Joints};
 use crate::field::Vec2;
-use crate::kinematics::{FOREARM_M, HAND_M, Jacobian, Pose, SHOULDER_M, UPPER_ARM_M, forward};
+use crate::kinematics::{FOREARM_M, HAND_M, Jacobian, SHOULDER_M, UPPER_ARM_M, forward};
+use crate::redundancy::{even_speeds, least_change, least_peak};
 
 /// Share of the evaluator's joint speed limits that references may use; the rest is for tracking
 /// errors and the observation filter.
-const CRUISE_SHARE: f64 = 0.93;
+const CRUISE_SHARE: f64 = 0.955;
 /// Rate at which a free posture approaches its preference, 1/s.
 const POSTURE_RATE: f64 = 4.0;
 /// Share of the speed limits that a posture change may take.
@@ -20,7 +21,7 @@ const POSTURE_SHARE: f64 = 0.6;
 /// Largest acceleration of a posture change, rad/s².
 const POSTURE_ACCELERATION: f64 = 8.0;
 /// Share of the possible speed that strikes are planned with: the posture is never exactly the best.
-const STRIKE_SHARE: f64 = 0.96;
+const STRIKE_SHARE: f64 = 0.98;
 /// Largest correction of the tip per control step that does not come from the velocity, metres.
 const NUDGE_MAX_M: f64 = 0.004;
 /// Time in which the strike's way to share the load between joints fades, seconds.
@@ -115,11 +116,6 @@ impl Arm {
         }
     }
 
-    /// Pose of the reference.
-    pub fn pose(&self) -> Pose {
-        forward(&self.q)
-    }
-
     /// Moves the reference on by one control step so that the mallet is at `position` with
     /// `velocity` (base frame, metres, m/s), as far as the joint speed limits allow.
     pub fn advance(&mut self, position: Vec2, velocity: Vec2, posture: Posture) -> Reached {
@@ -151,7 +147,10 @@ impl Arm {
         self.dq = dq;
         let end = forward(&q);
         let velocity = end.jacobian * dq;
-        Reached { position: end.tip.xy(), velocity: velocity.xy() }
+        Reached {
+            position: end.tip.xy(),
+            velocity: velocity.xy(),
+        }
     }
 
     /// Position and velocity command for the end of this control step.
@@ -174,8 +173,11 @@ impl Arm {
         if self.sharpness > 0.0 {
             // Few steps from the last balance, so that it changes smoothly over a swing.
             let rounds = if self.balance.is_some() { 3 } else { 12 };
-            let balance = self.balance.get_or_insert(self.speed_max.component_mul(&self.speed_max));
-            base += self.sharpness * least_peak(jacobian, velocity, &self.speed_max, balance, rounds);
+            let balance = self
+                .balance
+                .get_or_insert(self.speed_max.component_mul(&self.speed_max));
+            base +=
+                self.sharpness * least_peak(jacobian, velocity, &self.speed_max, balance, rounds);
         } else {
             self.balance = None;
         }
@@ -265,67 +267,6 @@ impl Arm {
         let peak = speeds.component_div(&self.speed_max).amax();
         STRIKE_SHARE / peak.max(1e-6)
     }
-}
-
-/// The change of joints of least weighted norm that moves the tip by `delta`.
-fn least_change(jacobian: &Jacobian, delta: &Vector3<f64>, cap: &Joints) -> Joints {
-    weighted(jacobian, delta, &cap.component_mul(cap))
-}
-
-/// Joint speeds for the tip velocity with moderate load on all joints: a few steps of reweighted
-/// least squares towards the 4-norm of the loads.
-fn even_speeds(jacobian: &Jacobian, velocity: &Vector3<f64>, cap: &Joints) -> Joints {
-    let square = cap.component_mul(cap);
-    let mut speeds = weighted(jacobian, velocity, &square);
-    for _ in 0..4 {
-        let load = speeds.component_div(cap);
-        let peak = load.amax();
-        if peak < 1e-9 {
-            break;
-        }
-        // The fourth power's weight is load²; the floor keeps idle joints available.
-        let compliance = Joints::from_fn(|i, _| square[i] / (load[i] / peak).powi(2).max(0.05));
-        speeds = 0.5 * (speeds + weighted(jacobian, velocity, &compliance));
-    }
-    speeds
-}
-
-/// Joint speeds for the tip velocity whose largest load is nearly the least possible: Lawson's
-/// iteration divides the compliances by the loads they led to, again and again.
-fn least_peak(
-    jacobian: &Jacobian,
-    velocity: &Vector3<f64>,
-    cap: &Joints,
-    compliance: &mut Joints,
-    rounds: usize,
-) -> Joints {
-    let mut speeds = weighted(jacobian, velocity, compliance);
-    for _ in 0..rounds {
-        let load = speeds.component_div(cap);
-        let peak = load.amax();
-        if peak < 1e-9 {
-            break;
-        }
-        for i in 0..JOINTS {
-            // Bounded relative to the others: an idle joint must be able to come back.
-            compliance[i] = (compliance[i] / (load[i].abs() / peak).max(0.1)).min(1e3);
-        }
-        *compliance /= compliance.min();
-        speeds = weighted(jacobian, velocity, compliance);
-    }
-    speeds
-}
-
-/// `C Jᵀ (J C Jᵀ)⁻¹ delta` with the diagonal compliance C.
-fn weighted(jacobian: &Jacobian, delta: &Vector3<f64>, compliance: &Joints) -> Joints {
-    let cjt = SMatrix::<f64, JOINTS, 3>::from_fn(|i, k| compliance[i] * jacobian[(k, i)]);
-    let square: Matrix3<f64> = jacobian * cjt;
-    // Singular only with the arm stretched out, which the workspace excludes; the damping keeps the
-    // answer finite there.
-    let damped = square + Matrix3::identity() * 1e-9;
-    damped
-        .try_inverse()
-        .map_or_else(Joints::zeros, |inverse| cjt * (inverse * delta))
 }
 
 #[cfg(test)]

@@ -124,11 +124,6 @@ impl Estimator {
         *self = Self::new(&self.field, self.dt);
     }
 
-    /// Control steps since the puck was last seen.
-    pub fn lost_steps(&self) -> u32 {
-        self.lost
-    }
-
     /// Standard deviations of the estimated speed components, m/s.
     pub fn speed_deviation(&self) -> Vec2 {
         self.axes.map_or(Vec2::zeros(), |[x, y]| {

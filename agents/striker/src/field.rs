@@ -41,7 +41,7 @@ impl Field {
     }
 
     /// Field coordinates of a point in the robot's base frame.
-    pub fn from_base(&self, p: Vec2) -> Vec2 {
+    pub fn to_field(&self, p: Vec2) -> Vec2 {
         Vec2::new(p.x - self.base, p.y)
     }
 
@@ -73,7 +73,7 @@ impl Field {
     /// Largest distance from the robot's base that a mallet reference may have: the arm is nearly
     /// stretched there.
     pub fn reach_max(&self) -> f64 {
-        1.3
+        1.36
     }
 
     /// Largest |y| that a mallet reference may take.
@@ -84,7 +84,10 @@ impl Field {
     /// Lowest and highest coordinates that a mallet reference may take; the reach bounds it further.
     pub fn mallet_bounds(&self) -> (Vec2, Vec2) {
         let y = self.mallet_y_max();
-        (Vec2::new(self.mallet_x_min(), -y), Vec2::new(self.reach_max() - self.base, y))
+        (
+            Vec2::new(self.mallet_x_min(), -y),
+            Vec2::new(self.reach_max() - self.base, y),
+        )
     }
 
     /// The nearest point where a mallet reference may be.
@@ -93,6 +96,10 @@ impl Field {
         let p = Vec2::new(p.x.clamp(low.x, high.x), p.y.clamp(low.y, high.y));
         let from_base = self.to_base(p);
         let reach = from_base.norm();
-        if reach <= self.reach_max() { p } else { self.from_base(from_base * (self.reach_max() / reach)) }
+        if reach <= self.reach_max() {
+            p
+        } else {
+            self.to_field(from_base * (self.reach_max() / reach))
+        }
     }
 }

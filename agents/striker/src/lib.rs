@@ -15,6 +15,7 @@ mod motion;
 mod opponent;
 pub mod protocol;
 mod puck;
+mod redundancy;
 mod skills;
 #[cfg(test)]
 mod testing;
@@ -108,7 +109,7 @@ impl Agent {
         let pose = forward(&q);
         let tip_velocity = pose.jacobian * dq;
         let seen = MalletState {
-            pos: self.field.from_base(Vec2::new(pose.tip.x, pose.tip.y)),
+            pos: self.field.to_field(Vec2::new(pose.tip.x, pose.tip.y)),
             vel: Vec2::new(tip_velocity.x, tip_velocity.y),
         };
         if self.step == 0 {
@@ -129,7 +130,7 @@ impl Agent {
             let opponent = self
                 .opponent
                 .get_or_insert_with(|| Opponent::new(&self.field));
-            opponent.observe(time, self.field.from_base(Vec2::new(x, y)));
+            opponent.observe(time, self.field.to_field(Vec2::new(x, y)));
         }
         let scene = Scene {
             field: &self.field,
@@ -138,7 +139,6 @@ impl Agent {
             puck,
             puck_speed_deviation: self.estimator.speed_deviation(),
             mallet: self.mallet,
-            mallet_seen: seen,
             arm: &self.arm,
             // In a game the other side is no pendulum; its position is no basis for a prediction.
             opponent: self.opponent.as_ref().filter(|_| self.task == Task::Hit),
@@ -166,13 +166,15 @@ impl Agent {
         let mut next = before.towards(&order.target, self.dt);
         next.limit(&before, self.dt, order.acceleration);
         next.confine(&before, self.dt, &self.field);
-        let reached = self.arm.advance(self.field.to_base(next.pos), next.vel, order.posture);
+        let reached = self
+            .arm
+            .advance(self.field.to_base(next.pos), next.vel, order.posture);
         // Where limits cut the motion, go on from what is possible.
         if (reached.velocity - next.vel).norm() > 0.02 {
             next.vel = reached.velocity;
             next.acc = Vec2::zeros();
         }
-        next.pos = self.field.from_base(reached.position);
+        next.pos = self.field.to_field(reached.position);
         self.mallet = next;
     }
 }

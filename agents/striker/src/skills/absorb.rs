@@ -13,7 +13,7 @@ use crate::puck::{DRAG, MALLET_RESTITUTION, Puck};
 /// Pucks are best met with their centre between these.
 const MEET_X: (f64, f64) = (-0.68, -0.4);
 /// Where a puck shall come to rest that had to be met close to the goal.
-const REST_X: f64 = -0.58;
+const REST_X: f64 = -0.5;
 /// Latest contact that is considered for a fast puck, seconds from now.
 const FAST_HORIZON: f64 = 1.6;
 /// The same for a slow one.
@@ -24,6 +24,10 @@ const FAST: f64 = 0.6;
 const STILL: f64 = 0.05;
 /// The meeting is no longer corrected this long before it, seconds.
 const LAST_CORRECTION: f64 = 0.05;
+/// A touch that is nearer than this is cushioned, seconds.
+const CUSHION_TIME: f64 = 0.07;
+/// A planned contact stays if it differs from the cushioned one by less, m/s.
+const AS_PLANNED: f64 = 0.2;
 /// A running plan is given up only for one that is cheaper by this much.
 const LOYALTY: f64 = 2.0;
 
@@ -80,7 +84,14 @@ impl Absorb {
                 return Some(Order::brake(scene));
             }
         }
-        if let Some(m) = self.meeting.filter(|m| m.time - scene.time < LAST_CORRECTION) {
+        let last = self.meeting.filter(|m| m.time - scene.time < LAST_CORRECTION);
+        if let Some(velocity) = cushion(scene)
+            && last.is_none_or(|m| (m.velocity - velocity).norm() > AS_PLANNED)
+        {
+            self.meeting = None;
+            return Some(Order::coast(scene, velocity, Posture::Free));
+        }
+        if let Some(m) = last {
             return Some(go(scene, &m));
         }
         if scene.puck.vel.norm() < FAST {
@@ -135,6 +146,25 @@ impl Absorb {
     }
 }
 
+/// The velocity that softens a touch which is about to happen, planned or not.
+fn cushion(scene: &Scene<'_>) -> Option<Vec2> {
+    let offset = scene.mallet.pos - scene.puck.pos;
+    let distance = offset.norm();
+    let normal = offset / distance.max(1e-6);
+    let gap = distance - scene.field.contact();
+    let closing = (scene.puck.vel - scene.mallet.vel).dot(&normal);
+    let along = scene.puck.vel.dot(&normal);
+    let soon = closing > 0.1 && gap > -0.01 && gap < CUSHION_TIME * closing;
+    (soon && along > 0.0).then(|| retreat(along, normal, scene.puck.pos) * normal)
+}
+
+/// The speed of the mallet along the puck's motion at contact: (1 + e) w = e v stops the puck, a
+/// slower mallet sends one that came far back a little forward again.
+fn retreat(speed: f64, along: Vec2, puck: Vec2) -> f64 {
+    let back = if along.x < -0.5 { (DRAG * (REST_X - puck.x)).clamp(0.0, 0.25) } else { 0.0 };
+    (MALLET_RESTITUTION * speed - back) / (1.0 + MALLET_RESTITUTION)
+}
+
 /// On the way to a meeting.
 fn go(scene: &Scene<'_>, m: &Meeting) -> Order {
     let time = (m.time - scene.time).max(scene.dt);
@@ -152,10 +182,10 @@ fn best_meeting(scene: &Scene<'_>) -> Option<(Meeting, f64)> {
     let mut best: Option<(Meeting, f64)> = None;
     let mut left = 2.0 * scene.dt;
     while left < FAST_HORIZON {
-        if let Some((m, cost)) = priced(scene, left) {
-            if best.is_none_or(|(_, c)| cost < c) {
-                best = Some((m, cost));
-            }
+        if let Some((m, cost)) = priced(scene, left)
+            && best.is_none_or(|(_, c)| cost < c)
+        {
+            best = Some((m, cost));
         }
         left += scene.dt;
     }
@@ -178,21 +208,8 @@ fn meeting(scene: &Scene<'_>, left: f64) -> Option<(Meeting, Puck)> {
     if (mallet - field.clamp_mallet(mallet)).norm() > 1e-9 {
         return None;
     }
-    // (1 + e) w = e v stops the puck; a slower mallet sends it back a little.
-    let back = if along.x < -0.5 {
-        (DRAG * (REST_X - puck.pos.x)).clamp(0.0, 0.2)
-    } else {
-        0.0
-    };
-    let retreat = (MALLET_RESTITUTION * speed - back) / (1.0 + MALLET_RESTITUTION);
-    Some((
-        Meeting {
-            time: scene.time + left,
-            mallet,
-            velocity: retreat * along,
-        },
-        puck,
-    ))
+    let velocity = retreat(speed, along, puck.pos) * along;
+    Some((Meeting { time: scene.time + left, mallet, velocity }, puck))
 }
 
 /// The meeting with a fast puck, and what it costs.

@@ -12,7 +12,6 @@ pub use prepare::Prepare;
 pub use tournament::Tournament;
 
 use crate::arm::{Arm, Posture, Side};
-use crate::estimator::MalletState;
 use crate::field::{Field, Vec2};
 use crate::motion::{Motion, Pace, Target};
 use crate::opponent::Opponent;
@@ -33,8 +32,6 @@ pub struct Scene<'a> {
     pub puck_speed_deviation: Vec2,
     /// The mallet's reference.
     pub mallet: Motion,
-    /// The mallet as observed.
-    pub mallet_seen: MalletState,
     /// The arm, for what it can do.
     pub arm: &'a Arm,
     /// The opponent, if there is one on the table.

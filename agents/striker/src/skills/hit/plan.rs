@@ -1,0 +1,239 @@
+//! Which strike, when: contact times and aims compared by the chance of a goal.
+
+use crate::arm::Side;
+use crate::estimator::{FLOW_PER_SPEED, FLOW_TIME};
+use crate::field::{Field, Vec2};
+use crate::motion::{Pace, Target};
+use crate::opponent::Opponent;
+use crate::puck::{DRAG, MALLET_RESTITUTION, Puck};
+use crate::skills::{Scene, around, lean, normal_cdf, strike_towards};
+
+/// Duration of the run-up, seconds.
+const RUN_UP: f64 = 0.32;
+/// What speed² a run-up of one metre could reach: bounds the accelerations of short run-ups, m/s².
+const RUN_ACCELERATION: f64 = 30.0;
+/// Latest contact that is considered, seconds from now.
+const HORIZON: f64 = 2.2;
+/// Chance that a second of waiting costs.
+const IMPATIENCE: f64 = 0.02;
+/// Standard deviation of a shot's direction without air flow, radians.
+const AIM_ERROR: f64 = 0.012;
+/// Shots with less chance are not taken while the puck can be nudged to a better place.
+pub const WORTH_A_NUDGE: f64 = 0.45;
+/// Pucks nearer to our goal are worth a nudge.
+const NUDGE_FROM_X: f64 = -0.5;
+/// Where a nudged puck shall be …
+const NUDGE_TO_X: f64 = -0.36;
+/// … this long after the nudge, seconds.
+const NUDGE_TIME: f64 = 2.6;
+/// Goal-line points that are tried, metres.
+const AIMS: [f64; 5] = [-0.05, -0.025, 0.0, 0.025, 0.05];
+
+/// A strike at a chosen time.
+#[derive(Debug, Clone, Copy)]
+pub struct Plan {
+    /// Time of contact since the episode's start, seconds.
+    pub contact_time: f64,
+    /// Where on the goal line the puck shall arrive.
+    pub aim: f64,
+    /// Mallet at contact.
+    pub mallet: Vec2,
+    /// Direction of the mallet's motion and of the contact.
+    pub normal: Vec2,
+    /// Speed of the mallet at contact.
+    pub speed: f64,
+    /// To which side the arm leans.
+    pub side: Side,
+    /// Moves the puck forward to be struck again, instead of shooting.
+    pub nudge: bool,
+    /// Chance of a goal.
+    pub chance: f64,
+}
+
+impl Plan {
+    /// Where the run-up starts, and how long it takes in seconds.
+    pub fn run_up(&self, field: &Field) -> (Vec2, f64) {
+        let wish = self.mallet - 0.5 * self.speed * RUN_UP * self.normal;
+        let start = field.clamp_mallet(wish);
+        let room = (self.mallet - start).dot(&self.normal).max(0.02);
+        (start, (2.0 * room / self.speed).min(RUN_UP))
+    }
+}
+
+/// The same plan with the present estimate of the puck, if there is still time to change it.
+pub fn refresh(scene: &Scene<'_>, plan: &Plan) -> Option<Plan> {
+    let left = plan.contact_time - scene.time;
+    (left > scene.dt)
+        .then(|| again(scene, plan, left, None))
+        .flatten()
+}
+
+/// The same plan, `left` seconds before the contact.
+pub fn again(scene: &Scene<'_>, plan: &Plan, left: f64, speed: Option<f64>) -> Option<Plan> {
+    if plan.nudge {
+        nudge_at(scene, left, plan.side)
+    } else {
+        aim_at(scene, left, plan.aim, plan.side, speed)
+    }
+}
+
+/// The earliest nudge that can be made.
+pub fn best_nudge(scene: &Scene<'_>) -> Option<Plan> {
+    let side = lean(scene.puck.pos);
+    (0..20)
+        .map(|k| 0.2 + 0.06 * f64::from(k))
+        .find_map(|left| nudge_at(scene, left, side).filter(|plan| reachable(scene, plan, left)))
+}
+
+/// A gentle strike in `left` seconds after which the puck drifts to where shots are best.
+fn nudge_at(scene: &Scene<'_>, left: f64, side: Side) -> Option<Plan> {
+    let field = scene.field;
+    let mut puck = scene.puck;
+    if !puck.advance(field, left) || puck.pos.x > NUDGE_FROM_X || puck.pos.y.abs() > 0.4 {
+        return None;
+    }
+    let way = Vec2::new(NUDGE_TO_X, 0.8 * puck.pos.y) - puck.pos;
+    let direction = way.normalize();
+    let wanted = way.norm() * DRAG / (1.0 - (-DRAG * NUDGE_TIME).exp());
+    let speed =
+        (wanted + MALLET_RESTITUTION * puck.vel.dot(&direction)) / (1.0 + MALLET_RESTITUTION);
+    if speed < 0.1 {
+        return None;
+    }
+    let (normal, _) = strike_towards(&puck, direction, speed, field.contact());
+    let mallet = puck.pos - field.contact() * normal;
+    if (mallet - field.clamp_mallet(mallet)).norm() > 1e-9
+        || room_behind(field, mallet, normal) < 0.02
+    {
+        return None;
+    }
+    let contact_time = scene.time + left;
+    Some(Plan {
+        contact_time,
+        aim: 0.0,
+        mallet,
+        normal,
+        speed,
+        side,
+        nudge: true,
+        chance: WORTH_A_NUDGE,
+    })
+}
+
+/// The strike with the best chance among contact times and aims.
+pub fn best_plan(scene: &Scene<'_>) -> Option<Plan> {
+    let mut best: Option<Plan> = None;
+    let side = lean(scene.puck.pos);
+    let mut left = RUN_UP + 0.1;
+    while left < HORIZON {
+        for aim in AIMS {
+            if let Some(plan) = aim_at(scene, left, aim, side, None)
+                && reachable(scene, &plan, left)
+                && best.is_none_or(|b| plan.chance > b.chance)
+            {
+                best = Some(plan);
+            }
+        }
+        left += 0.06;
+    }
+    best
+}
+
+/// Can the mallet be behind the puck in time without haste?
+fn reachable(scene: &Scene<'_>, plan: &Plan, left: f64) -> bool {
+    let (start, run_up) = plan.run_up(scene.field);
+    let way = around(scene, start, scene.field.contact() + 0.015);
+    let mut time = Target::stop(&scene.mallet, way, Pace::CALM).time;
+    if way != start {
+        time += 0.4;
+    }
+    if !plan.nudge {
+        time = time.max(scene.arm.ready_time(scene.field.to_base(start), plan.side));
+    }
+    time <= left - run_up
+}
+
+/// Length of the run-up that the table allows, metres.
+fn room_behind(field: &Field, contact: Vec2, direction: Vec2) -> f64 {
+    let limit = |pos: f64, step: f64, lo: f64, hi: f64| {
+        if step > 1e-6 {
+            (pos - lo) / step
+        } else if step < -1e-6 {
+            (pos - hi) / step
+        } else {
+            f64::INFINITY
+        }
+    };
+    let y = field.mallet_y_max();
+    let x = limit(contact.x, direction.x, field.mallet_x_min(), 0.0);
+    x.min(limit(contact.y, direction.y, -y, y)).clamp(0.0, 1.0)
+}
+
+/// A strike in `left` seconds that sends the puck to `aim` on the goal line.
+fn aim_at(scene: &Scene<'_>, left: f64, aim: f64, side: Side, speed: Option<f64>) -> Option<Plan> {
+    let field = scene.field;
+    let mut puck = scene.puck;
+    if !puck.advance(field, left) {
+        return None;
+    }
+    let goal = Vec2::new(field.half_length, aim);
+    let direction = (goal - puck.pos).normalize();
+    let guess = puck.pos - field.contact() * direction;
+    let speed = speed.unwrap_or_else(|| {
+        let room = room_behind(field, guess, direction);
+        let swing = scene
+            .arm
+            .strike_speed(field.to_base(guess), direction, side);
+        swing.min((RUN_ACCELERATION * room).sqrt())
+    });
+    let (normal, struck) = strike_towards(&puck, direction, speed, field.contact());
+    let mallet = puck.pos - field.contact() * normal;
+    if (mallet - field.clamp_mallet(mallet)).norm() > 1e-9 || mallet.x > -0.25 {
+        return None;
+    }
+    let chance = chance(field, scene.opponent, scene.time + left, &struck, aim) - IMPATIENCE * left;
+    Some(Plan {
+        contact_time: scene.time + left,
+        aim,
+        mallet,
+        normal,
+        speed,
+        side,
+        nudge: false,
+        chance,
+    })
+}
+
+/// The chance that the struck puck passes the opponent and enters the goal.
+fn chance(field: &Field, opponent: Option<&Opponent>, time: f64, struck: &Puck, aim: f64) -> f64 {
+    let way = Vec2::new(field.half_length, aim) - struck.pos;
+    let length = way.norm();
+    let share = DRAG * length / struck.vel.norm().max(1e-3);
+    if share > 0.9 {
+        return 0.0;
+    }
+    let flight = -(1.0 - share).ln() / DRAG;
+    // The air flow pushes with a random, correlated acceleration proportional to the speed; twice
+    // integrated over the flight this is its spread across the way. Aiming errors add to it.
+    let tau = FLOW_TIME;
+    let integral = 2.0 * tau * flight.powi(3) / 3.0 - (tau * flight).powi(2) + 2.0 * tau.powi(4)
+        - 2.0 * tau.powi(3) * (flight + tau) * (-flight / tau).exp();
+    let spread =
+        (FLOW_PER_SPEED * length / flight * integral.max(0.0).sqrt()).hypot(AIM_ERROR * length);
+    let within = |lo: f64, hi: f64| {
+        if hi <= lo {
+            0.0
+        } else {
+            normal_cdf((hi - aim) / spread) - normal_cdf((lo - aim) / spread)
+        }
+    };
+    let half = field.half_goal - 0.7 * field.puck;
+    let open = within(-half, half);
+    let Some(opponent) = opponent else {
+        return open;
+    };
+    let arrival = time + flight * (1.0 - (field.half_length - opponent.x()) / length);
+    let y = opponent.y_at(arrival);
+    let block = field.contact() + 0.005;
+    open - within((y - block).max(-half), (y + block).min(half))
+}

@@ -1,0 +1,193 @@
+//! Trying strikes at a puck near the rim against the puck model.
+
+use crate::contact::{SUBSTEP, substep};
+use crate::field::{Field, Vec2};
+use crate::puck::{DRAG, Puck, Rim};
+
+/// Half width of the strip in which a puck counts as prepared, with a margin.
+const SAFE_Y: f64 = 0.365;
+/// The area along x, with a margin.
+const SAFE_X: (f64, f64) = (-0.78, -0.22);
+/// Line at which the episode ends.
+const CENTRE_Y: f64 = 0.01;
+/// Deceleration of the mallet after a strike, m/s².
+pub const BRAKE: f64 = 7.0;
+/// Directions of the contact normal that are tried.
+pub const NORMALS: usize = 60;
+/// Mallet speeds that are tried, m/s.
+const SPEEDS: [f64; 7] = [0.12, 0.2, 0.3, 0.42, 0.55, 0.7, 0.9];
+/// Angles between contact normal and mallet motion that are tried, radians.
+const SLANTS: [f64; 3] = [0.0, -0.5, 0.5];
+
+/// A strike: contact normal (mallet to puck), mallet velocity, and what it promises.
+#[derive(Debug, Clone, Copy)]
+pub struct Strike {
+    pub normal: Vec2,
+    pub velocity: Vec2,
+    pub value: f64,
+}
+
+/// From the start of the run-up to the contact.
+pub fn run_up(velocity: &Vec2) -> Vec2 {
+    let time = (0.16 + 0.15 * velocity.norm()).min(0.3);
+    0.5 * time * velocity
+}
+
+/// Will it do as it is?
+pub fn prepared(puck: &Puck) -> bool {
+    let rest = puck.pos + puck.vel / DRAG;
+    rest.y.abs() < SAFE_Y && rest.x > SAFE_X.0 && rest.x < SAFE_X.1 && puck.vel.x < 0.05
+}
+
+fn turned(v: Vec2, angle: f64) -> Vec2 {
+    let (sin, cos) = angle.sin_cos();
+    Vec2::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y)
+}
+
+/// Tries the strikes of one contact normal.
+pub fn try_normal(field: &Field, puck: &Puck, index: usize, best: &mut Option<Strike>) {
+    let normal = turned(
+        Vec2::x(),
+        std::f64::consts::TAU * index as f64 / NORMALS as f64,
+    );
+    let contact = puck.pos - field.contact() * normal;
+    if (contact - field.clamp_mallet(contact)).norm() > 1e-9 {
+        return;
+    }
+    for slant in SLANTS {
+        for speed in SPEEDS {
+            let velocity = speed * turned(normal, slant);
+            let start = contact - run_up(&velocity);
+            let end = contact + 0.5 * speed / BRAKE * velocity;
+            let shortened = (start - field.clamp_mallet(start)).norm();
+            if shortened > 0.5 * run_up(&velocity).norm()
+                || (end - field.clamp_mallet(end)).norm() > 0.01
+            {
+                continue;
+            }
+            let least = best.map_or(0.05, |b| b.value + 1e-9);
+            if let Some(value) = value(field, puck, normal, velocity, least) {
+                *best = Some(Strike {
+                    normal,
+                    velocity,
+                    value,
+                });
+            }
+        }
+    }
+}
+
+/// Mean worth of a strike over variations of what is uncertain (contact normal, speed), if it exceeds
+/// `least`. Gentler strikes are preferred a little.
+fn value(field: &Field, puck: &Puck, normal: Vec2, velocity: Vec2, least: f64) -> Option<f64> {
+    const VARIATIONS: [(f64, f64); 7] = [
+        (0.0, 1.0),
+        (0.05, 1.0),
+        (-0.05, 1.0),
+        (0.0, 0.92),
+        (0.0, 1.08),
+        (0.1, 1.04),
+        (-0.1, 0.96),
+    ];
+    let count = VARIATIONS.len() as f64;
+    let cost = 0.03 * velocity.norm();
+    let mut sum = 0.0;
+    for (k, (turn, factor)) in VARIATIONS.iter().enumerate() {
+        sum += outcome(field, *puck, turned(normal, *turn), *factor * velocity);
+        let possible = (sum + count - 1.0 - k as f64) / count - cost;
+        if possible < least {
+            return None;
+        }
+    }
+    Some(sum / count - cost)
+}
+
+/// How a strike ends: 1 prepared, less if nearer to it than before, 0 spoilt.
+fn outcome(field: &Field, mut puck: Puck, normal: Vec2, velocity: Vec2) -> f64 {
+    let speed = velocity.norm();
+    let direction = velocity / speed;
+    // Contact, braking and a moment's rest of the mallet, at the scale of the contact.
+    let mut mallet = puck.pos - (field.contact() + 1e-4) * normal;
+    let mut v = speed;
+    let mut time = 0.0;
+    while time < 0.45 {
+        substep(&mut puck, field, mallet, v * direction);
+        mallet += SUBSTEP * v * direction;
+        time += SUBSTEP;
+        // The reference brakes after the planned contact, which takes a control step to notice.
+        if time > 0.01 {
+            v = (v - BRAKE * SUBSTEP).max(0.0);
+        }
+        if let Some(end) = ended(&puck) {
+            return end;
+        }
+        let gap = (puck.pos - mallet).norm() - field.contact();
+        let opening = (puck.vel - v * direction).dot(&(puck.pos - mallet)) > 0.0;
+        if gap > 0.03
+            && opening
+            && (v == 0.0 || gap > 0.1)
+            && puck.next_rim(field).is_none_or(|(t, _)| t > 0.02)
+        {
+            break;
+        }
+    }
+    slide_out(field, puck)
+}
+
+/// The task's end, if the puck is there.
+fn ended(puck: &Puck) -> Option<f64> {
+    if puck.pos.x > -0.01 {
+        return Some(0.0);
+    }
+    (puck.pos.y.abs() < CENTRE_Y).then(|| crossing(puck.pos.x, puck.vel.x))
+}
+
+/// Worth of crossing the middle at `x` with `vx`: less near the borders of what is asked for.
+fn crossing(x: f64, vx: f64) -> f64 {
+    let along = ((x - SAFE_X.0).min(SAFE_X.1 - x) / 0.06).clamp(0.0, 1.0);
+    let slow = ((0.09 - vx) / 0.06).clamp(0.0, 1.0);
+    along * slow
+}
+
+/// Where the puck comes to rest or crosses the middle, the mallet out of its way.
+pub fn slide_out(field: &Field, mut puck: Puck) -> f64 {
+    for _ in 0..8 {
+        let (span, rim) = puck
+            .next_rim(field)
+            .map_or((8.0, None), |(t, r)| (t.min(8.0), Some(r)));
+        let end = puck.pos + puck.vel * ((1.0 - (-DRAG * span).exp()) / DRAG);
+        if end.y * puck.pos.y < 0.0 || end.y.abs() < CENTRE_Y {
+            // Somewhere on this segment it crosses the middle.
+            let share = (puck.pos.y.abs() - CENTRE_Y) / (puck.pos.y - end.y).abs().max(1e-9);
+            let x = puck.pos.x + share * (end.x - puck.pos.x);
+            let vx = puck.vel.x - DRAG * (x - puck.pos.x);
+            return crossing(x, vx);
+        }
+        if end.x > -0.01 {
+            return 0.0;
+        }
+        match rim {
+            Some(Rim::Goal) => return 0.0,
+            Some(rim) => {
+                puck.advance(field, 0.9999 * span);
+                puck.bounce(rim);
+            }
+            None => {
+                puck.pos = end;
+                break;
+            }
+        }
+    }
+    let p = puck.pos;
+    if p.x > SAFE_X.0 && p.x < SAFE_X.1 && p.y.abs() < SAFE_Y {
+        return 0.97;
+    }
+    // Not yet, but is the next strike easier?
+    let off_rim = ((field.puck_y() - p.y.abs()) / 0.12).clamp(0.0, 1.0);
+    let off_end = ((p.x + field.puck_x()) / 0.2).clamp(0.0, 1.0);
+    if p.x < -0.2 {
+        0.3 + 0.4 * off_rim * off_end
+    } else {
+        0.0
+    }
+}

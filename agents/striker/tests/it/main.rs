@@ -1,0 +1,4 @@
+//! The agent as the evaluator meets it: over the protocol, and in whole simulated episodes.
+
+mod episodes;
+mod protocol;
