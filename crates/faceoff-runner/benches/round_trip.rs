@@ -26,8 +26,8 @@ use std::{
     io::{BufRead, BufReader, Read, Write},
     os::unix::fs::PermissionsExt,
     path::Path,
-    process::{Command, Stdio},
-    time::Duration,
+    process::{Child, ChildStdin, ChildStdout, Command, Stdio},
+    time::{Duration, Instant},
 };
 
 /// An action of the cubic interpolation with all digits, as a real agent sends them.
@@ -53,6 +53,7 @@ fn main() {
                 .measurement_time(Duration::from_secs(5))
                 .warm_up_time(Duration::from_secs(1));
             round_trips(&mut criterion);
+            medians();
             steps(&mut criterion);
             criterion.final_summary();
         }
@@ -111,34 +112,13 @@ fn round_trips(criterion: &mut Criterion) {
     let observation = observation();
     let mut question = Vec::new();
     Message::step(17, &observation).write_line(&mut question);
-    let answer_len = format!("{{\"type\":\"act\",\"step\":17,\"action\":{ACTION}}}\n").len();
-    println!(
-        "question {} bytes, answer {answer_len} bytes",
-        question.len()
-    );
     let mut group = criterion.benchmark_group("round trip");
-
-    let mut child = Command::new(std::env::current_exe().unwrap())
-        .args([
-            "--echo",
-            &question.len().to_string(),
-            &answer_len.to_string(),
-        ])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let (mut stdin, mut stdout) = (child.stdin.take().unwrap(), child.stdout.take().unwrap());
-    let mut answer = vec![0; answer_len];
-    group.bench_function("bare pipe", |bencher| {
-        bencher.iter(|| {
-            stdin.write_all(&question).unwrap();
-            stdout.read_exact(&mut answer).unwrap();
+    {
+        let mut bare = BarePipe::new(&question);
+        group.bench_function("bare pipe", |bencher| {
+            bencher.iter(|| bare.round_trip(&question))
         });
-    });
-    drop(stdin);
-    child.wait().unwrap();
-
+    }
     let agent = InstantAgent::new();
     for (name, env) in [
         (
@@ -181,6 +161,96 @@ fn round_trips(criterion: &mut Criterion) {
         session.finish().unwrap();
     }
     group.finish();
+}
+
+/// Both kinds of round trip in turns, so that the machine's other work meets both alike.
+fn medians() {
+    const TURNS: usize = 200;
+    const PER_TURN: usize = 100;
+    let observation = observation();
+    let mut question = Vec::new();
+    Message::step(17, &observation).write_line(&mut question);
+    let mut bare = BarePipe::new(&question);
+    let agent = InstantAgent::new();
+    let env = environment(Isolation::Sandboxed {
+        given_up: Vec::new(),
+    });
+    let mut session = Session::start(&agent.bundle, &env, Task::Hit)
+        .map_err(|(trouble, _)| trouble)
+        .unwrap();
+    session.reset(0).unwrap();
+    let mut action = Vec::new();
+    let (mut bare_s, mut protocol_s) = (Vec::new(), Vec::new());
+    for turn in 0..TURNS {
+        for _ in 0..PER_TURN {
+            let started = Instant::now();
+            bare.round_trip(&question);
+            bare_s.push(started.elapsed().as_secs_f64());
+        }
+        for index in 0..PER_TURN {
+            let step = u32::try_from(turn * PER_TURN + index).unwrap();
+            let started = Instant::now();
+            session.step(step, &observation, &mut action).unwrap();
+            protocol_s.push(started.elapsed().as_secs_f64());
+        }
+    }
+    session.finish().unwrap();
+    let median = |times: &mut Vec<f64>| {
+        times.sort_by(f64::total_cmp);
+        1e6 * times[times.len() / 2]
+    };
+    let (bare, protocol) = (median(&mut bare_s), median(&mut protocol_s));
+    println!(
+        "median round trip, in turns: bare pipe {bare:.1} us, protocol {protocol:.1} us, ratio {:.2}",
+        protocol / bare
+    );
+}
+
+/// A child that reads as many bytes as the question has and writes as many as the answer.
+struct BarePipe {
+    child: Child,
+    stdin: Option<ChildStdin>,
+    stdout: ChildStdout,
+    answer: Vec<u8>,
+}
+
+impl BarePipe {
+    fn new(question: &[u8]) -> Self {
+        let answer_len = format!("{{\"type\":\"act\",\"step\":17,\"action\":{ACTION}}}\n").len();
+        println!(
+            "question {} bytes, answer {answer_len} bytes",
+            question.len()
+        );
+        let mut child = Command::new(std::env::current_exe().unwrap())
+            .args([
+                "--echo",
+                &question.len().to_string(),
+                &answer_len.to_string(),
+            ])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let (stdin, stdout) = (child.stdin.take(), child.stdout.take().unwrap());
+        Self {
+            child,
+            stdin,
+            stdout,
+            answer: vec![0; answer_len],
+        }
+    }
+
+    fn round_trip(&mut self, question: &[u8]) {
+        self.stdin.as_mut().unwrap().write_all(question).unwrap();
+        self.stdout.read_exact(&mut self.answer).unwrap();
+    }
+}
+
+impl Drop for BarePipe {
+    fn drop(&mut self) {
+        self.stdin = None;
+        self.child.wait().unwrap();
+    }
 }
 
 fn steps(criterion: &mut Criterion) {

@@ -15,6 +15,7 @@ use faceoff_runner::{
 use faceoff_sandbox::{Isolation, Runtime};
 use faceoff_types::{AgentFault, Profile, RULESET, Seed, Task};
 use faceoff_worker::CpuLayout;
+use rustix::thread::{CpuSet, sched_getaffinity};
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -163,14 +164,17 @@ impl EvalCommand {
             );
         }
         let workers = usize::from(self.workers);
-        let cpus = std::thread::available_parallelism()
-            .context("asking for the number of CPUs")?
-            .get();
-        let layout = CpuLayout::for_slots(cpus, workers);
+        // Those that this process may use: not always the machine's, nor numbered from 0.
+        let allowed = sched_getaffinity(None).context("asking for the CPUs of this process")?;
+        let cpus: Vec<usize> = (0..CpuSet::MAX_CPU)
+            .filter(|cpu| allowed.is_set(*cpu))
+            .collect();
+        let layout = CpuLayout::divide(&cpus, workers);
         if layout.shared && workers > 1 {
             println!(
-                "note: {workers} workers share {cpus} CPUs; results are the same, computation \
-                 times may be longer"
+                "note: {workers} workers share {} CPUs; results are the same, computation \
+                 times may be longer",
+                cpus.len()
             );
         }
         Ok(layout
