@@ -84,7 +84,9 @@ impl Absorb {
                 return Some(Order::brake(scene));
             }
         }
-        let last = self.meeting.filter(|m| m.time - scene.time < LAST_CORRECTION);
+        let last = self
+            .meeting
+            .filter(|m| m.time - scene.time < LAST_CORRECTION);
         if let Some(velocity) = cushion(scene)
             && last.is_none_or(|m| (m.velocity - velocity).norm() > AS_PLANNED)
         {
@@ -161,7 +163,11 @@ fn cushion(scene: &Scene<'_>) -> Option<Vec2> {
 /// The speed of the mallet along the puck's motion at contact: (1 + e) w = e v stops the puck, a
 /// slower mallet sends one that came far back a little forward again.
 fn retreat(speed: f64, along: Vec2, puck: Vec2) -> f64 {
-    let back = if along.x < -0.5 { (DRAG * (REST_X - puck.x)).clamp(0.0, 0.25) } else { 0.0 };
+    let back = if along.x < -0.5 {
+        (DRAG * (REST_X - puck.x)).clamp(0.0, 0.25)
+    } else {
+        0.0
+    };
     (MALLET_RESTITUTION * speed - back) / (1.0 + MALLET_RESTITUTION)
 }
 
@@ -209,7 +215,14 @@ fn meeting(scene: &Scene<'_>, left: f64) -> Option<(Meeting, Puck)> {
         return None;
     }
     let velocity = retreat(speed, along, puck.pos) * along;
-    Some((Meeting { time: scene.time + left, mallet, velocity }, puck))
+    Some((
+        Meeting {
+            time: scene.time + left,
+            mallet,
+            velocity,
+        },
+        puck,
+    ))
 }
 
 /// The meeting with a fast puck, and what it costs.

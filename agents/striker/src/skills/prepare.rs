@@ -23,7 +23,7 @@ const LEAD: f64 = 0.9;
 /// A puck that is this far from where it was expected asks for a new plan, metres.
 const MISPLACED: f64 = 0.03;
 /// Contact normals that are tried per control step.
-const PER_STEP: usize = 5;
+const PER_STEP: usize = 2;
 
 #[derive(Debug, Clone, Copy)]
 enum Phase {
