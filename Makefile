@@ -40,6 +40,7 @@ demo: setup
 # dependencies get the same features as in the run below, and are not built twice.
 test: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
+	python3 agents/test_agents.py
 	if $(CARGO) nextest --version >/dev/null 2>&1; \
 	    then $(CARGO) nextest run --locked --workspace --no-fail-fast; \
 	    else $(CARGO) test --locked --workspace --no-fail-fast -- --test-threads 2; fi
