@@ -20,6 +20,7 @@ use faceoff_sandbox::{Isolation, Limits, Runtime};
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
 use faceoff_types::{EpisodeOutcome, Profile, Seed, Task};
 use faceoff_wire::{Manifest, Message};
+use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use std::{
     collections::BTreeMap,
     fs,
@@ -53,7 +54,15 @@ fn main() {
                 .measurement_time(Duration::from_secs(5))
                 .warm_up_time(Duration::from_secs(1));
             round_trips(&mut criterion);
-            medians();
+            let all = sched_getaffinity(None).unwrap();
+            let cpus: Vec<usize> = (0..CpuSet::MAX_CPU)
+                .filter(|cpu| all.is_set(*cpu))
+                .collect();
+            medians("one CPU", cpus[0], cpus[0]);
+            if let [here, there, ..] = cpus[..] {
+                medians("a CPU each", here, there);
+            }
+            sched_setaffinity(None, &all).unwrap();
             steps(&mut criterion);
             criterion.final_summary();
         }
@@ -163,18 +172,22 @@ fn round_trips(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// Both kinds of round trip in turns, so that the machine's other work meets both alike.
-fn medians() {
+/// Both kinds of round trip in turns, so that the machine's other work meets both alike, and both on
+/// the same CPUs, since waking another CPU costs more than all the rest.
+fn medians(placement: &str, here: usize, there: usize) {
     const TURNS: usize = 200;
     const PER_TURN: usize = 100;
     let observation = observation();
     let mut question = Vec::new();
     Message::step(17, &observation).write_line(&mut question);
+    pin(there);
     let mut bare = BarePipe::new(&question);
+    pin(here);
     let agent = InstantAgent::new();
-    let env = environment(Isolation::Sandboxed {
+    let mut env = environment(Isolation::Sandboxed {
         given_up: Vec::new(),
     });
+    env.agent_cpus = vec![there];
     let mut session = Session::start(&agent.bundle, &env, Task::Hit)
         .map_err(|(trouble, _)| trouble)
         .unwrap();
@@ -201,9 +214,16 @@ fn medians() {
     };
     let (bare, protocol) = (median(&mut bare_s), median(&mut protocol_s));
     println!(
-        "median round trip, in turns: bare pipe {bare:.1} us, protocol {protocol:.1} us, ratio {:.2}",
+        "median round trip, {placement}: bare pipe {bare:.1} us, protocol {protocol:.1} us, ratio {:.2}",
         protocol / bare
     );
+}
+
+/// Pins this thread and the children that it starts from now on.
+fn pin(cpu: usize) {
+    let mut cpus = CpuSet::new();
+    cpus.set(cpu);
+    sched_setaffinity(None, &cpus).unwrap();
 }
 
 /// A child that reads as many bytes as the question has and writes as many as the answer.
