@@ -9,6 +9,11 @@
 //! This crate reads no clock and no environment and does no I/O. It knows neither agents as processes
 //! nor scores.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "joints are numbered: one index runs over several arrays, as in the equations"
+)]
+
 pub mod dynamics;
 pub mod episode;
 pub mod perturbation;

@@ -78,7 +78,10 @@ impl fmt::Display for AgentFaultKind {
             }
             Self::NonFinite => f.write_str("the action holds a number that is not finite"),
             Self::LineTooLong { limit_bytes } => {
-                write!(f, "the answer is longer than {limit_bytes} bytes without a newline")
+                write!(
+                    f,
+                    "the answer is longer than {limit_bytes} bytes without a newline"
+                )
             }
             Self::TimedOut { phase, limit_s } => {
                 write!(f, "no answer within the {phase} limit of {limit_s} s")
@@ -86,8 +89,15 @@ impl fmt::Display for AgentFaultKind {
             Self::ClosedOutput => f.write_str("the agent closed its standard output"),
             Self::Exited { code } => write!(f, "the agent exited with status {code}"),
             Self::Signalled { signal } => write!(f, "the agent was ended by signal {signal}"),
-            Self::LimitExceeded { limit, allowed, used } => {
-                write!(f, "the agent exceeded its {limit} limit: {used} used, {allowed} allowed")
+            Self::LimitExceeded {
+                limit,
+                allowed,
+                used,
+            } => {
+                write!(
+                    f,
+                    "the agent exceeded its {limit} limit: {used} used, {allowed} allowed"
+                )
             }
             Self::CannotStart { detail } => write!(f, "the agent cannot be started: {detail}"),
         }

@@ -77,7 +77,13 @@ mod tests {
 
     #[test]
     fn names_of_the_paper_are_names() {
-        for name in ["AiRLIHockey", "Air-HocKIT", "RL3_polimi", "Kalash Jain", "Zoë"] {
+        for name in [
+            "AiRLIHockey",
+            "Air-HocKIT",
+            "RL3_polimi",
+            "Kalash Jain",
+            "Zoë",
+        ] {
             assert_eq!(name.parse::<TeamName>().map(String::from), Ok(name.into()));
         }
     }
@@ -85,8 +91,14 @@ mod tests {
     #[test]
     fn what_a_page_could_not_show_is_refused() {
         assert_eq!("".parse::<TeamName>(), Err(InvalidTeamName::Length(0)));
-        assert_eq!("a".repeat(41).parse::<TeamName>(), Err(InvalidTeamName::Length(41)));
-        assert_eq!("<b>".parse::<TeamName>(), Err(InvalidTeamName::Character('<')));
+        assert_eq!(
+            "a".repeat(41).parse::<TeamName>(),
+            Err(InvalidTeamName::Length(41))
+        );
+        assert_eq!(
+            "<b>".parse::<TeamName>(),
+            Err(InvalidTeamName::Character('<'))
+        );
         assert_eq!(" a".parse::<TeamName>(), Err(InvalidTeamName::Space));
     }
 }

@@ -140,34 +140,32 @@ impl<T: Lanes> Bodies<T> {
         bodies
     }
 
-    /// The inertia that each degree of freedom of the plant carries itself. `scale` multiplies the
-    /// masses of links 1…7, end effector and mallet. The universal joint's first hinge carries
-    /// nothing but the second one, so that its entry is `None`.
+    /// The bodies of the plant: `scale` multiplies the masses of links 1…7, end effector and mallet.
     #[inline(always)]
-    pub fn plant(&self, scale: &[f64; 9]) -> [Option<Inertia<T>>; DOFS] {
-        let link = |i: usize| self.links[i].scaled(scale[i]);
-        [
-            Some(link(0)),
-            Some(link(1)),
-            Some(link(2)),
-            Some(link(3)),
-            Some(link(4)),
-            Some(link(5)),
-            Some(link(6) + self.end_effector.scaled(scale[7])),
-            None,
-            Some(self.mallet.scaled(scale[8])),
-        ]
+    pub fn plant(&self, scale: &[f64; 9]) -> PlantBodies<T> {
+        let mut links = self.links;
+        for i in 0..JOINTS {
+            links[i] = links[i].scaled(scale[i]);
+        }
+        links[6] = links[6] + self.end_effector.scaled(scale[7]);
+        PlantBodies {
+            links,
+            mallet: self.mallet.scaled(scale[8]),
+        }
     }
 }
 
-/// Rotor inertias by joint, kg m².
-fn armature(i: usize) -> f64 {
-    if i < JOINTS {
-        LINKS[i].armature_kg_m2
-    } else {
-        0.0
-    }
+/// What moves in the plant. The universal joint's first hinge carries nothing but the second one.
+#[derive(Debug, Clone, Copy)]
+pub struct PlantBodies<T> {
+    /// Links 1…7, the end effector belonging to the last.
+    pub links: [Inertia<T>; JOINTS],
+    /// The mallet, on the second hinge.
+    pub mallet: Inertia<T>,
 }
+
+/// Index of the degree of freedom that carries the mallet.
+const MALLET: usize = DOFS - 1;
 
 /// Inverse dynamics of the controller's seven-joint model by recursive Newton–Euler: the torques
 /// `M(q) ddq + bias(q, dq)`, N m.
@@ -197,7 +195,7 @@ pub fn controller_torques<T: Lanes>(
     let mut torques = [T::splat(0.0); JOINTS];
     for i in (0..JOINTS).rev() {
         total = total + forces[i];
-        torques[i] = kinematics.axes[i].dot(total) + T::splat(armature(i)) * ddq[i];
+        torques[i] = kinematics.axes[i].dot(total) + T::splat(LINKS[i].armature_kg_m2) * ddq[i];
     }
     torques
 }
@@ -206,7 +204,7 @@ pub fn controller_torques<T: Lanes>(
 #[inline(always)]
 pub fn plant_bias<T: Lanes>(
     kinematics: &Kinematics<T>,
-    bodies: &[Option<Inertia<T>>; DOFS],
+    bodies: &PlantBodies<T>,
     dq: &[T; DOFS],
 ) -> [T; DOFS] {
     let mut velocity = Motion::zero();
@@ -214,19 +212,24 @@ pub fn plant_bias<T: Lanes>(
         angular: Vec3::zero(),
         linear: Vec3::splat([0.0, 0.0, GRAVITY_M_S2]),
     };
-    let mut forces = [None; DOFS];
+    let mut forces = [Force::zero(); JOINTS];
+    let mut total = Force::zero();
     for i in 0..DOFS {
         let joint_velocity = kinematics.axes[i].scale(dq[i]);
         acceleration = acceleration + velocity.cross_motion(joint_velocity);
         velocity = velocity + joint_velocity;
-        forces[i] =
-            bodies[i].map(|body| body.mul(acceleration) + velocity.cross_force(body.mul(velocity)));
+        let force =
+            |body: &Inertia<T>| body.mul(acceleration) + velocity.cross_force(body.mul(velocity));
+        if i < JOINTS {
+            forces[i] = force(&bodies.links[i]);
+        } else if i == MALLET {
+            total = force(&bodies.mallet);
+        }
     }
-    let mut total = Force::zero();
     let mut torques = [T::splat(0.0); DOFS];
     for i in (0..DOFS).rev() {
-        if let Some(force) = forces[i] {
-            total = total + force;
+        if i < JOINTS {
+            total = total + forces[i];
         }
         torques[i] = kinematics.axes[i].dot(total);
     }
@@ -238,21 +241,21 @@ pub fn plant_bias<T: Lanes>(
 #[inline(always)]
 pub fn mass_matrix<T: Lanes>(
     kinematics: &Kinematics<T>,
-    bodies: &[Option<Inertia<T>>; DOFS],
+    bodies: &PlantBodies<T>,
 ) -> [[T; DOFS]; DOFS] {
     let mut mass = [[T::splat(0.0); DOFS]; DOFS];
-    let mut composite: Option<Inertia<T>> = None;
+    let mut composite = bodies.mallet;
     for i in (0..DOFS).rev() {
-        composite = match (composite, bodies[i]) {
-            (Some(a), Some(b)) => Some(a + b),
-            (a, b) => a.or(b),
-        };
-        let Some(carried) = composite else { continue };
-        let momentum = carried.mul(kinematics.axes[i]);
+        if i < JOINTS {
+            composite = composite + bodies.links[i];
+        }
+        let momentum = composite.mul(kinematics.axes[i]);
         for j in 0..=i {
             mass[i][j] = kinematics.axes[j].dot(momentum);
         }
-        mass[i][i] += T::splat(armature(i));
+    }
+    for i in 0..JOINTS {
+        mass[i][i] += T::splat(LINKS[i].armature_kg_m2);
     }
     mass
 }

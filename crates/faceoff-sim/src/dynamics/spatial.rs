@@ -269,7 +269,7 @@ impl<T: Lanes> Symmetric<T> {
 
     /// Matrix times vector.
     #[inline(always)]
-    pub fn mul(self, v: Vec3<T>) -> Vec3<T> {
+    pub fn times(self, v: Vec3<T>) -> Vec3<T> {
         Vec3::new(
             self.xx * v.x + self.xy * v.y + self.xz * v.z,
             self.xy * v.x + self.yy * v.y + self.yz * v.z,
@@ -372,7 +372,7 @@ impl<T: Lanes> Inertia<T> {
     #[inline(always)]
     pub fn mul(&self, v: Motion<T>) -> Force<T> {
         Force {
-            moment: self.rotational.mul(v.angular) + self.first_moment.cross(v.linear),
+            moment: self.rotational.times(v.angular) + self.first_moment.cross(v.linear),
             force: v.linear.scale(self.mass) - self.first_moment.cross(v.angular),
         }
     }

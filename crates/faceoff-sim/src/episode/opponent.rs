@@ -20,6 +20,12 @@ pub struct Opponent {
     q: [f64; JOINTS],
 }
 
+impl Default for Opponent {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Opponent {
     /// At rest in the initial pose.
     #[must_use]

@@ -102,12 +102,25 @@ fn at(position: [f64; 2]) -> Pose {
     Pose::from_translation(Vector::new(position[0], position[1], 0.0))
 }
 
+/// The broad phase of the rims: whether the puck may touch a long, a short one.
+#[inline(always)]
+fn near(puck: [f64; 2]) -> [bool; 2] {
+    [
+        puck[1].abs() + PUCK.radius_m > TABLE.half_width_m(),
+        puck[0].abs() + PUCK.radius_m > TABLE.half_length_m(),
+    ]
+}
+
+/// Whether the puck may touch a rim.
+#[inline(always)]
+pub fn near_rims(puck: [f64; 2]) -> bool {
+    near(puck) != [false; 2]
+}
+
 /// Contacts of the puck with the rims; at most two at a time, in a corner.
 pub fn rims(puck: [f64; 2], mut found: impl FnMut(Touch)) {
-    let [x, y] = puck.map(f64::abs);
-    let near_short = x + PUCK.radius_m > TABLE.half_length_m();
-    let near_long = y + PUCK.radius_m > TABLE.half_width_m();
-    if !near_short && !near_long {
+    let [near_long, near_short] = near(puck);
+    if !near_long && !near_short {
         return;
     }
     let colliders = &*COLLIDERS;

@@ -147,6 +147,10 @@ fn find_contacts<T: Lanes>(
     } else {
         None
     };
+    let mallets_touch = between_mallets.is_some() || touches != [None, None];
+    if !mallets_touch && !contact_finder::near_rims(puck_xy) {
+        return None;
+    }
     let mut contacts = Contacts::none();
     contact_finder::rims(puck_xy, |touch| {
         contacts.add(
@@ -157,7 +161,7 @@ fn find_contacts<T: Lanes>(
             },
         );
     });
-    if between_mallets.is_none() && touches == [None, None] {
+    if !mallets_touch {
         return (!contacts.is_empty()).then_some(contacts);
     }
     let mallet = |a: usize, touch: &Touch| {

@@ -234,7 +234,7 @@ fn check_finite(numbers: &[f64], field: impl Fn() -> String) -> Result<()> {
     // Written so that a number that is none fails.
     match numbers
         .iter()
-        .find(|number| !(number.abs() <= NUMBER_LIMIT))
+        .find(|number| number.is_nan() || number.abs() > NUMBER_LIMIT)
     {
         None => Ok(()),
         Some(number) => {

@@ -1,0 +1,272 @@
+//! Each factor's statistics, and that no factor changes another one's draws (RULES).
+
+use faceoff_sim::{
+    Episode, Interpolation, PerturbationSettings, Plant,
+    perturbation::{
+        disturbance::Disturbance, noise::ObservationNoise, stream::Stream,
+        tracking_loss::TrackingLoss,
+    },
+    robot::model::INITIAL_Q,
+    table::puck::Puck,
+};
+use faceoff_types::{Factor, Factors, Seed, Task};
+
+fn stream(label: &str) -> Stream {
+    Stream::new(&Seed::from_number(42), label)
+}
+
+fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (
+        mean,
+        (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt(),
+    )
+}
+
+fn hold() -> [f64; 14] {
+    let mut action = [0.0; 14];
+    action[..7].copy_from_slice(&INITIAL_Q);
+    action
+}
+
+fn episode(task: Task, factors: Factors, seed: u64) -> Episode {
+    Episode::new(
+        task,
+        Interpolation::Cubic,
+        factors,
+        &PerturbationSettings::default(),
+        &Plant::nominal(),
+        Seed::from_number(seed),
+    )
+}
+
+#[test]
+fn noise_has_the_deviations_of_the_rules() {
+    let settings = PerturbationSettings::default().observation_noise;
+    let mut noise = ObservationNoise::new(&settings, stream("noise"));
+    let draws: Vec<[f64; 20]> = (0..20_000)
+        .map(|_| {
+            let mut observation = [0.0; 20];
+            noise.add(&mut observation);
+            observation
+        })
+        .collect();
+    let expected: Vec<f64> = [1e-3, 1e-3, 0.02, 0.1, 0.1, 0.1]
+        .into_iter()
+        .chain([1e-4; 7])
+        .chain([1e-3; 7])
+        .collect();
+    for (i, sigma) in expected.iter().enumerate() {
+        let (mean, deviation) = mean_and_deviation(&draws.iter().map(|d| d[i]).collect::<Vec<_>>());
+        // Five standard errors.
+        assert!(
+            mean.abs() < 5.0 * sigma / 20_000f64.sqrt(),
+            "{i}: mean {mean}"
+        );
+        assert!(
+            (deviation / sigma - 1.0).abs() < 0.025,
+            "{i}: deviation {deviation}"
+        );
+    }
+}
+
+#[test]
+fn air_flow_is_stationary_with_its_correlation_time() {
+    let settings = PerturbationSettings::default().disturbance;
+    let puck = Puck::from_state([0.0, 0.0, 0.0, 0.6, 0.8, 0.0]);
+    let mut first = vec![];
+    let (mut products, mut squares) = (0.0, 0.0);
+    for index in 0..400 {
+        let seed = Seed::from_number(index);
+        let mut air = Disturbance::new(&settings, Stream::new(&seed, "disturbance"));
+        let forces: Vec<[f64; 2]> = (0..2_000).map(|_| air.force(&puck)).collect();
+        first.extend(forces[0]);
+        for k in 0..1_800 {
+            products += forces[k][0] * forces[k + 200][0];
+            squares += forces[k][0] * forces[k][0];
+        }
+    }
+    // At 1 m/s the force is the process itself, from the first substep on.
+    let (mean, deviation) = mean_and_deviation(&first);
+    assert!(mean.abs() < 0.000_8, "{mean}");
+    assert!((deviation / 0.004 - 1.0).abs() < 0.12, "{deviation}");
+    let deviation = (squares / (400.0 * 1_800.0)).sqrt();
+    assert!((deviation / 0.004 - 1.0).abs() < 0.06, "{deviation}");
+    // After one correlation time a share of 1/e is left.
+    let correlation = products / squares;
+    assert!(
+        (correlation - (-1.0f64).exp()).abs() < 0.06,
+        "{correlation}"
+    );
+    // A resting puck stays at rest.
+    let mut air = Disturbance::new(&settings, stream("disturbance"));
+    assert_eq!(air.force(&Puck::default()), [0.0; 2]);
+}
+
+#[test]
+fn tracking_is_lost_as_often_and_as_long_as_the_rules_say() {
+    let settings = PerturbationSettings::default().tracking_loss;
+    let mut tracking = TrackingLoss::new(&settings, stream("tracking_loss"));
+    let (mut tracked, mut losses, mut runs) = (0u32, 0u32, vec![]);
+    let mut run = 0u32;
+    for _ in 0..400_000 {
+        if tracking.advance() {
+            losses += u32::from(run == 0);
+            run += 1;
+        } else {
+            if run > 0 {
+                runs.push(run);
+            }
+            run = 0;
+            tracked += 1;
+        }
+    }
+    // While tracked: the steps that were tracked and those at which a loss began.
+    let rate = f64::from(losses) / f64::from(tracked + losses);
+    assert!((rate - 0.03).abs() < 0.002, "{rate}");
+    // Losses that follow each other at once are one run here, hence a few longer than 20.
+    assert_eq!(runs.iter().min(), Some(&5));
+    let single: Vec<f64> = runs
+        .iter()
+        .filter(|run| **run <= 20)
+        .map(|run| f64::from(*run))
+        .collect();
+    let (mean, _) = mean_and_deviation(&single);
+    assert!((mean - 12.5).abs() < 0.3, "{mean}");
+}
+
+#[test]
+fn a_lost_puck_is_frozen_bit_for_bit_and_reported_at_rest() {
+    let factors = Factors::only(Factor::TrackingLoss).with(Factor::ObservationNoise);
+    let mut frozen = 0;
+    for seed in 0..8 {
+        let mut episode = episode(Task::Prepare, factors, seed);
+        let mut last = episode.observation()[..3].to_vec();
+        assert_ne!(episode.observation()[3], 0.0, "tracked at first");
+        for _ in 0..60 {
+            episode.step(&hold());
+            let observation = episode.observation();
+            if observation[3..6] == [0.0; 3] {
+                assert_eq!(observation[..3], last[..]);
+                frozen += 1;
+            } else {
+                assert_ne!(observation[..3], last[..]);
+            }
+            last = observation[..3].to_vec();
+        }
+    }
+    assert!(frozen >= 40, "{frozen}");
+}
+
+#[test]
+fn switching_a_factor_leaves_the_others_draws_alone() {
+    // Noise and loss do not act on the world, so that the noise of an observation can be compared
+    // where the puck is seen.
+    let noise = Factors::only(Factor::ObservationNoise);
+    let both = noise.with(Factor::TrackingLoss);
+    let mut ideal = episode(Task::Prepare, Factors::NONE, 5);
+    let mut alone = episode(Task::Prepare, noise, 5);
+    let mut together = episode(Task::Prepare, both, 5);
+    let mut loss = episode(Task::Prepare, Factors::only(Factor::TrackingLoss), 5);
+    for _ in 0..200 {
+        for episode in [&mut ideal, &mut alone, &mut together, &mut loss] {
+            episode.step(&hold());
+        }
+        assert_eq!(ideal.state(), together.state());
+        // Joints are observed with noise whether or not the puck is lost.
+        assert_eq!(alone.observation()[6..], together.observation()[6..]);
+        let seen = together.observation()[3..6] != [0.0; 3];
+        if seen {
+            assert_eq!(alone.observation(), together.observation());
+        }
+    }
+    // The air flow's draws do not depend on the noise's: the worlds agree bit for bit.
+    let air = Factors::only(Factor::Disturbance);
+    let mut alone = episode(Task::Defend, air, 5);
+    let mut together = episode(Task::Defend, Factors::ALL, 5);
+    for _ in 0..30 {
+        alone.step(&hold());
+        together.step(&hold());
+        assert_eq!(alone.state(), together.state());
+    }
+    // And the initial state depends on none of them.
+    assert_eq!(
+        episode(Task::Hit, Factors::NONE, 9).state(),
+        episode(Task::Hit, Factors::ALL, 9).state()
+    );
+}
+
+#[test]
+fn mismatched_plants_sag_by_five_to_ten_millimetres() {
+    let settings = PerturbationSettings::default();
+    for seed in 0..8 {
+        let plant = Plant::mismatched(&settings, Seed::from_number(seed));
+        let error = plant.largest_static_error();
+        assert!((0.005..=0.010).contains(&error), "{error}");
+        assert_eq!(plant, Plant::mismatched(&settings, Seed::from_number(seed)));
+        assert_ne!(plant, Plant::nominal());
+    }
+    let nominal = Plant::nominal().largest_static_error();
+    // The mallet's weight alone, with the arm stretched out.
+    assert!((0.002..0.010).contains(&nominal), "{nominal}");
+}
+
+#[test]
+fn initial_states_fill_the_ranges_of_the_rules() {
+    let states = |task| (0..2_000).map(move |seed| episode(task, Factors::NONE, seed).state().puck);
+    let range = |values: Vec<f64>| {
+        let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+        (
+            low,
+            values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        )
+    };
+    let near = |(low, high): (f64, f64), expected: [f64; 2]| {
+        let slack = 0.01 * (expected[1] - expected[0]);
+        assert!(
+            low >= expected[0] && low < expected[0] + slack,
+            "{low} {expected:?}"
+        );
+        assert!(
+            high <= expected[1] && high > expected[1] - slack,
+            "{high} {expected:?}"
+        );
+    };
+    near(
+        range(states(Task::Hit).map(|p| p[0]).collect()),
+        [-0.7, -0.2],
+    );
+    near(
+        range(states(Task::Hit).map(|p| p[1]).collect()),
+        [-0.39105, 0.39105],
+    );
+    near(
+        range(states(Task::Hit).map(|p| p[3].hypot(p[4])).collect()),
+        [0.0, 0.5],
+    );
+    near(
+        range(states(Task::Hit).map(|p| p[5]).collect()),
+        [-2.0, 2.0],
+    );
+    near(
+        range(states(Task::Defend).map(|p| p[0]).collect()),
+        [0.29, 0.65],
+    );
+    near(
+        range(states(Task::Defend).map(|p| p[3].hypot(p[4])).collect()),
+        [1.0, 3.0],
+    );
+    near(
+        range(states(Task::Defend).map(|p| (p[4]).atan2(-p[3])).collect()),
+        [-0.5, 0.5],
+    );
+    let prepare: Vec<[f64; 6]> = states(Task::Prepare).collect();
+    let side = prepare.iter().filter(|p| p[0] >= -0.8).count() as f64 / 2_000.0;
+    // 0.6 × 0.0943 against 0.14 × 0.36035.
+    assert!((side - 0.5286).abs() < 0.06, "{side}");
+    for p in &prepare {
+        let least = if p[0] >= -0.8 { 0.39105 } else { 0.125 };
+        assert!((least..=0.48535).contains(&p[1].abs()) && (-0.94..=-0.2).contains(&p[0]));
+    }
+}
