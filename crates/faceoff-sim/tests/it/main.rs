@@ -1,5 +1,14 @@
 //! The simulator against the reference's recordings, its own promises, and itself.
 
+#![expect(
+    clippy::print_stdout,
+    reason = "`--nocapture` shows how far from each recording the simulator is"
+)]
+#![expect(
+    clippy::unwrap_used,
+    reason = "a test that cannot read its recording fails"
+)]
+
 mod arm_tracking;
 mod determinism;
 mod episodes;
