@@ -136,8 +136,9 @@ impl Findings {
         let cpus = &self.cpus;
         writeln!(out, "CPUs")?;
         let bound = match cpus.agent_cpus.as_slice() {
-            [] => "all".to_owned(),
-            list => format!("{list:?}"),
+            [] if cpus.usable >= 2 * cpus.slots => "CPUs of their own, slot by slot".to_owned(),
+            [] => "the CPUs of the service".to_owned(),
+            list => format!("CPUs {list:?}"),
         };
         writeln!(
             out,
