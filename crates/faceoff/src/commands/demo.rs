@@ -73,10 +73,13 @@ impl DemoCommand {
         println!("1. starting the server on {}", self.data_dir.display());
         let log = self.data_dir.join("server.log");
         let mut server = Server::start(self.listen, &self.data_dir, &log)?;
-        let organiser = server
-            .ready()
-            .await
-            .with_context(|| format!("the server did not start; its log is {}", log.display()))?;
+        let organiser = server.ready().await.with_context(|| {
+            format!(
+                "the server did not start; the end of {}:\n{}\n",
+                log.display(),
+                tail(&log)
+            )
+        })?;
 
         println!(
             "2. creating {} teams and uploading their agents",
@@ -149,6 +152,14 @@ impl DemoCommand {
         }
         server.stop().await
     }
+}
+
+/// The last lines of a log, as a beginner needs them.
+fn tail(log: &Path) -> String {
+    const LINES: usize = 12;
+    let text = std::fs::read_to_string(log).unwrap_or_default();
+    let lines: Vec<&str> = text.lines().collect();
+    lines[lines.len().saturating_sub(LINES)..].join("\n")
 }
 
 /// Empties the folder of an earlier demo; refuses one that holds something else.
