@@ -44,6 +44,8 @@ test: setup-test
 	if $(CARGO) nextest --version >/dev/null 2>&1; \
 	    then $(CARGO) nextest run --locked --workspace --no-fail-fast; \
 	    else $(CARGO) test --locked --workspace --no-fail-fast -- --test-threads 2; fi
+	@# The golden hashes again, as the released program computes them: the same bits.
+	$(CARGO) test --release --locked --package faceoff-sim --test it determinism
 
 lint:
 	$(CARGO) fmt --all --check
