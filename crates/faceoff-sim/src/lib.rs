@@ -4,7 +4,8 @@
 //! The arm's dynamics, its 1 kHz torque controller and the soft contacts follow the reference's
 //! equations, so that trajectories agree with its recordings; a test holds each kind of recording.
 //! Everything is deterministic: the same seed gives the same bits in debug and release builds and on
-//! any number of threads. Transcendental functions come from `libm`, never from the platform.
+//! any number of threads. Sines and cosines are polynomials of its own, other transcendental functions come
+//! from `libm`; none from the platform.
 //!
 //! This crate reads no clock and no environment and does no I/O. It knows neither agents as processes
 //! nor scores.
