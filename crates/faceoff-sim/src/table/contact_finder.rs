@@ -2,14 +2,17 @@
 //!
 //! Table, puck and mallets are rapier colliders; rapier's narrow-phase queries find normals and
 //! depths. Everything of interest happens in the plane of the surface, where a disc is represented
-//! exactly by a ball that meets walls of any height; overlap in z is the caller's to check. The goal
+//! exactly by a ball that meets walls of any height; a leaning mallet is cut at the heights where it
+//! can touch first. The goal
 //! posts' rounding is a contact skin around sharp-edged cuboids, which is the same set of points.
 //! The queries are pure functions of the poses, so that a world is saved without them.
 //!
 //! Rapier's math types end in this module.
 
-use super::geometry::{PUCK, TABLE};
-use crate::robot::model::TOOL;
+use super::{
+    geometry::{PUCK, TABLE},
+    mallet_cylinder::MalletCylinder,
+};
 use rapier3d_f64::{
     geometry::{Collider, ColliderBuilder},
     math::{Pose, Vector},
@@ -21,11 +24,13 @@ use std::sync::LazyLock;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touch {
     /// Unit normal in the table frame, into the second body.
-    pub normal: [f64; 2],
+    pub normal: [f64; 3],
     /// Depth of the overlap, m, positive.
     pub depth_m: f64,
     /// Middle of the overlap, m, table frame.
     pub point: [f64; 2],
+    /// Its height, m, table frame; 0 where the height of the bodies does not matter.
+    pub height_m: f64,
 }
 
 /// The table's rims never move: two long ones and the four parts beside the goals.
@@ -33,7 +38,6 @@ struct Colliders {
     long_rims: [Collider; 2],
     short_rims: [Collider; 4],
     puck: Collider,
-    mallet: Collider,
 }
 
 /// Half the height of the walls, m: any height above the discs' radii gives the same contacts.
@@ -77,7 +81,6 @@ static COLLIDERS: LazyLock<Colliders> = LazyLock::new(|| {
             short_rim(-1.0, -1.0),
         ],
         puck: ColliderBuilder::ball(PUCK.radius_m).build(),
-        mallet: ColliderBuilder::ball(TOOL.cylinder_radius_m).build(),
     }
 });
 
@@ -92,9 +95,10 @@ fn touch(first: (&Collider, Pose), second: (&Collider, Pose)) -> Option<Touch> {
     let middle = (contact.point1 + contact.point2) * 0.5
         + contact.normal1 * (0.5 * (first.0.contact_skin() - second.0.contact_skin()));
     (depth_m > 0.0).then_some(Touch {
-        normal: [contact.normal1.x, contact.normal1.y],
+        normal: [contact.normal1.x, contact.normal1.y, 0.0],
         depth_m,
         point: [middle.x, middle.y],
+        height_m: 0.0,
     })
 }
 
@@ -136,21 +140,56 @@ pub fn rims(puck: [f64; 2], mut found: impl FnMut(Touch)) {
     }
 }
 
-/// Contact of a mallet with the puck, normal into the puck.
-pub fn mallet_and_puck(mallet: [f64; 2], puck: [f64; 2]) -> Option<Touch> {
-    within(mallet, puck, TOOL.cylinder_radius_m + PUCK.radius_m)?;
-    let colliders = &*COLLIDERS;
-    touch((&colliders.mallet, at(mallet)), (&colliders.puck, at(puck)))
+/// Contact of a mallet with the puck, normal into the puck. A leaning cylinder meets the puck first at
+/// the puck's upper or lower edge.
+pub fn mallet_and_puck(mallet: &MalletCylinder, puck: [f64; 2]) -> Option<Touch> {
+    let [low, high] = mallet.heights();
+    let [low, high] = [low.max(0.0), high.min(PUCK.height_m)];
+    let puck_disc = (&COLLIDERS.puck, at(puck));
+    [low, high]
+        .into_iter()
+        .filter(|_| low < high)
+        .filter_map(|z| {
+            let axis = mallet.at(z);
+            let reach = mallet.reach([puck[0] - axis[0], puck[1] - axis[1]]);
+            within(axis, puck, reach + PUCK.radius_m)?;
+            let touch = touch((&disc(reach), at(axis)), puck_disc)?;
+            Some(Touch {
+                normal: mallet.side_normal(touch.normal),
+                height_m: z,
+                ..touch
+            })
+        })
+        .reduce(deeper)
 }
 
 /// Contact of the two mallets, normal into the second.
-pub fn mallets(first: [f64; 2], second: [f64; 2]) -> Option<Touch> {
-    within(first, second, 2.0 * TOOL.cylinder_radius_m)?;
-    let colliders = &*COLLIDERS;
-    touch(
-        (&colliders.mallet, at(first)),
-        (&colliders.mallet, at(second)),
-    )
+pub fn mallets(first: &MalletCylinder, second: &MalletCylinder) -> Option<Touch> {
+    let ([low_1, high_1], [low_2, high_2]) = (first.heights(), second.heights());
+    let [low, high] = [low_1.max(low_2), high_1.min(high_2)];
+    [low, high]
+        .into_iter()
+        .filter(|_| low < high)
+        .filter_map(|z| {
+            let (a, b) = (first.at(z), second.at(z));
+            let direction = [b[0] - a[0], b[1] - a[1]];
+            let reaches = (first.reach(direction), second.reach(direction));
+            within(a, b, reaches.0 + reaches.1)?;
+            Some(Touch {
+                height_m: z,
+                ..touch((&disc(reaches.0), at(a)), (&disc(reaches.1), at(b)))?
+            })
+        })
+        .reduce(deeper)
+}
+
+/// A horizontal cut of a mallet, as a ball.
+fn disc(radius_m: f64) -> Collider {
+    ColliderBuilder::ball(radius_m).build()
+}
+
+fn deeper(a: Touch, b: Touch) -> Touch {
+    if b.depth_m > a.depth_m { b } else { a }
 }
 
 /// The broad phase: nothing to find beyond this distance.

@@ -136,12 +136,18 @@ impl Contacts {
         // overlap, which is millimetres deep (that halves the errors of spin and direction), and there is
         // a second, vertical tangent: the puck does not move along z, but its friction brakes a mallet
         // that does. Without it a struck arm's mallet recoils by a third more than recorded.
-        let vertical = [0.0, 0.0, 1.0];
+        let across = 1.0 / (n[0] * n[0] + n[1] * n[1]).sqrt();
+        let horizontal = [-n[1] * across, n[0] * across, 0.0];
+        let upward = [
+            -n[2] * horizontal[1],
+            n[2] * horizontal[0],
+            n[0] * horizontal[1] - n[1] * horizontal[0],
+        ];
         let spin_arm = 0.5 * touch.depth_m - PUCK.radius_m;
         for (k, (direction, spin_arm, push)) in [
-            ([n[0], n[1], 0.0], 0.0, push),
-            ([-n[1], n[0], 0.0], spin_arm, 0.0),
-            (vertical, 0.0, 0.0),
+            (n, 0.0, push),
+            (horizontal, spin_arm, 0.0),
+            (upward, 0.0, 0.0),
         ]
         .into_iter()
         .enumerate()

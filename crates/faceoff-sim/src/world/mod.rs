@@ -10,13 +10,14 @@ use crate::{
     dynamics::arm::Kinematics,
     robot::{
         interpolation::Interpolation,
-        model::{DOFS, INITIAL_Q, JOINTS, SUBSTEPS, TOOL},
+        model::{DOFS, INITIAL_Q, JOINTS, SUBSTEPS},
         plant::Plant,
     },
     table::{
         contact_finder,
         contact_law::{MALLET, RIM},
-        geometry::{PUCK, TABLE},
+        geometry::TABLE,
+        mallet_cylinder::MalletCylinder,
         puck::Puck,
     },
 };
@@ -210,11 +211,9 @@ impl World {
         let mut contacts = Contacts::none();
         self.add_rims(&mut contacts);
         if let Some(mallet) = self.imposed {
-            let [x, y, z] = mallet.position;
-            if meets_puck(z)
-                && let Some(touch) =
-                    contact_finder::mallet_and_puck([x, y], [self.puck.pose[0], self.puck.pose[1]])
-            {
+            let cylinder = MalletCylinder::upright(mallet.position);
+            let puck = [self.puck.pose[0], self.puck.pose[1]];
+            if let Some(touch) = contact_finder::mallet_and_puck(&cylinder, puck) {
                 let motion = MalletMotion {
                     jacobian: None,
                     velocity: [mallet.velocity[0], mallet.velocity[1], 0.0],
@@ -283,12 +282,6 @@ fn robot_from_table(robot: usize, p: [f64; 3]) -> [f64; 3] {
         side * p[1],
         p[2] - TABLE.base_z_m,
     ]
-}
-
-/// Do a mallet's cylinder, centred at height z (m, table frame), and the puck overlap in height?
-#[inline(always)]
-fn meets_puck(z: f64) -> bool {
-    z - TOOL.cylinder_half_height_m < PUCK.height_m && z + TOOL.cylinder_half_height_m > 0.0
 }
 
 fn head(q: &[f64; DOFS]) -> [f64; JOINTS] {

@@ -3,7 +3,7 @@
 use super::{
     World, add,
     contacts::{Contacts, MalletMotion, Pair},
-    meets_puck, robot_from_table, side,
+    robot_from_table, side,
     solver::{accelerations_in_contact, joint_accelerations},
     table_from_robot,
 };
@@ -16,18 +16,15 @@ use crate::{
     },
     robot::{
         controller::{filter_velocity, torque},
-        model::{DOFS, JOINTS, SUBSTEP_S, TOOL},
+        model::{DOFS, JOINTS, SUBSTEP_S},
     },
     table::{
         contact_finder::{self, Touch},
         contact_law::{MALLET, MALLETS, RIM},
-        geometry::PUCK,
+        mallet_cylinder::MalletCylinder,
         puck::Puck,
     },
 };
-
-/// Height of the point where a mallet is touched, m, table frame: the middle of the puck.
-const CONTACT_HEIGHT_M: f64 = PUCK.height_m / 2.0;
 
 impl World {
     /// One substep of all arms, `T::COUNT` of them, and the puck.
@@ -122,31 +119,21 @@ fn find_contacts<T: Lanes>(
 ) -> Option<Contacts> {
     let centre = kinematics.cylinder_centre();
     let puck_xy = [puck.pose[0], puck.pose[1]];
-    let positions: [[f64; 3]; 2] = std::array::from_fn(|a| {
-        if a < T::COUNT {
-            table_from_robot(a, centre.lane(a))
-        } else {
-            [0.0; 3]
-        }
+    let axis = kinematics.mallet_axis;
+    let cylinders: [MalletCylinder; 2] = std::array::from_fn(|robot| {
+        let lane = robot.min(T::COUNT - 1);
+        let ([x, y, z], side) = (axis.lane(lane), side(lane));
+        let centre = table_from_robot(lane, centre.lane(lane));
+        MalletCylinder::along(centre, [side * x, side * y, z])
     });
-    let touches: [Option<_>; 2] = std::array::from_fn(|a| {
-        let [x, y, z] = positions[a];
-        if a < T::COUNT && meets_puck(z) {
-            contact_finder::mallet_and_puck([x, y], puck_xy)
-        } else {
-            None
-        }
+    let touches: [Option<_>; 2] = std::array::from_fn(|robot| {
+        (robot < T::COUNT)
+            .then(|| contact_finder::mallet_and_puck(&cylinders[robot], puck_xy))
+            .flatten()
     });
-    let between_mallets = if T::COUNT == 2
-        && (positions[0][2] - positions[1][2]).abs() < 2.0 * TOOL.cylinder_half_height_m
-    {
-        contact_finder::mallets(
-            [positions[0][0], positions[0][1]],
-            [positions[1][0], positions[1][1]],
-        )
-    } else {
-        None
-    };
+    let between_mallets = (T::COUNT == 2)
+        .then(|| contact_finder::mallets(&cylinders[0], &cylinders[1]))
+        .flatten();
     let mallets_touch = between_mallets.is_some() || touches != [None, None];
     if !mallets_touch && !contact_finder::near_rims(puck_xy) {
         return None;
@@ -168,7 +155,7 @@ fn find_contacts<T: Lanes>(
         let lane = a.min(T::COUNT - 1);
         let side = side(lane);
         // The point of the mallet at the middle of the overlap.
-        let [x, y, z] = robot_from_table(lane, [touch.point[0], touch.point[1], CONTACT_HEIGHT_M]);
+        let [x, y, z] = robot_from_table(lane, [touch.point[0], touch.point[1], touch.height_m]);
         let jacobian = kinematics.jacobian_at(Vec3::splat([x, y, z]));
         let rows: [[f64; DOFS]; 3] = [
             std::array::from_fn(|i| side * jacobian[i].x.lane(lane)),
