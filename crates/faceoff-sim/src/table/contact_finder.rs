@@ -27,10 +27,10 @@ pub struct Touch {
     pub normal: [f64; 3],
     /// Depth of the overlap, m, positive.
     pub depth_m: f64,
-    /// Middle of the overlap, m, table frame.
-    pub point: [f64; 2],
-    /// Its height, m, table frame; 0 where the height of the bodies does not matter.
-    pub height_m: f64,
+    /// Where the force acts, m, table frame; its height is 0 where that does not matter.
+    pub point: [f64; 3],
+    /// Distance of that point from the second body's centre, m.
+    pub lever_m: f64,
 }
 
 /// The table's rims never move: two long ones and the four parts beside the goals.
@@ -84,21 +84,52 @@ static COLLIDERS: LazyLock<Colliders> = LazyLock::new(|| {
     }
 });
 
-/// Overlap of two colliders, the second one's pose given.
-fn touch(first: (&Collider, Pose), second: (&Collider, Pose)) -> Option<Touch> {
+/// Overlap of two colliders: unit normal towards the second one, and depth, m.
+fn overlap(first: (&Collider, Pose), second: (&Collider, Pose)) -> Option<([f64; 2], f64)> {
     let skin = first.0.contact_skin() + second.0.contact_skin();
     // Every pair is a ball with a ball or a cuboid, which the query supports.
     let contact =
         query::contact(&first.1, first.0.shape(), &second.1, second.0.shape(), skin).ok()??;
     let depth_m = skin - contact.dist;
-    // The skins thicken both sides of the gap.
-    let middle = (contact.point1 + contact.point2) * 0.5
-        + contact.normal1 * (0.5 * (first.0.contact_skin() - second.0.contact_skin()));
-    (depth_m > 0.0).then_some(Touch {
-        normal: [contact.normal1.x, contact.normal1.y, 0.0],
+    (depth_m > 0.0).then_some(([contact.normal1.x, contact.normal1.y], depth_m))
+}
+
+/// Contact of the puck with a rim. The force acts in the middle of the overlap.
+fn rim_and_puck(rim: &Collider, puck: [f64; 2]) -> Option<Touch> {
+    let (n, depth_m) = overlap((rim, *rim.position()), (&COLLIDERS.puck, at(puck)))?;
+    let lever_m = PUCK.radius_m - 0.5 * depth_m;
+    Some(Touch {
+        normal: [n[0], n[1], 0.0],
         depth_m,
-        point: [middle.x, middle.y],
-        height_m: 0.0,
+        point: [puck[0] - lever_m * n[0], puck[1] - lever_m * n[1], 0.0],
+        lever_m,
+    })
+}
+
+/// Contact of two discs, given by centre and radius, at a height. The force acts where the line
+/// between the centres is divided as the radii are.
+fn discs(
+    (first, first_radius): ([f64; 2], f64),
+    (second, second_radius): ([f64; 2], f64),
+    height: f64,
+) -> Option<Touch> {
+    let reach = first_radius + second_radius;
+    within(first, second, reach)?;
+    let ball = |radius: f64| ColliderBuilder::ball(radius).build();
+    let (n, depth_m) = overlap(
+        (&ball(first_radius), at(first)),
+        (&ball(second_radius), at(second)),
+    )?;
+    let lever_m = second_radius * (1.0 - depth_m / reach);
+    Some(Touch {
+        normal: [n[0], n[1], 0.0],
+        depth_m,
+        point: [
+            second[0] - lever_m * n[0],
+            second[1] - lever_m * n[1],
+            height,
+        ],
+        lever_m,
     })
 }
 
@@ -127,69 +158,49 @@ pub fn rims(puck: [f64; 2], mut found: impl FnMut(Touch)) {
     if !near_long && !near_short {
         return;
     }
-    let colliders = &*COLLIDERS;
-    let pose = at(puck);
+    let [right, far] = [puck[1] < 0.0, puck[0] < 0.0].map(usize::from);
     if near_long {
-        let rim = &colliders.long_rims[usize::from(puck[1] < 0.0)];
-        touch((rim, *rim.position()), (&colliders.puck, pose)).map(&mut found);
+        rim_and_puck(&COLLIDERS.long_rims[right], puck).map(&mut found);
     }
     if near_short {
-        let rim =
-            &colliders.short_rims[2 * usize::from(puck[0] < 0.0) + usize::from(puck[1] < 0.0)];
-        touch((rim, *rim.position()), (&colliders.puck, pose)).map(&mut found);
+        rim_and_puck(&COLLIDERS.short_rims[2 * far + right], puck).map(&mut found);
     }
 }
 
 /// Contact of a mallet with the puck, normal into the puck. A leaning cylinder meets the puck first at
-/// the puck's upper or lower edge.
+/// the puck's upper or lower edge, and pushes at right angles to its axis.
 pub fn mallet_and_puck(mallet: &MalletCylinder, puck: [f64; 2]) -> Option<Touch> {
     let [low, high] = mallet.heights();
-    let [low, high] = [low.max(0.0), high.min(PUCK.height_m)];
-    let puck_disc = (&COLLIDERS.puck, at(puck));
-    [low, high]
-        .into_iter()
-        .filter(|_| low < high)
-        .filter_map(|z| {
-            let axis = mallet.at(z);
-            let reach = mallet.reach([puck[0] - axis[0], puck[1] - axis[1]]);
-            within(axis, puck, reach + PUCK.radius_m)?;
-            let touch = touch((&disc(reach), at(axis)), puck_disc)?;
-            Some(Touch {
-                normal: mallet.side_normal(touch.normal),
-                height_m: z,
-                ..touch
-            })
+    deepest_of([low.max(0.0), high.min(PUCK.height_m)], |z| {
+        let axis = mallet.at(z);
+        let reach = mallet.reach([puck[0] - axis[0], puck[1] - axis[1]]);
+        let touch = discs((axis, reach), (puck, PUCK.radius_m), z)?;
+        Some(Touch {
+            normal: mallet.side_normal(touch.normal),
+            ..touch
         })
-        .reduce(deeper)
+    })
 }
 
 /// Contact of the two mallets, normal into the second.
 pub fn mallets(first: &MalletCylinder, second: &MalletCylinder) -> Option<Touch> {
     let ([low_1, high_1], [low_2, high_2]) = (first.heights(), second.heights());
-    let [low, high] = [low_1.max(low_2), high_1.min(high_2)];
-    [low, high]
-        .into_iter()
-        .filter(|_| low < high)
-        .filter_map(|z| {
-            let (a, b) = (first.at(z), second.at(z));
-            let direction = [b[0] - a[0], b[1] - a[1]];
-            let reaches = (first.reach(direction), second.reach(direction));
-            within(a, b, reaches.0 + reaches.1)?;
-            Some(Touch {
-                height_m: z,
-                ..touch((&disc(reaches.0), at(a)), (&disc(reaches.1), at(b)))?
-            })
-        })
-        .reduce(deeper)
+    deepest_of([low_1.max(low_2), high_1.min(high_2)], |z| {
+        let (a, b) = (first.at(z), second.at(z));
+        let direction = [b[0] - a[0], b[1] - a[1]];
+        discs((a, first.reach(direction)), (b, second.reach(direction)), z)
+    })
 }
 
-/// A horizontal cut of a mallet, as a ball.
-fn disc(radius_m: f64) -> Collider {
-    ColliderBuilder::ball(radius_m).build()
-}
-
-fn deeper(a: Touch, b: Touch) -> Touch {
-    if b.depth_m > a.depth_m { b } else { a }
+/// The deeper contact of the two ends of a range of heights; none if the range is empty.
+fn deepest_of([low, high]: [f64; 2], contact: impl Fn(f64) -> Option<Touch>) -> Option<Touch> {
+    if low >= high {
+        return None;
+    }
+    match (contact(low), contact(high)) {
+        (Some(a), Some(b)) if b.depth_m > a.depth_m => Some(b),
+        (a, b) => a.or(b),
+    }
 }
 
 /// The broad phase: nothing to find beyond this distance.

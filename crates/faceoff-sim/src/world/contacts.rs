@@ -5,7 +5,6 @@ use crate::{
     table::{
         contact_finder::Touch,
         contact_law::{MALLET_INVERSE_INERTIA, Material},
-        geometry::PUCK,
         puck::INVERSE_INERTIA,
     },
 };
@@ -16,13 +15,11 @@ pub const MAX_CONTACTS: usize = 5;
 const DIRECTIONS: usize = 3;
 const MAX_ROWS: usize = DIRECTIONS * MAX_CONTACTS;
 
-/// Rounds of the active-set search before falling back to Gauss–Seidel.
-const ACTIVE_SET_ROUNDS: usize = 30;
-/// Sweeps of the fallback, and the relative change at which it stops.
+/// Sweeps over several contacts of which one slips, and the relative change at which they end.
 const SWEEPS: usize = 20_000;
 const SWEEP_TOLERANCE: f64 = 1e-13;
-/// Turn of the slip's direction, rad, at which it is found.
-const SLIP_TOLERANCE: f64 = 1e-12;
+/// Halvings of a right angle in the search for the direction of slip: down to rounding.
+const BISECTIONS: usize = 54;
 
 /// How the motion of a mallet's cylinder depends on its arm's joints, table frame: rows for x, y and
 /// z.
@@ -132,10 +129,9 @@ impl Contacts {
         let impedance = material.impedance(touch.depth_m);
         let regularisation = Material::softness(impedance) * material.inverse_inertia;
         let push = material.stiffness_per_s2 * impedance * touch.depth_m;
-        // Where MODEL leaves a choice, the recordings decide: the contact point lies in the middle of the
-        // overlap, which is millimetres deep (that halves the errors of spin and direction), and there is
-        // a second, vertical tangent: the puck does not move along z, but its friction brakes a mallet
-        // that does. Without it a struck arm's mallet recoils by a third more than recorded.
+        // Where MODEL leaves a choice, the recordings decide: the force acts inside the overlap, which is
+        // millimetres deep, and there is a second, upright tangent: the puck does not move along z, but its
+        // friction brakes a mallet that does, and shares the cone with the horizontal one.
         let across = 1.0 / (n[0] * n[0] + n[1] * n[1]).sqrt();
         let horizontal = [-n[1] * across, n[0] * across, 0.0];
         let upward = [
@@ -143,7 +139,7 @@ impl Contacts {
             n[2] * horizontal[0],
             n[0] * horizontal[1] - n[1] * horizontal[0],
         ];
-        let spin_arm = 0.5 * touch.depth_m - PUCK.radius_m;
+        let spin_arm = -touch.lever_m;
         for (k, (direction, spin_arm, push)) in [
             (n, 0.0, push),
             (horizontal, spin_arm, 0.0),
@@ -258,64 +254,89 @@ fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum State {
-    Open,
-    Sticks,
-    /// With the unit direction of the tangential force.
-    Slips([f64; 2]),
-}
-
 type Matrix = [[f64; MAX_ROWS]; MAX_ROWS];
+/// One contact's force: normal, horizontal tangent, vertical tangent.
+type Force = [f64; DIRECTIONS];
 
-/// Solves `matrix · f = target` where each contact's normal force is not negative and its tangential
-/// force within friction times the normal force; rows alternate normal, tangent, vertical tangent.
+/// Minimises ½ f·matrix·f − target·f where each contact's tangential force stays within friction times
+/// its normal force; rows alternate normal, tangent, vertical tangent. This is the reference's notion of
+/// friction: a convex problem, in which slipping adds to the normal force.
 fn solve_cone(matrix: &Matrix, target: &[f64; MAX_ROWS], friction: &[f64]) -> [f64; MAX_ROWS] {
-    let mut states = [State::Sticks; MAX_CONTACTS];
-    let mut force = [0.0; MAX_ROWS];
-    for _ in 0..ACTIVE_SET_ROUNDS {
-        force = solve_states(matrix, target, friction, &states);
-        let mut changed = false;
+    let rows = DIRECTIONS * friction.len();
+    let mut force = eliminate(matrix, target, rows);
+    let sticks = |(c, mu): (usize, &f64)| {
+        let [f, a, b] = block(&force, c);
+        norm([a, b]) <= mu * f
+    };
+    if friction.iter().enumerate().all(sticks) {
+        return force;
+    }
+    // One contact after the other, the forces of the others held: a single contact needs one sweep.
+    for _ in 0..SWEEPS {
+        let (mut change, mut size) = (0.0f64, 0.0f64);
         for (c, &mu) in friction.iter().enumerate() {
-            let n = DIRECTIONS * c;
-            let missing = |r: usize| target[r] - dot(&matrix[r], &force);
-            let tangent = [force[n + 1], force[n + 2]];
-            let limit = mu * force[n];
-            let next = match states[c] {
-                State::Open if missing(n) > 0.0 => State::Sticks,
-                State::Open => State::Open,
-                _ if force[n] < 0.0 => State::Open,
-                State::Sticks if norm(tangent) > limit => direction(tangent),
-                State::Sticks => State::Sticks,
-                State::Slips(along) => {
-                    // Towards where the slip would have the force: the fixed point has it along it.
-                    let wanted: [f64; 2] = std::array::from_fn(|i| {
-                        let r = n + 1 + i;
-                        tangent[i] + missing(r) / matrix[r][r].max(f64::MIN_POSITIVE)
-                    });
-                    if norm(wanted) < limit {
-                        State::Sticks
-                    } else {
-                        let State::Slips(turned) = direction(wanted) else {
-                            continue;
-                        };
-                        let turn = norm([turned[0] - along[0], turned[1] - along[1]]);
-                        if turn < SLIP_TOLERANCE {
-                            states[c]
-                        } else {
-                            State::Slips(turned)
-                        }
-                    }
-                }
+            let first = DIRECTIONS * c;
+            let others = |r: usize| -> f64 {
+                (0..rows)
+                    .filter(|k| !(first..first + DIRECTIONS).contains(k))
+                    .map(|k| matrix[r][k] * force[k])
+                    .sum()
             };
-            changed |= next != states[c];
-            states[c] = next;
+            let target = std::array::from_fn(|d| target[first + d] - others(first + d));
+            let matrix = std::array::from_fn(|d| block(&matrix[first + d], c));
+            let next = solve_one_cone(&matrix, &target, mu);
+            for d in 0..DIRECTIONS {
+                change = change.max((next[d] - force[first + d]).abs());
+                size = size.max(next[d].abs());
+                force[first + d] = next[d];
+            }
         }
-        if !changed {
-            return force;
+        if friction.len() == 1 || change <= SWEEP_TOLERANCE * size {
+            break;
         }
     }
-    sweep(matrix, target, friction, force)
+    force
+}
+
+/// As [`solve_cone`], for one contact.
+fn solve_one_cone(matrix: &[Force; DIRECTIONS], target: &Force, mu: f64) -> Force {
+    let stuck = eliminate(matrix, target, DIRECTIONS);
+    if norm([stuck[1], stuck[2]]) <= mu * stuck[0] {
+        return stuck;
+    }
+    let pull = [target[1], target[2]];
+    if target[0] + mu * norm(pull) <= 0.0 {
+        return [0.0; DIRECTIONS];
+    }
+    // The force lies on the edge of the cone. Along a given edge it is a matter of one unknown; the edge
+    // sought is the one across which nothing is left to gain.
+    let along = |u: [f64; 2]| -> Force {
+        let edge = [1.0, mu * u[0], mu * u[1]];
+        let response = matrix.map(|row| dot(&row, &edge));
+        let size = (dot(&edge, target) / dot(&edge, &response)).max(0.0);
+        edge.map(|e| size * e)
+    };
+    let gain_across = |u: [f64; 2]| {
+        let force = along(u);
+        let left: Force = std::array::from_fn(|d| target[d] - dot(&matrix[d], &force));
+        left[2] * u[0] - left[1] * u[1]
+    };
+    let start = unit(pull);
+    let turn = if gain_across(start) < 0.0 { -1.0 } else { 1.0 };
+    let (mut near, mut far) = (start, [-turn * start[1], turn * start[0]]);
+    for _ in 0..BISECTIONS {
+        let middle = unit([near[0] + far[0], near[1] + far[1]]);
+        if turn * gain_across(middle) > 0.0 {
+            near = middle;
+        } else {
+            far = middle;
+        }
+    }
+    along(near)
+}
+
+fn block(row: &[f64; MAX_ROWS], contact: usize) -> Force {
+    std::array::from_fn(|d| row[DIRECTIONS * contact + d])
 }
 
 /// Not `hypot`, which is the platform's.
@@ -323,48 +344,20 @@ fn norm(v: [f64; 2]) -> f64 {
     (v[0] * v[0] + v[1] * v[1]).sqrt()
 }
 
-fn direction(tangent: [f64; 2]) -> State {
-    let size = norm(tangent);
+/// A unit vector in a direction; any, where there is none.
+fn unit(v: [f64; 2]) -> [f64; 2] {
+    let size = norm(v);
     if size > 0.0 {
-        State::Slips(tangent.map(|f| f / size))
+        v.map(|x| x / size)
     } else {
-        State::Sticks
+        [1.0, 0.0]
     }
 }
 
-/// Solves the linear system that a set of states leaves, by elimination with pivoting.
-fn solve_states(
-    matrix: &Matrix,
-    target: &[f64; MAX_ROWS],
-    friction: &[f64],
-    states: &[State; MAX_CONTACTS],
-) -> [f64; MAX_ROWS] {
-    let n = DIRECTIONS * friction.len();
+/// Solves the first `n` equations by elimination with pivoting.
+fn eliminate<const N: usize>(matrix: &[[f64; N]; N], target: &[f64; N], n: usize) -> [f64; N] {
     let mut a = *matrix;
     let mut x = *target;
-    for (c, &mu) in friction.iter().enumerate() {
-        let first = DIRECTIONS * c;
-        let mut fix = |k: usize, ratio: f64| {
-            a[k] = [0.0; MAX_ROWS];
-            a[k][first] = -ratio;
-            a[k][k] = 1.0;
-            x[k] = 0.0;
-        };
-        match states[c] {
-            State::Open => (0..DIRECTIONS).for_each(|d| fix(first + d, 0.0)),
-            State::Sticks => {}
-            State::Slips(along) => {
-                fix(first + 1, mu * along[0]);
-                fix(first + 2, mu * along[1]);
-                // The force lies on the edge of the cone; what is left of the three equations is
-                // their sum along that edge.
-                for (k, a) in a[first].iter_mut().enumerate() {
-                    *a += mu * (along[0] * matrix[first + 1][k] + along[1] * matrix[first + 2][k]);
-                }
-                x[first] += mu * (along[0] * target[first + 1] + along[1] * target[first + 2]);
-            }
-        }
-    }
     for k in 0..n {
         let mut pivot = k;
         for r in k + 1..n {
@@ -389,50 +382,4 @@ fn solve_states(
         x[k] /= a[k][k];
     }
     x
-}
-
-/// Gauss–Seidel over the contacts, one cone at a time: slow, but it converges where the search for the
-/// set of states does not.
-#[cold]
-fn sweep(
-    matrix: &Matrix,
-    target: &[f64; MAX_ROWS],
-    friction: &[f64],
-    start: [f64; MAX_ROWS],
-) -> [f64; MAX_ROWS] {
-    let mut force = start;
-    for _ in 0..SWEEPS {
-        let before = force;
-        for (c, &mu) in friction.iter().enumerate() {
-            let n = DIRECTIONS * c;
-            // A step along each row's own equation, then to the nearest point of the cone.
-            let step: f64 = (n..n + DIRECTIONS)
-                .map(|r| matrix[r][r])
-                .fold(0.0, f64::max);
-            let [f, a, b] = std::array::from_fn(|d| {
-                force[n + d] + (target[n + d] - dot(&matrix[n + d], &force)) / step
-            });
-            let size = norm([a, b]);
-            let projected = if size <= mu * f {
-                [f, a, b]
-            } else if mu * size <= -f {
-                [0.0; 3]
-            } else {
-                let normal = (f + mu * size) / (1.0 + mu * mu);
-                let ratio = mu * normal / size;
-                [normal, ratio * a, ratio * b]
-            };
-            force[n..n + DIRECTIONS].copy_from_slice(&projected);
-        }
-        let change = force
-            .iter()
-            .zip(&before)
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f64::max);
-        let size = force.iter().map(|f| f.abs()).fold(0.0, f64::max);
-        if change <= SWEEP_TOLERANCE * size {
-            break;
-        }
-    }
-    force
 }

@@ -154,8 +154,7 @@ fn find_contacts<T: Lanes>(
     let mallet = |a: usize, touch: &Touch| {
         let lane = a.min(T::COUNT - 1);
         let side = side(lane);
-        // The point of the mallet at the middle of the overlap.
-        let [x, y, z] = robot_from_table(lane, [touch.point[0], touch.point[1], touch.height_m]);
+        let [x, y, z] = robot_from_table(lane, touch.point);
         let jacobian = kinematics.jacobian_at(Vec3::splat([x, y, z]));
         let rows: [[f64; DOFS]; 3] = [
             std::array::from_fn(|i| side * jacobian[i].x.lane(lane)),

@@ -37,7 +37,7 @@ fn may_touch(mallet: &MalletState, puck: &[f64; 6]) -> bool {
 
 #[test]
 fn recorded_actions_lead_to_recorded_episodes() {
-    let (mut close, mut mild, mut total) = (0, 0, 0);
+    let (mut close, mut mild, mut mild_throughout, mut total) = (0, 0, 0, 0);
     for task in Task::ALL {
         let recording = recording(&format!("episodes_{task}"));
         for (index, case) in recording["episodes"].as_array().unwrap().iter().enumerate() {
@@ -58,6 +58,7 @@ fn recorded_actions_lead_to_recorded_episodes() {
                 init,
             );
             let (mut distance, mut joints_after, mut values_after) = (0.0f64, 0.0f64, 0.0f64);
+            let mut throughout = true;
             for step in 0..puck.len() {
                 if may_touch(&episode.world().mallet(0), &episode.state().puck) {
                     contact = contact.min(step);
@@ -82,9 +83,12 @@ fn recorded_actions_lead_to_recorded_episodes() {
                         values <= 1e-4,
                         "{name}, {step}: constraint values {values:e}"
                     );
-                } else if step <= contact + WINDOW {
-                    joints_after = joints_after.max(joints);
-                    values_after = values_after.max(values);
+                } else {
+                    throughout &= joints <= 5e-4 && values <= 5e-3;
+                    if step <= contact + WINDOW {
+                        joints_after = joints_after.max(joints);
+                        values_after = values_after.max(values);
+                    }
                 }
                 if step <= impact + WINDOW {
                     let [dx, dy] = [0, 1].map(|i| state.puck[i] - puck[step][i]);
@@ -102,15 +106,21 @@ fn recorded_actions_lead_to_recorded_episodes() {
             );
             total += 1;
             mild += u32::from(joints_after <= 5e-4 && values_after <= 5e-3);
+            mild_throughout += u32::from(throughout);
             close += u32::from(distance <= 0.005);
         }
     }
-    println!("{close} of {total} pucks within 5 mm, {mild} arms within 5e-4 rad");
+    println!(
+        "{close} of {total} pucks within 5 mm; arms within 5e-4 rad and 5e-3: {mild} for {WINDOW} steps \
+         after contact, {mild_throughout} to the end"
+    );
     assert_eq!(total, 90);
-    // A second contact may follow within the window: a few replays are chaotic already.
-    assert!(mild >= 85, "{mild} of {total} arms");
+    // The reference is held to 70 pucks. An arm feels where the puck went: a few replays become chaotic
+    // within the window, a few more later.
     assert!(
-        close >= 70,
+        close >= 85,
         "{close} of {total} pucks within 5 mm after the first impact"
     );
+    assert!(mild >= 88, "{mild} of {total} arms");
+    assert!(mild_throughout >= 80, "{mild_throughout} of {total} arms");
 }

@@ -90,15 +90,15 @@ fn bounces_match_recordings() {
             }
             "goal_post" => {
                 let ours_touched = first_touch(&ours);
-                let end = touched.map_or(0, |touched| (touched + 8).min(recorded.len() - 1));
-                let (velocity, _) = errors(&ours[end], &recorded[end], speed(&recorded[0]));
-                posts.push((
-                    touched,
-                    ours_touched,
-                    velocity,
-                    speed(&ours[end]),
-                    speed(&recorded[end]),
-                ));
+                let touched = touched.expect("a post case touches");
+                let ours_touched = ours_touched.expect("ours touches too");
+                assert!(
+                    touched.abs_diff(ours_touched) <= 1,
+                    "touched at {ours_touched} ms, recorded {touched} ms"
+                );
+                let end = (touched + 8).min(recorded.len() - 1);
+                assert_leaves_the_post(&ours[touched - 1], &ours[end]);
+                posts.push(speed(&ours[end]) / speed(&recorded[end]));
             }
             other => panic!("unknown kind {other}"),
         }
@@ -117,8 +117,21 @@ fn bounces_match_recordings() {
     assert!(median <= 0.002 && p90 <= 0.006);
     let (_, p90) = report("corner, velocity", &mut corner);
     assert!(p90 <= 0.01);
-    for post in &posts {
-        println!("post {post:?}");
-    }
+    // The reference meets the rounding's chords up to 0.3 mm off: no case-by-case match is to be had.
+    report(
+        "goal post, outgoing speed over the recorded one",
+        &mut posts,
+    );
+    assert!(posts.iter().all(|ratio| (0.4..=2.0).contains(ratio)));
+    assert_eq!(posts.len(), 28);
     assert!(entries > 0);
+}
+
+/// Hardly faster than before (the law's restitution reaches 1.03), and away from the nearest post's
+/// centre of rounding.
+fn assert_leaves_the_post(before: &[f64; 6], after: &[f64; 6]) {
+    assert!(speed(after) <= 1.05 * speed(before), "{before:?} {after:?}");
+    let post = [0.979 * after[0].signum(), 0.130 * after[1].signum()];
+    let outward = (after[0] - post[0]) * after[3] + (after[1] - post[1]) * after[4];
+    assert!(outward > 0.0, "{before:?} {after:?}");
 }
