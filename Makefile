@@ -45,7 +45,7 @@ test: setup-test
 	    then $(CARGO) nextest run --locked --workspace --no-fail-fast; \
 	    else $(CARGO) test --locked --workspace --no-fail-fast -- --test-threads 2; fi
 	@# The golden hashes again, as the released program computes them: the same bits.
-	$(CARGO) test --release --locked --package faceoff-sim --test it determinism
+	$(CARGO) test --release --locked --package faceoff-sim --test it golden
 
 lint:
 	$(CARGO) fmt --all --check

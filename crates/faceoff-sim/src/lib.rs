@@ -17,6 +17,8 @@
 
 pub mod dynamics;
 pub mod episode;
+pub mod game;
+pub mod link;
 pub mod perturbation;
 pub mod robot;
 pub mod table;
@@ -27,6 +29,8 @@ pub use episode::{
     constraints::ConstraintValues,
     env_info::{EnvInfo, env_info, env_info_for},
 };
+pub use game::{GAME_STEPS, Game, GameSetup, GameStep, WINDOW_STEPS, referee::RallyEnd};
+pub use link::Command;
 pub use perturbation::settings::PerturbationSettings;
 pub use robot::{
     interpolation::Interpolation,

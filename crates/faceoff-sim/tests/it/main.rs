@@ -12,8 +12,10 @@
 mod arm_tracking;
 mod determinism;
 mod episodes;
+mod game;
 mod kinematics;
 mod mallet_impact;
 mod perturbations;
+mod policy;
 mod puck;
 mod reference;

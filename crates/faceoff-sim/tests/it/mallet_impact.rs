@@ -22,7 +22,7 @@ fn impacts_match_recordings() {
             } else if k % SUBSTEPS == 0 {
                 match case["actions"].get(k / SUBSTEPS) {
                     Some(action) => world.command(0, Interpolation::Cubic, &flat(action)),
-                    None => world.hold(0),
+                    None => world.hold(0, Interpolation::Cubic),
                 }
             }
             ours.push(world.puck().state());
