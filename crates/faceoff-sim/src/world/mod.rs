@@ -56,6 +56,7 @@ impl World {
     #[must_use]
     pub fn new(plant: &Plant, joints: &[[f64; JOINTS]], puck: [f64; 6]) -> Self {
         debug_assert!(joints.len() <= 2);
+        contact_finder::make_ready();
         Self {
             plant: plant.clone(),
             arms: joints.iter().take(2).map(|q| Arm::new(plant, q)).collect(),

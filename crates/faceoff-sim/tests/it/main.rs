@@ -9,7 +9,9 @@
     reason = "a test that cannot read its recording fails"
 )]
 
+mod allocation;
 mod arm_tracking;
+mod delay;
 mod determinism;
 mod episodes;
 mod game;
