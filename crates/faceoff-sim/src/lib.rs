@@ -15,6 +15,7 @@
     reason = "joints are numbered: one index runs over several arrays, as in the equations"
 )]
 
+pub mod batch;
 pub mod dynamics;
 pub mod episode;
 pub mod game;
@@ -24,6 +25,7 @@ pub mod robot;
 pub mod table;
 pub mod world;
 
+pub use batch::{Batch, BatchOutcome, BatchSetup};
 pub use episode::{
     EPISODE_STEPS, Episode, EpisodeState, StepOutcome,
     constraints::ConstraintValues,

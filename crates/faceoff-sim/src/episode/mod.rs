@@ -6,7 +6,7 @@ pub mod opponent;
 pub mod task;
 
 use crate::{
-    link::{Command, Link, observation::OBSERVATION_LEN},
+    link::{Command, Link, observation},
     perturbation::{settings::PerturbationSettings, stream::Stream, table_factors::TableFactors},
     robot::{interpolation::Interpolation, model::JOINTS, plant::Plant},
     world::World,
@@ -75,10 +75,7 @@ impl Episode {
     /// The observation that the agent gets: 23 numbers for `hit`, 20 otherwise (PROTOCOL).
     #[must_use]
     pub fn observation(&self) -> &[f64] {
-        match self.opponent {
-            Some(_) => self.link.observation(),
-            None => &self.link.observation()[..OBSERVATION_LEN],
-        }
+        &self.link.observation()[..observation::len(self.task)]
     }
 
     /// One control step. `action` is row-major, of length [`Interpolation::len`], finite. Must not

@@ -11,6 +11,7 @@
 
 mod allocation;
 mod arm_tracking;
+mod batch;
 mod delay;
 mod determinism;
 mod episodes;
