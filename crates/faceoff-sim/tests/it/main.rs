@@ -10,6 +10,7 @@
 )]
 
 mod allocation;
+mod arithmetic;
 mod arm_tracking;
 mod batch;
 mod delay;
@@ -22,3 +23,4 @@ mod perturbations;
 mod policy;
 mod puck;
 mod reference;
+mod replay;
