@@ -19,6 +19,7 @@ mod episodes;
 mod game;
 mod kinematics;
 mod mallet_impact;
+mod outcomes;
 mod perturbations;
 mod policy;
 mod puck;
