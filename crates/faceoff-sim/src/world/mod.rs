@@ -1,6 +1,7 @@
 //! The physical world: a puck, and one or two arms around it.
 
 mod arm;
+mod cone;
 mod contacts;
 mod joints;
 mod solver;
