@@ -33,7 +33,6 @@ async fn site(max_bundle_bytes: u64) -> Site {
         },
         admin_token_hash: hash_token(ADMIN),
         upload_dir: folder.path().to_owned(),
-        season_name: None,
         daily_at: None,
         clock: Clock::new(Timestamp::now),
         limits: HttpLimits::default(),
