@@ -127,6 +127,33 @@ where
     }
 }
 
+/// The two parameters of the path, in its order.
+#[derive(Debug)]
+pub(crate) struct TwoPathParams<T>(pub(crate) T, pub(crate) T);
+
+impl<S, T> FromRequestParts<S> for TwoPathParams<T>
+where
+    S: Send + Sync,
+    T: FromStr<Err: Display>,
+{
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        let not_found = |detail: String| Problem::new(ProblemKind::NotFound, detail);
+        let params = RawPathParams::from_request_parts(parts, state)
+            .await
+            .map_err(|rejection| not_found(rejection.body_text()))?;
+        let mut params = params.iter().map(|(_, text)| text.parse::<T>());
+        let mut next = || {
+            params
+                .next()
+                .ok_or_else(|| not_found("the path has too few parts".into()))?
+                .map_err(|error| not_found(error.to_string()))
+        };
+        Ok(Self(next()?, next()?))
+    }
+}
+
 /// The query string.
 #[derive(Debug)]
 pub(crate) struct QueryParams<T>(pub(crate) T);

@@ -10,10 +10,12 @@ mod extract;
 mod layers;
 mod pages;
 pub mod problem;
+mod seeds;
+mod summaries;
 pub mod token;
 
 pub use axum::Router;
-use faceoff_store::{EvaluationPlan, Season, Store, StoreError};
+use faceoff_store::{EvaluationPlan, Store};
 use jiff::{Timestamp, civil, tz::TimeZone};
 use std::{fmt, io, path::PathBuf, sync::Arc, time::Duration};
 use tokio::{net::TcpListener, sync::Semaphore};
@@ -83,8 +85,6 @@ pub struct HttpConfig {
     pub admin_token_hash: [u8; 32],
     /// Existing folder for uploads under way, on a disk with room for some bundles.
     pub upload_dir: PathBuf,
-    /// Name of the season on the pages; `None` for the store's.
-    pub season_name: Option<String>,
     /// UTC time of the daily evaluation; `None` when the organiser starts it by hand. Shown only.
     pub daily_at: Option<civil::Time>,
     /// The time.
@@ -99,23 +99,10 @@ struct AppState {
     store: Store,
     config: HttpConfig,
     uploads: Arc<Semaphore>,
+    summaries: summaries::SummaryCache,
 }
 
 type App = Arc<AppState>;
-
-impl AppState {
-    /// The season, under the name that the configuration gives it.
-    async fn season(&self) -> Result<Season, StoreError> {
-        let season = self.store.season().await?;
-        Ok(match &self.config.season_name {
-            Some(name) => Season {
-                name: name.clone(),
-                ..season
-            },
-            None => season,
-        })
-    }
-}
 
 /// The whole site: pages at `/`, API under `/api/v1`.
 ///
@@ -128,6 +115,7 @@ pub fn router(store: Store, config: HttpConfig) -> Router {
         store,
         config,
         uploads,
+        summaries: summaries::SummaryCache::default(),
     });
     let site = Router::new()
         .merge(api::router(limits.answer))

@@ -36,6 +36,14 @@ pub enum ProblemKind {
     TeamNameTaken,
     /// The team's turn of the day is used.
     AlreadyEvaluated,
+    /// The day's seed is known, and the submission came after that.
+    DayReleased,
+    /// It carries a seed that is secret for some more time.
+    NotYet,
+    /// The season is over.
+    SeasonClosed,
+    /// Two evaluations did not play the same episodes.
+    NotPaired,
     /// The thing is in a state that does not allow this.
     Conflict,
     /// The team has several uploads that are not validated yet.
@@ -48,7 +56,7 @@ pub enum ProblemKind {
 
 impl ProblemKind {
     /// All kinds, as the page `/problems` lists them.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 19] = [
         Self::Unauthenticated,
         Self::Forbidden,
         Self::NotFound,
@@ -60,6 +68,10 @@ impl ProblemKind {
         Self::RequestTimeout,
         Self::TeamNameTaken,
         Self::AlreadyEvaluated,
+        Self::DayReleased,
+        Self::NotYet,
+        Self::SeasonClosed,
+        Self::NotPaired,
         Self::Conflict,
         Self::TooManyPending,
         Self::Busy,
@@ -133,6 +145,30 @@ impl ProblemKind {
                 StatusCode::CONFLICT,
                 "Today's turn is used",
                 "A team is evaluated once per UTC day. “next_turn” is the next day it can be.",
+            ),
+            Self::DayReleased => (
+                "day-released",
+                StatusCode::CONFLICT,
+                "Too late for today's episodes",
+                "A dataset of today was handed out, and with it the seed of today's episodes. What was uploaded after that plays from “next_turn” on.",
+            ),
+            Self::NotYet => (
+                "not-yet",
+                StatusCode::CONFLICT,
+                "Not yet",
+                "A dataset carries the seed of its day. It is handed out once no evaluation of that day is queued or running.",
+            ),
+            Self::SeasonClosed => (
+                "season-closed",
+                StatusCode::CONFLICT,
+                "The season is over",
+                "The season's secret is published, so nothing more is uploaded or evaluated. Results and datasets stay.",
+            ),
+            Self::NotPaired => (
+                "not-paired",
+                StatusCode::CONFLICT,
+                "Not the same episodes",
+                "Two evaluations are compared if they are of the same day and played equally many episodes of the same tasks under the same rules and profile. “field” names what differs.",
             ),
             Self::Conflict => (
                 "conflict",
@@ -208,7 +244,7 @@ impl Problem {
                 HeaderValue::from_static("Bearer realm=\"faceoff\""),
             )],
             ProblemKind::Busy => vec![(header::RETRY_AFTER, HeaderValue::from_static("2"))],
-            ProblemKind::TooManyPending => {
+            ProblemKind::TooManyPending | ProblemKind::NotYet => {
                 vec![(header::RETRY_AFTER, HeaderValue::from_static("30"))]
             }
             _ => Vec::new(),
@@ -312,6 +348,30 @@ impl From<StoreError> for Problem {
             )
             .with("day", day.to_string())
             .with("next_turn", next.to_string()),
+            StoreError::DayReleased {
+                day,
+                released_at,
+                next,
+            } => Self::new(
+                ProblemKind::DayReleased,
+                format!(
+                    "the seed of {day} is known since {}, when the first dataset of the day was handed \
+                     out, and this submission was uploaded after that; it can play from {next}, 00:00 \
+                     UTC. A submission that was uploaded before can still play {day}",
+                    released_at.strftime("%H:%M:%S UTC")
+                ),
+            )
+            .with("day", day.to_string())
+            .with("next_turn", next.to_string()),
+            StoreError::SeasonClosed { closed_at } => Self::new(
+                ProblemKind::SeasonClosed,
+                format!(
+                    "the season was closed on {} and its secret is public, so nothing more is uploaded \
+                     or evaluated; results and datasets stay",
+                    closed_at.strftime("%Y-%m-%d at %H:%M UTC")
+                ),
+            )
+            .with("closed_at", closed_at.to_string()),
             StoreError::Conflict(detail) => Self::new(ProblemKind::Conflict, detail),
             error @ (StoreError::Database(_)
             | StoreError::Artifacts(_)

@@ -4,23 +4,30 @@
 //! again without simulating, and anyone can check a published number. The rules are those of the
 //! ruleset [`faceoff_types::RULESET`]; `docs/rules.md` explains them.
 //!
-//! This crate reads no file, no clock and no random numbers, and it knows neither the simulator nor
+//! This crate reads no file, no clock and no random numbers (the bootstrap of the tiers draws from a hash
+//! of what it is given), and it knows neither the simulator nor
 //! the database.
 
 mod binomial;
 mod board;
+mod comparison;
+mod difference;
 mod episode;
 mod evaluation;
 mod interval;
 mod paired;
 mod qualifying;
 mod rank_groups;
+mod successes;
+mod summary;
 mod task;
 mod tier;
+mod tier_change;
 pub mod tournament;
 mod unique_map;
 
 pub use board::{BoardEntry, RankedEntry, overall_board, task_board};
+pub use comparison::{Comparison, NotPaired, OverallComparison, Played, TaskComparison};
 pub use episode::{
     COMPUTATION_TIME_MAX_POINTS, EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS,
     MAX_EPISODE_PENALTY, computation_time_penalty, episode_penalty,
@@ -32,5 +39,8 @@ pub use qualifying::{
     InvalidTaskScore, QUALIFYING_EPISODES, QualifyingRow, QualifyingSheet, TaskRow, TaskScore,
 };
 pub use rank_groups::rank_groups;
+pub use successes::Successes;
+pub use summary::{EpisodeSummary, TaskSummary};
 pub use task::score_task;
 pub use tier::{DEPLOYABLE_POINTS_PER_EPISODE, IMPROVABLE_POINTS_PER_EPISODE, tier_of};
+pub use tier_change::TIER_CHANGE_RESAMPLES;

@@ -30,6 +30,14 @@ pub enum PairingError {
         /// The episode.
         episode: u32,
     },
+    /// Episodes are numbered without gaps.
+    #[error("{task} episode {episode} is missing")]
+    Missing {
+        /// The task.
+        task: Task,
+        /// The episode.
+        episode: u32,
+    },
     /// An episode that only one of the two played.
     #[error("{task} episode {episode} was played by one of the two teams only")]
     Unpaired {

@@ -1,4 +1,4 @@
-use jiff::civil::Date;
+use jiff::{Timestamp, civil::Date};
 
 /// Why the store could not do what was asked.
 #[derive(Debug, thiserror::Error)]
@@ -16,6 +16,25 @@ pub enum StoreError {
         day: Date,
         /// The first day with a free turn.
         next: Date,
+    },
+    /// The day's episodes are known, and the submission was uploaded after that.
+    #[error(
+        "the seed of {day} was released at {released_at}, before this submission was uploaded; it can \
+         play from {next} on"
+    )]
+    DayReleased {
+        /// The day.
+        day: Date,
+        /// When the first dataset of the day was handed out.
+        released_at: Timestamp,
+        /// The next day, whose seed is secret.
+        next: Date,
+    },
+    /// The season is over: nothing more is uploaded or evaluated.
+    #[error("the season was closed at {closed_at}")]
+    SeasonClosed {
+        /// When.
+        closed_at: Timestamp,
     },
     /// What was asked does not fit the entity's state; the text says what does.
     #[error("{0}")]

@@ -1,7 +1,7 @@
 use crate::{
     EvaluationPlan, Event, Store, StoreError, Submission, SubmissionState,
     column::{Instant, Json},
-    shards, submissions,
+    releases, season, shards, submissions,
 };
 use faceoff_types::{
     AgentFault, EvaluationId, EvaluationResult, Profile, SubmissionId, Task, TeamId,
@@ -278,9 +278,11 @@ pub(crate) async fn start_teams(
     now: Timestamp,
 ) -> Result<Vec<Evaluation>, StoreError> {
     plan.check()?;
+    season::check_open(connection).await?;
     let day = utc_day(now);
+    let released_at = releases::released_at(connection, day).await?;
     let mut started = Vec::new();
-    for submission in submissions::awaiting_turn(connection, day).await? {
+    for submission in submissions::awaiting_turn(connection, day, released_at).await? {
         started.push(insert(connection, &submission, plan, day, now).await?);
     }
     Ok(started)
@@ -288,8 +290,10 @@ pub(crate) async fn start_teams(
 
 impl Store {
     /// Queues an evaluation of a valid submission, taking its team's turn of `now`'s UTC day.
-    /// [`StoreError::AlreadyEvaluated`] if the turn is used, [`StoreError::Conflict`] if the
-    /// submission is not valid (yet) or the plan is empty.
+    /// [`StoreError::AlreadyEvaluated`] if the turn is used, [`StoreError::DayReleased`] if the
+    /// submission came after the release of the day's seed, [`StoreError::SeasonClosed`] once the
+    /// season is over, [`StoreError::Conflict`] if the submission is not valid (yet) or the plan is
+    /// empty.
     pub async fn create_evaluation(
         &self,
         submission: SubmissionId,
@@ -298,6 +302,7 @@ impl Store {
     ) -> Result<Evaluation, StoreError> {
         plan.check()?;
         let mut tx = self.database.begin().await?;
+        season::check_open(&mut tx).await?;
         let submission = submissions::find(&mut tx, submission).await?;
         match &submission.state {
             SubmissionState::Valid { .. } => {}
@@ -317,7 +322,19 @@ impl Store {
                 ));
             }
         }
-        let evaluation = insert(&mut tx, &submission, plan, utc_day(now), now).await?;
+        let day = utc_day(now);
+        let evaluation = insert(&mut tx, &submission, plan, day, now).await?;
+        // after the insertion: that the turn is used says more
+        if let Some(released_at) = releases::released_at(&mut tx, day).await?
+            && submission.created_at >= released_at
+            && let Ok(next) = day.tomorrow()
+        {
+            return Err(StoreError::DayReleased {
+                day,
+                released_at,
+                next,
+            });
+        }
         tx.commit().await?;
         self.signals.work_added();
         self.signals.changed(Event::Evaluation(evaluation.id));
@@ -355,7 +372,9 @@ impl Store {
     }
 
     /// Starts the day: queues an evaluation of the newest valid submission of each team that has not
-    /// used its turn of `now`'s UTC day, earliest submission first. Returns what was created.
+    /// used its turn of `now`'s UTC day, earliest submission first; once the day's seed is released,
+    /// of those uploaded before. Returns what was created. [`StoreError::SeasonClosed`] once the
+    /// season is over.
     pub async fn start_day(
         &self,
         plan: &EvaluationPlan,

@@ -1,4 +1,4 @@
-use crate::{Evaluation, EvaluationPlan, Store, StoreError, evaluations};
+use crate::{Evaluation, EvaluationPlan, Store, StoreError, evaluations, season};
 use jiff::{Timestamp, civil::Date};
 use sqlx::types::Text;
 
@@ -13,7 +13,8 @@ impl Store {
     }
 
     /// Starts `now`'s UTC day once, whoever asks and however often: the note that the day was started
-    /// and its evaluations are one transaction. `None` if the schedule has started it before.
+    /// and its evaluations are one transaction. `None` if the schedule has started it before, or
+    /// the season is closed.
     pub async fn start_scheduled_day(
         &self,
         plan: &EvaluationPlan,
@@ -21,6 +22,9 @@ impl Store {
     ) -> Result<Option<Vec<Evaluation>>, StoreError> {
         let day = Text(evaluations::utc_day(now));
         let mut tx = self.database.begin().await?;
+        if season::closed_at(&mut tx).await?.is_some() {
+            return Ok(None);
+        }
         // ISO dates sort as text
         let noted = sqlx::query!(
             "UPDATE season SET last_scheduled_day = ?1

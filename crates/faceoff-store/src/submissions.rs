@@ -1,4 +1,4 @@
-use crate::{Event, Store, StoreError, column::Instant};
+use crate::{Event, Store, StoreError, column::Instant, season};
 use faceoff_types::{SubmissionId, TeamId};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
@@ -150,21 +150,24 @@ pub(crate) async fn find(
         .try_into()
 }
 
-/// The newest valid submission of each team whose turn of `day` is free, earliest first.
+/// The newest valid submission of each team whose turn of `day` is free, earliest first; of those
+/// uploaded before `released_at`, when the day's seed became known.
 pub(crate) async fn awaiting_turn(
     connection: &mut SqliteConnection,
     day: Date,
+    released_at: Option<Timestamp>,
 ) -> Result<Vec<Submission>, StoreError> {
-    let day = Text(day);
+    let (day, released_at) = (Text(day), Instant(released_at.unwrap_or(Timestamp::MAX)));
     select_submissions!(
-        "WHERE s.state = 'valid'
+        "WHERE s.state = 'valid' AND s.created_at < ?1
            AND NOT EXISTS (SELECT 1 FROM submissions n
                            WHERE n.team_id = s.team_id AND n.state = 'valid'
-                             AND (n.created_at, n.id) > (s.created_at, s.id))
+                             AND n.created_at < ?1 AND (n.created_at, n.id) > (s.created_at, s.id))
            AND NOT EXISTS (SELECT 1 FROM evaluations e
-                           WHERE e.team_id = s.team_id AND e.day = ?
+                           WHERE e.team_id = s.team_id AND e.day = ?2
                              AND e.state NOT IN ('platform_failed', 'cancelled'))
          ORDER BY s.created_at, s.id",
+        released_at,
         day
     )
     .fetch_all(connection)
@@ -176,6 +179,7 @@ pub(crate) async fn awaiting_turn(
 
 impl Store {
     /// Records an uploaded bundle whose bytes are an artifact already, and queues its smoke run.
+    /// [`StoreError::SeasonClosed`] once the season is over.
     pub async fn create_submission(
         &self,
         team: TeamId,
@@ -187,6 +191,7 @@ impl Store {
             .map_err(|_| StoreError::Conflict("the bundle is larger than any disk".into()))?;
         let (id_text, team, unit, now) = (Text(id), Text(team), Text(Uuid::now_v7()), Instant(now));
         let mut tx = self.database.begin().await?;
+        season::check_open(&mut tx).await?;
         sqlx::query_scalar!(r#"SELECT 1 AS "found!: i64" FROM teams WHERE id = ?"#, team)
             .fetch_optional(&mut *tx)
             .await?

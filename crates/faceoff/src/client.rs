@@ -7,9 +7,11 @@ use bundle_file::BundleFile;
 use faceoff_http::api::{
     BASE,
     board::BoardView,
+    comparisons::ComparisonView,
     days::{DayView, StartDay},
     evaluations::{Cancellation, EvaluationView},
     me::MeView,
+    season::{CloseSeason, SeasonView},
     submissions::SubmissionView,
     teams::{NewTeam, TeamView, TeamWithToken},
 };
@@ -101,6 +103,30 @@ impl Client {
     /// As [`ApiError`], or when the server cannot be reached; so for all calls below.
     pub async fn board(&self) -> anyhow::Result<BoardView> {
         self.get("/board").await
+    }
+
+    /// Two finished evaluations on the same episodes.
+    pub async fn compare(
+        &self,
+        a: EvaluationId,
+        b: EvaluationId,
+    ) -> anyhow::Result<ComparisonView> {
+        self.get(&format!("/evaluations/{a}/compare/{b}")).await
+    }
+
+    /// The season.
+    pub async fn season(&self) -> anyhow::Result<SeasonView> {
+        self.get("/season").await
+    }
+
+    /// Organiser: closes the season for good; `confirm` is its name.
+    pub async fn close_season(&self, confirm: &str) -> anyhow::Result<SeasonView> {
+        let request = self
+            .request(Method::POST, "/season/close")
+            .json(&CloseSeason {
+                confirm: confirm.to_owned(),
+            });
+        read(self.send(request).await?).await
     }
 
     /// Organiser: creates a team; its token comes this once.

@@ -68,7 +68,7 @@ impl Default for ServerConfig {
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SeasonConfig {
-    /// Name on the pages; left out, the one of the data folder.
+    /// Its name, kept in the data folder; left out, it stays as it is there (at first “Season 1”).
     pub name: Option<String>,
 }
 

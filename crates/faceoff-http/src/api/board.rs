@@ -3,14 +3,20 @@
 use super::schema;
 use crate::{App, extract::PathParam, problem::Problem};
 use axum::{Json, extract::State};
-use faceoff_scoring::{BoardEntry, RankedEntry, overall_board, task_board as rank_by_task};
+use faceoff_scoring::{
+    BoardEntry, EpisodeSummary, Played, RankedEntry, SIGNIFICANCE, TIER_CHANGE_RESAMPLES,
+    overall_board, rank_groups, task_board as rank_by_task,
+};
 use faceoff_store::BoardRecord;
 use faceoff_types::{
     EvaluationId, Profile, RULESET, Seed, Task, TaskResult, TeamId, TeamName, Tier,
 };
 use jiff::{Timestamp, civil};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::{
+    collections::{BTreeMap, HashMap},
+    sync::Arc,
+};
 use utoipa::ToSchema;
 
 /// A board: each team's newest finished evaluation, in board order.
@@ -22,6 +28,13 @@ pub struct BoardView {
     /// The task, or null for the overall board.
     #[schema(value_type = Option<String>)]
     pub task: Option<Task>,
+    /// The level at which teams are told apart: rows of one rank group stand in the same tier and
+    /// cannot be told from the group's first row.
+    #[schema(example = 0.05)]
+    pub significance: f64,
+    /// Bootstrap resamples behind each `tier_change_probability`.
+    #[schema(example = 2000)]
+    pub tier_change_resamples: u32,
     /// Deployable teams first, then improvable, then non-deployable; inside a tier the higher score,
     /// then the fewer penalty points, then the earlier submission.
     pub rows: Vec<BoardRow>,
@@ -32,9 +45,13 @@ pub struct BoardView {
 pub struct BoardRow {
     /// Place on the whole board, from 1.
     pub rank: u32,
+    /// Teams of one group cannot be told from the group's first; from 1 down the board.
+    pub rank_group: u32,
     /// Tier on this board.
     #[schema(value_type = String, example = "deployable")]
     pub tier: Tier,
+    /// Probability that other episodes of the same kind would give another tier.
+    pub tier_change_probability: f64,
     /// The team's name.
     #[schema(value_type = String)]
     pub team: TeamName,
@@ -61,8 +78,8 @@ pub struct BoardRow {
     pub score: f64,
     /// Overall penalty points: the maximum over the tasks.
     pub penalty_points: f64,
-    /// The seed of the day's evaluations; null until the day is over, because teams that have not
-    /// used their turn yet would know their episodes.
+    /// The seed of the day's evaluations; null while teams that have not used their turn must not know
+    /// their episodes.
     #[schema(value_type = Option<String>)]
     pub seed: Option<Seed>,
     /// Results by task: hit, defend, prepare.
@@ -70,51 +87,89 @@ pub struct BoardRow {
     pub tasks: BTreeMap<Task, TaskResult>,
 }
 
-/// The board's records, ranked.
-pub(crate) async fn ranked(
-    app: &App,
-    task: Option<Task>,
-) -> Result<Vec<RankedEntry<BoardRecord>>, Problem> {
-    let entries = app
-        .store
-        .board()
-        .await?
-        .into_iter()
-        .map(|record| BoardEntry {
-            result: record.result.clone(),
-            submitted_at_ms: record.submission.created_at.as_millisecond(),
-            key: record,
-        })
-        .collect();
-    Ok(match task {
-        None => overall_board(entries),
-        Some(task) => rank_by_task(task, entries),
+/// A team in its place.
+#[derive(Debug)]
+pub(crate) struct BoardLine {
+    pub(crate) ranked: RankedEntry<BoardRecord>,
+    pub(crate) rank_group: u32,
+    /// Of the tier on this board.
+    pub(crate) tier_change: f64,
+}
+
+/// A board's record as comparisons need it.
+fn played<'a>(
+    record: &'a BoardRecord,
+    summaries: &'a HashMap<EvaluationId, Arc<EpisodeSummary>>,
+    mismatch_seed: Seed,
+) -> Result<Played<'a>, Problem> {
+    let id = record.evaluation;
+    let summary = summaries
+        .get(&id)
+        .ok_or_else(|| Problem::internal(format_args!("evaluation {id} has no summary")))?;
+    Ok(Played {
+        ruleset: &record.result.ruleset,
+        profile: record.result.profile,
+        seed: record.result.seed,
+        mismatch_seed,
+        summary,
     })
 }
 
-/// The seed of an evaluation of `day`, once everybody may know it.
-pub(crate) fn public_seed(seed: Seed, day: civil::Date, today: civil::Date) -> Option<Seed> {
-    (day < today).then_some(seed)
+/// The board's records, ranked and grouped.
+pub(crate) async fn ranked(app: &App, task: Option<Task>) -> Result<Vec<BoardLine>, Problem> {
+    let mut entries = Vec::new();
+    let mut summaries = HashMap::new();
+    for record in app.store.board().await? {
+        let summary = app.summary(record.evaluation).await?;
+        summaries.insert(record.evaluation, summary);
+        entries.push(BoardEntry {
+            result: record.result.clone(),
+            submitted_at_ms: record.submission.created_at.as_millisecond(),
+            key: record,
+        });
+    }
+    let ranked = match task {
+        None => overall_board(entries),
+        Some(task) => rank_by_task(task, entries),
+    };
+    let mismatch_seed = app.store.season().await?.secret.model_mismatch();
+    let groups = rank_groups(&ranked, |leader, row| {
+        let leader = played(leader, &summaries, mismatch_seed)?;
+        Ok::<_, Problem>(leader.told_apart(&played(row, &summaries, mismatch_seed)?, task))
+    })?;
+    let mut lines = Vec::with_capacity(ranked.len());
+    for (ranked, rank_group) in ranked.into_iter().zip(groups) {
+        let summary = played(&ranked.entry.key, &summaries, mismatch_seed)?.summary;
+        let tier_change = match task {
+            None => summary.tier_change,
+            Some(task) => summary
+                .tasks
+                .get(&task)
+                .map_or(0.0, |task| task.tier_change),
+        };
+        lines.push(BoardLine {
+            ranked,
+            rank_group,
+            tier_change,
+        });
+    }
+    Ok(lines)
 }
 
 async fn view(app: &App, task: Option<Task>) -> Result<Json<BoardView>, Problem> {
-    let today = app.config.clock.today();
-    let rows = ranked(app, task)
-        .await?
+    let lines = ranked(app, task).await?;
+    let days = lines.iter().map(|line| line.ranked.entry.key.day);
+    let seeds = app.day_seeds(days.collect()).await?;
+    let rows = lines
         .into_iter()
-        .map(
-            |RankedEntry {
-                 rank,
-                 tier,
-                 entry:
-                     BoardEntry {
-                         key: record,
-                         result,
-                         ..
-                     },
-             }| BoardRow {
+        .map(|line| {
+            let RankedEntry { rank, tier, entry } = line.ranked;
+            let (record, result) = (entry.key, entry.result);
+            BoardRow {
                 rank,
+                rank_group: line.rank_group,
                 tier,
+                tier_change_probability: line.tier_change,
                 team: record.team.name,
                 team_id: record.team.id,
                 agent: record.submission.agent_name,
@@ -125,14 +180,16 @@ async fn view(app: &App, task: Option<Task>) -> Result<Json<BoardView>, Problem>
                 profile: result.profile,
                 score: result.score,
                 penalty_points: result.penalty_points,
-                seed: public_seed(result.seed, record.day, today),
+                seed: seeds.public(result.seed, record.day),
                 tasks: result.tasks,
-            },
-        )
+            }
+        })
         .collect();
     Ok(Json(BoardView {
         ruleset: RULESET.to_owned(),
         task,
+        significance: SIGNIFICANCE,
+        tier_change_resamples: TIER_CHANGE_RESAMPLES,
         rows,
     }))
 }

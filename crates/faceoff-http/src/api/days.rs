@@ -44,7 +44,8 @@ pub struct DayView {
     pub created: Vec<EvaluationView>,
     /// Evaluations of the day that existed before.
     pub existing: Vec<EvaluationView>,
-    /// Teams without an evaluation today: they have no valid submission.
+    /// Teams without an evaluation today: they have no valid submission, or none that was uploaded
+    /// before the day's seed was released.
     pub without_submission: Vec<TeamView>,
 }
 
@@ -56,6 +57,7 @@ pub struct DayView {
     request_body(content = Option<StartDay>, content_type = "application/json"),
     responses(
         (status = 200, body = DayView),
+        (status = 409, description = "the season is closed", body = ProblemBody, content_type = "application/problem+json"),
         (status = 422, body = ProblemBody, content_type = "application/problem+json"),
     )
 )]

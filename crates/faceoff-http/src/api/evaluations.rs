@@ -6,6 +6,7 @@ use crate::{
     auth::{Caller, Organiser},
     extract::{Json as Body, PathParam, QueryParams},
     problem::{Problem, ProblemKind},
+    seeds::DaySeeds,
 };
 use axum::{
     Json, body,
@@ -15,7 +16,8 @@ use axum::{
 };
 use faceoff_store::{Evaluation, EvaluationState};
 use faceoff_types::{
-    AgentFault, EvaluationId, EvaluationResult, Profile, SubmissionId, Task, TeamId, TeamName,
+    AgentFault, EvaluationId, EvaluationResult, Profile, Seed, SubmissionId, Task, TaskResult,
+    TeamId, TeamName, Tier,
 };
 use jiff::{Timestamp, civil};
 use serde::{Deserialize, Serialize};
@@ -86,8 +88,7 @@ pub enum EvaluationStatus {
         #[schema(value_type = String, format = DateTime)]
         finished_at: Timestamp,
         /// The score.
-        #[schema(value_type = schema::EvaluationResult)]
-        result: Box<EvaluationResult>,
+        result: Box<ResultView>,
         /// Path of the recorded dataset on this server.
         dataset: String,
     },
@@ -117,6 +118,44 @@ pub enum EvaluationStatus {
         /// Why.
         reason: String,
     },
+}
+
+/// The score of one evaluation; laid out as `results.json` of the dataset.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ResultView {
+    /// The ruleset's name.
+    pub ruleset: String,
+    /// The perturbation profile.
+    #[schema(value_type = String)]
+    pub profile: Profile,
+    /// The seed of the day's evaluations, 64 hexadecimal digits; null while teams that have not used
+    /// their turn must not know their episodes.
+    #[schema(value_type = Option<String>)]
+    pub seed: Option<Seed>,
+    /// By task: hit, defend, prepare.
+    #[schema(value_type = BTreeMap<String, schema::TaskResult>)]
+    pub tasks: BTreeMap<Task, TaskResult>,
+    /// Overall score in percent.
+    pub score: f64,
+    /// Penalty points: the maximum over the tasks.
+    pub penalty_points: f64,
+    /// deployable, improvable or non_deployable.
+    #[schema(value_type = String)]
+    pub tier: Tier,
+}
+
+impl ResultView {
+    fn new(result: EvaluationResult, seed: Option<Seed>) -> Self {
+        Self {
+            ruleset: result.ruleset,
+            profile: result.profile,
+            seed,
+            tasks: result.tasks,
+            score: result.score,
+            penalty_points: result.penalty_points,
+            tier: result.tier,
+        }
+    }
 }
 
 impl EvaluationStatus {
@@ -177,7 +216,7 @@ impl Progress {
 }
 
 impl EvaluationView {
-    pub(crate) fn new(evaluation: Evaluation, team_name: TeamName) -> Self {
+    fn new(evaluation: Evaluation, team_name: TeamName, seeds: &DaySeeds) -> Self {
         let progress = Progress::of(&evaluation);
         let status = match evaluation.state {
             EvaluationState::Queued => EvaluationStatus::Queued,
@@ -189,7 +228,10 @@ impl EvaluationView {
                 dataset: _,
             } => EvaluationStatus::Finished {
                 finished_at,
-                result,
+                result: {
+                    let seed = seeds.public(result.seed, evaluation.day);
+                    Box::new(ResultView::new(*result, seed))
+                },
                 dataset: format!("{}/evaluations/{}/dataset", super::BASE, evaluation.id),
             },
             EvaluationState::AgentFailed {
@@ -232,6 +274,16 @@ impl EvaluationView {
     }
 }
 
+/// An evaluation with its team's name.
+pub(crate) async fn with_name(
+    app: &App,
+    evaluation: Evaluation,
+) -> Result<EvaluationView, Problem> {
+    let team = app.store.team(evaluation.team).await?;
+    let seeds = app.day_seeds([evaluation.day].into()).await?;
+    Ok(EvaluationView::new(evaluation, team.name, &seeds))
+}
+
 /// Evaluations with their teams' names.
 pub(crate) async fn with_names(
     app: &App,
@@ -244,10 +296,12 @@ pub(crate) async fn with_names(
         .into_iter()
         .map(|team| (team.id, team.name))
         .collect();
+    let days = evaluations.iter().map(|evaluation| evaluation.day);
+    let seeds = app.day_seeds(days.collect()).await?;
     evaluations
         .into_iter()
         .map(|evaluation| match names.get(&evaluation.team) {
-            Some(name) => Ok(EvaluationView::new(evaluation, name.clone())),
+            Some(name) => Ok(EvaluationView::new(evaluation, name.clone(), &seeds)),
             None => Err(Problem::internal(format_args!(
                 "evaluation {} has no team",
                 evaluation.id
@@ -304,8 +358,7 @@ pub(crate) async fn evaluation(
     PathParam(id): PathParam<EvaluationId>,
 ) -> Result<Json<EvaluationView>, Problem> {
     let evaluation = visible(&app, &caller, id).await?;
-    let team = app.store.team(evaluation.team).await?;
-    Ok(Json(EvaluationView::new(evaluation, team.name)))
+    with_name(&app, evaluation).await.map(Json)
 }
 
 /// Why an evaluation is stopped.
@@ -345,11 +398,13 @@ pub(crate) async fn cancel_evaluation(
         .await?;
     tracing::info!(evaluation = %id, reason, "evaluation cancelled");
     let evaluation = app.store.evaluation(id).await?;
-    let team = app.store.team(evaluation.team).await?;
-    Ok(Json(EvaluationView::new(evaluation, team.name)))
+    with_name(&app, evaluation).await.map(Json)
 }
 
 /// The recorded dataset, a zip archive; for its team and the organiser.
+///
+/// It carries the day's seed. So it is handed out once no evaluation of the day is under way, and the
+/// first one handed out ends the day for what is uploaded after it.
 #[utoipa::path(
     get, path = "/evaluations/{id}/dataset", tag = "team",
     security(("team" = []), ("organiser" = [])),
@@ -357,7 +412,7 @@ pub(crate) async fn cancel_evaluation(
     responses(
         (status = 200, body = Vec<u8>, content_type = "application/zip"),
         (status = 404, body = ProblemBody, content_type = "application/problem+json"),
-        (status = 409, description = "not finished yet, or failed", body = ProblemBody, content_type = "application/problem+json"),
+        (status = 409, description = "not finished yet, or failed, or other evaluations of its day are under way", body = ProblemBody, content_type = "application/problem+json"),
     )
 )]
 pub(crate) async fn dataset(
@@ -368,6 +423,7 @@ pub(crate) async fn dataset(
     let evaluation = visible(&app, &caller, id).await?;
     let why_not = match &evaluation.state {
         EvaluationState::Finished { dataset, .. } => {
+            app.release_day(evaluation.day).await?;
             // A dataset that a finished evaluation names must be there: without it, we lost it.
             let (bytes, stream) = app
                 .store

@@ -3,6 +3,7 @@
 //! The views are public: the command line's client reads the very types that the server writes.
 
 pub mod board;
+pub mod comparisons;
 pub mod days;
 pub mod evaluations;
 mod health;
@@ -71,6 +72,7 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
     let resources = OpenApiRouter::with_openapi(Document::openapi())
         .routes(routes!(health::health))
         .routes(routes!(season::season))
+        .routes(routes!(season::close_season))
         .routes(routes!(board::board))
         .routes(routes!(board::task_board))
         .routes(routes!(me::me))
@@ -84,6 +86,7 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(evaluations::evaluation))
         .routes(routes!(evaluations::cancel_evaluation))
         .routes(routes!(evaluations::dataset))
+        .routes(routes!(comparisons::compare))
         .layer(middleware::from_fn_with_state(patience, layers::time_out))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES));
     // An upload may take long as long as it moves; `upload` itself watches size and pauses.

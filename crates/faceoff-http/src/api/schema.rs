@@ -5,7 +5,6 @@
     reason = "only their shape is used, by the OpenAPI document"
 )]
 
-use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
 /// Problem details (RFC 9457).
@@ -76,36 +75,65 @@ pub(crate) struct TaskResult {
     computation_time_s: ComputationTimeSummary,
 }
 
-/// The score of one evaluation; the layout of `results.json`.
+/// Two evaluations on the same episodes of one task.
 #[derive(ToSchema)]
 #[cfg_attr(test, derive(serde::Deserialize), serde(deny_unknown_fields))]
-pub(crate) struct EvaluationResult {
-    /// The ruleset's name.
-    ruleset: String,
-    /// The perturbation profile.
-    profile: String,
-    /// The evaluation's seed, 64 hexadecimal digits.
-    seed: String,
-    /// By task: hit, defend, prepare.
-    tasks: BTreeMap<String, TaskResult>,
-    /// Overall score in percent.
-    score: f64,
-    /// Penalty points: the maximum over the tasks.
-    penalty_points: f64,
-    /// deployable, improvable or non_deployable.
-    tier: String,
+pub(crate) struct TaskComparison {
+    /// Episodes that both solved.
+    both: u32,
+    /// Episodes that only A solved.
+    only_a: u32,
+    /// Episodes that only B solved.
+    only_b: u32,
+    /// Episodes that neither solved.
+    neither: u32,
+    /// A's success rate, a fraction.
+    success_rate_a: f64,
+    /// B's success rate, a fraction.
+    success_rate_b: f64,
+    /// Success rate of A minus that of B.
+    difference: f64,
+    /// Its 95 % interval for paired data (Newcombe's method 10).
+    #[schema(value_type = Vec<f64>, min_items = 2, max_items = 2)]
+    difference_ci95: [f64; 2],
+    /// McNemar's exact test, two-sided.
+    p_value: f64,
+    /// Is the p-value at most 0.05?
+    told_apart: bool,
+}
+
+/// The overall scores of two evaluations on the same episodes.
+#[derive(ToSchema)]
+#[cfg_attr(test, derive(serde::Deserialize), serde(deny_unknown_fields))]
+pub(crate) struct OverallComparison {
+    /// A's score in percent.
+    score_a: f64,
+    /// B's score in percent.
+    score_b: f64,
+    /// Score of A minus that of B, in percentage points.
+    difference: f64,
+    /// Its 95 % interval: the tasks' intervals, weighed and joined by the square-and-add method.
+    #[schema(value_type = Vec<f64>, min_items = 2, max_items = 2)]
+    difference_ci95: [f64; 2],
+    /// The exact paired test of the weighted score, two-sided.
+    p_value: f64,
+    /// Is the p-value at most 0.05?
+    told_apart: bool,
 }
 
 #[cfg(test)]
 mod tests {
-    use faceoff_types::{
-        ComputationTimeSummary, EvaluationResult, Profile, Seed, Task, TaskResult, Tier,
-        ViolationCounts,
-    };
+    use faceoff_scoring::{OverallComparison, TaskComparison};
+    use faceoff_types::{ComputationTimeSummary, TaskResult, Tier, ViolationCounts};
+
+    fn describes<Schema: serde::de::DeserializeOwned>(real: &impl serde::Serialize) {
+        let json = serde_json::to_string(real).unwrap();
+        serde_json::from_str::<Schema>(&json).unwrap();
+    }
 
     #[test]
     fn the_document_describes_the_real_result() {
-        let task = TaskResult {
+        describes::<super::TaskResult>(&TaskResult {
             episodes: 1,
             successes: 1,
             success_rate: 1.0,
@@ -115,17 +143,30 @@ mod tests {
             tier: Tier::Deployable,
             steps: 3,
             computation_time_s: ComputationTimeSummary::default(),
-        };
-        let result = EvaluationResult {
-            ruleset: "r".into(),
-            profile: Profile::Ideal,
-            seed: Seed::from_number(1),
-            tasks: [(Task::Hit, task)].into(),
-            score: 40.0,
-            penalty_points: 0.5,
-            tier: Tier::Deployable,
-        };
-        let json = serde_json::to_string(&result).unwrap();
-        serde_json::from_str::<super::EvaluationResult>(&json).unwrap();
+        });
+    }
+
+    #[test]
+    fn the_document_describes_the_real_comparison() {
+        describes::<super::TaskComparison>(&TaskComparison {
+            both: 1,
+            only_a: 2,
+            only_b: 3,
+            neither: 4,
+            success_rate_a: 0.3,
+            success_rate_b: 0.4,
+            difference: -0.1,
+            difference_ci95: [-0.5, 0.3],
+            p_value: 1.0,
+            told_apart: false,
+        });
+        describes::<super::OverallComparison>(&OverallComparison {
+            score_a: 12.0,
+            score_b: 16.0,
+            difference: -4.0,
+            difference_ci95: [-20.0, 12.0],
+            p_value: 1.0,
+            told_apart: false,
+        });
     }
 }

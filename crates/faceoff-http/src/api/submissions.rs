@@ -1,7 +1,7 @@
 //! Submissions: uploading an agent, following its smoke run, using the day's turn for it.
 
 use super::{
-    evaluations::EvaluationView,
+    evaluations::{EvaluationView, with_name},
     schema::ProblemBody,
     upload::{self, Format},
 };
@@ -18,7 +18,7 @@ use axum::{
     http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header},
     response::{AppendHeaders, IntoResponse},
 };
-use faceoff_store::{BundleRef, Submission, SubmissionState};
+use faceoff_store::{BundleRef, StoreError, Submission, SubmissionState};
 use faceoff_types::{SubmissionId, TeamId};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -130,6 +130,7 @@ const ARCHIVE_TYPES: [&str; 8] = [
     request_body(content = Vec<u8>, content_type = "application/octet-stream"),
     responses(
         (status = 201, body = SubmissionView),
+        (status = 409, description = "the season is closed", body = ProblemBody, content_type = "application/problem+json"),
         (status = 413, description = "larger than max_bundle_bytes", body = ProblemBody, content_type = "application/problem+json"),
         (status = 415, description = "not one of the archive formats", body = ProblemBody, content_type = "application/problem+json"),
         (status = 429, description = "several uploads wait for their smoke run", body = ProblemBody, content_type = "application/problem+json"),
@@ -149,6 +150,10 @@ pub(crate) async fn create_submission(
             "the server takes as many uploads as it may at once; try again in 2 s",
         )
     })?;
+    // before the bundle travels in vain; the store looks again
+    if let Some(closed_at) = app.store.season().await?.closed_at {
+        return Err(StoreError::SeasonClosed { closed_at }.into());
+    }
     let limits = &app.config.limits;
     let pending = app
         .store
@@ -304,7 +309,7 @@ pub(crate) async fn submission(
     responses(
         (status = 201, body = EvaluationView),
         (status = 404, body = ProblemBody, content_type = "application/problem+json"),
-        (status = 409, description = "the turn is used, or the submission is not valid", body = ProblemBody, content_type = "application/problem+json"),
+        (status = 409, description = "the turn is used, the submission is not valid or came after the release of the day's seed, or the season is closed", body = ProblemBody, content_type = "application/problem+json"),
     )
 )]
 pub(crate) async fn evaluate_submission(
@@ -317,14 +322,14 @@ pub(crate) async fn evaluate_submission(
         .store
         .create_evaluation(id, &app.config.plan, app.config.clock.now())
         .await?;
-    let team = app.store.team(evaluation.team).await?;
-    tracing::info!(team = %team.name, evaluation = %evaluation.id, "evaluation queued");
-    let location = format!("{}/evaluations/{}", super::BASE, evaluation.id);
+    let view = with_name(&app, evaluation).await?;
+    tracing::info!(team = %view.team_name, evaluation = %view.id, "evaluation queued");
+    let location = format!("{}/evaluations/{}", super::BASE, view.id);
     let location = HeaderValue::try_from(location).map_err(Problem::internal)?;
     Ok((
         StatusCode::CREATED,
         AppendHeaders([(header::LOCATION, location)]),
-        Json(EvaluationView::new(evaluation, team.name)),
+        Json(view),
     ))
 }
 

@@ -4,7 +4,7 @@ use super::{Frame, PageProblem, figures, render};
 use crate::{
     App,
     api::{
-        board::ranked,
+        board::{BoardLine, ranked},
         evaluations::{EvaluationStatus, Progress, with_names},
     },
     extract::PathParam,
@@ -12,8 +12,7 @@ use crate::{
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
-use faceoff_scoring::RankedEntry;
-use faceoff_store::{BoardRecord, Evaluation};
+use faceoff_store::Evaluation;
 use faceoff_types::{EvaluationId, Task, TaskResult, Tier, ViolationCounts};
 use figures::Rate;
 use jiff::civil;
@@ -21,6 +20,10 @@ use jiff::civil;
 /// Who a row is about.
 struct Who {
     rank: u32,
+    /// Whom the episodes cannot tell from the group's first.
+    rank_group: u32,
+    /// Of the tier on this board.
+    tier_change: String,
     team: String,
     agent: Option<String>,
     evaluation: EvaluationId,
@@ -30,8 +33,8 @@ struct Who {
 }
 
 /// How a result came about; results of different settings do not compare.
-fn setting(ranked: &RankedEntry<BoardRecord>) -> String {
-    let result = &ranked.entry.result;
+fn setting(line: &BoardLine) -> String {
+    let result = &line.ranked.entry.result;
     let episodes = result
         .tasks
         .values()
@@ -45,24 +48,26 @@ fn setting(ranked: &RankedEntry<BoardRecord>) -> String {
 }
 
 /// The setting of the whole board; `None` where its rows differ.
-fn common_setting(ranked: &[RankedEntry<BoardRecord>]) -> Option<String> {
-    let first = setting(ranked.first()?);
-    ranked
+fn common_setting(lines: &[BoardLine]) -> Option<String> {
+    let first = setting(lines.first()?);
+    lines
         .iter()
-        .all(|entry| setting(entry) == first)
+        .all(|line| setting(line) == first)
         .then_some(first)
 }
 
 impl Who {
-    fn of(ranked: &RankedEntry<BoardRecord>, common_setting: Option<&String>) -> Self {
-        let record = &ranked.entry.key;
+    fn of(line: &BoardLine, common_setting: Option<&String>) -> Self {
+        let record = &line.ranked.entry.key;
         Self {
-            rank: ranked.rank,
+            rank: line.ranked.rank,
+            rank_group: line.rank_group,
+            tier_change: figures::chance(line.tier_change),
             team: record.team.name.to_string(),
             agent: record.submission.agent_name.clone(),
             evaluation: record.evaluation,
             day: record.day,
-            setting: common_setting.is_none().then(|| setting(ranked)),
+            setting: common_setting.is_none().then(|| setting(line)),
         }
     }
 }
@@ -76,10 +81,7 @@ struct TierRows<Row> {
     rows: Vec<Row>,
 }
 
-fn by_tier<Row>(
-    ranked: &[RankedEntry<BoardRecord>],
-    row: impl Fn(&RankedEntry<BoardRecord>) -> Row,
-) -> Vec<TierRows<Row>> {
+fn by_tier<Row>(lines: &[BoardLine], row: impl Fn(&BoardLine) -> Row) -> Vec<TierRows<Row>> {
     let mut tiers: Vec<TierRows<Row>> = Tier::ALL
         .into_iter()
         .map(|tier| TierRows {
@@ -90,9 +92,9 @@ fn by_tier<Row>(
             rows: Vec::new(),
         })
         .collect();
-    for entry in ranked {
-        let tier = entry.tier as usize;
-        tiers[tier].rows.push(row(entry));
+    for line in lines {
+        let tier = line.ranked.tier as usize;
+        tiers[tier].rows.push(row(line));
     }
     tiers.retain(|tier| !tier.rows.is_empty());
     tiers
@@ -108,8 +110,8 @@ struct OverallRow {
 }
 
 impl OverallRow {
-    fn of(ranked: &RankedEntry<BoardRecord>, common_setting: Option<&String>) -> Self {
-        let result = &ranked.entry.result;
+    fn of(line: &BoardLine, common_setting: Option<&String>) -> Self {
+        let result = &line.ranked.entry.result;
         let episodes = result
             .tasks
             .values()
@@ -117,7 +119,7 @@ impl OverallRow {
             .max()
             .unwrap_or(0);
         Self {
-            who: Who::of(ranked, common_setting),
+            who: Who::of(line, common_setting),
             rates: Task::ALL
                 .into_iter()
                 .map(|task| (task, result.tasks.get(&task).map(Rate::of)))
@@ -151,10 +153,10 @@ struct OverallPage {
 
 /// The overall board.
 pub(super) async fn overall(State(app): State<App>) -> Result<Response, PageProblem> {
-    let season = app.season().await?;
+    let season = app.store.season().await?;
     let today = app.config.clock.today();
-    let ranked = ranked(&app, None).await?;
-    let setting = common_setting(&ranked);
+    let lines = ranked(&app, None).await?;
+    let setting = common_setting(&lines);
     let page = OverallPage {
         frame: Frame::new(season.name, "/"),
         today,
@@ -163,7 +165,7 @@ pub(super) async fn overall(State(app): State<App>) -> Result<Response, PageProb
             .daily_at
             .map(|at| at.strftime("%H:%M").to_string()),
         commitment: season.commitment,
-        tiers: by_tier(&ranked, |entry| OverallRow::of(entry, setting.as_ref())),
+        tiers: by_tier(&lines, |line| OverallRow::of(line, setting.as_ref())),
         setting,
         under_way: under_way(&app, today).await?,
     };
@@ -217,14 +219,10 @@ struct TaskRow {
 }
 
 impl TaskRow {
-    fn of(
-        ranked: &RankedEntry<BoardRecord>,
-        result: &TaskResult,
-        common_setting: Option<&String>,
-    ) -> Self {
+    fn of(line: &BoardLine, result: &TaskResult, common_setting: Option<&String>) -> Self {
         let time = result.computation_time_s;
         Self {
-            who: Who::of(ranked, common_setting),
+            who: Who::of(line, common_setting),
             rate: Rate::of(result),
             penalty_points: figures::one(result.penalty_points),
             per_episode: figures::per_episode(result.penalty_points, result.episodes),
@@ -252,7 +250,7 @@ pub(super) async fn by_task(
     task: Result<PathParam<Task>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PathParam(task) = task?;
-    let season = app.season().await?;
+    let season = app.store.season().await?;
     let (title, aim) = match task {
         Task::Hit => (
             "Hit",
@@ -267,12 +265,13 @@ pub(super) async fn by_task(
             "Bring a puck from the border to a good hitting position.",
         ),
     };
-    let mut entries = ranked(&app, Some(task)).await?;
+    let mut lines = ranked(&app, Some(task)).await?;
     // `task_board` leaves out teams without the task; a row without one could show nothing.
-    entries.retain(|entry| entry.entry.result.tasks.contains_key(&task));
-    let setting = common_setting(&entries);
-    let tiers = by_tier(&entries, |entry| {
-        TaskRow::of(entry, &entry.entry.result.tasks[&task], setting.as_ref())
+    lines.retain(|line| line.ranked.entry.result.tasks.contains_key(&task));
+    let setting = common_setting(&lines);
+    let tiers = by_tier(&lines, |line| {
+        let result = &line.ranked.entry.result.tasks[&task];
+        TaskRow::of(line, result, setting.as_ref())
     });
     let frame = Frame::new(season.name, format!("/tasks/{task}"));
     render(&TaskPage {

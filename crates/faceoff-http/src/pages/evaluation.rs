@@ -4,13 +4,14 @@
 use super::{Frame, PageProblem, figures, render};
 use crate::{
     App,
-    api::{board::public_seed, evaluations::Progress},
+    api::evaluations::{EvaluationStatus, Progress, with_names},
     extract::PathParam,
     problem::Problem,
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
-use faceoff_store::EvaluationState;
+use faceoff_scoring::{EpisodeSummary, TIER_CHANGE_RESAMPLES};
+use faceoff_store::{Evaluation, EvaluationState};
 use faceoff_types::{EvaluationId, EvaluationResult, Profile, Task, TaskResult};
 use figures::Rate;
 use jiff::civil;
@@ -26,6 +27,7 @@ struct TaskFigures {
     tier_name: &'static str,
     tier_title: &'static str,
     tier_sign: &'static str,
+    tier_change: String,
     steps: u64,
     ee: String,
     link: String,
@@ -38,7 +40,7 @@ struct TaskFigures {
 }
 
 impl TaskFigures {
-    fn of(task: Task, result: &TaskResult) -> Self {
+    fn of(task: Task, result: &TaskResult, summary: &EpisodeSummary) -> Self {
         let violations = result.violations;
         let count = |violations| figures::share(violations, result.episodes);
         let time = result.computation_time_s;
@@ -52,6 +54,12 @@ impl TaskFigures {
             tier_name: result.tier.as_str(),
             tier_title: result.tier.title(),
             tier_sign: figures::tier_sign(result.tier),
+            tier_change: figures::chance(
+                summary
+                    .tasks
+                    .get(&task)
+                    .map_or(0.0, |task| task.tier_change),
+            ),
             steps: result.steps,
             ee: count(violations.ee),
             link: count(violations.link),
@@ -73,16 +81,28 @@ struct Finished {
     tier_title: &'static str,
     tier_sign: &'static str,
     tier_bounds: &'static str,
+    tier_change: String,
+    resamples: u32,
     ruleset: String,
     seed: Option<String>,
     finished_at: String,
     tasks: Vec<TaskFigures>,
+    /// Evaluations that met the same episodes.
+    others: Vec<Other>,
+}
+
+/// Another team's evaluation of the same episodes.
+struct Other {
+    team: String,
+    evaluation: EvaluationId,
+    score: String,
 }
 
 #[derive(Template)]
 #[template(path = "evaluation.html")]
 struct Page {
     frame: Frame,
+    id: EvaluationId,
     team: String,
     agent: Option<String>,
     day: civil::Date,
@@ -102,8 +122,7 @@ pub(super) async fn page(
     let evaluation = app.store.evaluation(id).await?;
     let team = app.store.team(evaluation.team).await?;
     let submission = app.store.submission(evaluation.submission).await?;
-    let season = app.season().await?;
-    let today = app.config.clock.today();
+    let season = app.store.season().await?;
     let progress = Progress::of(&evaluation);
     let (state, moving) = match &evaluation.state {
         EvaluationState::Queued => ("It waits for a worker.", true),
@@ -131,13 +150,23 @@ pub(super) async fn page(
             ..
         } => {
             let finished_at = finished_at.strftime("%Y-%m-%d %H:%M UTC").to_string();
-            let seed = public_seed(result.seed, evaluation.day, today).map(|seed| seed.to_string());
-            Some(finished(result, seed, finished_at))
+            let seeds = app.day_seeds([evaluation.day].into()).await?;
+            let seed = seeds.public(result.seed, evaluation.day);
+            let summary = app.summary(id).await?;
+            let mut done = finished(
+                result,
+                seed.map(|seed| seed.to_string()),
+                finished_at,
+                &summary,
+            );
+            done.others = others(&app, &evaluation).await?;
+            Some(done)
         }
         _ => None,
     };
     render(&Page {
         frame: Frame::new(season.name, ""),
+        id,
         team: team.name.to_string(),
         agent: submission.agent_name,
         day: evaluation.day,
@@ -148,7 +177,43 @@ pub(super) async fn page(
     })
 }
 
-fn finished(result: &EvaluationResult, seed: Option<String>, finished_at: String) -> Finished {
+/// The finished evaluations that can be compared with this one, in the order of their scores.
+async fn others(app: &App, evaluation: &Evaluation) -> Result<Vec<Other>, PageProblem> {
+    let mut same = app.store.evaluations_on(evaluation.day).await?;
+    same.retain(|other| {
+        let (plan, of_other) = (&evaluation.plan, &other.plan);
+        other.id != evaluation.id
+            && of_other.profile == plan.profile
+            && of_other.episodes_per_task == plan.episodes_per_task
+            && of_other.tasks == plan.tasks
+    });
+    let mut others: Vec<_> = with_names(app, same)
+        .await?
+        .into_iter()
+        .filter_map(|view| match view.status {
+            EvaluationStatus::Finished { result, .. } => {
+                Some((result.score, view.team_name, view.id))
+            }
+            _ => None,
+        })
+        .collect();
+    others.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.2.cmp(&b.2)));
+    Ok(others
+        .into_iter()
+        .map(|(score, team, evaluation)| Other {
+            team: team.to_string(),
+            evaluation,
+            score: figures::one(score),
+        })
+        .collect())
+}
+
+fn finished(
+    result: &EvaluationResult,
+    seed: Option<String>,
+    finished_at: String,
+    summary: &EpisodeSummary,
+) -> Finished {
     Finished {
         score: figures::one(result.score),
         penalty_points: figures::one(result.penalty_points),
@@ -156,13 +221,16 @@ fn finished(result: &EvaluationResult, seed: Option<String>, finished_at: String
         tier_title: result.tier.title(),
         tier_sign: figures::tier_sign(result.tier),
         tier_bounds: figures::tier_bounds(result.tier),
+        tier_change: figures::chance(summary.tier_change),
+        resamples: TIER_CHANGE_RESAMPLES,
         ruleset: result.ruleset.clone(),
         seed,
         finished_at,
         tasks: result
             .tasks
             .iter()
-            .map(|(task, result)| TaskFigures::of(*task, result))
+            .map(|(task, result)| TaskFigures::of(*task, result, summary))
             .collect(),
+        others: Vec::new(),
     }
 }

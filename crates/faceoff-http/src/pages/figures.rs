@@ -1,5 +1,6 @@
 //! Numbers as the pages write them. The pages' units are stated in the tables' heads.
 
+use faceoff_scoring::TIER_CHANGE_RESAMPLES;
 use faceoff_types::{TaskResult, Tier};
 
 /// A success rate with its interval.
@@ -36,6 +37,34 @@ impl Rate {
 /// One decimal; never “-0.0”.
 pub(super) fn one(value: f64) -> String {
     format!("{:.1}", value + 0.0)
+}
+
+/// A probability from a bootstrap, in percent. None of the resamples is not the same as never.
+pub(super) fn chance(probability: f64) -> String {
+    if probability * f64::from(TIER_CHANGE_RESAMPLES) < 0.5 {
+        format!("under {} %", 100.0 / f64::from(TIER_CHANGE_RESAMPLES))
+    } else {
+        format!("{} %", one(100.0 * probability))
+    }
+}
+
+/// The p-value of a test.
+pub(super) fn p_value(p: f64) -> String {
+    if p < 0.001 {
+        "under 0.001".to_owned()
+    } else {
+        format!("{p:.3}")
+    }
+}
+
+/// A difference with its sign, one decimal.
+pub(super) fn signed(value: f64) -> String {
+    let text = one(value.abs());
+    match value {
+        _ if text == "0.0" => text,
+        value if value > 0.0 => format!("+{text}"),
+        _ => format!("−{text}"),
+    }
 }
 
 /// Seconds as milliseconds, with three significant places where that matters.
@@ -102,6 +131,14 @@ mod tests {
         assert_eq!(milliseconds(0.000_212), "0.21");
         assert_eq!(milliseconds(0.0204), "20");
         assert_eq!(per_episode(327.5, 1000), "0.33");
+        assert_eq!(chance(0.0), "under 0.05 %");
+        assert_eq!(chance(0.0005), "0.1 %");
+        assert_eq!(chance(0.4025), "40.2 %");
+        assert_eq!(p_value(0.0004), "under 0.001");
+        assert_eq!(p_value(0.0494), "0.049");
+        assert_eq!(signed(12.24), "+12.2");
+        assert_eq!(signed(-0.3), "−0.3");
+        assert_eq!(signed(-0.01), "0.0");
         assert_eq!(share(0, 50), "0");
         assert_eq!(share(5, 50), "5 (10 %)");
     }

@@ -3,9 +3,11 @@
 
 mod assets;
 mod board;
+mod comparison;
 mod evaluation;
 mod figures;
 mod problems;
+mod season;
 
 use crate::{
     App, api, layers,
@@ -30,6 +32,8 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .route("/", get(board::overall))
         .route("/tasks/{task}", get(board::by_task))
         .route("/evaluations/{id}", get(evaluation::page))
+        .route("/evaluations/{id}/compare/{other}", get(comparison::page))
+        .route("/season", get(season::page))
         .route("/problems", get(problems::page))
         .route(assets::STYLE_PATH, get(assets::style))
         .route(assets::ICON_PATH, get(assets::icon))

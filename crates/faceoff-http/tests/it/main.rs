@@ -5,10 +5,14 @@
 )]
 
 mod board;
+mod board_load;
+mod comparisons;
 mod days;
 mod evaluations;
 mod openapi;
 mod problems;
+mod season;
+mod seeds;
 mod site;
 mod submissions;
 mod teams;

@@ -101,6 +101,7 @@ impl Site {
         let upload_dir = folder.path().join("uploads");
         std::fs::create_dir(&upload_dir).unwrap();
         let store = Store::open(folder.path()).await.unwrap();
+        store.name_season("Test season").await.unwrap();
         let now = Arc::new(Mutex::new(
             "2026-03-01T10:00:00Z".parse::<Timestamp>().unwrap(),
         ));
@@ -116,7 +117,6 @@ impl Site {
             },
             admin_token_hash: hash_token(ADMIN),
             upload_dir,
-            season_name: Some("Test season".into()),
             daily_at: None,
             clock: Clock::new(move || *clock.lock().unwrap()),
             limits,
@@ -142,6 +142,10 @@ impl Site {
 
     pub fn now(&self) -> Timestamp {
         *self.now.lock().unwrap()
+    }
+
+    pub fn later(&self, seconds: i64) {
+        *self.now.lock().unwrap() += SignedDuration::from_secs(seconds);
     }
 
     pub fn next_day(&self) {
@@ -255,18 +259,7 @@ impl Site {
         else {
             panic!("expected a finalisation");
         };
-        let dataset = self.folder.path().join("dataset.zip");
-        std::fs::write(&dataset, b"PK the recorded dataset").unwrap();
-        let key = format!("datasets/{}.zip", evaluation.id);
-        self.store
-            .artifacts()
-            .put_file(&key, &dataset)
-            .await
-            .unwrap();
-        self.store
-            .finish_evaluation(&claim, result, &key, self.now())
-            .await
-            .unwrap();
+        self.publish(&claim, evaluation.id, result).await;
     }
 
     /// Uses the team's turn of today; the evaluation's path in the API.
@@ -277,6 +270,91 @@ impl Site {
             .await
             .json(201);
         format!("/api/v1/evaluations/{}", text(&evaluation["id"]))
+    }
+
+    /// Plays the evaluation that comes next, episode by episode as `played` says, and scores it by the
+    /// rules; the evaluation's id.
+    pub async fn finish_as(&self, played: impl Fn(Task, u32) -> EpisodeOutcome) -> EvaluationId {
+        let mut outcomes = Vec::new();
+        loop {
+            match self.claim().await {
+                Work::Shard { claim, shard, .. } => {
+                    let of_shard: Vec<_> = (shard.first_episode..shard.end_episode)
+                        .map(|episode| played(shard.task, episode))
+                        .collect();
+                    outcomes.extend(of_shard.iter().cloned());
+                    let commit = ShardCommit {
+                        outcomes: of_shard,
+                        log: String::new(),
+                        stopped_by_faults: false,
+                        recording: claim.recording_key(EvaluationId::new()),
+                    };
+                    let committed = self.store.commit_shard(&claim, commit, self.now());
+                    assert_eq!(committed.await.unwrap(), Committed::Now);
+                }
+                Work::Finalise {
+                    claim, evaluation, ..
+                } => {
+                    let tasks = Task::ALL.map(|task| {
+                        let of_task: Vec<_> = outcomes
+                            .iter()
+                            .filter(|o| o.task == task)
+                            .cloned()
+                            .collect();
+                        (task, faceoff_scoring::score_task(&of_task, &mut []))
+                    });
+                    let secret = self.store.season().await.unwrap().secret;
+                    let result = faceoff_scoring::score_evaluation(
+                        evaluation.plan.profile,
+                        secret.day(evaluation.day),
+                        tasks.into(),
+                    );
+                    self.publish(&claim, evaluation.id, &result).await;
+                    return evaluation.id;
+                }
+                other => panic!("expected a shard or a finalisation, claimed {other:?}"),
+            }
+        }
+    }
+
+    /// Ends an evaluation with its score and a dataset.
+    async fn publish(&self, claim: &Claim, id: EvaluationId, result: &EvaluationResult) {
+        let dataset = self.folder.path().join("dataset.zip");
+        std::fs::write(&dataset, b"PK the recorded dataset").unwrap();
+        let key = format!("datasets/{id}.zip");
+        self.store
+            .artifacts()
+            .put_file(&key, &dataset)
+            .await
+            .unwrap();
+        self.store
+            .finish_evaluation(claim, result, &key, self.now())
+            .await
+            .unwrap();
+    }
+
+    /// A team whose agent played `episodes` of each task as `played` says; the evaluation's id.
+    pub async fn played_team(
+        &self,
+        name: &str,
+        episodes: u32,
+        played: impl Fn(Task, u32) -> EpisodeOutcome,
+    ) -> EvaluationId {
+        let team = self.team(name).await;
+        let submission = self.valid_submission(&team, name).await;
+        let submission = submission.rsplit('/').next().unwrap().parse().unwrap();
+        let plan = EvaluationPlan {
+            profile: Profile::Evaluation,
+            tasks: Task::ALL.to_vec(),
+            episodes_per_task: episodes,
+            episodes_per_shard: 50,
+            max_faults: 0,
+        };
+        self.store
+            .create_evaluation(submission, &plan, self.now())
+            .await
+            .unwrap();
+        self.finish_as(played).await
     }
 
     /// A team on the board.
@@ -296,7 +374,7 @@ pub fn text(value: &Value) -> String {
         .to_owned()
 }
 
-fn outcome(task: Task, episode: u32, faulty: bool) -> EpisodeOutcome {
+pub fn outcome(task: Task, episode: u32, faulty: bool) -> EpisodeOutcome {
     let fault = faulty.then(|| AgentFault {
         fault: AgentFaultKind::NonFinite,
         task,

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
 
 mod boards;
+mod comparison;
 mod evaluation;
 mod pairing;
 mod paper_qualifying;

@@ -10,5 +10,6 @@ mod kill;
 mod offline_data;
 mod opening;
 mod queue;
+mod releases;
 mod teams;
 mod turns;

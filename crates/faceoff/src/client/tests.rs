@@ -33,7 +33,6 @@ async fn site(max_bundle_bytes: u64) -> Site {
         },
         admin_token_hash: hash_token(ADMIN),
         upload_dir: folder.path().to_owned(),
-        season_name: None,
         daily_at: None,
         clock: Clock::new(Timestamp::now),
         limits: HttpLimits::default(),
@@ -171,4 +170,19 @@ async fn a_refusal_keeps_the_servers_words() {
     );
     assert!(Client::new("https://127.0.0.1", None).is_err());
     assert!(Client::new("127.0.0.1:8080", None).is_err());
+}
+
+#[tokio::test]
+async fn a_season_is_closed_by_its_name() {
+    let site = site(64).await;
+    let refused = site.organiser.close_season("Season").await.unwrap_err();
+    assert!(refused.to_string().contains("Season 1"), "{refused}");
+    assert_eq!(site.organiser.season().await.unwrap().secret, None);
+    let closed = site.organiser.close_season("Season 1").await.unwrap();
+    let secret = site.store.season().await.unwrap().secret;
+    assert_eq!(closed.secret, Some(secret));
+    assert_eq!(site.organiser.season().await.unwrap(), closed);
+    let id = EvaluationId::new();
+    let error = site.organiser.compare(id, id).await.unwrap_err();
+    assert!(error.to_string().contains(&id.to_string()), "{error}");
 }

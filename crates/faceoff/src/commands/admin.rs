@@ -8,6 +8,7 @@ use clap::{Args, Subcommand};
 use faceoff_http::api::{
     days::StartDay,
     evaluations::{EvaluationStatus, EvaluationView},
+    season::SeasonView,
 };
 use faceoff_types::{EvaluationId, Profile, TeamId};
 use jiff::civil::Date;
@@ -71,6 +72,11 @@ enum Action {
         /// Shown to the team
         reason: String,
     },
+    /// Show the season, or close it
+    Season {
+        #[command(subcommand)]
+        action: SeasonAction,
+    },
     /// List the teams
     Teams,
     /// List the evaluations of a day with their progress
@@ -78,6 +84,18 @@ enum Action {
         /// UTC day, e.g. 2026-11-21 [default: today]
         #[arg(long)]
         day: Option<Date>,
+    },
+}
+
+#[derive(Debug, Subcommand)]
+enum SeasonAction {
+    /// Show name, commitment and state
+    Show,
+    /// Close the season for good: its secret becomes public, nothing more is uploaded or evaluated
+    Close {
+        /// The season's name, since this cannot be undone
+        #[arg(long, value_name = "NAME")]
+        confirm: Option<String>,
     },
 }
 
@@ -147,6 +165,27 @@ impl AdminCommand {
                 let cancelled = client.cancel(evaluation, &reason).await?;
                 print(self.json, &cancelled, || line(&cancelled))
             }
+            Action::Season {
+                action: SeasonAction::Show,
+            } => {
+                let season = client.season().await?;
+                print(self.json, &season, || of_season(&season))
+            }
+            Action::Season {
+                action: SeasonAction::Close { confirm },
+            } => {
+                let Some(confirm) = confirm else {
+                    let season = client.season().await?;
+                    bail!(
+                        "closing {:?} publishes its secret and ends uploads and evaluations; it cannot \
+                         be undone. To do it: faceoff admin season close --confirm {:?}",
+                        season.name,
+                        season.name
+                    );
+                };
+                let season = client.close_season(&confirm).await?;
+                print(self.json, &season, || of_season(&season))
+            }
             Action::Teams => {
                 let teams = client.teams().await?;
                 print(self.json, &teams, || {
@@ -205,6 +244,23 @@ async fn find_team(client: &Client, wanted: &str) -> anyhow::Result<TeamId> {
         Some(team) => Ok(team.id),
         None => bail!("no team is named {wanted:?}; faceoff admin teams lists them"),
     }
+}
+
+fn of_season(season: &SeasonView) -> String {
+    let state = match (season.closed_at, season.secret) {
+        (Some(closed_at), Some(secret)) => {
+            let closed_at = closed_at.strftime("%Y-%m-%d %H:%M UTC");
+            format!("closed     {closed_at}\nsecret     {secret}")
+        }
+        _ => "open       its secret is published when it is closed".to_owned(),
+    };
+    format!(
+        "{} ({}), {} days played\ncommitment {}\n{state}",
+        season.name,
+        season.ruleset,
+        season.days.len(),
+        season.commitment
+    )
 }
 
 fn line(evaluation: &EvaluationView) -> String {

@@ -104,6 +104,9 @@ async fn serve(config: Config) -> anyhow::Result<()> {
     let store = Store::open(&data_dir)
         .await
         .with_context(|| format!("opening the data folder {}", data_dir.display()))?;
+    if let Some(name) = &config.season.name {
+        store.name_season(name).await.context("naming the season")?;
+    }
     let listener = TcpListener::bind(config.server.listen)
         .await
         .with_context(|| {
@@ -120,7 +123,6 @@ async fn serve(config: Config) -> anyhow::Result<()> {
             plan: plan.clone(),
             admin_token_hash,
             upload_dir,
-            season_name: config.season.name.clone(),
             daily_at: config.evaluation.at,
             clock: Clock::new(Timestamp::now),
             limits: HttpLimits::default(),

@@ -1,0 +1,31 @@
+//! `/season`: for sceptics. The commitment, the secret once it is public, and how every draw follows
+//! from it.
+
+use super::{Frame, PageProblem, render};
+use crate::{
+    App,
+    api::season::{SeasonView, view},
+};
+use askama::Template;
+use axum::{extract::State, response::Response};
+use jiff::Timestamp;
+
+#[derive(Template)]
+#[template(path = "season.html")]
+struct Page {
+    frame: Frame,
+    season: SeasonView,
+    opened: String,
+    closed: Option<String>,
+}
+
+pub(super) async fn page(State(app): State<App>) -> Result<Response, PageProblem> {
+    let season = view(&app).await?;
+    let instant = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M:%S UTC").to_string();
+    render(&Page {
+        frame: Frame::new(season.name.clone(), "/season"),
+        opened: instant(season.created_at),
+        closed: season.closed_at.map(instant),
+        season,
+    })
+}

@@ -1,0 +1,264 @@
+use crate::{
+    EpisodeSummary, PairedTally, SIGNIFICANCE,
+    difference::{paired_difference, score_difference, unpaired_difference},
+    overall_p_value, overall_score,
+};
+use faceoff_types::{Profile, Seed, Task};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// An evaluation as comparisons need it: its episodes and what they were drawn from.
+#[derive(Debug, Clone, Copy)]
+pub struct Played<'a> {
+    /// The rules that it was scored by.
+    pub ruleset: &'a str,
+    /// The perturbations.
+    pub profile: Profile,
+    /// The evaluation's seed: on a server, the day's.
+    pub seed: Seed,
+    /// The seed of the season's model mismatch.
+    pub mismatch_seed: Seed,
+    /// The episodes.
+    pub summary: &'a EpisodeSummary,
+}
+
+/// Why two evaluations did not meet the same episodes; names the field that differs. Seeds are not
+/// told, since they may be secret.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NotPaired {
+    /// Other rules.
+    #[error("ruleset: the first evaluation was scored by {a}, the second by {b}")]
+    Ruleset {
+        /// Of the first.
+        a: String,
+        /// Of the second.
+        b: String,
+    },
+    /// Other perturbations.
+    #[error("profile: the first evaluation played {a}, the second {b}")]
+    Profile {
+        /// Of the first.
+        a: Profile,
+        /// Of the second.
+        b: Profile,
+    },
+    /// Other draws.
+    #[error("seed: the two evaluations have different seeds (another day, season or --seed)")]
+    Seed,
+    /// Another robot.
+    #[error(
+        "mismatch_seed: the two evaluations have different seeds of the model mismatch (another \
+         season or --mismatch-seed)"
+    )]
+    MismatchSeed,
+    /// A task that only one of the two played.
+    #[error("tasks: only one of the two evaluations played {0}")]
+    Tasks(Task),
+    /// Not equally many.
+    #[error("episodes: the first evaluation played {a} of {task}, the second {b}")]
+    Episodes {
+        /// The task.
+        task: Task,
+        /// Of the first.
+        a: u32,
+        /// Of the second.
+        b: u32,
+    },
+}
+
+impl NotPaired {
+    /// The field that differs.
+    #[must_use]
+    pub const fn field(&self) -> &'static str {
+        match self {
+            Self::Ruleset { .. } => "ruleset",
+            Self::Profile { .. } => "profile",
+            Self::Seed => "seed",
+            Self::MismatchSeed => "mismatch_seed",
+            Self::Tasks(_) => "tasks",
+            Self::Episodes { .. } => "episodes",
+        }
+    }
+}
+
+/// Two evaluations on the same episodes. Differences are the first (A) minus the second (B).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Comparison {
+    /// By task.
+    pub tasks: BTreeMap<Task, TaskComparison>,
+    /// Of the overall scores.
+    pub overall: OverallComparison,
+}
+
+/// Two evaluations on the same episodes of one task.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TaskComparison {
+    /// Episodes that both solved.
+    pub both: u32,
+    /// Episodes that only A solved.
+    pub only_a: u32,
+    /// Episodes that only B solved.
+    pub only_b: u32,
+    /// Episodes that neither solved.
+    pub neither: u32,
+    /// A's success rate, a fraction.
+    pub success_rate_a: f64,
+    /// B's success rate, a fraction.
+    pub success_rate_b: f64,
+    /// Success rate of A minus that of B.
+    pub difference: f64,
+    /// Its 95 % interval for paired data: Newcombe's score interval (method 10).
+    pub difference_ci95: [f64; 2],
+    /// McNemar's exact test, two-sided.
+    pub p_value: f64,
+    /// Is `p_value` at most [`SIGNIFICANCE`]?
+    pub told_apart: bool,
+}
+
+/// The overall scores of two evaluations on the same episodes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OverallComparison {
+    /// A's score in percent.
+    pub score_a: f64,
+    /// B's score in percent.
+    pub score_b: f64,
+    /// Score of A minus that of B, in percentage points.
+    pub difference: f64,
+    /// Its 95 % interval: the tasks' intervals, weighed and joined by the square-and-add method.
+    pub difference_ci95: [f64; 2],
+    /// The exact paired test of the weighted score ([`overall_p_value`]).
+    pub p_value: f64,
+    /// Is `p_value` at most [`SIGNIFICANCE`]?
+    pub told_apart: bool,
+}
+
+impl Played<'_> {
+    /// Compares with an evaluation that met the same episodes.
+    ///
+    /// # Errors
+    /// If it did not: the field that differs.
+    pub fn compare(&self, other: &Self) -> Result<Comparison, NotPaired> {
+        let tallies = self.tallies(other)?;
+        let estimates: BTreeMap<_, _> = tallies
+            .iter()
+            .map(|(task, tally)| (*task, paired_difference(tally)))
+            .collect();
+        let overall = score_difference(estimates.clone());
+        let [score_a, score_b] = [self, other].map(|played| played.score());
+        let p_value = overall_p_value(&tallies);
+        let tasks = tallies.into_iter().zip(estimates.into_values());
+        Ok(Comparison {
+            tasks: tasks
+                .map(|((task, tally), difference)| {
+                    let n = f64::from(tally.episodes().max(1));
+                    let p_value = tally.p_value();
+                    let comparison = TaskComparison {
+                        both: tally.both,
+                        only_a: tally.only_a,
+                        only_b: tally.only_b,
+                        neither: tally.neither,
+                        success_rate_a: f64::from(tally.both + tally.only_a) / n,
+                        success_rate_b: f64::from(tally.both + tally.only_b) / n,
+                        difference: difference.value,
+                        difference_ci95: [difference.low, difference.high],
+                        p_value,
+                        told_apart: p_value <= SIGNIFICANCE,
+                    };
+                    (task, comparison)
+                })
+                .collect(),
+            overall: OverallComparison {
+                score_a,
+                score_b,
+                difference: overall.value,
+                difference_ci95: [overall.low, overall.high],
+                p_value,
+                told_apart: p_value <= SIGNIFICANCE,
+            },
+        })
+    }
+
+    /// Can the two be told apart at [`SIGNIFICANCE`], by one task or by the overall score?
+    ///
+    /// On the same episodes by the paired test. On other episodes of the same kind (another day) by
+    /// whether the 95 % interval of the difference, for independent episodes, leaves out zero. Under
+    /// other rules or perturbations always: nothing says that they are alike.
+    #[must_use]
+    pub fn told_apart(&self, other: &Self, task: Option<Task>) -> bool {
+        let of_interest = |any: &Task| task.is_none_or(|task| task == *any);
+        match self.tallies(other) {
+            Ok(mut tallies) => {
+                tallies.retain(|any, _| of_interest(any));
+                overall_p_value(&tallies) <= SIGNIFICANCE
+            }
+            Err(NotPaired::Seed | NotPaired::Episodes { .. }) => {
+                let differences = self.summary.tasks.iter().filter_map(|(any, mine)| {
+                    let theirs = other.summary.tasks.get(any)?;
+                    let counts =
+                        [mine, theirs].map(|one| [one.successes.count(), one.successes.episodes()]);
+                    Some((*any, unpaired_difference(counts[0], counts[1])))
+                });
+                score_difference(differences.filter(|(any, _)| of_interest(any))).excludes_zero()
+            }
+            Err(_) => true,
+        }
+    }
+
+    fn score(&self) -> f64 {
+        overall_score(self.summary.tasks.iter().map(|(task, summary)| {
+            let successes = &summary.successes;
+            let n = f64::from(successes.episodes().max(1));
+            (*task, f64::from(successes.count()) / n)
+        }))
+    }
+
+    fn tallies(&self, other: &Self) -> Result<BTreeMap<Task, PairedTally>, NotPaired> {
+        if self.ruleset != other.ruleset {
+            return Err(NotPaired::Ruleset {
+                a: self.ruleset.to_owned(),
+                b: other.ruleset.to_owned(),
+            });
+        }
+        if self.profile != other.profile {
+            return Err(NotPaired::Profile {
+                a: self.profile,
+                b: other.profile,
+            });
+        }
+        if self.mismatch_seed != other.mismatch_seed {
+            return Err(NotPaired::MismatchSeed);
+        }
+        let (a, b) = (&self.summary.tasks, &other.summary.tasks);
+        let unshared = |a: &BTreeMap<Task, _>, b: &BTreeMap<Task, _>| {
+            a.keys().find(|task| !b.contains_key(task)).copied()
+        };
+        if let Some(task) = unshared(a, b).or_else(|| unshared(b, a)) {
+            return Err(NotPaired::Tasks(task));
+        }
+        if self.seed != other.seed {
+            return Err(NotPaired::Seed);
+        }
+        a.iter()
+            .zip(b.values())
+            .map(|((task, a), b)| {
+                let (a, b) = (&a.successes, &b.successes);
+                if a.episodes() != b.episodes() {
+                    return Err(NotPaired::Episodes {
+                        task: *task,
+                        a: a.episodes(),
+                        b: b.episodes(),
+                    });
+                }
+                let both = a.in_common(b);
+                let (only_a, only_b) = (a.count() - both, b.count() - both);
+                let tally = PairedTally {
+                    both,
+                    only_a,
+                    only_b,
+                    neither: a.episodes() - both - only_a - only_b,
+                };
+                Ok((*task, tally))
+            })
+            .collect()
+    }
+}

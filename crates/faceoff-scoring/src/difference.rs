@@ -1,0 +1,188 @@
+//! Intervals of differences, all by the square-and-add method: each bound of a sum lies as far from its
+//! estimate as the root of the summed squares of its parts' distances (Newcombe, Statistics in Medicine
+//! 17, 1998; Zou and Donner, Statistics in Medicine 27, 2008).
+
+use crate::{PairedTally, interval::wilson95, task_weight_percent};
+use faceoff_types::Task;
+
+/// An estimate and its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Estimate {
+    pub(crate) value: f64,
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+}
+
+impl Estimate {
+    /// A success rate with its Wilson interval.
+    fn rate(successes: u32, episodes: u32) -> Self {
+        let [low, high] = wilson95(successes, episodes);
+        Self {
+            value: f64::from(successes) / f64::from(episodes.max(1)),
+            low,
+            high,
+        }
+    }
+
+    fn below(self) -> f64 {
+        self.value - self.low
+    }
+
+    fn above(self) -> f64 {
+        self.high - self.value
+    }
+
+    /// `a − b` of two rates whose episodes correlate with `phi`; 0 for independent ones.
+    fn difference(a: Self, b: Self, phi: f64) -> Self {
+        let distance = |of_a: f64, of_b: f64| {
+            (of_a * of_a - 2.0 * phi * of_a * of_b + of_b * of_b)
+                .max(0.0)
+                .sqrt()
+        };
+        let value = a.value - b.value;
+        Self {
+            value,
+            low: (value - distance(a.below(), b.above())).max(-1.0),
+            high: (value + distance(a.above(), b.below())).min(1.0),
+        }
+    }
+
+    pub(crate) fn excludes_zero(self) -> bool {
+        self.low > 0.0 || self.high < 0.0
+    }
+}
+
+/// Success rate of the first team minus that of the second on the same episodes, with Newcombe's paired
+/// score interval (method 10 of his comparison).
+pub(crate) fn paired_difference(tally: &PairedTally) -> Estimate {
+    let n = tally.episodes();
+    let (a, b) = (tally.both + tally.only_a, tally.both + tally.only_b);
+    Estimate::difference(Estimate::rate(a, n), Estimate::rate(b, n), phi(tally))
+}
+
+/// The correlation of the two teams' successes, shrunk towards 0 where it is positive: a correlation
+/// that chance might have made must not narrow the interval.
+fn phi(tally: &PairedTally) -> f64 {
+    let [both, only_a, only_b, neither] =
+        [tally.both, tally.only_a, tally.only_b, tally.neither].map(f64::from);
+    let margins = (both + only_a) * (only_b + neither) * (both + only_b) * (only_a + neither);
+    if margins == 0.0 {
+        return 0.0;
+    }
+    let product = both * neither - only_a * only_b;
+    let half = f64::from(tally.episodes()) / 2.0;
+    let shrunk = if product > half {
+        product - half
+    } else {
+        product.min(0.0)
+    };
+    shrunk / margins.sqrt()
+}
+
+/// As [`paired_difference`], for `[successes, episodes]` of two teams that met different episodes
+/// (Newcombe's score interval for independent proportions).
+pub(crate) fn unpaired_difference(a: [u32; 2], b: [u32; 2]) -> Estimate {
+    Estimate::difference(Estimate::rate(a[0], a[1]), Estimate::rate(b[0], b[1]), 0.0)
+}
+
+/// The difference of the overall scores in percentage points, from the tasks' differences of rates.
+/// The tasks' episodes are independent of each other.
+pub(crate) fn score_difference(tasks: impl IntoIterator<Item = (Task, Estimate)>) -> Estimate {
+    let (mut value, mut below, mut above) = (0.0, 0.0, 0.0);
+    for (task, difference) in tasks {
+        let weight = f64::from(task_weight_percent(task));
+        value += weight * difference.value;
+        below += (weight * difference.below()).powi(2);
+        above += (weight * difference.above()).powi(2);
+    }
+    Estimate {
+        value,
+        low: value - below.sqrt(),
+        high: value + above.sqrt(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use statrs::distribution::{Binomial, Discrete};
+
+    fn tally(both: u32, only_a: u32, only_b: u32, neither: u32) -> PairedTally {
+        PairedTally {
+            both,
+            only_a,
+            only_b,
+            neither,
+        }
+    }
+
+    /// The values come from a program of its own that follows the formula in the paper.
+    #[test]
+    fn the_paired_interval_is_newcombes_method_10() {
+        for (tally, low, high) in [
+            (tally(20, 12, 2, 16), 0.056_156_4, 0.329_207_0),
+            (tally(36, 12, 2, 0), 0.056_929_6, 0.340_427_6),
+            (tally(54, 0, 0, 0), -0.066_413_6, 0.066_413_6),
+            (tally(43, 0, 1, 0), -0.118_077_1, 0.059_718_0),
+            (tally(1, 97, 1, 1), 0.873_672_2, 0.985_025_8),
+        ] {
+            let got = paired_difference(&tally);
+            assert!(
+                (got.low - low).abs() < 1e-6 && (got.high - high).abs() < 1e-6,
+                "{tally:?}: {got:?}, expected {low} to {high}"
+            );
+        }
+    }
+
+    /// Over all results that 24 episodes can have, weighed by their probabilities: how often the
+    /// interval holds the true difference.
+    #[test]
+    fn the_paired_interval_covers_the_truth_about_as_often_as_it_says() {
+        const N: u32 = 24;
+        for cells in [
+            [0.3, 0.2, 0.2, 0.3],
+            [0.5, 0.25, 0.05, 0.2],
+            [0.7, 0.1, 0.1, 0.1],
+            [0.25, 0.25, 0.25, 0.25],
+            [0.05, 0.6, 0.05, 0.3],
+        ] {
+            let truth = cells[1] - cells[2];
+            // the cells one after the other, each out of what the earlier ones left
+            let chance = |of: f64, n: u32, k: u32| {
+                Binomial::new(of, u64::from(n)).unwrap().pmf(u64::from(k))
+            };
+            let mut covered = 0.0;
+            for both in 0..=N {
+                for only_a in 0..=N - both {
+                    for only_b in 0..=N - both - only_a {
+                        let counts = tally(both, only_a, only_b, N - both - only_a - only_b);
+                        let difference = paired_difference(&counts);
+                        if difference.low <= truth && truth <= difference.high {
+                            let rest = 1.0 - cells[0];
+                            let left = N - both;
+                            covered += chance(cells[0], N, both)
+                                * chance(cells[1] / rest, left, only_a)
+                                * chance(cells[2] / (rest - cells[1]), left - only_a, only_b);
+                        }
+                    }
+                }
+            }
+            assert!((0.93..0.995).contains(&covered), "{cells:?}: {covered}");
+        }
+    }
+
+    #[test]
+    fn the_score_weighs_its_tasks() {
+        let one = Estimate {
+            value: 0.1,
+            low: 0.0,
+            high: 0.3,
+        };
+        let score = score_difference(Task::ALL.map(|task| (task, one)));
+        assert!((score.value - 10.0).abs() < 1e-12);
+        // √(40² + 40² + 20²) = 60
+        assert!((score.low - 4.0).abs() < 1e-12, "{score:?}");
+        assert!((score.high - 22.0).abs() < 1e-12, "{score:?}");
+        assert!(score.excludes_zero() && !one.excludes_zero());
+    }
+}

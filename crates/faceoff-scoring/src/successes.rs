@@ -1,0 +1,108 @@
+use serde::{Deserialize, Serialize};
+
+/// Which of the episodes 0, 1, … n − 1 of a task were solved, one bit each.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "Raw")]
+pub struct Successes {
+    episodes: u32,
+    /// Episode e is bit e % 64 of word e / 64; bits beyond the last episode are 0.
+    words: Vec<u64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Raw {
+    episodes: u32,
+    words: Vec<u64>,
+}
+
+impl TryFrom<Raw> for Successes {
+    type Error = &'static str;
+
+    fn try_from(Raw { episodes, words }: Raw) -> Result<Self, Self::Error> {
+        let used = episodes % 64;
+        let stray = words
+            .last()
+            .is_some_and(|last| used > 0 && last >> used != 0);
+        if words.len() != episodes.div_ceil(64) as usize || stray {
+            return Err("expected one bit per episode");
+        }
+        Ok(Self { episodes, words })
+    }
+}
+
+impl FromIterator<bool> for Successes {
+    /// In order of the episodes.
+    fn from_iter<I: IntoIterator<Item = bool>>(solved: I) -> Self {
+        let mut all = Self {
+            episodes: 0,
+            words: Vec::new(),
+        };
+        for solved in solved {
+            let bit = all.episodes % 64;
+            if bit == 0 {
+                all.words.push(0);
+            }
+            if let Some(word) = all.words.last_mut() {
+                *word |= u64::from(solved) << bit;
+            }
+            all.episodes += 1;
+        }
+        all
+    }
+}
+
+impl Successes {
+    /// Episodes played.
+    #[must_use]
+    pub const fn episodes(&self) -> u32 {
+        self.episodes
+    }
+
+    /// Episodes solved.
+    #[must_use]
+    pub fn count(&self) -> u32 {
+        self.words.iter().map(|word| word.count_ones()).sum()
+    }
+
+    /// Episodes that both solved; those beyond the shorter one's last do not count.
+    pub(crate) fn in_common(&self, other: &Self) -> u32 {
+        self.words
+            .iter()
+            .zip(&other.words)
+            .map(|(a, b)| (a & b).count_ones())
+            .sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bits_count_what_was_solved_and_survive_being_stored() {
+        for n in [0u32, 1, 63, 64, 65, 1000] {
+            let every_third: Successes = (0..n).map(|e| e % 3 == 0).collect();
+            let even: Successes = (0..n).map(|e| e % 2 == 0).collect();
+            assert_eq!(every_third.episodes(), n);
+            assert_eq!(every_third.count(), n.div_ceil(3));
+            assert_eq!(every_third.in_common(&even), n.div_ceil(6));
+            let json = serde_json::to_string(&every_third).unwrap();
+            assert_eq!(
+                serde_json::from_str::<Successes>(&json).unwrap(),
+                every_third
+            );
+        }
+    }
+
+    #[test]
+    fn bits_that_belong_to_no_episode_are_refused() {
+        for json in [
+            r#"{"episodes":3,"words":[8]}"#,
+            r#"{"episodes":3,"words":[]}"#,
+            r#"{"episodes":64,"words":[1,0]}"#,
+        ] {
+            assert!(serde_json::from_str::<Successes>(json).is_err(), "{json}");
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! `faceoff compare`: two evaluations on the same episodes, with the tests that say whether their
+//! difference is more than luck.
+#![expect(clippy::print_stdout, reason = "a command talks to the terminal")]
+
+mod dataset;
+mod table;
+
+use crate::client::Client;
+use anyhow::Context;
+use clap::Args;
+use dataset::Dataset;
+use faceoff_scoring::{Comparison, Played};
+use faceoff_types::{EvaluationId, Profile};
+use serde::Serialize;
+use std::path::Path;
+
+/// Compares two evaluations that played the same episodes: which of them each solved, McNemar's exact
+/// test, and the difference with its 95 % interval, by task and overall.
+#[derive(Debug, Args)]
+pub struct CompareCommand {
+    /// A dataset.zip, an unpacked dataset, or the folder of `faceoff eval --out`; with --server the id
+    /// of an evaluation
+    a: String,
+    /// The same, of the other evaluation
+    b: String,
+    /// Compare two evaluations of this server, by their ids
+    #[arg(long, value_name = "URL")]
+    server: Option<String>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// A local comparison, as `--json` prints it.
+#[derive(Serialize)]
+struct LocalView<'a> {
+    a: LocalSide<'a>,
+    b: LocalSide<'a>,
+    ruleset: &'a str,
+    profile: Profile,
+    #[serde(flatten)]
+    comparison: &'a Comparison,
+}
+
+#[derive(Serialize)]
+struct LocalSide<'a> {
+    path: &'a str,
+    agent: &'a str,
+}
+
+impl CompareCommand {
+    /// Compares and prints.
+    ///
+    /// # Errors
+    /// If an evaluation cannot be read, or the two did not play the same episodes; the error names the
+    /// field that differs.
+    pub fn run(self) -> anyhow::Result<()> {
+        match &self.server {
+            Some(server) => tokio::runtime::Builder::new_current_thread()
+                .enable_all()
+                .build()
+                .context("starting the async runtime")?
+                .block_on(self.on_server(server)),
+            None => self.locally(),
+        }
+    }
+
+    fn locally(&self) -> anyhow::Result<()> {
+        let (a, b) = (open(&self.a)?, open(&self.b)?);
+        let comparison = played(&a).compare(&played(&b)).context(
+            "the two did not play the same episodes; give both evaluations the same --seed, \
+             --mismatch-seed, --profile, --task and --episodes",
+        )?;
+        if self.json {
+            return print_json(&LocalView {
+                a: LocalSide {
+                    path: &self.a,
+                    agent: &a.manifest.agent,
+                },
+                b: LocalSide {
+                    path: &self.b,
+                    agent: &b.manifest.agent,
+                },
+                ruleset: &a.manifest.ruleset,
+                profile: a.manifest.profile,
+                comparison: &comparison,
+            });
+        }
+        println!("A: {} ({})", a.manifest.agent, self.a);
+        println!("B: {} ({})", b.manifest.agent, self.b);
+        print!("{}", table::of(&comparison));
+        Ok(())
+    }
+
+    async fn on_server(&self, server: &str) -> anyhow::Result<()> {
+        let id = |text: &str| -> anyhow::Result<EvaluationId> {
+            text.parse().with_context(|| {
+                format!("{text:?}: expected the id of an evaluation, as with --server")
+            })
+        };
+        let client = Client::new(server, None)?;
+        let view = client.compare(id(&self.a)?, id(&self.b)?).await?;
+        if self.json {
+            return print_json(&view);
+        }
+        println!("A: {} ({})", view.a.team, view.a.evaluation);
+        println!("B: {} ({})", view.b.team, view.b.evaluation);
+        let comparison = Comparison {
+            tasks: view.tasks,
+            overall: view.overall,
+        };
+        print!("{}", table::of(&comparison));
+        Ok(())
+    }
+}
+
+fn open(path: &str) -> anyhow::Result<Dataset> {
+    Dataset::open(Path::new(path)).with_context(|| format!("reading the evaluation {path}"))
+}
+
+fn played(dataset: &Dataset) -> Played<'_> {
+    Played {
+        ruleset: &dataset.manifest.ruleset,
+        profile: dataset.manifest.profile,
+        seed: dataset.manifest.seed,
+        mismatch_seed: dataset.manifest.mismatch_seed,
+        summary: &dataset.summary,
+    }
+}
+
+fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
+    println!(
+        "{}",
+        serde_json::to_string_pretty(value).context("writing JSON")?
+    );
+    Ok(())
+}

@@ -1,0 +1,140 @@
+use serde_json::Value;
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output},
+};
+
+fn faceoff(args: &[&str], folder: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_faceoff"))
+        .args(args)
+        .current_dir(folder)
+        .output()
+        .unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn agent(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../agents")
+        .join(name)
+}
+
+/// Plays an agent into the folder `out` of `folder`.
+fn eval(folder: &Path, name: &str, out: &str, args: &[&str]) {
+    let bundle = agent(name);
+    let bundle = bundle.to_str().unwrap();
+    let output = faceoff(&[&["eval", bundle, "--out", out], args].concat(), folder);
+    assert!(output.status.success(), "{out}: {}", text(&output.stderr));
+}
+
+#[test]
+fn local_evaluations_are_compared_if_they_played_the_same_episodes() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let common = ["--task", "hit,defend", "--episodes", "4"];
+    eval(
+        folder,
+        "hold",
+        "a",
+        &[&common[..], &["--seed", "5"]].concat(),
+    );
+    eval(
+        folder,
+        "reckless",
+        "b",
+        &[&common[..], &["--seed", "5"]].concat(),
+    );
+    eval(
+        folder,
+        "hold",
+        "other-seed",
+        &[&common[..], &["--seed", "6"]].concat(),
+    );
+    let shorter = ["--task", "hit,defend", "--episodes", "3", "--seed", "5"];
+    eval(folder, "hold", "shorter", &shorter);
+    eval(
+        folder,
+        "hold",
+        "ideal",
+        &[&common[..], &["--seed", "5", "--profile", "ideal"]].concat(),
+    );
+
+    let output = faceoff(&["compare", "a", "b", "--json"], folder);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let view: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(view["a"]["agent"], "hold");
+    let results = |out: &str| -> Value {
+        let file = folder.join(out).join("results.json");
+        serde_json::from_slice(&fs::read(file).unwrap()).unwrap()
+    };
+    for (side, out, only) in [("a", "a", "only_a"), ("b", "b", "only_b")] {
+        let results = results(out);
+        assert_eq!(view["overall"][format!("score_{side}")], results["score"]);
+        for (task, of) in view["tasks"].as_object().unwrap() {
+            let successes = of["both"].as_u64().unwrap() + of[only].as_u64().unwrap();
+            assert_eq!(
+                results["tasks"][task]["successes"], successes,
+                "{side} {task}"
+            );
+        }
+    }
+    assert_eq!(view["tasks"].as_object().unwrap().len(), 2);
+
+    // Packed or unpacked, folder or archive: the same.
+    let unpacked = folder.join("unpacked");
+    let file = fs::File::open(folder.join("a/dataset.zip")).unwrap();
+    zip::ZipArchive::new(file)
+        .unwrap()
+        .extract(&unpacked)
+        .unwrap();
+    for same in ["unpacked", "a/dataset.zip"] {
+        let output = faceoff(&["compare", same, "b", "--json"], folder);
+        let mut again: Value = serde_json::from_slice(&output.stdout).unwrap();
+        again["a"]["path"] = "a".into();
+        assert_eq!(again, view, "{same}");
+    }
+    let table = faceoff(&["compare", "a", "a"], folder);
+    let table = text(&table.stdout);
+    for part in ["A: hold (a)", "not told apart", "95 % interval", "score"] {
+        assert!(table.contains(part), "{part:?} is not in {table}");
+    }
+
+    for (other, field) in [
+        ("other-seed", "seed:"),
+        (
+            "shorter",
+            "episodes: the first evaluation played 4 of hit, the second 3",
+        ),
+        (
+            "ideal",
+            "profile: the first evaluation played evaluation, the second ideal",
+        ),
+    ] {
+        let refused = faceoff(&["compare", "a", other], folder);
+        assert!(!refused.status.success(), "{other}");
+        let message = text(&refused.stderr);
+        assert!(message.contains(field), "{field:?} is not in {message}");
+    }
+
+    // What was changed by hand is no evidence.
+    let episodes = unpacked.join("episodes.parquet");
+    let mut bytes = fs::read(&episodes).unwrap();
+    bytes[40] ^= 1;
+    fs::write(&episodes, bytes).unwrap();
+    let refused = faceoff(&["compare", "unpacked", "b"], folder);
+    assert!(
+        text(&refused.stderr).contains("its hash differs"),
+        "{}",
+        text(&refused.stderr)
+    );
+    let missing = faceoff(&["compare", ".", "b"], folder);
+    assert!(
+        text(&missing.stderr).contains("the folder has neither"),
+        "{}",
+        text(&missing.stderr)
+    );
+}
