@@ -23,6 +23,8 @@ enum Command {
     Demo(commands::demo::DemoCommand),
     /// Evaluate a bundle locally with the server's evaluator.
     Eval(commands::eval::EvalCommand),
+    /// Simulate a dataset again and compare every state and score.
+    Verify(commands::verify::VerifyCommand),
     /// Score results by hand: a qualifying board or a tournament.
     Score(commands::score::ScoreCommand),
     /// Simulate open loop, or measure the simulator.
@@ -40,6 +42,7 @@ fn main() -> ExitCode {
         Command::Serve(command) => command.run(),
         Command::Demo(command) => command.run(),
         Command::Eval(command) => command.run(),
+        Command::Verify(command) => return command.run(),
         Command::Score(command) => command.run(),
         Command::Sim(command) => command.run(),
         Command::Submit(command) => command.run(),
