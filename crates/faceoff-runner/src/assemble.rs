@@ -8,10 +8,12 @@ use crate::{
     },
 };
 use faceoff_types::{
-    ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationResult, Profile, Seed, Task, TaskResult,
+    ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationResult, Profile, Seed, SlotTiming, Task,
+    TaskResult,
 };
 use faceoff_wire::dataset::{
-    DATASET_SCHEMA, DatasetManifest, FileDigest, SlowEpisode, TaskViolations, ViolationsFile,
+    CalibrationFile, DATASET_SCHEMA, DatasetManifest, FileDigest, ShardCalibration, SlowEpisode,
+    TaskViolations, ViolationsFile,
 };
 use serde::{Deserialize, Serialize};
 use std::{
@@ -38,8 +40,8 @@ pub struct EvaluationMeta {
 }
 
 /// Joins the recordings of all shards of an evaluation, in any order, into one zip archive:
-/// `steps.parquet`, `episodes.parquet`, `violations.json`, `results.json`, `agent.log` and
-/// `manifest.json` with the hashes of the others. Returns the score, which is also `results.json`.
+/// `steps.parquet`, `episodes.parquet`, `violations.json`, `results.json`, `calibration.json`,
+/// `agent.log` and `manifest.json` with the hashes of the others. Returns the score, which is also `results.json`.
 ///
 /// Nothing is simulated again. The archive is written under a temporary name and renamed; the same
 /// shards give the same bytes.
@@ -96,6 +98,7 @@ fn write_dataset(
     })?;
     dataset.add_json("violations.json", violations)?;
     dataset.add_json("results.json", result)?;
+    dataset.add_json("calibration.json", &calibration(shards))?;
     dataset.add(LOG_FILE, |out| write_log(shards, out))?;
     let manifest = DatasetManifest {
         schema: DATASET_SCHEMA.to_owned(),
@@ -163,6 +166,22 @@ fn check(
     Ok(episodes)
 }
 
+/// What each slot measured of itself.
+fn calibration(shards: &[ShardRecording]) -> CalibrationFile {
+    CalibrationFile {
+        schema: DATASET_SCHEMA.to_owned(),
+        shards: shards
+            .iter()
+            .map(|ShardRecording { spec, report, .. }| ShardCalibration {
+                task: spec.task,
+                first_episode: spec.episodes.start,
+                end_episode: spec.episodes.end,
+                timing: report.timing,
+            })
+            .collect(),
+    }
+}
+
 struct Scored {
     result: EvaluationResult,
     violations: ViolationsFile,
@@ -208,7 +227,11 @@ fn score(meta: &EvaluationMeta, shards: &[ShardRecording]) -> Result<Scored, Pla
             },
         );
     }
-    let result = faceoff_scoring::score_evaluation(meta.profile, meta.seed, tasks);
+    let mut result = faceoff_scoring::score_evaluation(meta.profile, meta.seed, tasks);
+    result.timing = shards
+        .iter()
+        .map(|shard| shard.report.timing)
+        .reduce(SlotTiming::worse);
     Ok(Scored { result, violations })
 }
 

@@ -41,11 +41,17 @@ pub(crate) struct StepRow<'a> {
 
 /// Where an episode's course goes.
 pub(crate) trait StepSink {
+    /// Begins an episode. What was begun before and has not ended is dropped: it is played again.
     fn begin(&mut self, start: EpisodeStart<'_>);
     /// The observation that the agent was given, before the step.
     fn observe(&mut self, observation: &[f64]);
     fn step(&mut self, row: &StepRow<'_>);
-    fn end(&mut self, outcome: &EpisodeOutcome) -> Result<(), PlatformFault>;
+    /// Ends it; `host_noise_reruns` tries were dropped before this one.
+    fn end(
+        &mut self,
+        outcome: &EpisodeOutcome,
+        host_noise_reruns: u32,
+    ) -> Result<(), PlatformFault>;
 }
 
 /// Records nothing.
@@ -55,7 +61,7 @@ impl StepSink for Nowhere {
     fn begin(&mut self, _: EpisodeStart<'_>) {}
     fn observe(&mut self, _: &[f64]) {}
     fn step(&mut self, _: &StepRow<'_>) {}
-    fn end(&mut self, _: &EpisodeOutcome) -> Result<(), PlatformFault> {
+    fn end(&mut self, _: &EpisodeOutcome, _: u32) -> Result<(), PlatformFault> {
         Ok(())
     }
 }
@@ -97,9 +103,13 @@ impl StepSink for Recorder {
         self.steps.push(row);
     }
 
-    fn end(&mut self, outcome: &EpisodeOutcome) -> Result<(), PlatformFault> {
+    fn end(
+        &mut self,
+        outcome: &EpisodeOutcome,
+        host_noise_reruns: u32,
+    ) -> Result<(), PlatformFault> {
         self.steps.flush()?;
-        self.episodes.end(outcome)
+        self.episodes.end(outcome, host_noise_reruns)
     }
 }
 

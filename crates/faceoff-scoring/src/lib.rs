@@ -22,8 +22,8 @@ mod unique_map;
 
 pub use board::{BoardEntry, RankedEntry, overall_board, task_board};
 pub use episode::{
-    COMPUTATION_TIME_MAX_POINTS, EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS,
-    MAX_EPISODE_PENALTY, computation_time_penalty, episode_penalty,
+    COMPUTATION_TIME_LIMITS_S, COMPUTATION_TIME_MAX_POINTS, EE_POINTS, JOINT_POS_POINTS,
+    JOINT_VEL_POINTS, LINK_POINTS, MAX_EPISODE_PENALTY, computation_time_penalty, episode_penalty,
 };
 pub use evaluation::{overall_score, score_evaluation, task_weight_percent};
 pub use interval::{wilson95, wilson95_of_rate};

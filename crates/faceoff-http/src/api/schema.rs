@@ -76,6 +76,34 @@ pub(crate) struct TaskResult {
     computation_time_s: ComputationTimeSummary,
 }
 
+/// Round trips to an agent that answers at once, in seconds.
+#[derive(ToSchema)]
+#[cfg_attr(test, derive(serde::Deserialize), serde(deny_unknown_fields))]
+pub(crate) struct RoundTrips {
+    /// How many were measured.
+    count: u32,
+    /// Median.
+    p50: f64,
+    /// 99th percentile.
+    p99: f64,
+    /// Maximum.
+    max: f64,
+}
+
+/// How evenly the slots kept time: the worst of them, value by value.
+#[derive(ToSchema)]
+#[cfg_attr(test, derive(serde::Deserialize), serde(deny_unknown_fields))]
+pub(crate) struct SlotTiming {
+    /// Before the first episode.
+    before_s: RoundTrips,
+    /// Between the episodes.
+    during_s: RoundTrips,
+    /// Longest time for which one of the slots' CPUs served nobody, in seconds.
+    longest_stall_s: f64,
+    /// Tries of episodes that were dropped and played again because the host stalled.
+    host_noise_reruns: u32,
+}
+
 /// The score of one evaluation; the layout of `results.json`.
 #[derive(ToSchema)]
 #[cfg_attr(test, derive(serde::Deserialize), serde(deny_unknown_fields))]
@@ -94,13 +122,15 @@ pub(crate) struct EvaluationResult {
     penalty_points: f64,
     /// deployable, improvable or non_deployable.
     tier: String,
+    /// The slots' noise floor and re-runs; absent in results of older versions.
+    timing: Option<SlotTiming>,
 }
 
 #[cfg(test)]
 mod tests {
     use faceoff_types::{
-        ComputationTimeSummary, EvaluationResult, Profile, Seed, Task, TaskResult, Tier,
-        ViolationCounts,
+        ComputationTimeSummary, EvaluationResult, Profile, Seed, SlotTiming, Task, TaskResult,
+        Tier, ViolationCounts,
     };
 
     #[test]
@@ -124,6 +154,7 @@ mod tests {
             score: 40.0,
             penalty_points: 0.5,
             tier: Tier::Deployable,
+            timing: Some(SlotTiming::default()),
         };
         let json = serde_json::to_string(&result).unwrap();
         serde_json::from_str::<super::EvaluationResult>(&json).unwrap();

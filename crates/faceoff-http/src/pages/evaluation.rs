@@ -11,7 +11,9 @@ use crate::{
 use askama::Template;
 use axum::{extract::State, response::Response};
 use faceoff_store::EvaluationState;
-use faceoff_types::{EvaluationId, EvaluationResult, Profile, Task, TaskResult};
+use faceoff_types::{
+    EvaluationId, EvaluationResult, Profile, RoundTrips, SlotTiming, Task, TaskResult,
+};
 use figures::Rate;
 use jiff::civil;
 
@@ -77,6 +79,42 @@ struct Finished {
     seed: Option<String>,
     finished_at: String,
     tasks: Vec<TaskFigures>,
+    timing: Option<TimingFigures>,
+}
+
+/// How evenly the slots kept time, in words.
+struct TimingFigures {
+    before: RoundTripFigures,
+    during: RoundTripFigures,
+    /// `None` when there was none.
+    longest_stall_ms: Option<String>,
+    host_noise_reruns: u32,
+}
+
+/// Round trips to the calibration agent, in milliseconds.
+struct RoundTripFigures {
+    count: u32,
+    p50_ms: String,
+    p99_ms: String,
+    max_ms: String,
+}
+
+impl TimingFigures {
+    fn of(timing: &SlotTiming) -> Self {
+        let figures = |trips: RoundTrips| RoundTripFigures {
+            count: trips.count,
+            p50_ms: figures::fine_milliseconds(trips.p50),
+            p99_ms: figures::fine_milliseconds(trips.p99),
+            max_ms: figures::fine_milliseconds(trips.max),
+        };
+        Self {
+            before: figures(timing.before_s),
+            during: figures(timing.during_s),
+            longest_stall_ms: (timing.longest_stall_s > 0.0)
+                .then(|| figures::milliseconds(timing.longest_stall_s)),
+            host_noise_reruns: timing.host_noise_reruns,
+        }
+    }
 }
 
 #[derive(Template)]
@@ -164,5 +202,6 @@ fn finished(result: &EvaluationResult, seed: Option<String>, finished_at: String
             .iter()
             .map(|(task, result)| TaskFigures::of(*task, result))
             .collect(),
+        timing: result.timing.as_ref().map(TimingFigures::of),
     }
 }

@@ -5,6 +5,7 @@ use arrow_array::{
     builder::{BooleanBuilder, StringBuilder, UInt32Builder},
 };
 use arrow_schema::{DataType, Field, Schema};
+use faceoff_sim::EpisodeState;
 use faceoff_types::{EpisodeEnd, EpisodeOutcome};
 use std::{path::Path, sync::Arc};
 
@@ -15,6 +16,8 @@ const BATCH: usize = 256;
 pub(super) struct EpisodesTable {
     writer: TableWriter,
     rows: usize,
+    /// How the episode under way began.
+    begun: Option<Begun>,
     tasks: StringBuilder,
     episodes: UInt32Builder,
     seeds: StringBuilder,
@@ -25,7 +28,14 @@ pub(super) struct EpisodesTable {
     violations: [BooleanBuilder; 4],
     times: FloatColumns,
     faults: StringBuilder,
+    host_noise_reruns: UInt32Builder,
     initial: FloatColumns,
+}
+
+struct Begun {
+    seed: String,
+    interpolation: Option<String>,
+    initial: EpisodeState,
 }
 
 impl EpisodesTable {
@@ -57,10 +67,12 @@ impl EpisodesTable {
         ];
         fields.extend_from_slice(times.fields());
         fields.push(text("fault", true));
+        fields.push(Field::new("host_noise_reruns", DataType::UInt32, false));
         fields.extend_from_slice(initial.fields());
         Ok(Self {
             writer: TableWriter::create(path, Schema::new(fields))?,
             rows: 0,
+            begun: None,
             tasks: StringBuilder::new(),
             episodes: UInt32Builder::new(),
             seeds: StringBuilder::new(),
@@ -71,19 +83,32 @@ impl EpisodesTable {
             violations: Default::default(),
             times,
             faults: StringBuilder::new(),
+            host_noise_reruns: UInt32Builder::new(),
             initial,
         })
     }
 
+    /// Begins an episode, in place of one that has not ended.
     pub fn begin(&mut self, start: &EpisodeStart<'_>) {
-        self.seeds.append_value(start.seed.to_string());
-        self.interpolations
-            .append_option(start.interpolation.map(|code| code.to_string()));
-        self.initial.put_state(start.state);
-        self.initial.end_row();
+        self.begun = Some(Begun {
+            seed: start.seed.to_string(),
+            interpolation: start.interpolation.map(|code| code.to_string()),
+            initial: start.state.clone(),
+        });
     }
 
-    pub fn end(&mut self, outcome: &EpisodeOutcome) -> Result<(), PlatformFault> {
+    pub fn end(
+        &mut self,
+        outcome: &EpisodeOutcome,
+        host_noise_reruns: u32,
+    ) -> Result<(), PlatformFault> {
+        let begun = self.begun.take().ok_or_else(|| {
+            PlatformFault::Recording("an episode ended that was not begun".to_owned())
+        })?;
+        self.seeds.append_value(begun.seed);
+        self.interpolations.append_option(begun.interpolation);
+        self.initial.put_state(&begun.initial);
+        self.initial.end_row();
         self.tasks.append_value(outcome.task.as_str());
         self.episodes.append_value(outcome.episode);
         self.steps.append_value(outcome.steps);
@@ -110,6 +135,7 @@ impl EpisodesTable {
             .transpose()
             .map_err(PlatformFault::recording("writing a fault"))?;
         self.faults.append_option(fault);
+        self.host_noise_reruns.append_value(host_noise_reruns);
         self.rows += 1;
         if self.rows < BATCH {
             Ok(())
@@ -139,6 +165,7 @@ impl EpisodesTable {
         );
         columns.extend(self.times.take());
         columns.push(Arc::new(self.faults.finish()));
+        columns.push(Arc::new(self.host_noise_reruns.finish()));
         columns.extend(self.initial.take());
         self.writer.write(columns)
     }
