@@ -7,6 +7,7 @@
 //! This crate reads no file, no clock and no random numbers, and it knows neither the simulator nor
 //! the database.
 
+mod ablation;
 mod binomial;
 mod board;
 mod episode;
@@ -20,6 +21,7 @@ mod tier;
 pub mod tournament;
 mod unique_map;
 
+pub use ablation::{ProfileEffect, ablation};
 pub use board::{BoardEntry, RankedEntry, overall_board, task_board};
 pub use episode::{
     COMPUTATION_TIME_LIMITS_S, COMPUTATION_TIME_MAX_POINTS, EE_POINTS, JOINT_POS_POINTS,
