@@ -3,17 +3,19 @@
 use crate::{
     PlatformFault,
     recording::{
-        EPISODES_FILE, HashingWriter, LOG_FILE, MANIFEST_FILE, RESULTS_FILE, STEPS_FILE,
-        ShardRecording, StepScan, VIOLATIONS_FILE, join, scan_steps,
+        CALIBRATION_FILE, EPISODES_FILE, HashingWriter, LOG_FILE, MANIFEST_FILE, RESULTS_FILE,
+        STEPS_FILE, ShardRecording, StepScan, VIOLATIONS_FILE, join, scan_steps,
     },
     seal,
     simulator::simulator_id,
 };
 use faceoff_types::{
-    ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationResult, Profile, Seed, Task, TaskResult,
+    ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationResult, Profile, Seed, SlotTiming, Task,
+    TaskResult,
 };
 use faceoff_wire::dataset::{
-    DATASET_SCHEMA, DatasetManifest, FileDigest, SlowEpisode, TaskViolations, ViolationsFile,
+    CalibrationFile, DATASET_SCHEMA, DatasetManifest, FileDigest, ShardCalibration, SlowEpisode,
+    TaskViolations, ViolationsFile,
 };
 use serde::{Deserialize, Serialize};
 use std::{
@@ -40,8 +42,8 @@ pub struct EvaluationMeta {
 }
 
 /// Joins the recordings of all shards of an evaluation, in any order, into one zip archive:
-/// `steps.parquet`, `episodes.parquet`, `violations.json`, `results.json`, `agent.log` and
-/// `manifest.json` with the hashes of the others. Returns the score, which is also `results.json`.
+/// `steps.parquet`, `episodes.parquet`, `violations.json`, `results.json`, `calibration.json`,
+/// `agent.log` and `manifest.json` with the hashes of the others. Returns the score, which is also `results.json`.
 ///
 /// Nothing is simulated again. The archive is written under a temporary name and renamed; the same
 /// shards give the same bytes.
@@ -60,21 +62,35 @@ pub fn assemble(
         .collect::<Result<Vec<_>, _>>()?;
     shards.sort_by_key(|shard| (shard.spec.task, shard.spec.episodes.start));
     let episodes = check(meta, &shards)?;
-    let Scored { result, violations } = score(meta.profile, meta.seed, played(&shards)?);
+    let calibration = calibration(&shards);
+    let Scored { result, violations } = score(
+        meta.profile,
+        meta.seed,
+        played(&shards)?,
+        calibration.worst(),
+    );
 
     let partial = archive.with_extension("zip.partial");
-    write_dataset(meta, &shards, episodes, &result, &violations, &partial)
-        .and_then(|()| {
-            fs::rename(&partial, archive).map_err(PlatformFault::io(format!(
-                "renaming to {}",
-                archive.display()
-            )))
-        })
-        .inspect_err(|_| {
-            if let Err(error) = fs::remove_file(&partial) {
-                tracing::debug!(%error, "no unfinished dataset to remove");
-            }
-        })?;
+    write_dataset(
+        meta,
+        &shards,
+        episodes,
+        &result,
+        &violations,
+        &calibration,
+        &partial,
+    )
+    .and_then(|()| {
+        fs::rename(&partial, archive).map_err(PlatformFault::io(format!(
+            "renaming to {}",
+            archive.display()
+        )))
+    })
+    .inspect_err(|_| {
+        if let Err(error) = fs::remove_file(&partial) {
+            tracing::debug!(%error, "no unfinished dataset to remove");
+        }
+    })?;
     Ok(result)
 }
 
@@ -84,6 +100,7 @@ fn write_dataset(
     episodes: BTreeMap<Task, u32>,
     result: &EvaluationResult,
     violations: &ViolationsFile,
+    calibration: &CalibrationFile,
     path: &Path,
 ) -> Result<(), PlatformFault> {
     let file =
@@ -98,6 +115,7 @@ fn write_dataset(
     })?;
     dataset.add_json(VIOLATIONS_FILE, violations)?;
     dataset.add_json(RESULTS_FILE, result)?;
+    dataset.add_json(CALIBRATION_FILE, calibration)?;
     dataset.add(LOG_FILE, |out| write_log(shards, out))?;
     let manifest = DatasetManifest {
         schema: DATASET_SCHEMA.to_owned(),
@@ -167,6 +185,22 @@ fn check(
     Ok(episodes)
 }
 
+/// What each slot measured of itself.
+fn calibration(shards: &[ShardRecording]) -> CalibrationFile {
+    CalibrationFile {
+        schema: DATASET_SCHEMA.to_owned(),
+        shards: shards
+            .iter()
+            .map(|ShardRecording { spec, report, .. }| ShardCalibration {
+                task: spec.task,
+                first_episode: spec.episodes.start,
+                end_episode: spec.episodes.end,
+                timing: report.timing,
+            })
+            .collect(),
+    }
+}
+
 /// What follows from the episodes of an evaluation.
 pub(crate) struct Scored {
     pub result: EvaluationResult,
@@ -178,6 +212,7 @@ pub(crate) fn score(
     profile: Profile,
     seed: Seed,
     played: BTreeMap<Task, (Vec<EpisodeOutcome>, StepScan)>,
+    timing: Option<SlotTiming>,
 ) -> Scored {
     let mut tasks: BTreeMap<Task, TaskResult> = BTreeMap::new();
     let mut violations = ViolationsFile {
@@ -202,10 +237,9 @@ pub(crate) fn score(
             },
         );
     }
-    Scored {
-        result: faceoff_scoring::score_evaluation(profile, seed, tasks),
-        violations,
-    }
+    let mut result = faceoff_scoring::score_evaluation(profile, seed, tasks);
+    result.timing = timing;
+    Scored { result, violations }
 }
 
 /// Outcomes and steps of all shards, which come in order.

@@ -14,6 +14,9 @@ pub struct TimeLimits {
     pub step_s: f64,
     /// To exit after `bye`, before it is killed.
     pub bye_s: f64,
+    /// How often an episode is played again because the host stalled, at most; then the last try
+    /// counts as it is. 0: never.
+    pub host_noise_reruns: u32,
 }
 
 impl Default for TimeLimits {
@@ -23,6 +26,7 @@ impl Default for TimeLimits {
             reset_s: 10.0,
             step_s: 1.0,
             bye_s: 5.0,
+            host_noise_reruns: 2,
         }
     }
 }

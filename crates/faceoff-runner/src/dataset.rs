@@ -13,11 +13,12 @@ pub(crate) use episodes::{Columns, batches as episode_batches};
 pub use steps::{StepBatches, StepTable};
 
 use crate::recording::{
-    EPISODES_FILE, LOG_FILE, MANIFEST_FILE, RESULTS_FILE, STEPS_FILE, VIOLATIONS_FILE,
+    CALIBRATION_FILE, EPISODES_FILE, LOG_FILE, MANIFEST_FILE, RESULTS_FILE, STEPS_FILE,
+    VIOLATIONS_FILE,
 };
 use container::Container;
 use faceoff_types::{EvaluationResult, RULESET};
-use faceoff_wire::dataset::{DATASET_SCHEMA, DatasetManifest};
+use faceoff_wire::dataset::{CalibrationFile, DATASET_SCHEMA, DatasetManifest};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use part::Part;
 use serde::Deserialize;
@@ -31,11 +32,12 @@ use std::{
 const ARCHIVE: &str = "dataset.zip";
 
 /// Every file of a dataset but its manifest.
-const FILES: [&str; 5] = [
+const FILES: [&str; 6] = [
     STEPS_FILE,
     EPISODES_FILE,
     VIOLATIONS_FILE,
     RESULTS_FILE,
+    CALIBRATION_FILE,
     LOG_FILE,
 ];
 
@@ -144,6 +146,15 @@ impl Dataset {
     pub fn results(&self) -> Result<EvaluationResult, DatasetError> {
         serde_json::from_slice(&self.bytes(RESULTS_FILE)?)
             .map_err(DatasetError::unreadable(RESULTS_FILE))
+    }
+
+    /// What the slots measured of themselves.
+    ///
+    /// # Errors
+    /// [`DatasetError::Unreadable`] if `calibration.json` is nothing of the kind.
+    pub fn calibration(&self) -> Result<CalibrationFile, DatasetError> {
+        serde_json::from_slice(&self.bytes(CALIBRATION_FILE)?)
+            .map_err(DatasetError::unreadable(CALIBRATION_FILE))
     }
 
     /// The episodes, in order.

@@ -12,10 +12,13 @@
 
 mod assemble;
 pub mod bundle;
+mod calibration;
 mod config;
 mod cpu;
 pub mod dataset;
 mod fault;
+mod host_noise;
+mod host_watch;
 mod log;
 mod player;
 mod recording;
@@ -31,6 +34,7 @@ mod wire_env;
 pub use assemble::{EvaluationMeta, assemble};
 pub use config::{AgentEnvironment, TimeLimits};
 pub use fault::PlatformFault;
+pub use host_watch::HostWatch;
 pub use session::{Answered, Session, Trouble};
-pub use shard::{Observer, ShardReport, ShardSpec, run_shard};
+pub use shard::{Observer, ShardReport, ShardSpec, run_shard, run_shard_watched};
 pub use smoke::{SMOKE_STEPS, SmokeReport, smoke};

@@ -1,17 +1,17 @@
 use crate::{
-    AgentEnvironment, PlatformFault, Session, Trouble,
+    AgentEnvironment, HostWatch, PlatformFault, Session, Trouble,
     bundle::Bundle,
+    host_noise::{Late, Times},
     log::Log,
     recording::{EpisodeStart, StepRow, StepSink},
 };
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
 use faceoff_types::{
-    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, EpisodeOutcome, Factor, Profile, Seed,
-    Task,
+    AgentFault, AgentFaultKind, EpisodeEnd, EpisodeOutcome, Factor, Profile, Seed, Task,
 };
 
-/// Plays episodes of one task with one agent, which is restarted after a fault.
-#[derive(Debug)]
+/// Plays episodes of one task with one agent, which is restarted after a fault. An episode that the
+/// host's stalls cost the agent is played again.
 pub(crate) struct Player<'a> {
     bundle: &'a Bundle,
     env: &'a AgentEnvironment,
@@ -23,6 +23,15 @@ pub(crate) struct Player<'a> {
     session: Option<Session>,
     log: Log,
     action: Vec<f64>,
+    watch: &'a dyn HostWatch,
+    host_noise_reruns: u32,
+}
+
+/// One try of an episode.
+struct Try {
+    outcome: EpisodeOutcome,
+    /// Did the host's stalls cost the agent points, or the episode?
+    spoilt_by_host: bool,
 }
 
 /// The agent's fault, before it is known where it counts.
@@ -40,6 +49,7 @@ impl<'a> Player<'a> {
         profile: Profile,
         seed: Seed,
         mismatch_seed: Seed,
+        watch: &'a dyn HostWatch,
     ) -> Self {
         let settings = PerturbationSettings::default();
         let plant = if profile.factors().contains(Factor::ModelMismatch) {
@@ -58,10 +68,18 @@ impl<'a> Player<'a> {
             session: None,
             log: Log::new(env.limits.stderr_tail_bytes),
             action: Vec::new(),
+            watch,
+            host_noise_reruns: 0,
         }
     }
 
-    /// Plays one episode of at most `max_steps` control steps.
+    /// Tries that were dropped so far because the host stalled.
+    pub const fn host_noise_reruns(&self) -> u32 {
+        self.host_noise_reruns
+    }
+
+    /// Plays one episode of at most `max_steps` control steps, again while the host spoils it and the
+    /// limit of re-runs allows; the last try counts.
     ///
     /// # Errors
     /// The platform's alone; an agent's fault is an outcome. `cancelled` is asked before each step.
@@ -72,6 +90,36 @@ impl<'a> Player<'a> {
         sink: &mut dyn StepSink,
         cancelled: &dyn Fn() -> bool,
     ) -> Result<EpisodeOutcome, PlatformFault> {
+        let mut reruns = 0;
+        loop {
+            let Try {
+                outcome,
+                spoilt_by_host,
+            } = self.attempt(episode, max_steps, sink, cancelled)?;
+            if spoilt_by_host && reruns < self.env.time.host_noise_reruns {
+                reruns += 1;
+                self.host_noise_reruns += 1;
+                tracing::warn!(task = %self.task, episode, reruns, "the host stalled: the episode is played again");
+                if outcome.fault.is_some() {
+                    self.log.add(
+                        "",
+                        Some("not counted: the host stalled, and the episode is played again"),
+                    );
+                }
+                continue;
+            }
+            sink.end(&outcome, reruns)?;
+            return Ok(outcome);
+        }
+    }
+
+    fn attempt(
+        &mut self,
+        episode: u32,
+        max_steps: u32,
+        sink: &mut dyn StepSink,
+        cancelled: &dyn Fn() -> bool,
+    ) -> Result<Try, PlatformFault> {
         let start_up = match self.session {
             Some(_) => None,
             None => self.start()?,
@@ -99,14 +147,17 @@ impl<'a> Player<'a> {
         });
         if let Some(fault) = start_up {
             let outcome = self.failed(&world, episode, None, None, fault, Times::default());
-            sink.end(&outcome)?;
-            return Ok(outcome);
+            return Ok(Try {
+                outcome,
+                spoilt_by_host: false,
+            });
         }
 
         let mut times = Times::default();
-        let outcome =
-            match self.converse(episode, max_steps, &mut world, &mut times, sink, cancelled) {
-                Ok(end) => EpisodeOutcome {
+        match self.converse(episode, max_steps, &mut world, &mut times, sink, cancelled) {
+            Ok(end) => Ok(Try {
+                spoilt_by_host: times.host_cost_points(),
+                outcome: EpisodeOutcome {
                     task: self.task,
                     episode,
                     steps: world.steps(),
@@ -116,14 +167,36 @@ impl<'a> Player<'a> {
                     computation_time: times.summary(),
                     fault: None,
                 },
-                Err((_, Trouble::Platform(fault))) => return Err(fault),
-                Err((step, Trouble::Agent { fault, line })) => {
-                    let fault = Fault { kind: fault, line };
-                    self.failed(&world, episode, Some(episode), step, fault, times)
-                }
-            };
-        sink.end(&outcome)?;
-        Ok(outcome)
+            }),
+            Err((_, Trouble::Platform(fault))) => Err(fault),
+            Err((step, Trouble::Agent { fault, line })) => {
+                let spoilt_by_host = step.is_some() && self.is_kept_from_answering(&fault);
+                let fault = Fault { kind: fault, line };
+                Ok(Try {
+                    outcome: self.failed(&world, episode, Some(episode), step, fault, times),
+                    spoilt_by_host,
+                })
+            }
+        }
+    }
+
+    /// Was it the host's stall that made a step's hard limit pass?
+    fn is_kept_from_answering(&mut self, fault: &AgentFaultKind) -> bool {
+        let AgentFaultKind::TimedOut { limit_s, .. } = fault else {
+            return false;
+        };
+        let Some(session) = &mut self.session else {
+            return false;
+        };
+        let Some((asked, until)) = session.waited() else {
+            return false;
+        };
+        let late = Late {
+            wall_s: (until - asked).as_secs_f64(),
+            cpu_s: session.cpu_time_since_answer_s(),
+            stalled_s: self.watch.stalled_s(asked, until),
+        };
+        late.no_answer_is_noise(*limit_s)
     }
 
     /// Says goodbye to the agent and returns the log of all its processes.
@@ -179,7 +252,17 @@ impl<'a> Player<'a> {
             let answered = session
                 .step(step, world.observation(), &mut self.action)
                 .map_err(at_step)?;
-            times.add(answered.computation_time_s);
+            let wall_s = answered.computation_time_s;
+            let without_noise_s = match session.waited() {
+                Some((asked, until)) if Late::is_late(wall_s) => Late {
+                    wall_s,
+                    cpu_s: answered.cpu_time_s,
+                    stalled_s: self.watch.stalled_s(asked, until),
+                }
+                .without_noise_s(),
+                _ => wall_s,
+            };
+            times.add(wall_s, without_noise_s);
             sink.observe(world.observation());
             let outcome = world.step(&self.action);
             sink.step(&StepRow {
@@ -232,34 +315,6 @@ impl<'a> Player<'a> {
             violations: world.violations(),
             computation_time: times.summary(),
             fault: Some(fault),
-        }
-    }
-}
-
-/// Computation times of one episode.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Times {
-    sum_s: f64,
-    max_s: f64,
-    count: u32,
-}
-
-impl Times {
-    pub fn add(&mut self, time_s: f64) {
-        self.sum_s += time_s;
-        self.max_s = self.max_s.max(time_s);
-        self.count += 1;
-    }
-
-    pub fn summary(self) -> ComputationTime {
-        let mean_s = if self.count == 0 {
-            0.0
-        } else {
-            self.sum_s / f64::from(self.count)
-        };
-        ComputationTime {
-            mean_s,
-            max_s: self.max_s,
         }
     }
 }

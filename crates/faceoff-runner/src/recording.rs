@@ -45,11 +45,17 @@ pub(crate) struct StepRow<'a> {
 
 /// Where an episode's course goes.
 pub(crate) trait StepSink {
+    /// Begins an episode. What was begun before and has not ended is dropped: it is played again.
     fn begin(&mut self, start: EpisodeStart<'_>);
     /// The observation that the agent was given, before the step.
     fn observe(&mut self, observation: &[f64]);
     fn step(&mut self, row: &StepRow<'_>);
-    fn end(&mut self, outcome: &EpisodeOutcome) -> Result<(), PlatformFault>;
+    /// Ends it; `host_noise_reruns` tries were dropped before this one.
+    fn end(
+        &mut self,
+        outcome: &EpisodeOutcome,
+        host_noise_reruns: u32,
+    ) -> Result<(), PlatformFault>;
 }
 
 /// Records nothing.
@@ -59,7 +65,7 @@ impl StepSink for Nowhere {
     fn begin(&mut self, _: EpisodeStart<'_>) {}
     fn observe(&mut self, _: &[f64]) {}
     fn step(&mut self, _: &StepRow<'_>) {}
-    fn end(&mut self, _: &EpisodeOutcome) -> Result<(), PlatformFault> {
+    fn end(&mut self, _: &EpisodeOutcome, _: u32) -> Result<(), PlatformFault> {
         Ok(())
     }
 }
@@ -111,9 +117,13 @@ impl StepSink for Recorder {
         self.episodes.step(row);
     }
 
-    fn end(&mut self, outcome: &EpisodeOutcome) -> Result<(), PlatformFault> {
+    fn end(
+        &mut self,
+        outcome: &EpisodeOutcome,
+        host_noise_reruns: u32,
+    ) -> Result<(), PlatformFault> {
         self.steps_file.write(self.steps.take())?;
-        self.episodes.end(outcome)?;
+        self.episodes.end(outcome, host_noise_reruns)?;
         if self.episodes.len() >= EPISODES_BATCH {
             self.episodes_file.write(self.episodes.take())?;
         }
@@ -129,6 +139,7 @@ pub(crate) const EPISODES_FILE: &str = "episodes.parquet";
 pub(crate) const VIOLATIONS_FILE: &str = "violations.json";
 /// The score.
 pub(crate) const RESULTS_FILE: &str = "results.json";
+pub(crate) const CALIBRATION_FILE: &str = "calibration.json";
 /// What a dataset is, and the hashes of its other files.
 pub(crate) const MANIFEST_FILE: &str = "manifest.json";
 /// The agent's log.

@@ -47,6 +47,8 @@ pub struct Session {
     /// The message being written; its memory is reused.
     line: Vec<u8>,
     cpu_time_s: Option<f64>,
+    /// From the last question's last byte to its answer, or to the end of the wait for one.
+    waited: Option<(Instant, Instant)>,
 }
 
 /// A question's wait: its name and limit, as a fault tells them.
@@ -106,6 +108,7 @@ impl Session {
             interpolation: InterpolationCode::new(None).expect("null is a code"),
             line: Vec::with_capacity(4096),
             cpu_time_s: None,
+            waited: None,
         };
         match session.hello(started, manifest.interpolation, task) {
             Ok(()) => Ok(session),
@@ -195,6 +198,19 @@ impl Session {
         })
     }
 
+    /// When the last question had been asked, and when its answer came or was no longer waited for.
+    /// `None` when it could not even be asked.
+    pub(crate) const fn waited(&self) -> Option<(Instant, Instant)> {
+        self.waited
+    }
+
+    /// CPU time that the agent's process tree used since its last answer, in seconds, where the host
+    /// tells.
+    pub(crate) fn cpu_time_since_answer_s(&mut self) -> Option<f64> {
+        let before = self.cpu_time_s?;
+        Some((self.process.cpu_time_s()? - before).max(0.0))
+    }
+
     /// Tells that an episode is over. An agent that no longer listens meets its fault at the next
     /// question.
     ///
@@ -243,6 +259,7 @@ impl Session {
         if wait.phase != "start-up" && self.process.has_pending_output().map_err(platform)? {
             return Err(self.early(wait));
         }
+        self.waited = None;
         let asked = match self.process.write_line(&self.line, deadline) {
             Ok(asked) => asked,
             Err(WriteError::Closed) => return Err(self.closed()),
@@ -254,13 +271,19 @@ impl Session {
             .read_line(MAX_LINE_BYTES, deadline)
             .map_err(platform)?
         {
-            ReadLine::Line { bytes, at } => Ok(Answer {
-                bytes,
-                asked,
-                answered: at,
-            }),
+            ReadLine::Line { bytes, at } => {
+                self.waited = Some((asked, at));
+                Ok(Answer {
+                    bytes,
+                    asked,
+                    answered: at,
+                })
+            }
             ReadLine::TooLong { head } => Err(too_long(&head)),
-            ReadLine::TimedOut => Err(timed_out(wait)),
+            ReadLine::TimedOut => {
+                self.waited = Some((asked, Instant::now()));
+                Err(timed_out(wait))
+            }
             ReadLine::Closed => Err(self.closed()),
         }
     }

@@ -1,11 +1,13 @@
 use crate::{
-    AgentEnvironment, PlatformFault,
+    AgentEnvironment, HostWatch, PlatformFault,
     bundle::Bundle,
+    calibration::{self, CalibrationAgent},
     cpu::OffTheAgentsCpus,
+    host_watch::StallWatch,
     player::Player,
     recording::{Recorder, ShardFolder},
 };
-use faceoff_types::{EpisodeOutcome, Profile, Seed, Task};
+use faceoff_types::{EpisodeOutcome, Profile, Seed, SlotTiming, Task};
 use serde::{Deserialize, Serialize};
 use std::{ops::Range, path::Path};
 
@@ -35,6 +37,8 @@ pub struct ShardReport {
     pub log: String,
     /// More than the allowed faults: the remaining episodes were not played.
     pub stopped_by_faults: bool,
+    /// How evenly the slot kept time meanwhile.
+    pub timing: SlotTiming,
 }
 
 /// Follows a shard as it runs, and can stop it.
@@ -63,6 +67,24 @@ pub fn run_shard(
     observer: &mut dyn Observer,
 ) -> Result<ShardReport, PlatformFault> {
     let _pinned = OffTheAgentsCpus::pin(&env.agent_cpus);
+    let watch = StallWatch::start(&env.agent_cpus)?;
+    run_shard_watched(spec, bundle, env, out, observer, &watch)
+}
+
+/// [`run_shard`] with another witness of what the host does.
+///
+/// # Errors
+/// As [`run_shard`].
+pub fn run_shard_watched(
+    spec: &ShardSpec,
+    bundle: &Bundle,
+    env: &AgentEnvironment,
+    out: &Path,
+    observer: &mut dyn Observer,
+    watch: &dyn HostWatch,
+) -> Result<ShardReport, PlatformFault> {
+    let _pinned = OffTheAgentsCpus::pin(&env.agent_cpus);
+    let mut calibration = Calibration::start(&env.agent_cpus)?;
     let folder = ShardFolder::create(out)?;
     let mut recorder = Recorder::create(&folder, spec.task)?;
     let mut player = Player::new(
@@ -72,20 +94,24 @@ pub fn run_shard(
         spec.profile,
         spec.seed,
         spec.mismatch_seed,
+        watch,
     );
-    let (outcomes, stopped_by_faults) = match play(spec, &mut player, &mut recorder, observer) {
+    let played = play(spec, &mut player, &mut recorder, observer, &mut calibration);
+    let (outcomes, stopped_by_faults) = match played {
         Ok(played) => played,
         Err(fault) => {
             observer.log(&player.abort());
             return Err(fault);
         }
     };
+    let timing = calibration.finish(watch, player.host_noise_reruns());
     let log = player.close()?;
     observer.log(&log);
     let report = ShardReport {
         outcomes,
         log,
         stopped_by_faults,
+        timing,
     };
     recorder.finish()?;
     folder.commit(spec, &report)?;
@@ -98,6 +124,7 @@ fn play(
     player: &mut Player<'_>,
     recorder: &mut Recorder,
     observer: &mut dyn Observer,
+    calibration: &mut Calibration,
 ) -> Result<(Vec<EpisodeOutcome>, bool), PlatformFault> {
     let mut outcomes = Vec::with_capacity(spec.episodes.len());
     let mut faults = 0;
@@ -108,6 +135,7 @@ fn play(
         let outcome = player.play(episode, faceoff_sim::EPISODE_STEPS, recorder, &|| {
             observer.cancelled()
         })?;
+        calibration.between_episodes()?;
         observer.episode_done(&outcome);
         faults += u32::from(outcome.fault.is_some());
         outcomes.push(outcome);
@@ -116,4 +144,38 @@ fn play(
         }
     }
     Ok((outcomes, false))
+}
+
+/// The slot's noise floor, measured by the calibration agent.
+struct Calibration {
+    agent: CalibrationAgent,
+    before_s: Vec<f64>,
+    during_s: Vec<f64>,
+}
+
+impl Calibration {
+    /// Measures before the first episode.
+    fn start(agent_cpus: &[usize]) -> Result<Self, PlatformFault> {
+        let mut agent = CalibrationAgent::start(agent_cpus)?;
+        let mut before_s = Vec::new();
+        agent.measure(calibration::BEFORE, &mut before_s)?;
+        Ok(Self {
+            agent,
+            before_s,
+            during_s: Vec::new(),
+        })
+    }
+
+    fn between_episodes(&mut self) -> Result<(), PlatformFault> {
+        self.agent.measure(calibration::BETWEEN, &mut self.during_s)
+    }
+
+    fn finish(mut self, watch: &dyn HostWatch, host_noise_reruns: u32) -> SlotTiming {
+        SlotTiming {
+            before_s: calibration::summarise(&mut self.before_s),
+            during_s: calibration::summarise(&mut self.during_s),
+            longest_stall_s: watch.longest_stall_s(),
+            host_noise_reruns,
+        }
+    }
 }

@@ -1,4 +1,7 @@
-use crate::{AgentEnvironment, PlatformFault, bundle::Bundle, log::Log, player::Player, recording};
+use crate::{
+    AgentEnvironment, PlatformFault, bundle::Bundle, host_watch::StallWatch, log::Log,
+    player::Player, recording,
+};
 use faceoff_types::{AgentFault, Profile, Seed, Task};
 use serde::{Deserialize, Serialize};
 
@@ -21,8 +24,14 @@ pub struct SmokeReport {
 /// about the season.
 ///
 /// # Errors
-/// The platform's alone; the agent's fault is in the report.
-pub fn smoke(bundle: &Bundle, env: &AgentEnvironment) -> Result<SmokeReport, PlatformFault> {
+/// The platform's alone; the agent's fault is in the report. [`PlatformFault::Cancelled`] when
+/// `cancelled`, which is asked before each step, said so.
+pub fn smoke(
+    bundle: &Bundle,
+    env: &AgentEnvironment,
+    cancelled: &dyn Fn() -> bool,
+) -> Result<SmokeReport, PlatformFault> {
+    let watch = StallWatch::start(&env.agent_cpus)?;
     let seed = Seed::from_number(0);
     let mut log = Log::new(env.limits.stderr_tail_bytes);
     for task in Task::ALL {
@@ -33,8 +42,9 @@ pub fn smoke(bundle: &Bundle, env: &AgentEnvironment) -> Result<SmokeReport, Pla
             Profile::Evaluation,
             seed,
             seed.model_mismatch(),
+            &watch,
         );
-        let outcome = player.play(0, SMOKE_STEPS, &mut recording::Nowhere, &|| false)?;
+        let outcome = player.play(0, SMOKE_STEPS, &mut recording::Nowhere, cancelled)?;
         log.add(&player.close()?, None);
         if let Some(fault) = outcome.fault {
             return Ok(SmokeReport {

@@ -2,8 +2,8 @@
 //! recorded actions, and compares every recorded number bit for bit; then scores again and compares
 //! the published score.
 //!
-//! Computation times, CPU times and faults cannot be simulated. They are taken from the record, as
-//! they are; what follows from them is computed again.
+//! Computation times, CPU times, faults, the slots' calibration and re-runs cannot be simulated.
+//! They are taken from the record, as they are; what follows from them is computed again.
 
 mod compare;
 mod difference;
@@ -17,7 +17,7 @@ pub use season::{SeasonClaim, SeasonMismatch};
 use crate::{
     assemble::{Scored, json_file, score},
     dataset::{Dataset, DatasetError},
-    recording::{RESULTS_FILE, StepScan, VIOLATIONS_FILE},
+    recording::{CALIBRATION_FILE, RESULTS_FILE, StepScan, VIOLATIONS_FILE},
     simulator::simulator_id,
 };
 use faceoff_types::{EpisodeOutcome, EvaluationResult, Task};
@@ -184,7 +184,7 @@ fn finish(
 ) -> Result<Verified, VerifyError> {
     // Episodes were handed out in order: whatever comes before the first difference was simulated.
     replayed.sort_by_key(|(index, _)| *index);
-    let (mut episodes, mut steps) = (0, 0);
+    let (mut episodes, mut steps, mut reruns) = (0, 0, 0);
     let mut played: BTreeMap<Task, (Vec<EpisodeOutcome>, StepScan)> = dataset
         .manifest()
         .episodes
@@ -192,8 +192,13 @@ fn finish(
         .map(|task| (*task, Default::default()))
         .collect();
     for (_, result) in replayed {
-        let Replayed { outcome, scan } = result?;
+        let Replayed {
+            outcome,
+            scan,
+            host_noise_reruns,
+        } = result?;
         episodes += 1;
+        reruns += host_noise_reruns;
         steps += u64::from(outcome.steps);
         let (outcomes, all) = played.entry(outcome.task).or_default();
         outcomes.push(outcome);
@@ -201,7 +206,21 @@ fn finish(
     }
     fed?;
     let manifest = dataset.manifest();
-    let Scored { result, violations } = score(manifest.profile, manifest.seed, played);
+    let timing = dataset.calibration()?.worst();
+    let counted = timing.map_or(0, |timing| timing.host_noise_reruns);
+    if counted != reruns {
+        return Err(Difference {
+            file: CALIBRATION_FILE.to_owned(),
+            task: None,
+            episode: None,
+            step: None,
+            field: "host_noise_reruns".to_owned(),
+            recorded: format!("{counted} in all"),
+            expected: format!("{reruns}, as the episodes say"),
+        }
+        .into());
+    }
+    let Scored { result, violations } = score(manifest.profile, manifest.seed, played, timing);
     let bytes = |name, json: Result<Vec<u8>, crate::PlatformFault>| {
         json.map_err(DatasetError::unreadable(format!("scoring {name} again")))
     };

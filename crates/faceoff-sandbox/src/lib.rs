@@ -15,6 +15,7 @@ mod bubblewrap;
 mod cgroup;
 mod child_setup;
 mod command_check;
+mod cpu_clock;
 mod end;
 mod error;
 mod isolation;

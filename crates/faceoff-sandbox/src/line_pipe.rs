@@ -1,4 +1,5 @@
-//! Lines to and from the agent: capped, deadline-bounded, stamped right after the last byte.
+//! Lines to and from the agent: capped, deadline-bounded, answers stamped right after their last
+//! byte, questions right before theirs.
 
 use rustix::{
     buffer::spare_capacity,
@@ -40,7 +41,7 @@ pub enum ReadLine {
 /// How writing ended.
 #[derive(Debug)]
 pub(crate) enum Written {
-    /// All of it was taken at this time.
+    /// The call that took the last of it began at this time.
     At(Instant),
     Closed,
     TimedOut,
@@ -83,8 +84,10 @@ impl LinePipe {
             return Ok(Written::Closed);
         };
         loop {
+            // Before the call: on a shared CPU the agent may run, and even answer, before it returns.
+            let at = Instant::now();
             match write(input, bytes) {
-                Ok(count) if count == bytes.len() => return Ok(Written::At(Instant::now())),
+                Ok(count) if count == bytes.len() => return Ok(Written::At(at)),
                 Ok(count) => bytes = &bytes[count..],
                 Err(Errno::PIPE) => return Ok(Written::Closed),
                 Err(Errno::INTR) => {}

@@ -85,8 +85,8 @@ impl AgentProcess {
         })
     }
 
-    /// Writes all of `line` (which ends in `\n`) before `deadline`; returns the time right after its
-    /// last byte was taken.
+    /// Writes all of `line` (which ends in `\n`) before `deadline`; returns the time right before the
+    /// call that wrote its last byte: once woken, an agent that shares our CPU may run before it returns.
     ///
     /// # Errors
     /// [`WriteError::Closed`] and [`WriteError::TimedOut`] are the agent's doing, the rest is ours.
@@ -160,9 +160,11 @@ impl AgentProcess {
         self.stderr.text()
     }
 
-    /// CPU time of the whole tree so far, in seconds; `None` where the host does not tell (no cgroup).
+    /// CPU time of the whole tree so far, in seconds: by its cgroup, or where it has none by the clocks
+    /// of its processes, which miss what a process used right before its end. `None` where the host
+    /// does not tell.
     pub fn cpu_time_s(&self) -> Option<f64> {
-        self.tree.cgroup.as_ref()?.cpu_time_s()
+        self.tree.cpu_time_s()
     }
 
     /// Closes the agent's input, waits up to `grace` for it to exit, then kills the tree; always reaps.

@@ -1,6 +1,8 @@
 //! The processes of one agent: their end awaited, forced, and cleaned up after.
 
-use crate::{cgroup::AgentCgroup, line_pipe::wait_for, status_pipe::StatusPipe};
+use crate::{
+    cgroup::AgentCgroup, cpu_clock::TreeClock, line_pipe::wait_for, status_pipe::StatusPipe,
+};
 use rustix::{
     event::PollFlags,
     process::{Pid, PidfdFlags, Signal, kill_process_group, pidfd_open, pidfd_send_signal},
@@ -21,6 +23,7 @@ const FOLLOW_PATIENCE: Duration = Duration::from_secs(2);
 #[derive(Debug)]
 pub(crate) struct ProcessTree {
     child: Child,
+    clock: TreeClock,
     /// Readable when the child has ended.
     child_end: OwnedFd,
     /// The sandbox's first process: with it ends everything inside.
@@ -41,6 +44,7 @@ impl ProcessTree {
     ) -> io::Result<Self> {
         match pidfd_open(Pid::from_child(&child), PidfdFlags::empty()) {
             Ok(child_end) => Ok(Self {
+                clock: TreeClock::new(Pid::from_child(&child)),
                 child,
                 child_end,
                 sandbox_init: None,
@@ -72,6 +76,14 @@ impl ProcessTree {
 
     pub(crate) fn pid(&self) -> Pid {
         Pid::from_child(&self.child)
+    }
+
+    /// CPU time of the tree so far, seconds.
+    pub(crate) fn cpu_time_s(&self) -> Option<f64> {
+        self.cgroup
+            .as_ref()
+            .and_then(AgentCgroup::cpu_time_s)
+            .or_else(|| self.clock.cpu_time_s())
     }
 
     pub(crate) fn is_sandboxed(&self) -> bool {

@@ -18,15 +18,19 @@ pub const MAX_EPISODE_PENALTY: f64 =
 /// One control step, in seconds: what an answer may take.
 const STEP_S: f64 = 0.02;
 
+/// The times that an episode's slowest answer may take before it costs (more) points, in seconds.
+pub const COMPUTATION_TIME_LIMITS_S: [f64; 3] = [STEP_S, 5.0 * STEP_S, 10.0 * STEP_S];
+
 /// Points for the computation times of one episode: 0, 0.5, 1 or 2 (reference implementation, within
 /// the paper's "0.5–2 pts").
 #[must_use]
 pub fn computation_time_penalty(time: &ComputationTime) -> f64 {
-    if time.max_s > 10.0 * STEP_S || time.mean_s > STEP_S {
+    let [late, later, latest] = COMPUTATION_TIME_LIMITS_S;
+    if time.max_s > latest || time.mean_s > STEP_S {
         COMPUTATION_TIME_MAX_POINTS
-    } else if time.max_s > 5.0 * STEP_S {
+    } else if time.max_s > later {
         1.0
-    } else if time.max_s > STEP_S {
+    } else if time.max_s > late {
         0.5
     } else {
         0.0

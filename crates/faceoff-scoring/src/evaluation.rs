@@ -54,6 +54,7 @@ pub fn score_evaluation(
             .max()
             .unwrap_or(Tier::Deployable),
         tasks,
+        timing: None,
     }
 }
 

@@ -8,6 +8,7 @@
 //! of what it is given), and it knows neither the simulator nor
 //! the database.
 
+mod ablation;
 mod binomial;
 mod board;
 mod comparison;
@@ -26,11 +27,12 @@ mod tier_change;
 pub mod tournament;
 mod unique_map;
 
+pub use ablation::{ProfileEffect, ablation};
 pub use board::{BoardEntry, RankedEntry, overall_board, task_board};
 pub use comparison::{Comparison, NotPaired, OverallComparison, Played, TaskComparison};
 pub use episode::{
-    COMPUTATION_TIME_MAX_POINTS, EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS,
-    MAX_EPISODE_PENALTY, computation_time_penalty, episode_penalty,
+    COMPUTATION_TIME_LIMITS_S, COMPUTATION_TIME_MAX_POINTS, EE_POINTS, JOINT_POS_POINTS,
+    JOINT_VEL_POINTS, LINK_POINTS, MAX_EPISODE_PENALTY, computation_time_penalty, episode_penalty,
 };
 pub use evaluation::{overall_score, score_evaluation, task_weight_percent};
 pub use interval::{wilson95, wilson95_of_rate};

@@ -16,6 +16,7 @@ mod seed;
 mod task;
 mod team_name;
 mod tier;
+mod timing;
 
 pub use computation_time::ComputationTime;
 pub use constraint::{Constraint, Violations};
@@ -29,3 +30,4 @@ pub use seed::{ParseSeedError, Seed};
 pub use task::{ParseTaskError, Task};
 pub use team_name::{InvalidTeamName, TeamName};
 pub use tier::Tier;
+pub use timing::{RoundTrips, SlotTiming};

@@ -1,4 +1,4 @@
-use crate::{Profile, Seed, Task, Tier};
+use crate::{Profile, Seed, SlotTiming, Task, Tier};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -68,4 +68,8 @@ pub struct EvaluationResult {
     pub penalty_points: f64,
     /// Overall tier: the worst over the tasks.
     pub tier: Tier,
+    /// How evenly the slots kept time, the worst of them; absent in results of older versions and
+    /// where nothing was played.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub timing: Option<SlotTiming>,
 }

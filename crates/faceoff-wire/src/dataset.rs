@@ -1,10 +1,10 @@
 //! Files of a dataset: what an evaluation leaves behind beside its Parquet tables.
 //!
 //! A dataset is a zip archive with `manifest.json`, `results.json`, `violations.json`,
-//! `episodes.parquet`, `steps.parquet` and `agent.log`. The layout is versioned by
+//! `calibration.json`, `episodes.parquet`, `steps.parquet` and `agent.log`. The layout is versioned by
 //! [`DATASET_SCHEMA`]; `docs/dataset.md` describes every column.
 
-use faceoff_types::{Profile, Seed, Task};
+use faceoff_types::{Profile, Seed, SlotTiming, Task};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -102,4 +102,36 @@ pub struct SlowEpisode {
     pub max_s: f64,
     /// The points.
     pub points: f64,
+}
+
+/// `calibration.json`: how evenly the slots kept time, measured by the platform itself.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct CalibrationFile {
+    /// [`DATASET_SCHEMA`].
+    pub schema: String,
+    /// In order of the tasks and episodes.
+    pub shards: Vec<ShardCalibration>,
+}
+
+impl CalibrationFile {
+    /// The worst of all slots, value by value; `None` without any.
+    #[must_use]
+    pub fn worst(&self) -> Option<SlotTiming> {
+        let timings = self.shards.iter().map(|shard| shard.timing);
+        timings.reduce(SlotTiming::worse)
+    }
+}
+
+/// The measurements of the slot that played a range of episodes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ShardCalibration {
+    /// The task.
+    pub task: Task,
+    /// The first episode.
+    pub first_episode: u32,
+    /// One past the last episode.
+    pub end_episode: u32,
+    /// What was measured.
+    #[serde(flatten)]
+    pub timing: SlotTiming,
 }

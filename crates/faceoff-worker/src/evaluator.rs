@@ -17,7 +17,12 @@ pub(crate) trait Evaluator: Send + Sync {
     ) -> Result<Bundle, BundleError>;
 
     /// Does the agent start, answer and keep time?
-    fn smoke(&self, bundle: &Bundle, env: &AgentEnvironment) -> Result<SmokeReport, PlatformFault>;
+    fn smoke(
+        &self,
+        bundle: &Bundle,
+        env: &AgentEnvironment,
+        cancelled: &dyn Fn() -> bool,
+    ) -> Result<SmokeReport, PlatformFault>;
 
     /// Plays a shard; its recording is left in `out`.
     fn play(
@@ -52,8 +57,13 @@ impl Evaluator for Runner {
         bundle::unpack(archive, into, limits)
     }
 
-    fn smoke(&self, bundle: &Bundle, env: &AgentEnvironment) -> Result<SmokeReport, PlatformFault> {
-        faceoff_runner::smoke(bundle, env)
+    fn smoke(
+        &self,
+        bundle: &Bundle,
+        env: &AgentEnvironment,
+        cancelled: &dyn Fn() -> bool,
+    ) -> Result<SmokeReport, PlatformFault> {
+        faceoff_runner::smoke(bundle, env, cancelled)
     }
 
     fn play(

@@ -86,7 +86,9 @@ impl Slot {
 
     fn perform(&mut self, work: &Work, keeper: &LeaseKeeper) -> Ended {
         match work {
-            Work::Smoke { claim, submission } => self.tools.smoke(claim, submission),
+            Work::Smoke { claim, submission } => {
+                self.tools.smoke(claim, submission, &keeper.progress())
+            }
             Work::Shard {
                 claim,
                 evaluation,

@@ -61,10 +61,21 @@ impl Tools {
     }
 
     /// Checks an uploaded bundle in the very sandbox and under the very limits of the real run.
-    pub(crate) fn smoke(&mut self, claim: &Claim, submission: &Submission) -> Ended {
+    pub(crate) fn smoke(
+        &mut self,
+        claim: &Claim,
+        submission: &Submission,
+        progress: &Progress,
+    ) -> Ended {
         let outcome = match self.bundle(&submission.bundle) {
             Ok(bundle) => {
-                let report = self.evaluator.smoke(&bundle, &self.agent)?;
+                let smoke = self
+                    .evaluator
+                    .smoke(&bundle, &self.agent, &|| progress.stopped());
+                let report = match smoke {
+                    Err(PlatformFault::Cancelled) if progress.stopped() => return Ok(End::Stopped),
+                    other => other?,
+                };
                 let (agent_name, log) = (bundle.manifest.name, report.log);
                 match report.fault {
                     None => SmokeOutcome::Valid { agent_name, log },

@@ -16,8 +16,8 @@ use axum::{
 };
 use faceoff_store::{Evaluation, EvaluationState};
 use faceoff_types::{
-    AgentFault, EvaluationId, EvaluationResult, Profile, Seed, SubmissionId, Task, TaskResult,
-    TeamId, TeamName, Tier,
+    AgentFault, EvaluationId, EvaluationResult, Profile, Seed, SlotTiming, SubmissionId, Task,
+    TaskResult, TeamId, TeamName, Tier,
 };
 use jiff::{Timestamp, civil};
 use serde::{Deserialize, Serialize};
@@ -142,6 +142,10 @@ pub struct ResultView {
     /// deployable, improvable or non_deployable.
     #[schema(value_type = String)]
     pub tier: Tier,
+    /// The slots' noise floor and re-runs; absent in results of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(value_type = Option<schema::SlotTiming>)]
+    pub timing: Option<SlotTiming>,
 }
 
 impl ResultView {
@@ -154,6 +158,7 @@ impl ResultView {
             score: result.score,
             penalty_points: result.penalty_points,
             tier: result.tier,
+            timing: result.timing,
         }
     }
 }

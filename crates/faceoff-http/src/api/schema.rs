@@ -121,10 +121,38 @@ pub(crate) struct OverallComparison {
     told_apart: bool,
 }
 
+/// Round trips to an agent that answers at once, in seconds.
+#[derive(ToSchema)]
+#[cfg_attr(test, derive(serde::Deserialize), serde(deny_unknown_fields))]
+pub(crate) struct RoundTrips {
+    /// How many were measured.
+    count: u32,
+    /// Median.
+    p50: f64,
+    /// 99th percentile.
+    p99: f64,
+    /// Maximum.
+    max: f64,
+}
+
+/// How evenly the slots kept time: the worst of them, value by value.
+#[derive(ToSchema)]
+#[cfg_attr(test, derive(serde::Deserialize), serde(deny_unknown_fields))]
+pub(crate) struct SlotTiming {
+    /// Before the first episode.
+    before_s: RoundTrips,
+    /// Between the episodes.
+    during_s: RoundTrips,
+    /// Longest time for which one of the slots' CPUs served nobody, in seconds.
+    longest_stall_s: f64,
+    /// Tries of episodes that were dropped and played again because the host stalled.
+    host_noise_reruns: u32,
+}
+
 #[cfg(test)]
 mod tests {
     use faceoff_scoring::{OverallComparison, TaskComparison};
-    use faceoff_types::{ComputationTimeSummary, TaskResult, Tier, ViolationCounts};
+    use faceoff_types::{ComputationTimeSummary, SlotTiming, TaskResult, Tier, ViolationCounts};
 
     fn describes<Schema: serde::de::DeserializeOwned>(real: &impl serde::Serialize) {
         let json = serde_json::to_string(real).unwrap();
@@ -144,6 +172,11 @@ mod tests {
             steps: 3,
             computation_time_s: ComputationTimeSummary::default(),
         });
+    }
+
+    #[test]
+    fn the_document_describes_the_real_timing() {
+        describes::<super::SlotTiming>(&SlotTiming::default());
     }
 
     #[test]

@@ -12,7 +12,9 @@ use askama::Template;
 use axum::{extract::State, response::Response};
 use faceoff_scoring::{EpisodeSummary, TIER_CHANGE_RESAMPLES};
 use faceoff_store::{Evaluation, EvaluationState};
-use faceoff_types::{EvaluationId, EvaluationResult, Profile, Task, TaskResult};
+use faceoff_types::{
+    EvaluationId, EvaluationResult, Profile, RoundTrips, SlotTiming, Task, TaskResult,
+};
 use figures::Rate;
 use jiff::civil;
 
@@ -89,6 +91,7 @@ struct Finished {
     tasks: Vec<TaskFigures>,
     /// Evaluations that met the same episodes.
     others: Vec<Other>,
+    timing: Option<TimingFigures>,
 }
 
 /// Another team's evaluation of the same episodes.
@@ -96,6 +99,41 @@ struct Other {
     team: String,
     evaluation: EvaluationId,
     score: String,
+}
+
+/// How evenly the slots kept time, in words.
+struct TimingFigures {
+    before: RoundTripFigures,
+    during: RoundTripFigures,
+    /// `None` when there was none.
+    longest_stall_ms: Option<String>,
+    host_noise_reruns: u32,
+}
+
+/// Round trips to the calibration agent, in milliseconds.
+struct RoundTripFigures {
+    count: u32,
+    p50_ms: String,
+    p99_ms: String,
+    max_ms: String,
+}
+
+impl TimingFigures {
+    fn of(timing: &SlotTiming) -> Self {
+        let figures = |trips: RoundTrips| RoundTripFigures {
+            count: trips.count,
+            p50_ms: figures::fine_milliseconds(trips.p50),
+            p99_ms: figures::fine_milliseconds(trips.p99),
+            max_ms: figures::fine_milliseconds(trips.max),
+        };
+        Self {
+            before: figures(timing.before_s),
+            during: figures(timing.during_s),
+            longest_stall_ms: (timing.longest_stall_s > 0.0)
+                .then(|| figures::milliseconds(timing.longest_stall_s)),
+            host_noise_reruns: timing.host_noise_reruns,
+        }
+    }
 }
 
 #[derive(Template)]
@@ -232,5 +270,6 @@ fn finished(
             .map(|(task, result)| TaskFigures::of(*task, result, summary))
             .collect(),
         others: Vec::new(),
+        timing: result.timing.as_ref().map(TimingFigures::of),
     }
 }

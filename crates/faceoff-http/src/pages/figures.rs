@@ -77,6 +77,11 @@ pub(super) fn milliseconds(seconds: f64) -> String {
     }
 }
 
+/// Seconds as milliseconds to the microsecond, for times far below a control step.
+pub(super) fn fine_milliseconds(seconds: f64) -> String {
+    format!("{:.3}", seconds * 1e3)
+}
+
 /// Points per episode, by which the tiers are drawn.
 pub(super) fn per_episode(points: f64, episodes: u32) -> String {
     format!("{:.2}", points / f64::from(episodes.max(1)))
@@ -130,6 +135,7 @@ mod tests {
         assert_eq!(one(-0.0), "0.0");
         assert_eq!(milliseconds(0.000_212), "0.21");
         assert_eq!(milliseconds(0.0204), "20");
+        assert_eq!(fine_milliseconds(0.000_021_4), "0.021");
         assert_eq!(per_episode(327.5, 1000), "0.33");
         assert_eq!(chance(0.0), "under 0.05 %");
         assert_eq!(chance(0.0005), "0.1 %");

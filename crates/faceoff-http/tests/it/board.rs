@@ -202,10 +202,20 @@ async fn an_evaluations_page_shows_results_violations_and_times_to_everybody() {
     );
     let html = page(&site, &path).await;
     assert_eq!(texts(&html, "h1"), ["AiRLIHockey"]);
-    assert_eq!(texts(&html, "table caption").len(), 3);
+    assert_eq!(texts(&html, "table caption").len(), 4);
     let tables = texts(&html, "table").join(" ");
     for part in ["54.9 %", "7 (1 %)", "0.90", "12", "123456"] {
         assert!(tables.contains(part), "{part:?} is not in {tables:?}");
+    }
+    for part in [
+        "before2000.0210.0830.420",
+        "between episodes30000.0220.09531.200",
+    ] {
+        assert!(tables.contains(part), "{part:?} is not in {tables:?}");
+    }
+    let facts = texts(&html, ".facts").join(" ");
+    for part in ["Longest stall of the server30 ms", "played again for it2"] {
+        assert!(facts.contains(part), "{part:?} is not in {facts:?}");
     }
 }
 

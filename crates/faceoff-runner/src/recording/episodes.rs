@@ -10,6 +10,7 @@ use arrow_array::{
     builder::{ArrayBuilder, BooleanBuilder, StringBuilder, UInt32Builder},
 };
 use arrow_schema::{DataType, Field, Schema, SchemaRef};
+use faceoff_sim::EpisodeState;
 use faceoff_types::{EpisodeEnd, EpisodeOutcome};
 use std::sync::Arc;
 
@@ -19,6 +20,8 @@ pub(crate) struct EpisodeRows {
     digests: StepDigests,
     /// The observation after the last answered step; empty before the first.
     last_observation: Vec<f64>,
+    /// How the episode under way began.
+    begun: Option<Begun>,
     tasks: StringBuilder,
     episodes: UInt32Builder,
     seeds: StringBuilder,
@@ -31,8 +34,15 @@ pub(crate) struct EpisodeRows {
     faults: StringBuilder,
     actions_blake3: StringBuilder,
     times_blake3: StringBuilder,
+    host_noise_reruns: UInt32Builder,
     initial: FloatColumns,
     last: FloatColumns,
+}
+
+struct Begun {
+    seed: String,
+    interpolation: Option<String>,
+    initial: EpisodeState,
 }
 
 impl EpisodeRows {
@@ -67,12 +77,14 @@ impl EpisodeRows {
         fields.push(text("fault", true));
         fields.push(text("actions_blake3", false));
         fields.push(text("times_blake3", false));
+        fields.push(Field::new("host_noise_reruns", DataType::UInt32, false));
         fields.extend_from_slice(initial.fields());
         fields.extend_from_slice(last.fields());
         Self {
             schema: Arc::new(Schema::new(fields)),
             digests: StepDigests::default(),
             last_observation: Vec::new(),
+            begun: None,
             tasks: StringBuilder::new(),
             episodes: UInt32Builder::new(),
             seeds: StringBuilder::new(),
@@ -85,6 +97,7 @@ impl EpisodeRows {
             faults: StringBuilder::new(),
             actions_blake3: StringBuilder::new(),
             times_blake3: StringBuilder::new(),
+            host_noise_reruns: UInt32Builder::new(),
             initial,
             last,
         }
@@ -100,12 +113,13 @@ impl EpisodeRows {
         self.episodes.len()
     }
 
+    /// Begins an episode, in place of one that has not ended.
     pub fn begin(&mut self, start: &EpisodeStart<'_>) {
-        self.seeds.append_value(start.seed.to_string());
-        self.interpolations
-            .append_option(start.interpolation.map(|code| code.to_string()));
-        self.initial.put_state(start.state);
-        self.initial.end_row();
+        self.begun = Some(Begun {
+            seed: start.seed.to_string(),
+            interpolation: start.interpolation.map(|code| code.to_string()),
+            initial: start.state.clone(),
+        });
         self.digests = StepDigests::default();
         self.last_observation.clear();
     }
@@ -117,7 +131,18 @@ impl EpisodeRows {
             .extend_from_slice(row.next_observation);
     }
 
-    pub fn end(&mut self, outcome: &EpisodeOutcome) -> Result<(), PlatformFault> {
+    pub fn end(
+        &mut self,
+        outcome: &EpisodeOutcome,
+        host_noise_reruns: u32,
+    ) -> Result<(), PlatformFault> {
+        let begun = self.begun.take().ok_or_else(|| {
+            PlatformFault::Recording("an episode ended that was not begun".to_owned())
+        })?;
+        self.seeds.append_value(begun.seed);
+        self.interpolations.append_option(begun.interpolation);
+        self.initial.put_state(&begun.initial);
+        self.initial.end_row();
         self.tasks.append_value(outcome.task.as_str());
         self.episodes.append_value(outcome.episode);
         self.steps.append_value(outcome.steps);
@@ -147,6 +172,7 @@ impl EpisodeRows {
         let [actions, times] = self.digests.finish();
         self.actions_blake3.append_value(actions);
         self.times_blake3.append_value(times);
+        self.host_noise_reruns.append_value(host_noise_reruns);
         put_observation(&mut self.last, &self.last_observation);
         self.last.end_row();
         Ok(())
@@ -172,6 +198,7 @@ impl EpisodeRows {
         columns.push(Arc::new(self.faults.finish()));
         columns.push(Arc::new(self.actions_blake3.finish()));
         columns.push(Arc::new(self.times_blake3.finish()));
+        columns.push(Arc::new(self.host_noise_reruns.finish()));
         columns.extend(self.initial.take());
         columns.extend(self.last.take());
         columns

@@ -92,8 +92,18 @@ impl StepRows {
         &self.schema
     }
 
+    /// Begins an episode; rows of one that has not ended are dropped.
     pub fn begin(&mut self, episode: u32) {
         self.episode = episode;
+        if !self.steps.values_slice().is_empty() {
+            self.episodes.finish();
+            self.steps.finish();
+            self.observations.take();
+            self.actions.finish();
+            self.computation_times.finish();
+            self.cpu_times.finish();
+            self.rest.take();
+        }
     }
 
     pub fn observe(&mut self, observation: &[f64]) {

@@ -2,7 +2,7 @@ use super::{Difference, compare, feed::Recorded};
 use crate::{
     Answered,
     dataset::Columns,
-    player::Times,
+    host_noise::Times,
     recording::{
         EPISODES_FILE, EpisodeRows, EpisodeStart, STEPS_FILE, StepRow, StepRows, StepScan,
         end_name, seconds,
@@ -29,6 +29,8 @@ pub(super) struct Replay {
 pub(super) struct Replayed {
     pub outcome: EpisodeOutcome,
     pub scan: StepScan,
+    /// As recorded.
+    pub host_noise_reruns: u32,
 }
 
 /// One episode being simulated again.
@@ -148,7 +150,8 @@ impl Course<'_> {
         };
         self.steps.push(&row);
         self.episodes.step(&row);
-        self.times.add(answered.computation_time_s);
+        let time_s = answered.computation_time_s;
+        self.times.add(time_s, time_s);
         self.scan.add(
             self.recorded.episode,
             step,
@@ -251,7 +254,10 @@ impl Course<'_> {
             computation_time: self.times.summary(),
             fault,
         };
-        if let Err(error) = self.episodes.end(&outcome) {
+        // Nothing but the record tells it.
+        let reruns = Columns(&recorded.row).int("host_noise_reruns", 0);
+        let host_noise_reruns = reruns.unwrap_or_default();
+        if let Err(error) = self.episodes.end(&outcome, host_noise_reruns) {
             return Err(in_row(recorded, "fault", error.to_string(), "a fault"));
         }
         let schema = self.episodes.schema().clone();
@@ -261,6 +267,7 @@ impl Course<'_> {
             None => Ok(Replayed {
                 outcome,
                 scan: self.scan,
+                host_noise_reruns,
             }),
             Some(cell) => Err(in_row(recorded, &cell.field, cell.recorded, cell.expected)),
         }

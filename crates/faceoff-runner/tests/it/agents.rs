@@ -96,6 +96,8 @@ pub fn sandboxed() -> AgentEnvironment {
             reset_s: 30.0,
             step_s: 30.0,
             bye_s: 10.0,
+            // Tests of other things must not depend on what else the machine does.
+            host_noise_reruns: 0,
         },
         isolation: Isolation::Sandboxed {
             given_up: Vec::new(),

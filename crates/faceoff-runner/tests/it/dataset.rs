@@ -4,8 +4,8 @@ use crate::{
     shard::{run, spec},
 };
 use faceoff_runner::{EvaluationMeta, PlatformFault, ShardReport, assemble};
-use faceoff_types::{EpisodeOutcome, EvaluationResult, RULESET, Task};
-use faceoff_wire::dataset::{DATASET_SCHEMA, DatasetManifest, ViolationsFile};
+use faceoff_types::{EpisodeOutcome, EvaluationResult, RULESET, SlotTiming, Task};
+use faceoff_wire::dataset::{CalibrationFile, DATASET_SCHEMA, DatasetManifest, ViolationsFile};
 use std::{
     collections::BTreeMap,
     fs::{self, File},
@@ -105,6 +105,7 @@ fn the_dataset_is_whole_and_its_score_is_the_direct_one() {
             "episodes.parquet",
             "violations.json",
             "results.json",
+            "calibration.json",
             "agent.log",
             "manifest.json"
         ]
@@ -133,10 +134,11 @@ fn the_dataset_is_whole_and_its_score_is_the_direct_one() {
         tasks.insert(task, faceoff_scoring::score_task(&outcomes, &mut times));
     }
     let meta = &evaluation.meta;
-    assert_eq!(
-        result,
-        faceoff_scoring::score_evaluation(meta.profile, meta.seed, tasks)
-    );
+    let direct = EvaluationResult {
+        timing: result.timing,
+        ..faceoff_scoring::score_evaluation(meta.profile, meta.seed, tasks)
+    };
+    assert_eq!(result, direct);
 
     let manifest: DatasetManifest = json(&dir.join("manifest.json"));
     assert_eq!(manifest.schema, DATASET_SCHEMA);
@@ -148,7 +150,7 @@ fn the_dataset_is_whole_and_its_score_is_the_direct_one() {
         (manifest.seed, manifest.mismatch_seed),
         (meta.seed, meta.mismatch_seed)
     );
-    assert_eq!(manifest.files.len(), 5);
+    assert_eq!(manifest.files.len(), 6);
     for (name, digest) in &manifest.files {
         let bytes = fs::read(dir.join(name)).unwrap();
         assert_eq!(bytes.len() as u64, digest.bytes, "{name}");
@@ -158,6 +160,19 @@ fn the_dataset_is_whole_and_its_score_is_the_direct_one() {
             "{name}"
         );
     }
+    let calibration: CalibrationFile = json(&dir.join("calibration.json"));
+    let shards = &calibration.shards;
+    let ranges: Vec<_> = shards
+        .iter()
+        .map(|shard| (shard.task, shard.first_episode, shard.end_episode))
+        .collect();
+    assert_eq!(ranges[0], (Task::Hit, 0, 2));
+    let worst = shards
+        .iter()
+        .map(|shard| shard.timing)
+        .reduce(SlotTiming::worse);
+    assert_eq!(result.timing, worst);
+    assert!(worst.unwrap().before_s.p50 > 0.0);
     let log = fs::read_to_string(dir.join("agent.log")).unwrap();
     assert!(log.starts_with("== hit, episodes 0 to 1 ==\ngoodbye\n== prepare, episodes 0 to 0 =="));
 }
@@ -307,7 +322,8 @@ fn the_archive_is_read_by_others() {
             "score",
             "seed",
             "tasks",
-            "tier"
+            "tier",
+            "timing"
         ]
     );
     assert_eq!(keys(&value["tasks"]), ["hit", "prepare"]);

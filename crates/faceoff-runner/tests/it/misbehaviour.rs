@@ -5,7 +5,7 @@ use faceoff_runner::{AgentEnvironment, SmokeReport, smoke};
 use faceoff_types::AgentFaultKind;
 
 fn verdict_in(agent: &Agent, env: &AgentEnvironment) -> (AgentFaultKind, SmokeReport) {
-    let report = smoke(&agent.bundle, env).expect("the platform works");
+    let report = smoke(&agent.bundle, env, &|| false).expect("the platform works");
     let fault = report.fault.clone().expect("a fault");
     (fault.fault, report)
 }
@@ -16,7 +16,7 @@ fn verdict(hooks: &str) -> (AgentFaultKind, SmokeReport) {
 
 #[test]
 fn a_behaving_agent_passes_the_smoke_run() {
-    let report = smoke(&Agent::behaving().bundle, &sandboxed()).unwrap();
+    let report = smoke(&Agent::behaving().bundle, &sandboxed(), &|| false).unwrap();
     assert_eq!(
         report,
         SmokeReport {

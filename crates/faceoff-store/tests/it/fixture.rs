@@ -172,5 +172,6 @@ pub fn result(score: f64) -> EvaluationResult {
         score,
         penalty_points: 0.1 + 0.2,
         tier: Tier::Improvable,
+        timing: None,
     }
 }

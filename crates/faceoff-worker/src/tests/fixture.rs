@@ -87,7 +87,12 @@ impl Evaluator for Scripted {
         })
     }
 
-    fn smoke(&self, _: &Bundle, _: &AgentEnvironment) -> Result<SmokeReport, PlatformFault> {
+    fn smoke(
+        &self,
+        _: &Bundle,
+        _: &AgentEnvironment,
+        _: &dyn Fn() -> bool,
+    ) -> Result<SmokeReport, PlatformFault> {
         Ok(SmokeReport {
             fault: None,
             log: "smoke\n".into(),
@@ -121,6 +126,7 @@ impl Evaluator for Scripted {
             outcomes,
             log: String::new(),
             stopped_by_faults: false,
+            timing: SlotTiming::default(),
         })
     }
 
@@ -144,6 +150,7 @@ impl Evaluator for Scripted {
             score: 50.0,
             penalty_points: 0.0,
             tier: Tier::Deployable,
+            timing: None,
         })
     }
 }
@@ -248,6 +255,7 @@ impl Server {
                     reset_s: 1.0,
                     step_s: 1.0,
                     bye_s: 1.0,
+                    host_noise_reruns: 0,
                 },
                 isolation: Isolation::None,
                 runtimes: BTreeMap::new(),

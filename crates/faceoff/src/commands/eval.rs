@@ -1,6 +1,7 @@
 //! `faceoff eval`: the server's evaluator, run locally.
 #![expect(clippy::print_stdout, reason = "a command talks to the terminal")]
 
+mod ablation;
 mod board;
 mod table;
 
@@ -13,7 +14,7 @@ use faceoff_runner::{
     bundle::{self, Bundle, BundleError, BundleLimits},
 };
 use faceoff_sandbox::{Isolation, Runtime};
-use faceoff_types::{AgentFault, Profile, RULESET, Seed, Task};
+use faceoff_types::{AgentFault, EpisodeOutcome, EvaluationResult, Profile, RULESET, Seed, Task};
 use faceoff_worker::CpuLayout;
 use rustix::thread::{CpuSet, sched_getaffinity};
 use std::{
@@ -41,6 +42,10 @@ pub struct EvalCommand {
     /// Perturbations: ideal, one factor's name, or evaluation
     #[arg(long, default_value = "evaluation")]
     profile: Profile,
+    /// Play the same episodes in every profile (ideal, each factor alone, all together) and compare
+    /// them: ablation.json, and a folder for each profile
+    #[arg(long, conflicts_with = "profile")]
+    ablation: bool,
     /// A number, or 64 hexadecimal digits; the same seed gives the same episodes everywhere
     #[arg(long, default_value = "0")]
     seed: Seed,
@@ -66,6 +71,25 @@ const RESULTS: &str = "results.json";
 const DATASET: &str = "dataset.zip";
 const LOG: &str = "agent.log";
 
+/// What all profiles are played with.
+#[derive(Debug)]
+struct Ground {
+    bundle: Bundle,
+    /// One per worker.
+    envs: Vec<AgentEnvironment>,
+    mismatch_seed: Seed,
+    max_faults: u32,
+    /// For recordings under way.
+    scratch: PathBuf,
+}
+
+/// What came of one profile.
+#[derive(Debug)]
+struct Played {
+    result: EvaluationResult,
+    outcomes: Vec<EpisodeOutcome>,
+}
+
 impl EvalCommand {
     /// Plays, scores, prints and writes.
     ///
@@ -82,9 +106,7 @@ impl EvalCommand {
         let config = Config::load(self.config.as_deref())?;
         fs::create_dir_all(&self.out)
             .with_context(|| format!("creating {}", self.out.display()))?;
-        for name in [RESULTS, DATASET, LOG] {
-            remove(&self.out.join(name))?;
-        }
+        remove_results(&self.out)?;
         // Beside the results, not in /tmp: a recording may be larger than a memory file system. An
         // agent of another user must be able to pass through.
         let scratch = tempfile::Builder::new()
@@ -95,15 +117,44 @@ impl EvalCommand {
         let bundle = self.open(scratch.path(), &config.bundle)?;
         let envs = self.environments(&config, &bundle.manifest.runtime)?;
 
-        let mismatch_seed = self
-            .mismatch_seed
-            .unwrap_or_else(|| self.seed.model_mismatch());
-        let jobs = self.jobs(mismatch_seed, config.evaluation.max_faults, scratch.path());
+        let ground = Ground {
+            mismatch_seed: self
+                .mismatch_seed
+                .unwrap_or_else(|| self.seed.model_mismatch()),
+            max_faults: config.evaluation.max_faults,
+            scratch: scratch.path().to_owned(),
+            bundle,
+            envs,
+        };
+        if self.ablation {
+            return ablation::run(&self, &ground);
+        }
+        let played = self.play(&ground, self.profile, &self.out)?;
+        print!(
+            "{}",
+            table::of(&ground.bundle.manifest.name, &played.result)
+        );
+        println!(
+            "\n{}\n{}",
+            self.out.join(RESULTS).display(),
+            self.out.join(DATASET).display()
+        );
+        Ok(())
+    }
+
+    /// Plays all episodes in one profile and leaves `results.json` and `dataset.zip` in `out`.
+    fn play(&self, ground: &Ground, profile: Profile, out: &Path) -> anyhow::Result<Played> {
+        fs::create_dir_all(out).with_context(|| format!("creating {}", out.display()))?;
+        remove_results(out)?;
+        let jobs = self.jobs(ground, profile);
         let dirs: Vec<PathBuf> = jobs.iter().map(|job| job.out.clone()).collect();
-        match play_all(&bundle, &envs, jobs)? {
-            Verdict::Played { faults } => print_faults(&faults),
+        let outcomes = match play_all(&ground.bundle, &ground.envs, jobs)? {
+            Verdict::Played { faults, outcomes } => {
+                print_faults(&faults);
+                outcomes
+            }
             Verdict::Failed { faults, log } => {
-                let path = self.out.join(LOG);
+                let path = out.join(LOG);
                 fs::write(&path, &log).with_context(|| format!("writing {}", path.display()))?;
                 print_faults(&faults);
                 print_log_tail(&log);
@@ -111,27 +162,26 @@ impl EvalCommand {
                 bail!(
                     "the agent failed: more than {} faults, so there is no score; the last one: \
                      {last}; its log is in {}",
-                    config.evaluation.max_faults,
+                    ground.max_faults,
                     path.display()
                 );
             }
-        }
+        };
         let meta = EvaluationMeta {
-            profile: self.profile,
+            profile,
             seed: self.seed,
-            mismatch_seed,
-            agent: bundle.manifest.name.clone(),
+            mismatch_seed: ground.mismatch_seed,
+            agent: ground.bundle.manifest.name.clone(),
             ruleset: RULESET.to_owned(),
         };
-        let dataset = self.out.join(DATASET);
-        let result = assemble(&meta, &dirs, &dataset).context("joining the recordings")?;
-        let mut json = serde_json::to_string_pretty(&result).context("writing the result")?;
-        json.push('\n');
-        let path = self.out.join(RESULTS);
-        fs::write(&path, json).with_context(|| format!("writing {}", path.display()))?;
-        print!("{}", table::of(&meta.agent, &result));
-        println!("\n{}\n{}", path.display(), dataset.display());
-        Ok(())
+        let result =
+            assemble(&meta, &dirs, &out.join(DATASET)).context("joining the recordings")?;
+        // They are in the dataset now; a further profile needs the room.
+        for dir in &dirs {
+            fs::remove_dir_all(dir).with_context(|| format!("removing {}", dir.display()))?;
+        }
+        write_json(&out.join(RESULTS), &result)?;
+        Ok(Played { result, outcomes })
     }
 
     /// A folder is copied under the rules of an archive, so that it is refused here if the server
@@ -188,27 +238,41 @@ impl EvalCommand {
     }
 
     /// One shard per task and worker, so that each agent is started as seldom as possible.
-    fn jobs(&self, mismatch_seed: Seed, max_faults: u32, scratch: &Path) -> Vec<Job> {
+    fn jobs(&self, ground: &Ground, profile: Profile) -> Vec<Job> {
         let per_shard = self.episodes.div_ceil(u32::from(self.workers));
         let mut jobs = Vec::new();
         for task in &self.tasks {
             for start in (0..self.episodes).step_by(per_shard as usize) {
                 let end = self.episodes.min(start + per_shard);
                 jobs.push(Job {
-                    out: scratch.join(format!("{task}-{start}")),
+                    out: ground.scratch.join(format!("{profile}-{task}-{start}")),
                     spec: ShardSpec {
                         task: *task,
                         episodes: start..end,
-                        profile: self.profile,
+                        profile,
                         seed: self.seed,
-                        mismatch_seed,
-                        max_faults,
+                        mismatch_seed: ground.mismatch_seed,
+                        max_faults: ground.max_faults,
                     },
                 });
             }
         }
         jobs
     }
+}
+
+/// Removes what an earlier run has left, so that it is not taken for this one's.
+fn remove_results(out: &Path) -> anyhow::Result<()> {
+    for name in [RESULTS, DATASET, LOG, ablation::FILE] {
+        remove(&out.join(name))?;
+    }
+    Ok(())
+}
+
+fn write_json(path: &Path, value: &impl serde::Serialize) -> anyhow::Result<()> {
+    let mut json = serde_json::to_string_pretty(value).context("writing the result")?;
+    json.push('\n');
+    fs::write(path, json).with_context(|| format!("writing {}", path.display()))
 }
 
 fn remove(path: &Path) -> anyhow::Result<()> {

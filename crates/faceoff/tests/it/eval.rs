@@ -32,7 +32,7 @@ fn text(bytes: &[u8]) -> String {
 fn result(out: &Path) -> serde_json::Value {
     let mut result: serde_json::Value =
         serde_json::from_slice(&fs::read(out.join("results.json")).unwrap()).unwrap();
-    for key in ["penalty_points", "tier"] {
+    for key in ["penalty_points", "tier", "timing"] {
         result.as_object_mut().unwrap().remove(key).unwrap();
     }
     for task in result["tasks"].as_object_mut().unwrap().values_mut() {
@@ -152,4 +152,61 @@ fn what_cannot_be_evaluated_is_refused_with_a_reason() {
         &["--episodes", "20"],
         "\"fortran\" of agent.toml is not offered",
     );
+}
+
+#[test]
+fn an_ablation_plays_the_same_episodes_in_every_profile_and_compares_them() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("out");
+    let args = [
+        "--ablation",
+        "--task",
+        "prepare",
+        "--episodes",
+        "2",
+        "--seed",
+        "5",
+    ];
+    let output = eval(&hold(), &out, &args);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let table = text(&output.stdout);
+    let profiles = [
+        "ideal",
+        "model_mismatch",
+        "observation_noise",
+        "disturbance",
+        "tracking_loss",
+        "evaluation",
+    ];
+    let file: serde_json::Value =
+        serde_json::from_slice(&fs::read(out.join("ablation.json")).unwrap()).unwrap();
+    let rows = file["tasks"]["prepare"].as_array().unwrap();
+    assert_eq!(rows.len(), profiles.len());
+    for (row, profile) in rows.iter().zip(profiles) {
+        assert!(table.contains(&format!("\nprepare  {profile} ")), "{table}");
+        assert_eq!(row["profile"], profile);
+        let result = result(&out.join(profile));
+        assert_eq!(result["profile"], profile);
+        assert_eq!(result["seed"], file["seed"]);
+        assert_eq!(result["tasks"]["prepare"]["successes"], row["successes"]);
+        assert_eq!(
+            result["tasks"]["prepare"]["success_ci95"],
+            row["success_ci95"]
+        );
+        assert!(out.join(profile).join("dataset.zip").exists());
+    }
+    // The profile alone is what the ablation's run of it is.
+    let alone = dir.path().join("alone");
+    let args = [
+        "--profile",
+        "tracking_loss",
+        "--task",
+        "prepare",
+        "--episodes",
+        "2",
+        "--seed",
+        "5",
+    ];
+    assert!(eval(&hold(), &alone, &args).status.success());
+    assert_eq!(result(&alone), result(&out.join("tracking_loss")));
 }

@@ -24,7 +24,11 @@ pub(super) struct Job {
 /// How all shards together ended.
 pub(super) enum Verdict {
     /// All episodes were played, with no more faults than allowed.
-    Played { faults: Vec<AgentFault> },
+    Played {
+        faults: Vec<AgentFault>,
+        /// Of all episodes, in (task, episode) order.
+        outcomes: Vec<EpisodeOutcome>,
+    },
     /// Too many faults.
     Failed {
         faults: Vec<AgentFault>,
@@ -36,6 +40,7 @@ pub(super) enum Verdict {
 struct Board {
     jobs: Mutex<VecDeque<Job>>,
     faults: Mutex<Vec<AgentFault>>,
+    outcomes: Mutex<Vec<EpisodeOutcome>>,
     logs: Mutex<String>,
     fault_count: AtomicU32,
     max_faults: u32,
@@ -61,6 +66,7 @@ pub(super) fn play_all(
     let board = Board {
         jobs: Mutex::new(jobs.into()),
         faults: Mutex::default(),
+        outcomes: Mutex::default(),
         logs: Mutex::default(),
         fault_count: AtomicU32::new(0),
         max_faults,
@@ -109,7 +115,12 @@ pub(super) fn play_all(
     if faults.len() > max_faults as usize {
         Ok(Verdict::Failed { faults, log })
     } else {
-        Ok(Verdict::Played { faults })
+        let mut outcomes = board
+            .outcomes
+            .into_inner()
+            .unwrap_or_else(PoisonError::into_inner);
+        outcomes.sort_by_key(|outcome| (outcome.task, outcome.episode));
+        Ok(Verdict::Played { faults, outcomes })
     }
 }
 
@@ -138,6 +149,7 @@ struct Seat<'a>(&'a Board);
 impl Observer for Seat<'_> {
     fn episode_done(&mut self, outcome: &EpisodeOutcome) {
         self.0.bar.inc(1);
+        lock(&self.0.outcomes).push(outcome.clone());
         if let Some(fault) = &outcome.fault {
             lock(&self.0.faults).push(fault.clone());
             if self.0.fault_count.fetch_add(1, Ordering::Relaxed) >= self.0.max_faults {

@@ -1,0 +1,88 @@
+//! `faceoff eval --ablation`: the same episodes under each perturbation alone.
+
+use super::{EvalCommand, Ground, write_json};
+use anyhow::Context;
+use faceoff_scoring::ProfileEffect;
+use faceoff_types::{Profile, RULESET, Seed, Task};
+use serde::Serialize;
+use std::{collections::BTreeMap, fmt::Write as _};
+
+/// The comparison's file.
+pub(super) const FILE: &str = "ablation.json";
+
+/// `ablation.json`.
+#[derive(Debug, Serialize)]
+struct AblationFile {
+    ruleset: &'static str,
+    seed: Seed,
+    agent: String,
+    tasks: BTreeMap<Task, Vec<ProfileEffect>>,
+}
+
+/// Plays every profile, each into a folder of its name, and compares them.
+pub(super) fn run(command: &EvalCommand, ground: &Ground) -> anyhow::Result<()> {
+    let mut runs = BTreeMap::new();
+    for profile in Profile::ALL {
+        let played = command
+            .play(ground, profile, &command.out.join(profile.as_str()))
+            .with_context(|| format!("profile {profile}"))?;
+        runs.insert(profile, played.outcomes);
+    }
+    let tasks = faceoff_scoring::ablation(&runs).context("comparing the profiles")?;
+    let agent = ground.bundle.manifest.name.clone();
+    print!("{}", table(&agent, command.seed, &tasks));
+    let path = command.out.join(FILE);
+    let file = AblationFile {
+        ruleset: RULESET,
+        seed: command.seed,
+        agent,
+        tasks,
+    };
+    write_json(&path, &file)?;
+    println!("\n{}", path.display());
+    Ok(())
+}
+
+/// The comparison as a table for a terminal.
+fn table(agent: &str, seed: Seed, tasks: &BTreeMap<Task, Vec<ProfileEffect>>) -> String {
+    let mut out = format!("{agent}: ablation ({RULESET}), seed {seed}\n\n");
+    let mut line = |args: std::fmt::Arguments<'_>| {
+        out.write_fmt(args).expect("writing to memory cannot fail");
+        out.push('\n');
+    };
+    line(format_args!(
+        "{:<8} {:<17} {:>8} {:>8} {:>17} {:>9} {:>5} {:>6} {:>7} {:>8}",
+        "task",
+        "profile",
+        "episodes",
+        "success",
+        "95 % interval",
+        "to ideal",
+        "lost",
+        "gained",
+        "p",
+        "penalty"
+    ));
+    for (task, effects) in tasks {
+        for effect in effects {
+            let [low, high] = effect.success_ci95.map(|bound| 100.0 * bound);
+            line(format_args!(
+                "{task:<8} {:<17} {:>8} {:>6.1} % {:>17} {:>9} {:>5} {:>6} {:>7.4} {:>8.1}",
+                effect.profile,
+                effect.episodes,
+                100.0 * effect.success_rate,
+                format!("{low:.1} to {high:.1} %"),
+                format!("{:+.1}", 100.0 * effect.difference),
+                effect.lost,
+                effect.gained,
+                effect.p_value,
+                effect.penalty_points,
+            ));
+        }
+    }
+    line(format_args!(
+        "\nto ideal: percentage points; lost, gained: episodes that succeed in the ideal profile only, \
+         in this one only; p: McNemar's exact test"
+    ));
+    out
+}
