@@ -10,12 +10,13 @@ CARGO      ?= cargo
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
 
-.PHONY: demo test lint format setup setup-test agents clean-demo help
+.PHONY: demo test lint format fidelity setup setup-test agents clean-demo help
 
 help:
 	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
 	@echo "make test   run everything that proves that it works"
 	@echo "make lint   format check and lints"
+	@echo "make fidelity   draw how far the simulator is from the recordings"
 
 setup:
 	@docker/setup.sh build
@@ -45,7 +46,11 @@ test: setup-test
 	    then $(CARGO) nextest run --locked --workspace --no-fail-fast; \
 	    else $(CARGO) test --locked --workspace --no-fail-fast -- --test-threads 2; fi
 	@# The golden hashes again, as the released program computes them: the same bits.
-	$(CARGO) test --release --locked --package faceoff-sim --test it determinism
+	$(CARGO) test --release --locked --package faceoff-sim --test it golden
+
+# The pictures and numbers of docs/simulator.md.
+fidelity:
+	$(CARGO) run --locked -p faceoff-sim --example fidelity -- docs/images/fidelity
 
 lint:
 	$(CARGO) fmt --all --check

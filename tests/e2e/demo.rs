@@ -44,7 +44,8 @@ fn the_demo_plays_a_day_and_its_board_is_served() {
     assert!(place("hold") < place("Non-deployable"));
     assert!(stdout.rfind("reckless").expect("the team is on the board") > place("Non-deployable"));
 
-    // The dataset is a complete archive.
+    // The dataset is a complete archive, and verified.
+    assert!(place("dataset of hold") < place("   verified "));
     let dataset = std::fs::read_dir(&data_dir)
         .expect("the demo made its folder")
         .filter_map(Result::ok)

@@ -3,9 +3,11 @@
 use crate::{
     PlatformFault,
     recording::{
-        EPISODES_FILE, HashingWriter, LOG_FILE, STEPS_FILE, ShardRecording, StepScan, join,
-        scan_steps,
+        EPISODES_FILE, HashingWriter, LOG_FILE, MANIFEST_FILE, RESULTS_FILE, STEPS_FILE,
+        ShardRecording, StepScan, VIOLATIONS_FILE, join, scan_steps,
     },
+    seal,
+    simulator::simulator_id,
 };
 use faceoff_types::{
     ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationResult, Profile, Seed, Task, TaskResult,
@@ -58,7 +60,7 @@ pub fn assemble(
         .collect::<Result<Vec<_>, _>>()?;
     shards.sort_by_key(|shard| (shard.spec.task, shard.spec.episodes.start));
     let episodes = check(meta, &shards)?;
-    let Scored { result, violations } = score(meta, &shards)?;
+    let Scored { result, violations } = score(meta.profile, meta.seed, played(&shards)?);
 
     let partial = archive.with_extension("zip.partial");
     write_dataset(meta, &shards, episodes, &result, &violations, &partial)
@@ -94,12 +96,13 @@ fn write_dataset(
     dataset.add(EPISODES_FILE, |out| {
         join(&paths(|shard| &shard.episodes), out)
     })?;
-    dataset.add_json("violations.json", violations)?;
-    dataset.add_json("results.json", result)?;
+    dataset.add_json(VIOLATIONS_FILE, violations)?;
+    dataset.add_json(RESULTS_FILE, result)?;
     dataset.add(LOG_FILE, |out| write_log(shards, out))?;
     let manifest = DatasetManifest {
         schema: DATASET_SCHEMA.to_owned(),
         ruleset: meta.ruleset.clone(),
+        simulator: simulator_id().clone(),
         profile: meta.profile,
         seed: meta.seed,
         mismatch_seed: meta.mismatch_seed,
@@ -107,8 +110,9 @@ fn write_dataset(
         episodes,
         files: dataset.files.clone(),
     };
-    dataset.add_json("manifest.json", &manifest)?;
-    dataset.finish()
+    dataset.add_json(MANIFEST_FILE, &manifest)?;
+    dataset.finish()?;
+    seal::put(path)
 }
 
 /// All shards belong to this evaluation and together hold each episode of each task once, from 0
@@ -163,34 +167,24 @@ fn check(
     Ok(episodes)
 }
 
-struct Scored {
-    result: EvaluationResult,
-    violations: ViolationsFile,
+/// What follows from the episodes of an evaluation.
+pub(crate) struct Scored {
+    pub result: EvaluationResult,
+    pub violations: ViolationsFile,
 }
 
-fn score(meta: &EvaluationMeta, shards: &[ShardRecording]) -> Result<Scored, PlatformFault> {
+/// Scores from outcomes and steps, per task in order of the episodes.
+pub(crate) fn score(
+    profile: Profile,
+    seed: Seed,
+    played: BTreeMap<Task, (Vec<EpisodeOutcome>, StepScan)>,
+) -> Scored {
     let mut tasks: BTreeMap<Task, TaskResult> = BTreeMap::new();
     let mut violations = ViolationsFile {
         schema: DATASET_SCHEMA.to_owned(),
         tasks: BTreeMap::new(),
     };
-    for shards in shards.chunk_by(|a, b| a.spec.task == b.spec.task) {
-        let task = shards[0].spec.task;
-        let outcomes: Vec<EpisodeOutcome> = shards
-            .iter()
-            .flat_map(|shard| shard.report.outcomes.iter().cloned())
-            .collect();
-        let mut scan = StepScan::default();
-        for shard in shards {
-            scan_steps(&shard.steps, &mut scan)?;
-        }
-        let steps: usize = outcomes.iter().map(|outcome| outcome.steps as usize).sum();
-        if scan.computation_times_s.len() != steps {
-            return Err(PlatformFault::Recording(format!(
-                "{task}: {} steps are recorded, {steps} were played",
-                scan.computation_times_s.len()
-            )));
-        }
+    for (task, (outcomes, mut scan)) in played {
         tasks.insert(
             task,
             faceoff_scoring::score_task(&outcomes, &mut scan.computation_times_s),
@@ -208,8 +202,40 @@ fn score(meta: &EvaluationMeta, shards: &[ShardRecording]) -> Result<Scored, Pla
             },
         );
     }
-    let result = faceoff_scoring::score_evaluation(meta.profile, meta.seed, tasks);
-    Ok(Scored { result, violations })
+    Scored {
+        result: faceoff_scoring::score_evaluation(profile, seed, tasks),
+        violations,
+    }
+}
+
+/// Outcomes and steps of all shards, which come in order.
+fn played(
+    shards: &[ShardRecording],
+) -> Result<BTreeMap<Task, (Vec<EpisodeOutcome>, StepScan)>, PlatformFault> {
+    let mut played: BTreeMap<Task, (Vec<EpisodeOutcome>, StepScan)> = BTreeMap::new();
+    for shard in shards {
+        let (outcomes, scan) = played.entry(shard.spec.task).or_default();
+        outcomes.extend_from_slice(&shard.report.outcomes);
+        scan_steps(&shard.steps, scan)?;
+    }
+    for (task, (outcomes, scan)) in &played {
+        let steps: usize = outcomes.iter().map(|outcome| outcome.steps as usize).sum();
+        if scan.computation_times_s.len() != steps {
+            return Err(PlatformFault::Recording(format!(
+                "{task}: {} steps are recorded, {steps} were played",
+                scan.computation_times_s.len()
+            )));
+        }
+    }
+    Ok(played)
+}
+
+/// A JSON file of a dataset, byte for byte.
+pub(crate) fn json_file<T: Serialize>(name: &str, value: &T) -> Result<Vec<u8>, PlatformFault> {
+    let mut bytes = serde_json::to_vec_pretty(value)
+        .map_err(PlatformFault::recording(format!("writing {name}")))?;
+    bytes.push(b'\n');
+    Ok(bytes)
 }
 
 /// The archive being written.
@@ -256,16 +282,17 @@ impl Dataset {
     }
 
     fn add_json<T: Serialize>(&mut self, name: &str, value: &T) -> Result<(), PlatformFault> {
-        let mut bytes = serde_json::to_vec_pretty(value)
-            .map_err(PlatformFault::recording(format!("writing {name}")))?;
-        bytes.push(b'\n');
+        let bytes = json_file(name, value)?;
         self.add(name, |out| {
             out.write_all(&bytes)
                 .map_err(PlatformFault::io(format!("writing {name}")))
         })
     }
 
-    fn finish(self) -> Result<(), PlatformFault> {
+    fn finish(mut self) -> Result<(), PlatformFault> {
+        self.zip
+            .set_comment(seal::blank())
+            .map_err(PlatformFault::recording("closing the dataset"))?;
         let mut buffered = self
             .zip
             .finish()

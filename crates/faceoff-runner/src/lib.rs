@@ -1,5 +1,6 @@
 //! Runs one agent over one shard of an evaluation: bundle → sandboxed process ⇄ JSON lines ⇄
-//! simulator → recording and report; and joins the shards of an evaluation to its dataset.
+//! simulator → recording and report; joins the shards of an evaluation to its dataset; and reads
+//! datasets, to verify or to convert them.
 //!
 //! Two kinds of failure never mix: what the agent does wrong is an
 //! [`AgentFault`](faceoff_types::AgentFault) inside of a report that succeeded, what fails on our
@@ -13,13 +14,18 @@ mod assemble;
 pub mod bundle;
 mod config;
 mod cpu;
+pub mod dataset;
 mod fault;
 mod log;
 mod player;
 mod recording;
+mod seal;
 mod session;
 mod shard;
+mod simulator;
 mod smoke;
+pub mod verify;
+
 mod wire_env;
 
 pub use assemble::{EvaluationMeta, assemble};

@@ -188,6 +188,7 @@ impl<'a> Player<'a> {
                 answered,
                 state: &world.state(),
                 constraints: outcome.constraints,
+                next_observation: world.observation(),
             });
             if let Some(end) = outcome.end {
                 break end;
@@ -237,20 +238,20 @@ impl<'a> Player<'a> {
 
 /// Computation times of one episode.
 #[derive(Debug, Clone, Copy, Default)]
-struct Times {
+pub(crate) struct Times {
     sum_s: f64,
     max_s: f64,
     count: u32,
 }
 
 impl Times {
-    fn add(&mut self, time_s: f64) {
+    pub fn add(&mut self, time_s: f64) {
         self.sum_s += time_s;
         self.max_s = self.max_s.max(time_s);
         self.count += 1;
     }
 
-    fn summary(self) -> ComputationTime {
+    pub fn summary(self) -> ComputationTime {
         let mean_s = if self.count == 0 {
             0.0
         } else {

@@ -1,8 +1,9 @@
-//! Control steps per second of a held arm, and of the parts of a substep.
+//! Control steps per second of a held arm: of single episodes, of a game, of many worlds together.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use faceoff_sim::{
-    Episode, Interpolation, JOINTS, PerturbationSettings, Plant, robot::model::INITIAL_Q,
+    Batch, BatchSetup, Command, Episode, Game, GameSetup, Interpolation, JOINTS,
+    PerturbationSettings, Plant, robot::model::INITIAL_Q,
 };
 use faceoff_types::{Factors, Seed, Task};
 use std::hint::black_box;
@@ -47,5 +48,54 @@ fn held_arm(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, held_arm);
+/// One control step of two agents.
+fn game(c: &mut Criterion) {
+    let hold = Interpolation::Cubic.held(&INITIAL_Q);
+    let mut game = Game::new(GameSetup {
+        interpolation: [Interpolation::Cubic; 2],
+        factors: Factors::NONE,
+        settings: PerturbationSettings::default(),
+        plant: Plant::nominal(),
+        seed: Seed::from_number(0),
+    });
+    let mut group = c.benchmark_group("game");
+    group.throughput(Throughput::Elements(1));
+    group.bench_function("ideal", |b| {
+        b.iter(|| black_box(game.step([Command::Act(black_box(&hold[..2 * JOINTS])); 2])));
+    });
+    group.finish();
+}
+
+/// A control step of many worlds, on one thread and on all.
+fn batch(c: &mut Criterion) {
+    const WORLDS: u32 = 64;
+    let hold = Interpolation::Cubic.held(&INITIAL_Q);
+    let actions = hold[..2 * JOINTS].repeat(WORLDS as usize);
+    let mut group = c.benchmark_group("batch_of_64");
+    group.throughput(Throughput::Elements(u64::from(WORLDS)));
+    let all = std::thread::available_parallelism().map_or(1, usize::from);
+    for threads in [1, all] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let Ok(pool) = pool else { continue };
+        let mut batch = Batch::new(BatchSetup {
+            task: Task::Prepare,
+            interpolation: Interpolation::Cubic,
+            factors: Factors::NONE,
+            settings: PerturbationSettings::default(),
+            plant: Plant::nominal(),
+            seed: Seed::from_number(0),
+            worlds: WORLDS,
+        });
+        group.bench_function(format!("prepare/{threads} threads"), |b| {
+            b.iter(|| {
+                pool.install(|| {
+                    black_box(batch.step(black_box(&actions)));
+                });
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, held_arm, game, batch);
 criterion_main!(benches);

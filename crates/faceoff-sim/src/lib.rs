@@ -15,18 +15,24 @@
     reason = "joints are numbered: one index runs over several arrays, as in the equations"
 )]
 
+pub mod batch;
 pub mod dynamics;
 pub mod episode;
+pub mod game;
+pub mod link;
 pub mod perturbation;
 pub mod robot;
 pub mod table;
 pub mod world;
 
+pub use batch::{Batch, BatchOutcome, BatchSetup};
 pub use episode::{
     EPISODE_STEPS, Episode, EpisodeState, StepOutcome,
     constraints::ConstraintValues,
     env_info::{EnvInfo, env_info, env_info_for},
 };
+pub use game::{GAME_STEPS, Game, GameSetup, GameStep, WINDOW_STEPS, referee::RallyEnd};
+pub use link::Command;
 pub use perturbation::settings::PerturbationSettings;
 pub use robot::{
     interpolation::Interpolation,

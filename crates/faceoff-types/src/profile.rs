@@ -13,6 +13,8 @@ pub enum Factor {
     Disturbance,
     /// The puck's pose freezes for some steps.
     TrackingLoss,
+    /// The laboratory's delays and table. Part of the rehearsal only, so not among [`Factor::ALL`].
+    Delay,
 }
 
 impl Factor {
@@ -32,7 +34,14 @@ impl Factor {
             Self::ObservationNoise => "observation_noise",
             Self::Disturbance => "disturbance",
             Self::TrackingLoss => "tracking_loss",
+            Self::Delay => "delay",
         }
+    }
+}
+
+impl fmt::Display for Factor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.as_str())
     }
 }
 
@@ -67,7 +76,7 @@ impl Factors {
 
 /// A named set of perturbations.
 ///
-/// The rehearsal profile of the rules (delays and the safety layer) is not offered yet.
+/// The rules' rehearsal profile, with its safety layer, is not offered yet; its delays are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Profile {
@@ -81,18 +90,21 @@ pub enum Profile {
     Disturbance,
     /// Tracking loss alone.
     TrackingLoss,
+    /// The laboratory's delays and table alone.
+    Delay,
     /// The four factors together: what counts.
     Evaluation,
 }
 
 impl Profile {
     /// All profiles.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Ideal,
         Self::ModelMismatch,
         Self::ObservationNoise,
         Self::Disturbance,
         Self::TrackingLoss,
+        Self::Delay,
         Self::Evaluation,
     ];
 
@@ -105,6 +117,7 @@ impl Profile {
             Self::ObservationNoise => Factor::ObservationNoise.as_str(),
             Self::Disturbance => Factor::Disturbance.as_str(),
             Self::TrackingLoss => Factor::TrackingLoss.as_str(),
+            Self::Delay => Factor::Delay.as_str(),
             Self::Evaluation => "evaluation",
         }
     }
@@ -118,6 +131,7 @@ impl Profile {
             Self::ObservationNoise => Factors::only(Factor::ObservationNoise),
             Self::Disturbance => Factors::only(Factor::Disturbance),
             Self::TrackingLoss => Factors::only(Factor::TrackingLoss),
+            Self::Delay => Factors::only(Factor::Delay),
             Self::Evaluation => Factors::ALL,
         }
     }
@@ -132,7 +146,7 @@ impl fmt::Display for Profile {
 /// A word that names no profile.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "unknown profile {0:?}: expected ideal, model_mismatch, observation_noise, disturbance, tracking_loss or evaluation"
+    "unknown profile {0:?}: expected ideal, model_mismatch, observation_noise, disturbance, tracking_loss, delay or evaluation"
 )]
 pub struct ParseProfileError(pub String);
 

@@ -57,6 +57,12 @@ impl Seed {
     pub fn episode(&self, task: Task, episode: u32) -> Self {
         self.derive(task.as_str(), &episode.to_le_bytes())
     }
+
+    /// A game's seed → the seed of one of its rallies, from 0.
+    #[must_use]
+    pub fn rally(&self, rally: u32) -> Self {
+        self.derive("rally", &rally.to_le_bytes())
+    }
 }
 
 impl fmt::Display for Seed {

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Name and version of the layout described here. Another meaning of a column is another version.
-pub const DATASET_SCHEMA: &str = "faceoff-dataset/1";
+pub const DATASET_SCHEMA: &str = "faceoff-dataset/2";
 
 /// `manifest.json`: what the dataset is and what its files must hash to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -18,6 +18,8 @@ pub struct DatasetManifest {
     pub schema: String,
     /// The ruleset's name.
     pub ruleset: String,
+    /// The simulator that made the states; only the same one can make them again.
+    pub simulator: SimulatorId,
     /// The perturbation profile.
     pub profile: Profile,
     /// The evaluation's seed.
@@ -30,6 +32,17 @@ pub struct DatasetManifest {
     pub episodes: BTreeMap<Task, u32>,
     /// Every other file of the archive.
     pub files: BTreeMap<String, FileDigest>,
+}
+
+/// Which simulator made a recording.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SimulatorId {
+    /// The program's version.
+    pub version: String,
+    /// BLAKE3, 64 hexadecimal digits, of what the simulator makes of a few fixed episodes: two
+    /// simulators that differ in one bit of them have different fingerprints, whatever their versions
+    /// say.
+    pub fingerprint: String,
 }
 
 /// Size and hash of a file.

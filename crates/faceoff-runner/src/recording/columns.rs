@@ -22,7 +22,9 @@ impl FloatColumns {
         self
     }
 
-    /// Adds the columns of a true state to the right, their names after `prefix`.
+    /// Adds the columns of a true state to the right, their names after `prefix`. The filtered
+    /// velocities are left out: they follow from the others, and seven more columns of noise would be
+    /// a tenth of a dataset.
     pub fn with_state(self, prefix: &str) -> Self {
         let name = |suffix: &str| format!("{prefix}{suffix}");
         self.with(
@@ -31,7 +33,6 @@ impl FloatColumns {
         )
         .with(joints(&name("q")), false)
         .with(joints(&name("dq")), false)
-        .with(joints(&name("dq_filtered")), false)
         .with([name("universal_1"), name("universal_2")], false)
         .with(["x", "y", "z"].map(|c| name(&format!("ee_{c}"))), false)
         .with(joints(&name("opponent_q")), true)
@@ -76,7 +77,7 @@ impl FloatColumns {
             puck,
             q,
             dq,
-            dq_filtered,
+            dq_filtered: _,
             universal,
             ee,
             opponent_q,
@@ -85,7 +86,6 @@ impl FloatColumns {
         self.put(puck);
         self.put(q);
         self.put(dq);
-        self.put(dq_filtered);
         self.put(universal);
         self.put(ee);
         self.put_optional(*opponent_q);

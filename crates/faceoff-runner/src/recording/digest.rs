@@ -1,4 +1,5 @@
-use crate::PlatformFault;
+use super::times::nanoseconds;
+use crate::{Answered, PlatformFault};
 use faceoff_wire::dataset::FileDigest;
 use std::{
     fs::File,
@@ -44,8 +45,37 @@ impl<W: Write> Write for HashingWriter<W> {
     }
 }
 
+/// Hashes of what an episode's steps were given from outside: the actions, and apart from them the
+/// measured times. An action may differ in a bit that moves nothing, and a time follows from nothing;
+/// the hashes show both.
+#[derive(Debug, Default)]
+pub(super) struct StepDigests {
+    actions: blake3::Hasher,
+    times: blake3::Hasher,
+}
+
+impl StepDigests {
+    /// Adds an answered step: the action's numbers as little-endian doubles; the computation time and
+    /// the CPU time in nanoseconds as little-endian 64-bit integers, −1 for a CPU time that is not
+    /// known.
+    pub fn add(&mut self, action: &[f64], answered: &Answered) {
+        for number in action {
+            self.actions.update(&number.to_le_bytes());
+        }
+        let cpu_time_ns = answered.cpu_time_s.map_or(-1, nanoseconds);
+        self.times
+            .update(&nanoseconds(answered.computation_time_s).to_le_bytes());
+        self.times.update(&cpu_time_ns.to_le_bytes());
+    }
+
+    /// Both hashes, of the actions and of the times.
+    pub fn finish(&self) -> [String; 2] {
+        [&self.actions, &self.times].map(|hasher| hasher.finalize().to_hex().to_string())
+    }
+}
+
 /// Count and hash of a file, streamed.
-pub(super) fn of_file(path: &Path) -> Result<FileDigest, PlatformFault> {
+pub(crate) fn of_file(path: &Path) -> Result<FileDigest, PlatformFault> {
     let reading = || PlatformFault::io(format!("reading {}", path.display()));
     let mut file = File::open(path).map_err(reading())?;
     let mut hashing = HashingWriter::new(io::sink());

@@ -1,20 +1,24 @@
-use super::{EpisodeStart, columns::FloatColumns, parquet_file::TableWriter};
+use super::{
+    EpisodeStart, StepRow,
+    columns::FloatColumns,
+    digest::StepDigests,
+    steps::{observation_columns, put_observation},
+};
 use crate::PlatformFault;
 use arrow_array::{
     ArrayRef,
-    builder::{BooleanBuilder, StringBuilder, UInt32Builder},
+    builder::{ArrayBuilder, BooleanBuilder, StringBuilder, UInt32Builder},
 };
-use arrow_schema::{DataType, Field, Schema};
+use arrow_schema::{DataType, Field, Schema, SchemaRef};
 use faceoff_types::{EpisodeEnd, EpisodeOutcome};
-use std::{path::Path, sync::Arc};
+use std::sync::Arc;
 
-/// Episodes that are held before they go to the file.
-const BATCH: usize = 256;
-
-/// The table of episodes: one row each.
-pub(super) struct EpisodesTable {
-    writer: TableWriter,
-    rows: usize,
+/// Rows of the table of episodes.
+pub(crate) struct EpisodeRows {
+    schema: SchemaRef,
+    digests: StepDigests,
+    /// The observation after the last answered step; empty before the first.
+    last_observation: Vec<f64>,
     tasks: StringBuilder,
     episodes: UInt32Builder,
     seeds: StringBuilder,
@@ -25,11 +29,14 @@ pub(super) struct EpisodesTable {
     violations: [BooleanBuilder; 4],
     times: FloatColumns,
     faults: StringBuilder,
+    actions_blake3: StringBuilder,
+    times_blake3: StringBuilder,
     initial: FloatColumns,
+    last: FloatColumns,
 }
 
-impl EpisodesTable {
-    pub fn create(path: &Path) -> Result<Self, PlatformFault> {
+impl EpisodeRows {
+    pub fn new() -> Self {
         let times = FloatColumns::default().with(
             [
                 "penalty_points",
@@ -40,6 +47,7 @@ impl EpisodesTable {
             false,
         );
         let initial = FloatColumns::default().with_state("initial_");
+        let last = observation_columns("last_obs_", true);
         let text = |name: &str, nullable| Field::new(name, DataType::Utf8, nullable);
         let flag = |name: &str| Field::new(name, DataType::Boolean, false);
         let mut fields = vec![
@@ -57,10 +65,14 @@ impl EpisodesTable {
         ];
         fields.extend_from_slice(times.fields());
         fields.push(text("fault", true));
+        fields.push(text("actions_blake3", false));
+        fields.push(text("times_blake3", false));
         fields.extend_from_slice(initial.fields());
-        Ok(Self {
-            writer: TableWriter::create(path, Schema::new(fields))?,
-            rows: 0,
+        fields.extend_from_slice(last.fields());
+        Self {
+            schema: Arc::new(Schema::new(fields)),
+            digests: StepDigests::default(),
+            last_observation: Vec::new(),
             tasks: StringBuilder::new(),
             episodes: UInt32Builder::new(),
             seeds: StringBuilder::new(),
@@ -71,8 +83,21 @@ impl EpisodesTable {
             violations: Default::default(),
             times,
             faults: StringBuilder::new(),
+            actions_blake3: StringBuilder::new(),
+            times_blake3: StringBuilder::new(),
             initial,
-        })
+            last,
+        }
+    }
+
+    /// The columns' names and types.
+    pub const fn schema(&self) -> &SchemaRef {
+        &self.schema
+    }
+
+    /// Rows so far.
+    pub fn len(&self) -> usize {
+        self.episodes.len()
     }
 
     pub fn begin(&mut self, start: &EpisodeStart<'_>) {
@@ -81,6 +106,15 @@ impl EpisodesTable {
             .append_option(start.interpolation.map(|code| code.to_string()));
         self.initial.put_state(start.state);
         self.initial.end_row();
+        self.digests = StepDigests::default();
+        self.last_observation.clear();
+    }
+
+    pub fn step(&mut self, row: &StepRow<'_>) {
+        self.digests.add(row.action, &row.answered);
+        self.last_observation.clear();
+        self.last_observation
+            .extend_from_slice(row.next_observation);
     }
 
     pub fn end(&mut self, outcome: &EpisodeOutcome) -> Result<(), PlatformFault> {
@@ -110,19 +144,16 @@ impl EpisodesTable {
             .transpose()
             .map_err(PlatformFault::recording("writing a fault"))?;
         self.faults.append_option(fault);
-        self.rows += 1;
-        if self.rows < BATCH {
-            Ok(())
-        } else {
-            self.flush()
-        }
+        let [actions, times] = self.digests.finish();
+        self.actions_blake3.append_value(actions);
+        self.times_blake3.append_value(times);
+        put_observation(&mut self.last, &self.last_observation);
+        self.last.end_row();
+        Ok(())
     }
 
-    fn flush(&mut self) -> Result<(), PlatformFault> {
-        if self.rows == 0 {
-            return Ok(());
-        }
-        self.rows = 0;
+    /// The rows so far, which are removed.
+    pub fn take(&mut self) -> Vec<ArrayRef> {
         let mut columns: Vec<ArrayRef> = vec![
             Arc::new(self.tasks.finish()),
             Arc::new(self.episodes.finish()),
@@ -139,17 +170,16 @@ impl EpisodesTable {
         );
         columns.extend(self.times.take());
         columns.push(Arc::new(self.faults.finish()));
+        columns.push(Arc::new(self.actions_blake3.finish()));
+        columns.push(Arc::new(self.times_blake3.finish()));
         columns.extend(self.initial.take());
-        self.writer.write(columns)
-    }
-
-    pub fn finish(mut self) -> Result<(), PlatformFault> {
-        self.flush()?;
-        self.writer.finish()
+        columns.extend(self.last.take());
+        columns
     }
 }
 
-const fn end_name(end: EpisodeEnd) -> &'static str {
+/// The end's name in tables.
+pub(crate) const fn end_name(end: EpisodeEnd) -> &'static str {
     match end {
         EpisodeEnd::Horizon => "horizon",
         EpisodeEnd::LeftTable => "left_table",

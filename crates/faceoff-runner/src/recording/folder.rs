@@ -1,6 +1,6 @@
 use super::{EPISODES_FILE, LOG_FILE, STEPS_FILE, digest};
-use crate::{PlatformFault, ShardReport, ShardSpec};
-use faceoff_wire::dataset::FileDigest;
+use crate::{PlatformFault, ShardReport, ShardSpec, simulator::simulator_id};
+use faceoff_wire::dataset::{FileDigest, SimulatorId};
 use serde::{Deserialize, Serialize};
 use std::{
     collections::BTreeMap,
@@ -13,13 +13,14 @@ const REPORT_FILE: &str = "report.json";
 /// Written last: a folder with this file is complete.
 const SHARD_FILE: &str = "shard.json";
 /// Name and version of a shard folder's layout; private to the platform.
-const SHARD_SCHEMA: &str = "faceoff-shard/1";
+const SHARD_SCHEMA: &str = "faceoff-shard/2";
 
 /// `shard.json`.
 #[derive(Debug, Serialize, Deserialize)]
 struct ShardFile {
     schema: String,
     ruleset: String,
+    simulator: SimulatorId,
     spec: ShardSpec,
     files: BTreeMap<String, FileDigest>,
 }
@@ -72,6 +73,7 @@ impl ShardFolder {
         let shard = ShardFile {
             schema: SHARD_SCHEMA.to_owned(),
             ruleset: faceoff_types::RULESET.to_owned(),
+            simulator: simulator_id().clone(),
             spec: spec.clone(),
             files,
         };
@@ -130,6 +132,12 @@ impl ShardRecording {
                 shard.schema,
                 shard.ruleset,
                 faceoff_types::RULESET
+            )));
+        }
+        if &shard.simulator != simulator_id() {
+            return Err(damaged(format!(
+                "it was played by another build of the simulator, {}",
+                shard.simulator.version
             )));
         }
         for name in [STEPS_FILE, EPISODES_FILE, LOG_FILE, REPORT_FILE] {

@@ -1,5 +1,5 @@
 use crate::PlatformFault;
-use arrow_array::{ArrayRef, RecordBatch};
+use arrow_array::{Array, ArrayRef, RecordBatch};
 use arrow_schema::{DataType, Schema, SchemaRef};
 use faceoff_wire::dataset::DATASET_SCHEMA;
 use parquet::{
@@ -38,22 +38,24 @@ pub(super) struct TableWriter {
 }
 
 impl TableWriter {
-    pub fn create(path: &Path, schema: Schema) -> Result<Self, PlatformFault> {
-        let schema = Arc::new(schema);
+    pub fn create(path: &Path, schema: &SchemaRef) -> Result<Self, PlatformFault> {
         let file = File::create(path)
             .map_err(PlatformFault::io(format!("creating {}", path.display())))?;
         let writer =
-            ArrowWriter::try_new(file, schema.clone(), Some(properties(&schema)?)).map_err(
+            ArrowWriter::try_new(file, schema.clone(), Some(properties(schema)?)).map_err(
                 PlatformFault::recording(format!("creating {}", path.display())),
             )?;
         Ok(Self {
             path: path.to_owned(),
-            schema,
+            schema: schema.clone(),
             writer,
         })
     }
 
     pub fn write(&mut self, columns: Vec<ArrayRef>) -> Result<(), PlatformFault> {
+        if columns.iter().all(|column| column.is_empty()) {
+            return Ok(());
+        }
         let writing = || format!("writing {}", self.path.display());
         let batch = RecordBatch::try_new(self.schema.clone(), columns)
             .map_err(PlatformFault::recording(writing()))?;
@@ -88,19 +90,32 @@ fn properties(schema: &Schema) -> Result<WriterProperties, PlatformFault> {
         .set_offset_index_disabled(true)
         .set_key_value_metadata(Some(vec![schema_metadata()]));
     for field in schema.fields() {
-        let path = match field.data_type() {
-            DataType::Float64 => ColumnPath::from(field.name().as_str()),
-            DataType::List(item) => ColumnPath::new(vec![
-                field.name().clone(),
-                "list".to_owned(),
-                item.name().clone(),
-            ]),
+        // Measured numbers hardly repeat, but their leading bytes do; numbers of steps count up.
+        let (path, encoding) = match field.data_type() {
+            DataType::Float64 | DataType::Int64 => (
+                ColumnPath::from(field.name().as_str()),
+                Encoding::BYTE_STREAM_SPLIT,
+            ),
+            DataType::List(item) => (
+                ColumnPath::new(vec![
+                    field.name().clone(),
+                    "list".to_owned(),
+                    item.name().clone(),
+                ]),
+                Encoding::BYTE_STREAM_SPLIT,
+            ),
+            DataType::UInt32 => {
+                let path = ColumnPath::from(field.name().as_str());
+                properties = properties
+                    .set_column_dictionary_enabled(path.clone(), false)
+                    .set_column_encoding(path, Encoding::DELTA_BINARY_PACKED);
+                continue;
+            }
             _ => continue,
         };
-        // Measured numbers hardly repeat, but their leading bytes do.
         properties = properties
             .set_column_dictionary_enabled(path.clone(), false)
-            .set_column_encoding(path.clone(), Encoding::BYTE_STREAM_SPLIT)
+            .set_column_encoding(path.clone(), encoding)
             .set_column_statistics_enabled(path, EnabledStatistics::None);
     }
     Ok(properties.build())

@@ -1,16 +1,18 @@
 use super::{
     StepRow,
     columns::{FloatColumns, joints},
-    parquet_file::{self, TableWriter},
+    parquet_file,
+    times::{nanoseconds, seconds},
 };
 use crate::PlatformFault;
 use arrow_array::{
     ArrayRef, Float64Array, RecordBatch, StringArray, UInt32Array,
-    builder::{Float64Builder, ListBuilder, UInt32Builder},
+    builder::{Float64Builder, Int64Builder, ListBuilder, UInt32Builder},
     cast::AsArray,
-    types::{Float64Type, UInt32Type},
+    types::{Float64Type, Int64Type, UInt32Type},
 };
-use arrow_schema::{DataType, Field, Schema};
+use arrow_schema::{DataType, Field, Schema, SchemaRef};
+use faceoff_sim::ConstraintValues;
 use faceoff_types::Task;
 use faceoff_wire::dataset::ConstraintViolation;
 use std::{path::Path, sync::Arc};
@@ -18,34 +20,46 @@ use std::{path::Path, sync::Arc};
 /// Numbers of an observation with an opponent on the table.
 const OBSERVATION_MAX: usize = 23;
 
-/// The table of control steps: one row per answered step.
-pub(super) struct StepsTable {
-    writer: TableWriter,
+/// Columns of an observation, in the protocol's order, their names after `prefix`; absent ones are
+/// null.
+pub(super) fn observation_columns(prefix: &str, nullable: bool) -> FloatColumns {
+    FloatColumns::default()
+        .with(
+            ["x", "y", "yaw", "vx", "vy", "yaw_rate"].map(|c| format!("{prefix}puck_{c}")),
+            nullable,
+        )
+        .with(joints(&format!("{prefix}q")), nullable)
+        .with(joints(&format!("{prefix}dq")), nullable)
+        .with(
+            ["x", "y", "z"].map(|c| format!("{prefix}opponent_ee_{c}")),
+            true,
+        )
+}
+
+/// Fills the columns of an observation; an empty one is absent as a whole.
+pub(super) fn put_observation(columns: &mut FloatColumns, observation: &[f64]) {
+    columns.put(observation);
+    columns.put_absent(OBSERVATION_MAX - observation.len());
+}
+
+/// Rows of the table of control steps: one per answered step.
+pub(crate) struct StepRows {
+    schema: SchemaRef,
     task: Task,
     episode: u32,
     episodes: UInt32Builder,
     steps: UInt32Builder,
     observations: FloatColumns,
     actions: ListBuilder<Float64Builder>,
+    computation_times: Int64Builder,
+    cpu_times: Int64Builder,
     rest: FloatColumns,
 }
 
-impl StepsTable {
-    pub fn create(path: &Path, task: Task) -> Result<Self, PlatformFault> {
-        let observations = FloatColumns::default()
-            .with(
-                ["x", "y", "yaw", "vx", "vy", "yaw_rate"].map(|c| format!("obs_puck_{c}")),
-                false,
-            )
-            .with(joints("obs_q"), false)
-            .with(joints("obs_dq"), false)
-            .with(
-                ["x", "y", "z"].map(|c| format!("obs_opponent_ee_{c}")),
-                true,
-            );
+impl StepRows {
+    pub fn new(task: Task) -> Self {
+        let observations = observation_columns("obs_", false);
         let rest = FloatColumns::default()
-            .with(["computation_time_s".to_owned()], false)
-            .with(["cpu_time_s".to_owned()], true)
             .with_state("")
             .with(CONSTRAINTS.map(str::to_owned), false);
         let item = Arc::new(Field::new_list_field(DataType::Float64, false));
@@ -56,17 +70,26 @@ impl StepsTable {
         ];
         fields.extend_from_slice(observations.fields());
         fields.push(Field::new("action", DataType::List(item.clone()), false));
+        fields.push(Field::new("computation_time_ns", DataType::Int64, false));
+        fields.push(Field::new("cpu_time_ns", DataType::Int64, true));
         fields.extend_from_slice(rest.fields());
-        Ok(Self {
-            writer: TableWriter::create(path, Schema::new(fields))?,
+        Self {
+            schema: Arc::new(Schema::new(fields)),
             task,
             episode: 0,
             episodes: UInt32Builder::new(),
             steps: UInt32Builder::new(),
             observations,
             actions: ListBuilder::new(Float64Builder::new()).with_field(item),
+            computation_times: Int64Builder::new(),
+            cpu_times: Int64Builder::new(),
             rest,
-        })
+        }
+    }
+
+    /// The columns' names and types.
+    pub const fn schema(&self) -> &SchemaRef {
+        &self.schema
     }
 
     pub fn begin(&mut self, episode: u32) {
@@ -74,9 +97,7 @@ impl StepsTable {
     }
 
     pub fn observe(&mut self, observation: &[f64]) {
-        self.observations.put(observation);
-        self.observations
-            .put_absent(OBSERVATION_MAX - observation.len());
+        put_observation(&mut self.observations, observation);
         self.observations.end_row();
     }
 
@@ -85,21 +106,20 @@ impl StepsTable {
         self.steps.append_value(row.step);
         self.actions.values().append_slice(row.action);
         self.actions.append(true);
+        self.computation_times
+            .append_value(nanoseconds(row.answered.computation_time_s));
+        self.cpu_times
+            .append_option(row.answered.cpu_time_s.map(nanoseconds));
         let rest = &mut self.rest;
-        rest.put(&[row.answered.computation_time_s]);
-        rest.put_optional(row.answered.cpu_time_s.map(|time| [time]));
         rest.put_state(row.state);
         let c = row.constraints;
         rest.put(&[c.joint_pos, c.joint_vel, c.ee, c.link]);
         rest.end_row();
     }
 
-    /// Hands the episode's rows to the file.
-    pub fn flush(&mut self) -> Result<(), PlatformFault> {
+    /// The rows so far, which are removed.
+    pub fn take(&mut self) -> Vec<ArrayRef> {
         let episodes = self.episodes.finish();
-        if episodes.is_empty() {
-            return Ok(());
-        }
         let tasks =
             StringArray::from_iter_values(std::iter::repeat_n(self.task.as_str(), episodes.len()));
         let mut columns: Vec<ArrayRef> = vec![
@@ -109,12 +129,10 @@ impl StepsTable {
         ];
         columns.extend(self.observations.take());
         columns.push(Arc::new(self.actions.finish()));
+        columns.push(Arc::new(self.computation_times.finish()));
+        columns.push(Arc::new(self.cpu_times.finish()));
         columns.extend(self.rest.take());
-        self.writer.write(columns)
-    }
-
-    pub fn finish(self) -> Result<(), PlatformFault> {
-        self.writer.finish()
+        columns
     }
 }
 
@@ -137,7 +155,7 @@ pub(crate) struct StepScan {
 
 /// Reads the few columns that scoring needs, batch by batch, and adds them to `scan`.
 pub(crate) fn scan_steps(path: &Path, scan: &mut StepScan) -> Result<(), PlatformFault> {
-    let mut names = vec!["episode", "step", "computation_time_s"];
+    let mut names = vec!["episode", "step", "computation_time_ns"];
     names.extend(CONSTRAINTS);
     let damaged = |what: &str| PlatformFault::Recording(format!("{}: {what}", path.display()));
     for batch in parquet_file::read(path, &names)? {
@@ -157,22 +175,50 @@ pub(crate) fn scan_steps(path: &Path, scan: &mut StepScan) -> Result<(), Platfor
                 .and_then(|column| column.as_primitive_opt::<Float64Type>())
                 .ok_or_else(|| damaged(&format!("no column {name}")))
         };
+        let times = batch
+            .column_by_name("computation_time_ns")
+            .and_then(|column| column.as_primitive_opt::<Int64Type>())
+            .ok_or_else(|| damaged("no column computation_time_ns"))?;
         scan.computation_times_s
-            .extend_from_slice(floats("computation_time_s")?.values());
+            .extend(times.values().iter().copied().map(seconds));
         let (episodes, steps) = (ints("episode")?.values(), ints("step")?.values());
         for (found, name) in scan.violations.iter_mut().zip(CONSTRAINTS) {
             let values = floats(name)?.values();
             for ((episode, step), value) in episodes.iter().zip(steps).zip(values) {
-                if *value > 0.0 {
-                    note(found, *episode, *step, *value);
-                }
+                note(found, *episode, *step, *value);
             }
         }
     }
     Ok(())
 }
 
+impl StepScan {
+    /// Adds one step, after all earlier ones.
+    pub fn add(&mut self, episode: u32, step: u32, time_s: f64, c: ConstraintValues) {
+        self.computation_times_s.push(time_s);
+        for (found, value) in
+            self.violations
+                .iter_mut()
+                .zip([c.joint_pos, c.joint_vel, c.ee, c.link])
+        {
+            note(found, episode, step, value);
+        }
+    }
+
+    /// Adds what comes after, of later episodes.
+    pub fn append(&mut self, later: Self) {
+        self.computation_times_s.extend(later.computation_times_s);
+        for (found, later) in self.violations.iter_mut().zip(later.violations) {
+            found.extend(later);
+        }
+    }
+}
+
+/// Counts a constraint's value if it is a violation.
 fn note(found: &mut Vec<ConstraintViolation>, episode: u32, step: u32, value: f64) {
+    if value.is_nan() || value <= 0.0 {
+        return;
+    }
     match found.last_mut() {
         Some(last) if last.episode == episode => {
             last.steps += 1;

@@ -1,6 +1,6 @@
 use crate::{
     agents::{Agent, sandboxed},
-    recording::{floats, moving, read, texts},
+    recording::{moving, read, seconds, texts},
     shard::{run, spec},
 };
 use faceoff_runner::{EvaluationMeta, PlatformFault, ShardReport, assemble};
@@ -121,10 +121,10 @@ fn the_dataset_is_whole_and_its_score_is_the_direct_one() {
             .flat_map(|report| report.outcomes.iter().filter(|o| o.task == task).cloned())
             .collect();
         let of_task = texts(&steps, "task");
-        let times = floats(&steps, "computation_time_s");
+        let times = seconds(&steps, "computation_time_ns");
         let mut times: Vec<f64> = (0..steps.num_rows())
             .filter(|row| of_task.value(*row) == task.as_str())
-            .map(|row| times.value(row))
+            .map(|row| times[row])
             .collect();
         assert_eq!(
             times.len() as u64,
@@ -338,7 +338,8 @@ fn timeless_columns(dir: &Path, table: &str) -> Vec<(String, arrow_array::ArrayR
         .map(|(field, column)| (field.name().clone(), column.clone()))
         .filter(|(name, _)| {
             !name.starts_with("computation_time")
-                && name != "cpu_time_s"
+                && name != "cpu_time_ns"
+                && name != "times_blake3"
                 && name != "penalty_points"
         })
         .collect()

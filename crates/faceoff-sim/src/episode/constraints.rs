@@ -4,6 +4,7 @@ use crate::{
     dynamics::arm::Kinematics,
     robot::model::{EE_DESIRED_HEIGHT_M, JOINTS, LIMIT_FRACTION, LINKS, TOOL},
     table::geometry::TABLE,
+    world::World,
 };
 use faceoff_types::Violations;
 
@@ -28,6 +29,16 @@ pub struct ConstraintValues {
 }
 
 impl ConstraintValues {
+    /// Of a robot (0 or 1) now.
+    #[must_use]
+    pub fn of(world: &World, robot: usize) -> Self {
+        Self::new(
+            &world.joints(robot),
+            world.filtered_velocities(robot),
+            &world.kinematics(robot),
+        )
+    }
+
     /// At one instant.
     #[must_use]
     pub fn new(

@@ -2,21 +2,17 @@
 
 pub mod constraints;
 pub mod env_info;
-pub mod observation;
 pub mod opponent;
 pub mod task;
 
 use crate::{
-    perturbation::{
-        disturbance::Disturbance, noise::ObservationNoise, settings::PerturbationSettings,
-        stream::Stream, tracking_loss::TrackingLoss,
-    },
+    link::{Command, Link, observation},
+    perturbation::{settings::PerturbationSettings, stream::Stream, table_factors::TableFactors},
     robot::{interpolation::Interpolation, model::JOINTS, plant::Plant},
     world::World,
 };
 use constraints::ConstraintValues;
-use faceoff_types::{EpisodeEnd, Factor, Factors, Seed, Task, Violations};
-use observation::{OBSERVATION_LEN, OBSERVATION_WITH_OPPONENT_LEN, observe, wrap};
+use faceoff_types::{EpisodeEnd, Factors, Seed, Task, Violations};
 use opponent::Opponent;
 
 /// Control steps of a qualifying episode.
@@ -26,13 +22,10 @@ pub const EPISODE_STEPS: u32 = 500;
 #[derive(Debug, Clone)]
 pub struct Episode {
     task: Task,
-    interpolation: Interpolation,
     world: World,
     opponent: Option<Opponent>,
-    noise: Option<ObservationNoise>,
-    disturbance: Option<Disturbance>,
-    tracking_loss: Option<TrackingLoss>,
-    observation: [f64; OBSERVATION_WITH_OPPONENT_LEN],
+    link: Link,
+    table: TableFactors,
     steps: u32,
     violations: Violations,
 }
@@ -65,59 +58,46 @@ impl Episode {
         seed: Seed,
         puck: [f64; 6],
     ) -> Self {
-        let stream = |factor: Factor| Stream::new(&seed, factor.as_str());
-        let on = |factor: Factor| factors.contains(factor).then(|| stream(factor));
         let opponent = (task == Task::Hit).then(Opponent::new);
-        let world = World::with_robots(plant, if opponent.is_some() { 2 } else { 1 }, puck);
-        let mut episode = Self {
+        let mut world = World::with_robots(plant, if opponent.is_some() { 2 } else { 1 }, puck);
+        let table = TableFactors::new(factors, settings, &seed, &mut world);
+        Self {
             task,
-            interpolation,
+            link: Link::new(0, interpolation, factors, settings, &seed, &world),
             world,
             opponent,
-            noise: on(Factor::ObservationNoise)
-                .map(|stream| ObservationNoise::new(&settings.observation_noise, stream)),
-            disturbance: on(Factor::Disturbance)
-                .map(|stream| Disturbance::new(&settings.disturbance, stream)),
-            tracking_loss: on(Factor::TrackingLoss)
-                .map(|stream| TrackingLoss::new(&settings.tracking_loss, stream)),
-            observation: [0.0; OBSERVATION_WITH_OPPONENT_LEN],
+            table,
             steps: 0,
             violations: Violations::default(),
-        };
-        episode.observe(false);
-        episode
+        }
     }
 
     /// The observation that the agent gets: 23 numbers for `hit`, 20 otherwise (PROTOCOL).
     #[must_use]
     pub fn observation(&self) -> &[f64] {
-        match self.opponent {
-            Some(_) => &self.observation,
-            None => &self.observation[..OBSERVATION_LEN],
-        }
+        &self.link.observation()[..observation::len(self.task)]
     }
 
     /// One control step. `action` is row-major, of length [`Interpolation::len`], finite. Must not
     /// be called after an end.
     pub fn step(&mut self, action: &[f64]) -> StepOutcome {
-        debug_assert_eq!(action.len(), self.interpolation.len());
-        self.world.command(0, self.interpolation, action);
+        self.advance(Command::Act(action))
+    }
+
+    /// One control step in which no action came in time.
+    pub fn step_late(&mut self) -> StepOutcome {
+        self.advance(Command::Late)
+    }
+
+    fn advance(&mut self, command: Command<'_>) -> StepOutcome {
+        self.link.command(&mut self.world, command);
         if let Some(opponent) = &mut self.opponent {
             self.world
                 .command(1, Interpolation::LinearBoth, &opponent.action());
         }
-        let disturbance = &mut self.disturbance;
-        self.world.control_step(|puck| {
-            disturbance
-                .as_mut()
-                .map_or([0.0; 2], |disturbance| disturbance.force(puck))
-        });
+        let lost = self.table.control_step(&mut self.world);
+        self.link.look(&self.world, lost);
         self.steps += 1;
-        let lost = self
-            .tracking_loss
-            .as_mut()
-            .is_some_and(TrackingLoss::advance);
-        self.observe(lost);
 
         let constraints = self.constraints();
         constraints.mark(&mut self.violations);
@@ -147,11 +127,7 @@ impl Episode {
     /// Constraint values of the agent's robot now.
     #[must_use]
     pub fn constraints(&self) -> ConstraintValues {
-        ConstraintValues::new(
-            &self.world.joints(0),
-            self.world.filtered_velocities(0),
-            &self.world.kinematics(0),
-        )
+        ConstraintValues::of(&self.world, 0)
     }
 
     /// True state after the last step, or the initial one.
@@ -176,24 +152,6 @@ impl Episode {
     #[must_use]
     pub fn world(&self) -> &World {
         &self.world
-    }
-
-    fn observe(&mut self, lost: bool) {
-        let last_pose = [
-            self.observation[0],
-            self.observation[1],
-            self.observation[2],
-        ];
-        self.observation = observe(&self.world, 0);
-        // Noise is drawn for the lost puck too, so that a loss does not shift later draws.
-        if let Some(noise) = &mut self.noise {
-            noise.add(&mut self.observation);
-            self.observation[2] = wrap(self.observation[2]);
-        }
-        if lost {
-            self.observation[..3].copy_from_slice(&last_pose);
-            self.observation[3..6].fill(0.0);
-        }
     }
 }
 

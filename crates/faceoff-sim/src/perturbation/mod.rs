@@ -3,6 +3,8 @@
 pub mod disturbance;
 mod mismatch;
 pub mod noise;
+pub mod rehearsal_table;
 pub mod settings;
 pub mod stream;
+pub mod table_factors;
 pub mod tracking_loss;

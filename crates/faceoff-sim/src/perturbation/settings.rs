@@ -14,6 +14,8 @@ pub struct PerturbationSettings {
     pub disturbance: DisturbanceSettings,
     /// Lost puck.
     pub tracking_loss: TrackingLossSettings,
+    /// The laboratory's delays and table.
+    pub delay: DelaySettings,
 }
 
 /// How far the plant may be off.
@@ -106,6 +108,28 @@ impl Default for TrackingLossSettings {
         Self {
             probability: 0.03,
             steps: [5, 20],
+        }
+    }
+}
+
+/// What the laboratory adds. Observations and actions are one control step late whatever the settings.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DelaySettings {
+    /// Probability that the puck is seen two control steps late in place of one.
+    pub second_step_probability: f64,
+    /// Standard deviation per axis of the puck's acceleration by the table's tilt, m/s².
+    pub tilt_m_s2: f64,
+    /// Range of the decay rate of the puck's velocity, 1/s.
+    pub puck_damping_per_s: [f64; 2],
+}
+
+impl Default for DelaySettings {
+    fn default() -> Self {
+        Self {
+            second_step_probability: 0.2,
+            tilt_m_s2: 0.03,
+            puck_damping_per_s: [0.2, 0.5],
         }
     }
 }

@@ -63,6 +63,20 @@ impl Interpolation {
         }
     }
 
+    /// The action that commands a position, rad, at rest, in the first [`Interpolation::len`] places.
+    #[must_use]
+    pub fn held(self, position: &[f64; JOINTS]) -> [f64; MAX_ACTION_LEN] {
+        let mut action = [0.0; MAX_ACTION_LEN];
+        let every = match self {
+            Self::Trajectory => 3 * JOINTS,
+            _ => MAX_ACTION_LEN,
+        };
+        for point in action.chunks_mut(every) {
+            point[..JOINTS].copy_from_slice(position);
+        }
+        action
+    }
+
     /// Numbers in an action: the product of its shape.
     #[must_use]
     #[expect(clippy::len_without_is_empty, reason = "an action is never empty")]
@@ -70,6 +84,9 @@ impl Interpolation {
         self.shape().iter().product()
     }
 }
+
+/// Numbers in the longest action, a whole trajectory.
+pub const MAX_ACTION_LEN: usize = SUBSTEPS * 3 * JOINTS;
 
 /// Desired motion at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]

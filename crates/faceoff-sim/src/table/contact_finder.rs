@@ -16,7 +16,10 @@ use super::{
 use rapier3d_f64::{
     geometry::{Collider, ColliderBuilder},
     math::{Pose, Vector},
-    parry::query,
+    parry::{
+        query,
+        shape::{Ball, Shape},
+    },
 };
 use std::sync::LazyLock;
 
@@ -84,19 +87,26 @@ static COLLIDERS: LazyLock<Colliders> = LazyLock::new(|| {
     }
 });
 
-/// Overlap of two colliders: unit normal towards the second one, and depth, m.
-fn overlap(first: (&Collider, Pose), second: (&Collider, Pose)) -> Option<([f64; 2], f64)> {
-    let skin = first.0.contact_skin() + second.0.contact_skin();
+/// Overlap of two shapes, the first one thickened by a skin (m): unit normal towards the second one,
+/// and depth, m.
+fn overlap(
+    (first, first_at): (&dyn Shape, Pose),
+    skin: f64,
+    (second, second_at): (&dyn Shape, Pose),
+) -> Option<([f64; 2], f64)> {
     // Every pair is a ball with a ball or a cuboid, which the query supports.
-    let contact =
-        query::contact(&first.1, first.0.shape(), &second.1, second.0.shape(), skin).ok()??;
+    let contact = query::contact(&first_at, first, &second_at, second, skin).ok()??;
     let depth_m = skin - contact.dist;
     (depth_m > 0.0).then_some(([contact.normal1.x, contact.normal1.y], depth_m))
 }
 
 /// Contact of the puck with a rim. The force acts in the middle of the overlap.
 fn rim_and_puck(rim: &Collider, puck: [f64; 2]) -> Option<Touch> {
-    let (n, depth_m) = overlap((rim, *rim.position()), (&COLLIDERS.puck, at(puck)))?;
+    let (n, depth_m) = overlap(
+        (rim.shape(), *rim.position()),
+        rim.contact_skin(),
+        (COLLIDERS.puck.shape(), at(puck)),
+    )?;
     let lever_m = PUCK.radius_m - 0.5 * depth_m;
     Some(Touch {
         normal: [n[0], n[1], 0.0],
@@ -115,11 +125,8 @@ fn discs(
 ) -> Option<Touch> {
     let reach = first_radius + second_radius;
     within(first, second, reach)?;
-    let ball = |radius: f64| ColliderBuilder::ball(radius).build();
-    let (n, depth_m) = overlap(
-        (&ball(first_radius), at(first)),
-        (&ball(second_radius), at(second)),
-    )?;
+    let balls = [first_radius, second_radius].map(Ball::new);
+    let (n, depth_m) = overlap((&balls[0], at(first)), 0.0, (&balls[1], at(second)))?;
     let lever_m = second_radius * (1.0 - depth_m / reach);
     Some(Touch {
         normal: [n[0], n[1], 0.0],
@@ -135,6 +142,11 @@ fn discs(
 
 fn at(position: [f64; 2]) -> Pose {
     Pose::from_translation(Vector::new(position[0], position[1], 0.0))
+}
+
+/// Makes the table's colliders, once per process, so that no substep has to.
+pub fn make_ready() {
+    LazyLock::force(&COLLIDERS);
 }
 
 /// The broad phase of the rims: whether the puck may touch a long, a short one.

@@ -19,8 +19,21 @@ pub const INVERSE_INERTIA: [f64; 3] = [
     1.0 / PUCK.inertia_kg_m2,
 ];
 
-/// Viscous damping along x, y and yaw.
-const DAMPING: [f64; 3] = [PUCK.damping, PUCK.damping, PUCK.yaw_damping];
+/// Viscous damping along x, y and yaw, N s/m and N m s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Damping([f64; 3]);
+
+impl Damping {
+    /// The reference's.
+    pub const NOMINAL: Self = Self([PUCK.damping, PUCK.damping, PUCK.yaw_damping]);
+
+    /// With another decay rate of the velocity, 1/s.
+    #[must_use]
+    pub fn per_s(rate: f64) -> Self {
+        let linear = rate * PUCK.mass_kg;
+        Self([linear, linear, PUCK.yaw_damping])
+    }
+}
 
 impl Puck {
     /// From [x, y, yaw, vx, vy, yaw rate].
@@ -47,17 +60,17 @@ impl Puck {
 
     /// Acceleration without contacts, under an air flow's force in N.
     #[inline(always)]
-    pub fn free_acceleration(&self, air_n: [f64; 2]) -> [f64; 3] {
+    pub fn free_acceleration(&self, damping: &Damping, air_n: [f64; 2]) -> [f64; 3] {
         let force = [air_n[0], air_n[1], 0.0];
-        std::array::from_fn(|i| (force[i] - DAMPING[i] * self.velocity[i]) * INVERSE_INERTIA[i])
+        std::array::from_fn(|i| (force[i] - damping.0[i] * self.velocity[i]) * INVERSE_INERTIA[i])
     }
 
     /// One substep under a force (N, N, N m): semi-implicit Euler, damping implicit.
     #[inline(always)]
-    pub fn advance(&mut self, force: [f64; 3]) {
+    pub fn advance(&mut self, damping: &Damping, force: [f64; 3]) {
         for i in 0..3 {
             let h = SUBSTEP_S * INVERSE_INERTIA[i];
-            self.velocity[i] = (self.velocity[i] + h * force[i]) / (1.0 + h * DAMPING[i]);
+            self.velocity[i] = (self.velocity[i] + h * force[i]) / (1.0 + h * damping.0[i]);
             self.pose[i] += SUBSTEP_S * self.velocity[i];
         }
     }

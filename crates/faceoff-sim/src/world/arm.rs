@@ -7,7 +7,7 @@ use crate::{
         controller::Limiter,
         interpolation::{Interpolation, Setpoint, Trajectory, interpolate},
         inverse_kinematics::full,
-        model::{DOFS, JOINTS, SUBSTEPS},
+        model::{DOFS, JOINTS, SUBSTEP_S, SUBSTEPS},
         plant::Plant,
         universal_joint::{UniversalJoint, vertical},
     },
@@ -25,7 +25,12 @@ pub struct Arm {
     pub(super) universal: UniversalJoint,
     pub(super) constraints: JointConstraints,
     pub(super) ee_before: [f64; 3],
+    /// Control steps since the last action that the trajectory has run on.
+    coasted: u32,
 }
+
+/// A late action's predecessor runs on for this many control steps: 80 ms.
+const COAST_STEPS: u32 = 4;
 
 impl Arm {
     /// At rest, the mallet vertical.
@@ -44,6 +49,7 @@ impl Arm {
             universal: UniversalJoint::default(),
             constraints: JointConstraints::new(plant),
             ee_before: ee.origin.lane(0),
+            coasted: 0,
         }
     }
 
@@ -55,10 +61,30 @@ impl Arm {
     /// Starts a control step with an action.
     pub fn command(&mut self, interpolation: Interpolation, action: &[f64]) {
         self.trajectory = interpolate(interpolation, self.end(), action);
+        self.coasted = 0;
     }
 
-    /// Starts a control step that holds the last commanded position at rest.
-    pub fn hold(&mut self) {
-        self.trajectory = [Setpoint::at_rest(self.end().position); SUBSTEPS];
+    /// Starts a control step that commands the last position again, at rest.
+    pub fn hold(&mut self, interpolation: Interpolation) {
+        let action = interpolation.held(&self.end().position);
+        self.command(interpolation, &action[..interpolation.len()]);
+    }
+
+    /// Starts a control step in which the last trajectory runs on at constant velocity, or stops after
+    /// [`COAST_STEPS`] of them.
+    pub fn coast(&mut self) {
+        let end = *self.end();
+        self.trajectory = std::array::from_fn(|k| {
+            if self.coasted >= COAST_STEPS {
+                return Setpoint::at_rest(end.position);
+            }
+            let t = (k + 1) as f64 * SUBSTEP_S;
+            Setpoint {
+                position: std::array::from_fn(|j| end.position[j] + t * end.velocity[j]),
+                velocity: end.velocity,
+                acceleration: [0.0; JOINTS],
+            }
+        });
+        self.coasted = (self.coasted + 1).min(COAST_STEPS);
     }
 }

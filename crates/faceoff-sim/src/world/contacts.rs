@@ -1,5 +1,6 @@
 //! The contact forces of one substep, solved together through the bodies that they share.
 
+use super::cone::{DIRECTIONS, solve_cone};
 use crate::{
     robot::model::DOFS,
     table::{
@@ -11,15 +12,7 @@ use crate::{
 
 /// Two rims, two mallets on the puck, mallet on mallet.
 pub const MAX_CONTACTS: usize = 5;
-/// Normal, horizontal tangent, vertical tangent.
-const DIRECTIONS: usize = 3;
 const MAX_ROWS: usize = DIRECTIONS * MAX_CONTACTS;
-
-/// Sweeps over several contacts of which one slips, and the relative change at which they end.
-const SWEEPS: usize = 20_000;
-const SWEEP_TOLERANCE: f64 = 1e-13;
-/// Halvings of a right angle in the search for the direction of slip: down to rounding.
-const BISECTIONS: usize = 54;
 
 /// How the motion of a mallet's cylinder depends on its arm's joints, table frame: rows for x, y and
 /// z.
@@ -252,134 +245,4 @@ pub struct ContactForces {
 
 fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-type Matrix = [[f64; MAX_ROWS]; MAX_ROWS];
-/// One contact's force: normal, horizontal tangent, vertical tangent.
-type Force = [f64; DIRECTIONS];
-
-/// Minimises ½ f·matrix·f − target·f where each contact's tangential force stays within friction times
-/// its normal force; rows alternate normal, tangent, vertical tangent. This is the reference's notion of
-/// friction: a convex problem, in which slipping adds to the normal force.
-fn solve_cone(matrix: &Matrix, target: &[f64; MAX_ROWS], friction: &[f64]) -> [f64; MAX_ROWS] {
-    let rows = DIRECTIONS * friction.len();
-    let mut force = eliminate(matrix, target, rows);
-    let sticks = |(c, mu): (usize, &f64)| {
-        let [f, a, b] = block(&force, c);
-        norm([a, b]) <= mu * f
-    };
-    if friction.iter().enumerate().all(sticks) {
-        return force;
-    }
-    // One contact after the other, the forces of the others held: a single contact needs one sweep.
-    for _ in 0..SWEEPS {
-        let (mut change, mut size) = (0.0f64, 0.0f64);
-        for (c, &mu) in friction.iter().enumerate() {
-            let first = DIRECTIONS * c;
-            let others = |r: usize| -> f64 {
-                (0..rows)
-                    .filter(|k| !(first..first + DIRECTIONS).contains(k))
-                    .map(|k| matrix[r][k] * force[k])
-                    .sum()
-            };
-            let target = std::array::from_fn(|d| target[first + d] - others(first + d));
-            let matrix = std::array::from_fn(|d| block(&matrix[first + d], c));
-            let next = solve_one_cone(&matrix, &target, mu);
-            for d in 0..DIRECTIONS {
-                change = change.max((next[d] - force[first + d]).abs());
-                size = size.max(next[d].abs());
-                force[first + d] = next[d];
-            }
-        }
-        if friction.len() == 1 || change <= SWEEP_TOLERANCE * size {
-            break;
-        }
-    }
-    force
-}
-
-/// As [`solve_cone`], for one contact.
-fn solve_one_cone(matrix: &[Force; DIRECTIONS], target: &Force, mu: f64) -> Force {
-    let stuck = eliminate(matrix, target, DIRECTIONS);
-    if norm([stuck[1], stuck[2]]) <= mu * stuck[0] {
-        return stuck;
-    }
-    let pull = [target[1], target[2]];
-    if target[0] + mu * norm(pull) <= 0.0 {
-        return [0.0; DIRECTIONS];
-    }
-    // The force lies on the edge of the cone. Along a given edge it is a matter of one unknown; the edge
-    // sought is the one across which nothing is left to gain.
-    let along = |u: [f64; 2]| -> Force {
-        let edge = [1.0, mu * u[0], mu * u[1]];
-        let response = matrix.map(|row| dot(&row, &edge));
-        let size = (dot(&edge, target) / dot(&edge, &response)).max(0.0);
-        edge.map(|e| size * e)
-    };
-    let gain_across = |u: [f64; 2]| {
-        let force = along(u);
-        let left: Force = std::array::from_fn(|d| target[d] - dot(&matrix[d], &force));
-        left[2] * u[0] - left[1] * u[1]
-    };
-    let start = unit(pull);
-    let turn = if gain_across(start) < 0.0 { -1.0 } else { 1.0 };
-    let (mut near, mut far) = (start, [-turn * start[1], turn * start[0]]);
-    for _ in 0..BISECTIONS {
-        let middle = unit([near[0] + far[0], near[1] + far[1]]);
-        if turn * gain_across(middle) > 0.0 {
-            near = middle;
-        } else {
-            far = middle;
-        }
-    }
-    along(near)
-}
-
-fn block(row: &[f64; MAX_ROWS], contact: usize) -> Force {
-    std::array::from_fn(|d| row[DIRECTIONS * contact + d])
-}
-
-/// Not `hypot`, which is the platform's.
-fn norm(v: [f64; 2]) -> f64 {
-    (v[0] * v[0] + v[1] * v[1]).sqrt()
-}
-
-/// A unit vector in a direction; any, where there is none.
-fn unit(v: [f64; 2]) -> [f64; 2] {
-    let size = norm(v);
-    if size > 0.0 {
-        v.map(|x| x / size)
-    } else {
-        [1.0, 0.0]
-    }
-}
-
-/// Solves the first `n` equations by elimination with pivoting.
-fn eliminate<const N: usize>(matrix: &[[f64; N]; N], target: &[f64; N], n: usize) -> [f64; N] {
-    let mut a = *matrix;
-    let mut x = *target;
-    for k in 0..n {
-        let mut pivot = k;
-        for r in k + 1..n {
-            if a[r][k].abs() > a[pivot][k].abs() {
-                pivot = r;
-            }
-        }
-        a.swap(k, pivot);
-        x.swap(k, pivot);
-        for r in k + 1..n {
-            let factor = a[r][k] / a[k][k];
-            for c in k..n {
-                a[r][c] -= factor * a[k][c];
-            }
-            x[r] -= factor * x[k];
-        }
-    }
-    for k in (0..n).rev() {
-        for c in k + 1..n {
-            x[k] -= a[k][c] * x[c];
-        }
-        x[k] /= a[k][k];
-    }
-    x
 }

@@ -1,6 +1,7 @@
 //! The physical world: a puck, and one or two arms around it.
 
 mod arm;
+mod cone;
 mod contacts;
 mod joints;
 mod solver;
@@ -18,7 +19,7 @@ use crate::{
         contact_law::{MALLET, RIM},
         geometry::TABLE,
         mallet_cylinder::MalletCylinder,
-        puck::Puck,
+        puck::{Damping, Puck},
     },
 };
 pub use arm::Arm;
@@ -41,6 +42,7 @@ pub struct World {
     plant: Plant,
     arms: Vec<Arm>,
     puck: Puck,
+    puck_damping: Damping,
     /// Robot 1's mallet, when it is imposed in place of being moved by an arm.
     imposed: Option<MalletState>,
     /// Force of the air on the puck, N.
@@ -55,10 +57,12 @@ impl World {
     #[must_use]
     pub fn new(plant: &Plant, joints: &[[f64; JOINTS]], puck: [f64; 6]) -> Self {
         debug_assert!(joints.len() <= 2);
+        contact_finder::make_ready();
         Self {
             plant: plant.clone(),
             arms: joints.iter().take(2).map(|q| Arm::new(plant, q)).collect(),
             puck: Puck::from_state(puck),
+            puck_damping: Damping::NOMINAL,
             imposed: None,
             air_n: [0.0; 2],
             substep: 0,
@@ -194,16 +198,28 @@ impl World {
         self.substep = (self.substep + 1) % SUBSTEPS;
     }
 
-    /// Lets a robot hold the end of its last trajectory at rest.
-    pub fn hold(&mut self, robot: usize) {
-        self.arms[robot].hold();
+    /// Commands a robot's last commanded position again, at rest, for the coming control step.
+    pub fn hold(&mut self, robot: usize, interpolation: Interpolation) {
+        self.arms[robot].hold(interpolation);
+    }
+
+    /// Lets a robot's last trajectory run on for the coming control step: at constant velocity for 80 ms
+    /// in all, then at rest.
+    pub fn coast(&mut self, robot: usize) {
+        self.arms[robot].coast();
+    }
+
+    /// Replaces the decay rate of the puck's velocity, 1/s; its spin is damped as before.
+    pub fn set_puck_damping(&mut self, per_s: f64) {
+        self.puck_damping = Damping::per_s(per_s);
     }
 
     fn advance_puck_alone(&mut self) {
         let mut contacts = Contacts::none();
         self.add_rims(&mut contacts);
-        let force = (!contacts.is_empty())
-            .then(|| contacts.solve_puck(&self.puck.free_acceleration(self.air_n)));
+        let force = (!contacts.is_empty()).then(|| {
+            contacts.solve_puck(&self.puck.free_acceleration(&self.puck_damping, self.air_n))
+        });
         self.advance_puck(force);
     }
 
@@ -229,8 +245,9 @@ impl World {
                 );
             }
         }
-        let force = (!contacts.is_empty())
-            .then(|| contacts.solve_puck(&self.puck.free_acceleration(self.air_n)));
+        let force = (!contacts.is_empty()).then(|| {
+            contacts.solve_puck(&self.puck.free_acceleration(&self.puck_damping, self.air_n))
+        });
         self.advance_puck(force);
     }
 
@@ -253,7 +270,7 @@ impl World {
                 force[i] += contact[i];
             }
         }
-        self.puck.advance(force);
+        self.puck.advance(&self.puck_damping, force);
     }
 }
 

@@ -73,7 +73,7 @@ impl World {
 
         // Friction, stops and contacts.
         let contacts = find_contacts(&kinematics, &dq, &self.puck);
-        let free = || self.puck.free_acceleration(self.air_n);
+        let free = || self.puck.free_acceleration(&self.puck_damping, self.air_n);
         let puck_force;
         let accelerations = match &contacts {
             Some(contacts) if contacts.move_arms() => {

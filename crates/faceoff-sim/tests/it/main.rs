@@ -9,11 +9,19 @@
     reason = "a test that cannot read its recording fails"
 )]
 
+mod allocation;
+mod arithmetic;
 mod arm_tracking;
+mod batch;
+mod delay;
 mod determinism;
 mod episodes;
+mod game;
 mod kinematics;
 mod mallet_impact;
+mod outcomes;
 mod perturbations;
+mod policy;
 mod puck;
 mod reference;
+mod replay;

@@ -2,7 +2,7 @@
 
 mod board_table;
 
-use crate::client::Client;
+use crate::{client::Client, commands::verify};
 use anyhow::{Context, bail, ensure};
 use clap::Args;
 use faceoff_http::api::{
@@ -134,6 +134,10 @@ impl DemoCommand {
             dataset.display(),
             bytes as f64 / 1e6
         );
+
+        let verifying = tokio::task::spawn_blocking(move || verify::verified_line(&dataset));
+        let verified = verifying.await.context("verifying the dataset")?;
+        println!("   {}", verified.context("the dataset is not verified")?);
 
         if self.no_serve {
             return server.stop().await;

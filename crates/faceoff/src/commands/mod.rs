@@ -9,6 +9,7 @@ pub mod score;
 pub mod serve;
 pub mod sim;
 pub mod submit;
+pub mod verify;
 
 use std::process::ExitCode;
 

@@ -1,11 +1,13 @@
 //! `faceoff sim bench`: how fast the simulator is on one core.
 
 use anyhow::{Result, ensure};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use faceoff_sim::{
-    Episode, Interpolation, JOINTS, PerturbationSettings, Plant, SUBSTEPS, robot::model::INITIAL_Q,
+    Command, Episode, Game, GameSetup, Interpolation, PerturbationSettings, Plant, SUBSTEPS,
+    WINDOW_STEPS, robot::model::INITIAL_Q,
 };
-use faceoff_types::{Profile, Seed, Task};
+use faceoff_types::{Factor, Profile, Seed, Task};
+use serde::Serialize;
 use std::{
     hint::black_box,
     io::Write as _,
@@ -15,10 +17,10 @@ use std::{
 /// Measure the simulator on one core: controller, constraints and observation included.
 #[derive(Debug, Args)]
 pub struct BenchArgs {
-    /// hit (two robots), defend or prepare.
+    /// hit (two robots), defend, prepare, or tournament (two robots with an agent each).
     #[arg(long)]
-    task: Task,
-    /// Episodes of at most 500 control steps.
+    task: Played,
+    /// Episodes of at most 500 control steps; in a tournament, windows of 500.
     #[arg(long, default_value_t = 20)]
     episodes: u32,
     /// Perturbations.
@@ -32,57 +34,133 @@ pub struct BenchArgs {
     json: bool,
 }
 
+/// How the agent that holds still speaks.
+const HOLDS: Interpolation = Interpolation::Cubic;
+
+/// What is played.
+#[derive(Debug, Clone, Copy, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Played {
+    Hit,
+    Defend,
+    Prepare,
+    Tournament,
+}
+
+impl Played {
+    fn name(self) -> &'static str {
+        self.task().map_or("tournament", Task::as_str)
+    }
+
+    fn task(self) -> Option<Task> {
+        match self {
+            Self::Hit => Some(Task::Hit),
+            Self::Defend => Some(Task::Defend),
+            Self::Prepare => Some(Task::Prepare),
+            Self::Tournament => None,
+        }
+    }
+}
+
+/// What was measured.
+#[derive(Debug, Serialize)]
+struct Report {
+    task: Played,
+    profile: Profile,
+    episodes: u32,
+    control_steps: u64,
+    seconds: f64,
+    control_steps_per_s: f64,
+    substeps_per_s: f64,
+}
+
 impl BenchArgs {
-    /// Plays the episodes with an agent that holds still and prints the speed.
+    /// Plays the episodes with agents that hold still and prints the speed.
     pub fn run(self) -> Result<()> {
         ensure!(self.episodes > 0, "--episodes: expected at least 1, got 0");
-        let settings = PerturbationSettings::default();
-        let plant = match self.profile {
-            Profile::Ideal => Plant::nominal(),
-            _ => Plant::mismatched(&settings, self.seed.model_mismatch()),
+        let (control_steps, time) = match self.task.task() {
+            Some(task) => self.play_episodes(task),
+            None => self.play_game(),
         };
-        let mut hold = [0.0; 2 * JOINTS];
-        hold[..JOINTS].copy_from_slice(&INITIAL_Q);
-        let (mut steps, mut time) = (0u64, Duration::ZERO);
+        let seconds = time.as_secs_f64();
+        let control_steps_per_s = control_steps as f64 / seconds;
+        let report = Report {
+            task: self.task,
+            profile: self.profile,
+            episodes: self.episodes,
+            control_steps,
+            seconds,
+            control_steps_per_s,
+            substeps_per_s: control_steps_per_s * SUBSTEPS as f64,
+        };
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            writeln!(out, "{}", serde_json::to_string(&report)?)?;
+        } else {
+            writeln!(
+                out,
+                "{} ({}): {} episodes, {control_steps} control steps in {seconds:.3} s: \
+                 {control_steps_per_s:.0} control steps/s, {:.0} substeps/s",
+                self.task.name(),
+                self.profile,
+                self.episodes,
+                report.substeps_per_s
+            )?;
+        }
+        Ok(())
+    }
+
+    fn plant(&self, settings: &PerturbationSettings) -> Plant {
+        if self.profile.factors().contains(Factor::ModelMismatch) {
+            Plant::mismatched(settings, self.seed.model_mismatch())
+        } else {
+            Plant::nominal()
+        }
+    }
+
+    fn play_episodes(&self, task: Task) -> (u64, Duration) {
+        let settings = PerturbationSettings::default();
+        let plant = self.plant(&settings);
+        let hold = HOLDS.held(&INITIAL_Q);
+        let hold = &hold[..HOLDS.len()];
+        let (mut steps, mut time) = (0, Duration::ZERO);
         for index in 0..self.episodes {
             let start = Instant::now();
             let mut episode = Episode::new(
-                self.task,
-                Interpolation::Cubic,
+                task,
+                HOLDS,
                 self.profile.factors(),
                 &settings,
                 &plant,
-                self.seed.episode(self.task, index),
+                self.seed.episode(task, index),
             );
-            while episode.step(black_box(&hold)).end.is_none() {
+            while episode.step(black_box(hold)).end.is_none() {
                 black_box(episode.observation());
             }
             time += start.elapsed();
             steps += u64::from(episode.steps());
         }
-        let seconds = time.as_secs_f64();
-        let steps_per_s = steps as f64 / seconds;
-        let substeps_per_s = steps_per_s * SUBSTEPS as f64;
-        let mut out = std::io::stdout().lock();
-        if self.json {
-            let report = serde_json::json!({
-                "task": self.task,
-                "profile": self.profile,
-                "episodes": self.episodes,
-                "control_steps": steps,
-                "seconds": seconds,
-                "control_steps_per_s": steps_per_s,
-                "substeps_per_s": substeps_per_s,
-            });
-            writeln!(out, "{report}")?;
-        } else {
-            writeln!(
-                out,
-                "{} ({}): {} episodes, {steps} control steps in {seconds:.3} s: \
-                 {steps_per_s:.0} control steps/s, {substeps_per_s:.0} substeps/s",
-                self.task, self.profile, self.episodes
-            )?;
+        (steps, time)
+    }
+
+    fn play_game(&self) -> (u64, Duration) {
+        let settings = PerturbationSettings::default();
+        let setup = GameSetup {
+            interpolation: [HOLDS; 2],
+            factors: self.profile.factors(),
+            plant: self.plant(&settings),
+            settings,
+            seed: self.seed,
+        };
+        let hold = HOLDS.held(&INITIAL_Q);
+        let hold = &hold[..HOLDS.len()];
+        let steps = u64::from(self.episodes) * u64::from(WINDOW_STEPS);
+        let start = Instant::now();
+        let mut game = Game::new(setup);
+        for _ in 0..steps {
+            black_box(game.step([Command::Act(black_box(hold)); 2]));
+            black_box((game.observation(0), game.observation(1)));
         }
-        Ok(())
+        (steps, start.elapsed())
     }
 }

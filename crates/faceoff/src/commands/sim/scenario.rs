@@ -191,8 +191,14 @@ fn actions(given: &[Vec<Value>], interpolation: &[Interpolation]) -> Result<Vec<
         for (step, action) in steps.iter().enumerate() {
             let field = || format!("actions[{robot}][{step}]");
             let shape = interpolation[robot].shape();
-            let mut flat = Vec::with_capacity(interpolation[robot].len());
-            flatten(action, shape, &mut flat).with_context(|| {
+            let len = interpolation[robot].len();
+            let mut flat = Vec::with_capacity(len);
+            // The recordings of REFERENCE.md write an action's rows one after the other.
+            let in_rows = match action {
+                Value::Array(items) if items.len() == len => &[len][..],
+                _ => shape,
+            };
+            flatten(action, in_rows, &mut flat).with_context(|| {
                 let shape: String = shape.iter().map(|n| format!("[{n}]")).collect();
                 format!("{}: expected numbers of shape {shape}", field())
             })?;
@@ -273,6 +279,21 @@ mod tests {
         assert_eq!(scenario.joints, [INITIAL_Q]);
         assert_eq!(scenario.interpolation, [Interpolation::Cubic]);
         assert_eq!(scenario.every_ms, 1);
+    }
+
+    #[test]
+    fn an_actions_rows_may_be_joined() {
+        let numbers: Vec<f64> = (0..14).map(f64::from).collect();
+        let action = |action: Value| {
+            let scenario = serde_json::json!({
+                "puck": [0, 0, 0, 0, 0, 0], "duration_ms": 20, "actions": [[action]],
+            });
+            let scenario = Scenario::read(scenario.to_string().as_bytes()).unwrap();
+            scenario.actions[0][0].clone()
+        };
+        let rows = serde_json::json!([&numbers[..7], &numbers[7..]]);
+        assert_eq!(action(rows), numbers);
+        assert_eq!(action(serde_json::json!(numbers)), numbers);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use faceoff_sim::{
     ConstraintValues, EPISODE_STEPS, Interpolation, JOINTS, MalletState, PerturbationSettings,
     Plant, SUBSTEPS, World,
     episode::{opponent::Opponent, task},
-    perturbation::{disturbance::Disturbance, stream::Stream},
+    perturbation::table_factors::TableFactors,
 };
 use faceoff_types::{EpisodeEnd, Factor};
 use serde::Serialize;
@@ -66,11 +66,8 @@ fn trace(scenario: &Scenario, out: &mut impl Write) -> Result<()> {
     } else {
         Plant::nominal()
     };
-    let mut disturbance = factors.contains(Factor::Disturbance).then(|| {
-        let stream = Stream::new(&scenario.seed, Factor::Disturbance.as_str());
-        Disturbance::new(&settings.disturbance, stream)
-    });
     let mut world = World::new(&plant, &scenario.joints, scenario.puck);
+    let mut table = TableFactors::new(factors, &settings, &scenario.seed, &mut world);
     let mut opponent = (scenario.task == Some(faceoff_types::Task::Hit)).then(Opponent::new);
     let mut steps = 0;
     let mut end = None;
@@ -81,16 +78,17 @@ fn trace(scenario: &Scenario, out: &mut impl Write) -> Result<()> {
             let step = usize::try_from(t_ms).unwrap_or(usize::MAX) / SUBSTEPS;
             for robot in 0..scenario.interpolation.len() {
                 let interpolation = scenario.interpolation[robot];
-                world.command(robot, interpolation, &action(scenario, robot, step));
+                match scenario.actions[robot].get(step) {
+                    Some(action) => world.command(robot, interpolation, action),
+                    None => world.hold(robot, interpolation),
+                }
             }
             if let Some(opponent) = &mut opponent {
                 world.command(1, Interpolation::LinearBoth, &opponent.action());
             }
         }
-        if let Some(disturbance) = &mut disturbance {
-            let force = disturbance.force(world.puck());
-            world.set_air_force(force);
-        }
+        let force = table.force(world.puck());
+        world.set_air_force(force);
         world.substep();
         let t_ms = t_ms + 1;
         impose(&mut world, scenario, t_ms);
@@ -121,31 +119,6 @@ fn trace(scenario: &Scenario, out: &mut impl Write) -> Result<()> {
         )?;
     }
     Ok(())
-}
-
-/// The action of a control step: the given one, then the last position held, or the initial one.
-fn action(scenario: &Scenario, robot: usize, step: usize) -> Vec<f64> {
-    let given = &scenario.actions[robot];
-    if let Some(action) = given.get(step) {
-        return action.clone();
-    }
-    let interpolation = scenario.interpolation[robot];
-    let position: [f64; JOINTS] = match given.last() {
-        None => scenario.joints[robot],
-        // A trajectory ends with position, velocity and acceleration of the last millisecond.
-        Some(last) if interpolation == Interpolation::Trajectory => {
-            std::array::from_fn(|j| last[last.len() - 3 * JOINTS + j])
-        }
-        Some(last) => std::array::from_fn(|j| last[j]),
-    };
-    let rows_per_point = if interpolation == Interpolation::Trajectory {
-        3
-    } else {
-        interpolation.len() / JOINTS
-    };
-    let mut point = vec![0.0; rows_per_point * JOINTS];
-    point[..JOINTS].copy_from_slice(&position);
-    point.repeat(interpolation.len() / point.len())
 }
 
 /// Imposes the mallet of this millisecond, or the last one at rest.
@@ -190,11 +163,7 @@ fn write(world: &World, t_ms: u64, out: &mut impl Write) -> Result<()> {
             velocity: [vx, vy],
         } = world.mallet(robot);
         state.mallet.push([x, y, z, vx, vy]);
-        let values = ConstraintValues::new(
-            &world.joints(robot),
-            world.filtered_velocities(robot),
-            &kinematics,
-        );
+        let values = ConstraintValues::of(world, robot);
         let ConstraintValues {
             joint_pos,
             joint_vel,

@@ -4,12 +4,22 @@ use crate::{
     table::{geometry::TABLE, puck::Puck},
     world::World,
 };
+use faceoff_types::Task;
 use std::f64::consts::{PI, TAU};
 
 /// Numbers in an observation without an opponent.
 pub const OBSERVATION_LEN: usize = 20;
 /// Numbers in an observation with an opponent.
 pub const OBSERVATION_WITH_OPPONENT_LEN: usize = 23;
+
+/// Numbers in the observation of a task: the opponent of `hit` is seen.
+#[must_use]
+pub const fn len(task: Task) -> usize {
+    match task {
+        Task::Hit => OBSERVATION_WITH_OPPONENT_LEN,
+        Task::Defend | Task::Prepare => OBSERVATION_LEN,
+    }
+}
 
 /// What a robot (0 or 1) sees of the world, in its own base frame, without noise: puck pose and
 /// velocity, joint positions, filtered joint velocities, and the opponent's end effector. The last

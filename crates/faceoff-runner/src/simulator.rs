@@ -1,0 +1,66 @@
+use faceoff_sim::{Episode, EpisodeState, Interpolation, JOINTS, PerturbationSettings, Plant};
+use faceoff_types::{Profile, Seed, Task};
+use faceoff_wire::dataset::SimulatorId;
+use std::sync::OnceLock;
+
+/// Control steps of each fixed episode: enough for the puck to meet rim and mallet.
+const STEPS: u32 = 60;
+
+/// Who simulates here. The fingerprint covers a short episode of each task with all perturbations.
+pub(crate) fn simulator_id() -> &'static SimulatorId {
+    static ID: OnceLock<SimulatorId> = OnceLock::new();
+    ID.get_or_init(|| SimulatorId {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        fingerprint: fingerprint(),
+    })
+}
+
+fn fingerprint() -> String {
+    let mut hasher = blake3::Hasher::new();
+    let seed = Seed::from_number(0);
+    let settings = PerturbationSettings::default();
+    let plant = Plant::mismatched(&settings, seed.model_mismatch());
+    for task in Task::ALL {
+        let mut episode = Episode::new(
+            task,
+            Interpolation::Cubic,
+            Profile::Evaluation.factors(),
+            &settings,
+            &plant,
+            seed.episode(task, 0),
+        );
+        let held = episode.state().q;
+        for step in 0..STEPS {
+            add(&mut hasher, episode.observation());
+            let mut action = [0.0; 2 * JOINTS];
+            action[..JOINTS].copy_from_slice(&held);
+            // A slow swing of the base, so that the arm's dynamics count.
+            action[0] += 0.005 * f64::from(step);
+            let outcome = episode.step(&action);
+            let c = outcome.constraints;
+            add(&mut hasher, &[c.joint_pos, c.joint_vel, c.ee, c.link]);
+            add_state(&mut hasher, &episode.state());
+            if outcome.end.is_some() {
+                break;
+            }
+        }
+    }
+    hasher.finalize().to_hex().to_string()
+}
+
+fn add(hasher: &mut blake3::Hasher, numbers: &[f64]) {
+    for number in numbers {
+        hasher.update(&number.to_le_bytes());
+    }
+}
+
+fn add_state(hasher: &mut blake3::Hasher, state: &EpisodeState) {
+    add(hasher, &state.puck);
+    add(hasher, &state.q);
+    add(hasher, &state.dq);
+    add(hasher, &state.dq_filtered);
+    add(hasher, &state.universal);
+    add(hasher, &state.ee);
+    add(hasher, state.opponent_q.as_ref().map_or(&[], |q| q));
+    add(hasher, state.opponent_ee.as_ref().map_or(&[], |ee| ee));
+}

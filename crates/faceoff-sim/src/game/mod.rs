@@ -1,0 +1,181 @@
+//! Games between two agents.
+
+pub mod referee;
+
+use crate::{
+    episode::{constraints::ConstraintValues, task::PLAYABLE_Y_M},
+    link::{Command, Link, observation::OBSERVATION_WITH_OPPONENT_LEN},
+    perturbation::{settings::PerturbationSettings, stream::Stream, table_factors::TableFactors},
+    robot::{interpolation::Interpolation, plant::Plant},
+    world::World,
+};
+use faceoff_types::{Factors, Seed, Violations};
+use referee::{RULES, RallyEnd, Referee};
+
+/// Control steps of a game: 15 minutes.
+pub const GAME_STEPS: u32 = 45_000;
+
+/// Control steps of a window: the same violation counts once in each.
+pub const WINDOW_STEPS: u32 = 500;
+
+/// What a game is played with.
+#[derive(Debug, Clone)]
+pub struct GameSetup {
+    /// How the two agents' actions become trajectories.
+    pub interpolation: [Interpolation; 2],
+    /// Perturbations. The table, the puck's tracking and the plant are the same for both robots, noise and
+    /// delays each robot's own.
+    pub factors: Factors,
+    /// Their magnitudes.
+    pub settings: PerturbationSettings,
+    /// Both arms; nominal unless the factors contain the model mismatch.
+    pub plant: Plant,
+    /// Each rally's draws derive from it and the rally's number.
+    pub seed: Seed,
+}
+
+/// A game of rallies. Deterministic: no clock, no I/O. Clone saves and restores it exactly.
+#[derive(Debug, Clone)]
+pub struct Game {
+    setup: GameSetup,
+    referee: Referee,
+    rally: Rally,
+    steps: u32,
+    /// Constraints broken in the current window.
+    violations: [Violations; 2],
+}
+
+/// What starts anew with each rally.
+#[derive(Debug, Clone)]
+struct Rally {
+    number: u32,
+    world: World,
+    links: [Link; 2],
+    table: TableFactors,
+}
+
+/// What a control step of a game led to. Robot 1's first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GameStep {
+    /// The rally's end, if it came. The next step plays a new rally, which both agents are to be told.
+    pub rally_end: Option<RallyEnd>,
+    /// Constraint values at this step, before a new rally.
+    pub constraints: [ConstraintValues; 2],
+    /// At the end of a window: the constraints broken in it.
+    pub window: Option<[Violations; 2]>,
+}
+
+impl Game {
+    /// A game at the start of its first rally, on a side drawn at random.
+    #[must_use]
+    pub fn new(setup: GameSetup) -> Self {
+        let serves = usize::from(Stream::new(&setup.seed, "first_side").unit() < 0.5);
+        let rally = Rally::new(&setup, 0, serves);
+        Self {
+            setup,
+            referee: Referee::new(serves),
+            rally,
+            steps: 0,
+            violations: [Violations::default(); 2],
+        }
+    }
+
+    /// What a robot's agent is told: 23 numbers in its own base frame.
+    #[must_use]
+    pub fn observation(&self, robot: usize) -> &[f64; OBSERVATION_WITH_OPPONENT_LEN] {
+        self.rally.links[robot].observation()
+    }
+
+    /// One control step of both robots. Whether the game is over, [`GAME_STEPS`] say, is the caller's
+    /// to decide.
+    pub fn step(&mut self, commands: [Command<'_>; 2]) -> GameStep {
+        let Rally {
+            world,
+            links,
+            table,
+            number,
+        } = &mut self.rally;
+        for (link, command) in links.iter_mut().zip(commands) {
+            link.command(world, command);
+        }
+        let lost = table.control_step(world);
+        for link in links {
+            link.look(world, lost);
+        }
+        self.steps += 1;
+
+        let constraints = [0, 1].map(|robot| ConstraintValues::of(world, robot));
+        for (values, violations) in constraints.iter().zip(&mut self.violations) {
+            values.mark(violations);
+        }
+        let rally_end = self.referee.judge(world.puck());
+        if rally_end.is_some() {
+            let next = *number + 1;
+            self.rally = Rally::new(&self.setup, next, self.referee.serves);
+        }
+        let window = self
+            .steps
+            .is_multiple_of(WINDOW_STEPS)
+            .then(|| std::mem::take(&mut self.violations));
+        GameStep {
+            rally_end,
+            constraints,
+            window,
+        }
+    }
+
+    /// Control steps played.
+    #[must_use]
+    pub fn steps(&self) -> u32 {
+        self.steps
+    }
+
+    /// Number of the current rally, from 0.
+    #[must_use]
+    pub fn rally(&self) -> u32 {
+        self.rally.number
+    }
+
+    /// The count so far.
+    #[must_use]
+    pub fn referee(&self) -> &Referee {
+        &self.referee
+    }
+
+    /// The physical world of the current rally.
+    #[must_use]
+    pub fn world(&self) -> &World {
+        &self.rally.world
+    }
+}
+
+impl Rally {
+    /// Both robots in their initial state, the puck at rest on the side of `serves`.
+    fn new(setup: &GameSetup, number: u32, serves: usize) -> Self {
+        let seed = setup.seed.rally(number);
+        let mut stream = Stream::new(&seed, "initial_state");
+        let [near, far] = RULES.start_x_m;
+        let x = stream.uniform(near, far);
+        let y = stream.uniform(-PLAYABLE_Y_M, PLAYABLE_Y_M);
+        let x = if serves == 0 { -x } else { x };
+        let mut world = World::with_robots(&setup.plant, 2, [x, y, 0.0, 0.0, 0.0, 0.0]);
+        let table = TableFactors::new(setup.factors, &setup.settings, &seed, &mut world);
+        let links = [0, 1].map(|robot| {
+            let interpolation = setup.interpolation[robot];
+            Link::new(
+                robot,
+                interpolation,
+                setup.factors,
+                &setup.settings,
+                &seed,
+                &world,
+            )
+        });
+        Self {
+            number,
+            world,
+            links,
+            table,
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! What lies between an agent and its robot: the observation one way, commands the other, both subject
+//! to the perturbations.
+
+mod latency;
+pub mod observation;
+
+use crate::{
+    perturbation::{noise::ObservationNoise, settings::PerturbationSettings, stream::Stream},
+    robot::interpolation::Interpolation,
+    world::World,
+};
+use faceoff_types::{Factor, Factors, Seed};
+use latency::Latency;
+use observation::{OBSERVATION_WITH_OPPONENT_LEN, observe, wrap};
+
+/// What an agent does in a control step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Command<'a> {
+    /// An action: row-major, of length [`Interpolation::len`], finite.
+    Act(&'a [f64]),
+    /// No answer came in time. The previous position is commanded again, with zero velocity; under
+    /// [`Factor::Delay`] the last trajectory runs on at constant velocity for 80 ms, then stops.
+    Late,
+}
+
+/// The link of one agent and its robot, for one episode or rally.
+#[derive(Debug, Clone)]
+pub struct Link {
+    robot: usize,
+    interpolation: Interpolation,
+    noise: Option<ObservationNoise>,
+    latency: Option<Latency>,
+    observation: [f64; OBSERVATION_WITH_OPPONENT_LEN],
+}
+
+impl Link {
+    /// The link of a robot (0 or 1) in a world at its start. Draws come from streams of their own,
+    /// derived from `seed` by the factor's name; robot 2's are other ones than robot 1's.
+    #[must_use]
+    pub fn new(
+        robot: usize,
+        interpolation: Interpolation,
+        factors: Factors,
+        settings: &PerturbationSettings,
+        seed: &Seed,
+        world: &World,
+    ) -> Self {
+        let stream = |factor: Factor| {
+            factors.contains(factor).then(|| match robot {
+                0 => Stream::new(seed, factor.as_str()),
+                _ => Stream::new(seed, &format!("{factor}, robot {}", robot + 1)),
+            })
+        };
+        let mut link = Self {
+            robot,
+            interpolation,
+            noise: stream(Factor::ObservationNoise)
+                .map(|stream| ObservationNoise::new(&settings.observation_noise, stream)),
+            latency: stream(Factor::Delay)
+                .map(|stream| Latency::new(&settings.delay, interpolation, stream)),
+            observation: [0.0; OBSERVATION_WITH_OPPONENT_LEN],
+        };
+        link.look(world, false);
+        link
+    }
+
+    /// What the agent was told last, with the opponent's end effector at the end; zero without one.
+    #[must_use]
+    pub fn observation(&self) -> &[f64; OBSERVATION_WITH_OPPONENT_LEN] {
+        &self.observation
+    }
+
+    /// Passes the coming control step's command to the robot.
+    pub fn command(&mut self, world: &mut World, command: Command<'_>) {
+        let (robot, interpolation) = (self.robot, self.interpolation);
+        if let Command::Act(action) = command {
+            debug_assert_eq!(action.len(), interpolation.len());
+        }
+        match (&mut self.latency, command) {
+            (Some(latency), command) => latency.command(world, robot, command),
+            (None, Command::Act(action)) => world.command(robot, interpolation, action),
+            (None, Command::Late) => world.hold(robot, interpolation),
+        }
+    }
+
+    /// Observes the world; `lost` repeats the puck's last reported pose.
+    pub fn look(&mut self, world: &World, lost: bool) {
+        let [x, y, yaw, ..] = self.observation;
+        self.observation = observe(world, self.robot);
+        if let Some(latency) = &mut self.latency {
+            latency.delay(&mut self.observation);
+        }
+        // Noise is drawn for the lost puck too, so that a loss does not shift later draws.
+        if let Some(noise) = &mut self.noise {
+            noise.add(&mut self.observation);
+            self.observation[2] = wrap(self.observation[2]);
+        }
+        if lost {
+            self.observation[..6].copy_from_slice(&[x, y, yaw, 0.0, 0.0, 0.0]);
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! The factors that act on the table and on how the puck is tracked: the same for all robots on it.
+
+use super::{
+    disturbance::Disturbance, rehearsal_table::RehearsalTable, settings::PerturbationSettings,
+    stream::Stream, tracking_loss::TrackingLoss,
+};
+use crate::{
+    table::{geometry::PUCK, puck::Puck},
+    world::World,
+};
+use faceoff_types::{Factor, Factors, Seed};
+
+/// The draws of one episode or rally.
+#[derive(Debug, Clone)]
+pub struct TableFactors {
+    disturbance: Option<Disturbance>,
+    tracking_loss: Option<TrackingLoss>,
+    /// Force on the puck by the table's tilt, N.
+    tilt_n: [f64; 2],
+}
+
+impl TableFactors {
+    /// From the seed of the episode or rally; sets up the world's table.
+    #[must_use]
+    pub fn new(
+        factors: Factors,
+        settings: &PerturbationSettings,
+        seed: &Seed,
+        world: &mut World,
+    ) -> Self {
+        let on = |factor: Factor, label: &str| {
+            factors.contains(factor).then(|| Stream::new(seed, label))
+        };
+        let table = on(Factor::Delay, "delay, table")
+            .map(|stream| RehearsalTable::draw(&settings.delay, stream));
+        if let Some(table) = &table {
+            world.set_puck_damping(table.puck_damping_per_s);
+        }
+        Self {
+            disturbance: on(Factor::Disturbance, Factor::Disturbance.as_str())
+                .map(|stream| Disturbance::new(&settings.disturbance, stream)),
+            tracking_loss: on(Factor::TrackingLoss, Factor::TrackingLoss.as_str())
+                .map(|stream| TrackingLoss::new(&settings.tracking_loss, stream)),
+            tilt_n: table.map_or([0.0; 2], |table| table.tilt_m_s2.map(|a| PUCK.mass_kg * a)),
+        }
+    }
+
+    /// The force on the puck in the coming substep, N, table frame. To be asked once per substep.
+    pub fn force(&mut self, puck: &Puck) -> [f64; 2] {
+        let [x, y] = self
+            .disturbance
+            .as_mut()
+            .map_or([0.0; 2], |disturbance| disturbance.force(puck));
+        [x + self.tilt_n[0], y + self.tilt_n[1]]
+    }
+
+    /// Advances the world by a control step; tells whether the puck is lost at its end.
+    pub fn control_step(&mut self, world: &mut World) -> bool {
+        world.control_step(|puck| self.force(puck));
+        self.tracking_loss
+            .as_mut()
+            .is_some_and(TrackingLoss::advance)
+    }
+}

@@ -1,0 +1,262 @@
+//! The convex problem behind the contact forces.
+//!
+//! Each contact has a normal and two tangential forces, within a cone. The forces minimise one quadratic
+//! function over all cones, as in the reference engine.
+
+/// Normal, horizontal tangent, upright tangent.
+pub const DIRECTIONS: usize = 3;
+
+/// Sweeps over several contacts of which one slips, and the relative change at which they end.
+const SWEEPS: usize = 20_000;
+const SWEEP_TOLERANCE: f64 = 1e-13;
+/// Directions of slip that are tried, all around, before the search between the best one's neighbours.
+const DIRECTIONS_TRIED: usize = 16;
+/// Halvings in that search: down to rounding.
+const BISECTIONS: usize = 54;
+
+/// One contact's force: normal, horizontal tangent, upright tangent.
+type Force = [f64; DIRECTIONS];
+
+/// Minimises ½ f·matrix·f − target·f where each contact's tangential force stays within friction times
+/// its normal force; rows are normal, horizontal and upright tangent of each contact. This is the reference's notion of
+/// friction: a convex problem, in which slipping adds to the normal force.
+///
+/// The matrix is symmetric and positive definite in the rows of the contacts, one friction coefficient
+/// each; later rows are ignored.
+pub fn solve_cone<const N: usize>(
+    matrix: &[[f64; N]; N],
+    target: &[f64; N],
+    friction: &[f64],
+) -> [f64; N] {
+    let rows = DIRECTIONS * friction.len();
+    let mut force = eliminate(matrix, target, rows);
+    let sticks = |(c, mu): (usize, &f64)| {
+        let [f, a, b] = block(&force, c);
+        norm([a, b]) <= mu * f
+    };
+    if friction.iter().enumerate().all(sticks) {
+        return force;
+    }
+    // One contact after the other, the forces of the others held: a single contact needs one sweep.
+    for _ in 0..SWEEPS {
+        let (mut change, mut size) = (0.0f64, 0.0f64);
+        for (c, &mu) in friction.iter().enumerate() {
+            let first = DIRECTIONS * c;
+            let others = |r: usize| -> f64 {
+                (0..rows)
+                    .filter(|k| !(first..first + DIRECTIONS).contains(k))
+                    .map(|k| matrix[r][k] * force[k])
+                    .sum()
+            };
+            let target = std::array::from_fn(|d| target[first + d] - others(first + d));
+            let matrix = std::array::from_fn(|d| block(&matrix[first + d], c));
+            let next = solve_one_cone(&matrix, &target, mu);
+            for d in 0..DIRECTIONS {
+                change = change.max((next[d] - force[first + d]).abs());
+                size = size.max(next[d].abs());
+                force[first + d] = next[d];
+            }
+        }
+        if friction.len() == 1 || change <= SWEEP_TOLERANCE * size {
+            break;
+        }
+    }
+    force
+}
+
+/// As [`solve_cone`], for one contact.
+fn solve_one_cone(matrix: &[Force; DIRECTIONS], target: &Force, mu: f64) -> Force {
+    let stuck = eliminate(matrix, target, DIRECTIONS);
+    if norm([stuck[1], stuck[2]]) <= mu * stuck[0] {
+        return stuck;
+    }
+    let pull = [target[1], target[2]];
+    if target[0] + mu * norm(pull) <= 0.0 {
+        return [0.0; DIRECTIONS];
+    }
+    // The force lies on the edge of the cone. Along a given edge it is a matter of one unknown; the edge
+    // sought is the best of all, found roughly first and then between its neighbours.
+    let edge = |u: [f64; 2]| [1.0, mu * u[0], mu * u[1]];
+    let response = |edge: &Force| matrix.map(|row| dot(&row, edge));
+    let gain = |u: [f64; 2]| {
+        let edge = edge(u);
+        let push = dot(&edge, target).max(0.0);
+        push * push / dot(&edge, &response(&edge))
+    };
+    let along = |u: [f64; 2]| -> Force {
+        let edge = edge(u);
+        let size = (dot(&edge, target) / dot(&edge, &response(&edge))).max(0.0);
+        edge.map(|e| size * e)
+    };
+    let gain_across = |u: [f64; 2]| {
+        let force = along(u);
+        let left: Force = std::array::from_fn(|d| target[d] - dot(&matrix[d], &force));
+        left[2] * u[0] - left[1] * u[1]
+    };
+    let mut best = unit(pull);
+    let mut direction = best;
+    for _ in 1..DIRECTIONS_TRIED {
+        direction = turned(direction, 1.0);
+        if gain(direction) > gain(best) {
+            best = direction;
+        }
+    }
+    let (mut before, mut after) = (turned(best, -1.0), turned(best, 1.0));
+    for _ in 0..BISECTIONS {
+        let middle = unit([before[0] + after[0], before[1] + after[1]]);
+        if gain_across(middle) > 0.0 {
+            before = middle;
+        } else {
+            after = middle;
+        }
+    }
+    along(before)
+}
+
+/// Turned by one of [`DIRECTIONS_TRIED`] parts of a full turn, forwards (+1) or backwards (−1).
+fn turned([x, y]: [f64; 2], sign: f64) -> [f64; 2] {
+    const COS: f64 = 0.923_879_532_511_286_7;
+    const SIN: f64 = 0.382_683_432_365_089_8;
+    let sin = sign * SIN;
+    [COS * x - sin * y, sin * x + COS * y]
+}
+
+fn dot(a: &Force, b: &Force) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn block<const N: usize>(row: &[f64; N], contact: usize) -> Force {
+    std::array::from_fn(|d| row[DIRECTIONS * contact + d])
+}
+
+/// Not `hypot`, which is the platform's.
+fn norm(v: [f64; 2]) -> f64 {
+    (v[0] * v[0] + v[1] * v[1]).sqrt()
+}
+
+/// A unit vector in a direction; any, where there is none.
+fn unit(v: [f64; 2]) -> [f64; 2] {
+    let size = norm(v);
+    if size > 0.0 {
+        v.map(|x| x / size)
+    } else {
+        [1.0, 0.0]
+    }
+}
+
+/// Solves the first `n` equations by elimination with pivoting.
+fn eliminate<const N: usize>(matrix: &[[f64; N]; N], target: &[f64; N], n: usize) -> [f64; N] {
+    let mut a = *matrix;
+    let mut x = *target;
+    for k in 0..n {
+        let mut pivot = k;
+        for r in k + 1..n {
+            if a[r][k].abs() > a[pivot][k].abs() {
+                pivot = r;
+            }
+        }
+        a.swap(k, pivot);
+        x.swap(k, pivot);
+        for r in k + 1..n {
+            let factor = a[r][k] / a[k][k];
+            for c in k..n {
+                a[r][c] -= factor * a[k][c];
+            }
+            x[r] -= factor * x[k];
+        }
+    }
+    for k in (0..n).rev() {
+        for c in k + 1..n {
+            x[k] -= a[k][c] * x[c];
+        }
+        x[k] /= a[k][k];
+    }
+    x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::perturbation::stream::Stream;
+    use faceoff_types::Seed;
+
+    /// A random symmetric, positive definite matrix and a target whose pushes are as often off as on.
+    fn problem<const N: usize>(stream: &mut Stream) -> ([[f64; N]; N], [f64; N]) {
+        let root: [[f64; N]; N] =
+            std::array::from_fn(|_| std::array::from_fn(|_| stream.uniform(-1.0, 1.0)));
+        let scale: [f64; N] = std::array::from_fn(|r| if r % DIRECTIONS == 2 { 0.2 } else { 3.0 });
+        let matrix = std::array::from_fn(|r| {
+            std::array::from_fn(|c| {
+                let product: f64 = (0..N).map(|k| root[r][k] * root[c][k]).sum();
+                scale[r] * scale[c] * product + if r == c { 0.3 } else { 0.0 }
+            })
+        });
+        (matrix, std::array::from_fn(|_| stream.uniform(-20.0, 20.0)))
+    }
+
+    /// The conditions of the optimum: forces in their cones, what is left in the polar cones, and nothing
+    /// to gain along the forces. Returns how many contacts are open, stick and slip.
+    fn check<const N: usize>(
+        matrix: &[[f64; N]; N],
+        target: &[f64; N],
+        friction: &[f64],
+    ) -> [usize; 3] {
+        let force = solve_cone(matrix, target, friction);
+        let mut kinds = [0; 3];
+        for (c, &mu) in friction.iter().enumerate() {
+            let [f, a, b] = block(&force, c);
+            let left: Force = std::array::from_fn(|d| {
+                let row = matrix[DIRECTIONS * c + d];
+                let response: f64 = row.iter().zip(&force).map(|(m, f)| m * f).sum();
+                target[DIRECTIONS * c + d] - response
+            });
+            let tolerance = 1e-9;
+            assert!(
+                norm([a, b]) <= mu * f + tolerance,
+                "outside its cone: {force:?}"
+            );
+            let outward = left[0] + mu * norm([left[1], left[2]]);
+            assert!(
+                outward <= 1e-8 * (1.0 + mu),
+                "something is left to gain: {left:?} {force:?}"
+            );
+            assert!(
+                dot(&left, &[f, a, b]).abs() <= tolerance * 1e3,
+                "{left:?} {force:?}"
+            );
+            let kind = if f == 0.0 {
+                0
+            } else if norm([a, b]) < mu * f * (1.0 - 1e-9) {
+                1
+            } else {
+                2
+            };
+            kinds[kind] += 1;
+        }
+        kinds
+    }
+
+    #[test]
+    fn one_contact_meets_the_conditions_of_the_optimum() {
+        let mut stream = Stream::new(&Seed::from_number(1), "one contact");
+        let mut kinds = [0; 3];
+        for _ in 0..2000 {
+            let (matrix, target) = problem::<3>(&mut stream);
+            let found = check(&matrix, &target, &[stream.uniform(0.2, 2.0)]);
+            kinds = std::array::from_fn(|k| kinds[k] + found[k]);
+        }
+        assert!(kinds.iter().all(|count| *count > 20), "{kinds:?}");
+    }
+
+    #[test]
+    fn several_contacts_meet_them_together() {
+        let mut stream = Stream::new(&Seed::from_number(2), "several contacts");
+        let mut kinds = [0; 3];
+        for _ in 0..300 {
+            let (matrix, target) = problem::<9>(&mut stream);
+            let found = check(&matrix, &target, &[1.0, 1e4, stream.uniform(0.2, 2.0)]);
+            kinds = std::array::from_fn(|k| kinds[k] + found[k]);
+        }
+        assert!(kinds.iter().all(|count| *count > 50), "{kinds:?}");
+    }
+}

@@ -1,0 +1,68 @@
+//! A substep allocates nothing: memory is set aside when a world is made.
+
+use crate::policy::strike;
+use faceoff_sim::{
+    Command, Episode, Game, GameSetup, Interpolation, PerturbationSettings, Plant,
+    robot::model::INITIAL_Q,
+};
+use faceoff_types::{Factors, Seed, Task};
+
+#[test]
+fn control_steps_allocate_nothing() {
+    let settings = PerturbationSettings::default();
+    let seed = Seed::from_number(1);
+    let plant = Plant::mismatched(&settings, seed.model_mismatch());
+    for task in Task::ALL {
+        let mut episode = Episode::new(
+            task,
+            Interpolation::Cubic,
+            Factors::ALL,
+            &settings,
+            &plant,
+            seed.episode(task, 0),
+        );
+        let before = *episode.world().puck();
+        let mut met = false;
+        let count = |episode: &mut Episode, met: &mut bool| {
+            allocation_counter::measure(|| {
+                let action = strike(episode.observation(), episode.steps());
+                episode.step(&action);
+                *met |= episode.world().puck().velocity != before.velocity;
+            })
+            .count_total
+        };
+        let mut total = 0;
+        while episode.steps() < 150 {
+            total += count(&mut episode, &mut met);
+        }
+        assert_eq!(total, 0, "{task}");
+        assert!(met, "{task}: the puck was never touched");
+    }
+}
+
+#[test]
+fn a_game_allocates_only_when_a_rally_starts() {
+    let mut game = Game::new(GameSetup {
+        interpolation: [Interpolation::Cubic; 2],
+        factors: Factors::ALL,
+        settings: PerturbationSettings::default(),
+        plant: Plant::nominal(),
+        seed: Seed::from_number(1),
+    });
+    let hold = Interpolation::Cubic.held(&INITIAL_Q);
+    let mut steps = 0;
+    for _ in 0..1000 {
+        let mut new_rally = false;
+        let allocated = allocation_counter::measure(|| {
+            new_rally = game
+                .step([Command::Act(&hold[..14]), Command::Late])
+                .rally_end
+                .is_some();
+        });
+        if !new_rally {
+            assert_eq!(allocated.count_total, 0);
+            steps += 1;
+        }
+    }
+    assert!(steps > 990);
+}

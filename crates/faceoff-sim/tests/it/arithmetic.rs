@@ -1,0 +1,148 @@
+//! How much arithmetic a substep is: the dynamics run on numbers that count their operations.
+
+use faceoff_sim::{
+    dynamics::{
+        arm::{Bodies, Kinematics, controller_torques, damped, mass_matrix, plant_bias},
+        factor::Factor,
+        lanes::Lanes,
+    },
+    robot::model::{DOFS, INITIAL_Q, JOINTS},
+};
+use std::{
+    cell::Cell,
+    ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign},
+};
+
+thread_local! {
+    static OPERATIONS: Cell<u32> = const { Cell::new(0) };
+}
+
+/// A number that counts additions, subtractions, multiplications and divisions; signs are free.
+#[derive(Debug, Clone, Copy)]
+struct Counted(f64);
+
+fn count(result: f64) -> Counted {
+    OPERATIONS.set(OPERATIONS.get() + 1);
+    Counted(result)
+}
+
+impl Add for Counted {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        count(self.0 + other.0)
+    }
+}
+
+impl Sub for Counted {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        count(self.0 - other.0)
+    }
+}
+
+impl Mul for Counted {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        count(self.0 * other.0)
+    }
+}
+
+impl Div for Counted {
+    type Output = Self;
+    fn div(self, other: Self) -> Self {
+        count(self.0 / other.0)
+    }
+}
+
+impl Neg for Counted {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self(-self.0)
+    }
+}
+
+impl AddAssign for Counted {
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl SubAssign for Counted {
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
+    }
+}
+
+impl Lanes for Counted {
+    const COUNT: usize = 1;
+
+    fn splat(value: f64) -> Self {
+        Self(value)
+    }
+
+    fn from_fn(mut value: impl FnMut(usize) -> f64) -> Self {
+        Self(value(0))
+    }
+
+    fn lane(self, _index: usize) -> f64 {
+        self.0
+    }
+
+    fn nearest(self) -> Self {
+        // An addition and a subtraction in the simulator's own numbers.
+        count(count(self.0.round_ties_even()).0)
+    }
+}
+
+/// The result of a computation, its operations printed and added up.
+fn counted<R>(name: &str, total: &mut u32, compute: impl FnOnce() -> R) -> R {
+    OPERATIONS.set(0);
+    let result = compute();
+    let operations = OPERATIONS.get();
+    println!("{operations:5} {name}");
+    *total += operations;
+    result
+}
+
+/// What `docs/simulator.md` says of the arithmetic of one arm's substep.
+const DOCUMENTED: u32 = 6339;
+
+#[test]
+fn a_substep_is_as_much_arithmetic_as_documented() {
+    let zero = [Counted(0.0); DOFS];
+    let q: [Counted; DOFS] =
+        std::array::from_fn(|i| Counted(INITIAL_Q.get(i).copied().unwrap_or_default()));
+    let velocities = [Counted(0.1); DOFS];
+    let joints = [Counted(0.1); JOINTS];
+    let mut total = 0;
+    let kinematics = counted("forward kinematics with sines", &mut total, || {
+        Kinematics::new(&q)
+    });
+    let bodies = counted("inertias in the base frame", &mut total, || {
+        Bodies::new(&kinematics)
+    });
+    counted(
+        "controller: recursive Newton-Euler, 7 joints",
+        &mut total,
+        || controller_torques(&kinematics, &bodies.controller(), &joints, &joints),
+    );
+    let bodies = counted("inertias of the plant", &mut total, || {
+        bodies.plant(&[1.0; 9])
+    });
+    counted(
+        "plant: recursive Newton-Euler, 9 joints",
+        &mut total,
+        || plant_bias(&kinematics, &bodies, &velocities),
+    );
+    let mass = counted("plant: composite rigid bodies", &mut total, || {
+        mass_matrix(&kinematics, &bodies)
+    });
+    counted("dry friction: a Newton step", &mut total, || {
+        Factor::new(&mass).solve(&zero)
+    });
+    counted("integration: implicit damping", &mut total, || {
+        Factor::new(&damped(&mass, &[0.1; JOINTS])).solve(&zero)
+    });
+    println!("{total:5} in all");
+    assert_eq!(total, DOCUMENTED);
+}

@@ -1,0 +1,265 @@
+//! Recordings replayed: what the tests judge and what the page's plots show.
+
+use crate::reference::{array, flat, max_difference, recording, rows};
+use faceoff_sim::{
+    Episode, Interpolation, MalletState, PerturbationSettings, Plant, SUBSTEPS, World,
+};
+use faceoff_types::{Factors, Seed, Task};
+
+const PUCK_RADIUS: f64 = 0.03165;
+const MALLET_RADIUS: f64 = 0.04815;
+
+/// Change of velocity in a control step, m/s, beyond which the puck has hit something.
+const SHARP_M_S: f64 = 0.02;
+
+/// The puck's states, one per ms, robot 1 holding its initial pose.
+pub fn slide(init: [f64; 6], rows: usize) -> Vec<[f64; 6]> {
+    let mut world = World::with_robots(&Plant::nominal(), 1, init);
+    let mut states = vec![init];
+    while states.len() < rows {
+        world.substep();
+        states.push(world.puck().state());
+    }
+    states
+}
+
+/// First row whose velocity differs from the free slide's by more than rounding.
+pub fn first_touch(states: &[[f64; 6]]) -> Option<usize> {
+    (1..states.len()).find(|&k| {
+        let (before, after) = (states[k - 1], states[k]);
+        (0..2).any(|i| (after[3 + i] - before[3 + i] / 1.0005).abs() > 1e-6 + 1e-7)
+    })
+}
+
+/// m/s.
+pub fn speed(state: &[f64; 6]) -> f64 {
+    state[3].hypot(state[4])
+}
+
+/// A bounce off a rim (`rim_bounce`).
+pub struct Bounce {
+    pub kind: String,
+    pub recorded: Vec<[f64; 6]>,
+    pub ours: Vec<[f64; 6]>,
+}
+
+impl Bounce {
+    /// The row by which the bounce is judged: after 30 ms at a wall, 8 ms after the first touch elsewhere.
+    pub fn judged_at(&self) -> usize {
+        match self.kind.as_str() {
+            "wall" | "wall_spin" => 30,
+            _ => first_touch(&self.recorded).map_or(0, |k| (k + 8).min(self.recorded.len() - 1)),
+        }
+    }
+
+    /// Differences of the velocity and of r·spin over the speed before.
+    pub fn errors(&self) -> (f64, f64) {
+        let mut before = speed(&self.recorded[0]);
+        if self.kind.starts_with("wall") {
+            before = before.max(PUCK_RADIUS * self.recorded[0][5].abs());
+        }
+        let (ours, recorded) = (self.ours[self.judged_at()], self.recorded[self.judged_at()]);
+        let velocity = (ours[3] - recorded[3]).hypot(ours[4] - recorded[4]);
+        let spin = PUCK_RADIUS * (ours[5] - recorded[5]).abs();
+        (velocity / before, spin / before)
+    }
+}
+
+/// Replays the bounces.
+pub fn bounces() -> Vec<Bounce> {
+    let replay = |case: &serde_json::Value| {
+        let recorded: Vec<[f64; 6]> = rows(&case["state"]);
+        Bounce {
+            kind: case["kind"].as_str().unwrap().to_owned(),
+            ours: slide(array(&case["init"]), recorded.len()),
+            recorded,
+        }
+    };
+    let recording = recording("rim_bounce");
+    recording["cases"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(replay)
+        .collect()
+}
+
+/// A mallet's impact on the puck (`mallet_impact`): differences at the end.
+pub struct Impact {
+    pub kind: String,
+    /// Velocity over the peak speed.
+    pub velocity: f64,
+    /// m.
+    pub position_m: f64,
+}
+
+impl Impact {
+    /// Moved by the simulated arm; otherwise the mallet's motion is imposed.
+    pub fn by_arm(&self) -> bool {
+        self.kind.starts_with("realarm")
+    }
+}
+
+/// Replays the impacts.
+pub fn impacts() -> Vec<Impact> {
+    let replay = |case: &serde_json::Value| {
+        let recorded: Vec<[f64; 11]> = rows(&case["rows"]);
+        let kind = case["kind"].as_str().unwrap();
+        let mut world = World::with_robots(&Plant::nominal(), 1, array(&case["puck_init"]));
+        let mut ours = world.puck().state();
+        for (k, row) in recorded.iter().enumerate() {
+            if kind.starts_with("override") {
+                world.impose_mallet(Some(MalletState {
+                    position: [row[0], row[1], row[2]],
+                    velocity: [row[3], row[4]],
+                }));
+            } else if k % SUBSTEPS == 0 {
+                match case["actions"].get(k / SUBSTEPS) {
+                    Some(action) => world.command(0, Interpolation::Cubic, &flat(action)),
+                    None => world.hold(0, Interpolation::Cubic),
+                }
+            }
+            ours = world.puck().state();
+            world.substep();
+        }
+        let puck = |k: usize| -> [f64; 6] { std::array::from_fn(|i| recorded[k][5 + i]) };
+        let peak = (0..recorded.len())
+            .map(|k| speed(&puck(k)))
+            .fold(0.0, f64::max);
+        let last = puck(recorded.len() - 1);
+        Impact {
+            kind: kind.to_owned(),
+            velocity: (ours[3] - last[3]).hypot(ours[4] - last[4]) / peak,
+            position_m: (ours[0] - last[0]).hypot(ours[1] - last[1]),
+        }
+    };
+    let recording = recording("mallet_impact");
+    recording["cases"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(replay)
+        .collect()
+}
+
+/// A whole episode with its recorded actions replayed open loop (`episodes_*`): differences per control
+/// step.
+pub struct Replay {
+    pub name: String,
+    /// First control step in which the recorded puck hit something.
+    pub impact: usize,
+    /// First control step in which robot 1's mallet may have touched the puck.
+    pub contact: usize,
+    pub steps: Vec<StepDifferences>,
+    /// The puck after each control step, as recorded.
+    pub recorded_puck: Vec<[f64; 6]>,
+    /// The puck after each control step, ours.
+    pub puck: Vec<[f64; 6]>,
+}
+
+/// Largest differences after a control step; of the observation, before it.
+pub struct StepDifferences {
+    pub observation: f64,
+    /// rad.
+    pub joints_rad: f64,
+    pub constraints: f64,
+    /// m.
+    pub puck_m: f64,
+}
+
+impl Replay {
+    /// The largest value over some control steps.
+    pub fn largest(
+        &self,
+        steps: impl Fn(usize) -> bool,
+        value: impl Fn(&StepDifferences) -> f64,
+    ) -> f64 {
+        self.steps
+            .iter()
+            .enumerate()
+            .filter(|(step, _)| steps(*step))
+            .map(|(_, differences)| value(differences))
+            .fold(0.0, f64::max)
+    }
+}
+
+/// Replays the episodes of all tasks.
+pub fn episodes() -> Vec<Replay> {
+    let of_task = |task: Task| {
+        let recording = recording(&format!("episodes_{task}"));
+        let cases = recording["episodes"].as_array().unwrap().clone();
+        cases
+            .into_iter()
+            .enumerate()
+            .map(move |(index, case)| episode(task, index, &case))
+    };
+    Task::ALL.into_iter().flat_map(of_task).collect()
+}
+
+fn episode(task: Task, index: usize, case: &serde_json::Value) -> Replay {
+    let init: [f64; 6] = array(&case["puck_init"]);
+    let puck: Vec<[f64; 6]> = rows(&case["puck"]);
+    let q_dq: Vec<[f64; 14]> = rows(&case["q_dq"]);
+    let constraints: Vec<[f64; 4]> = rows(&case["max_constraint"]);
+    let mut episode = Episode::starting_with(
+        task,
+        Interpolation::Cubic,
+        Factors::NONE,
+        &PerturbationSettings::default(),
+        &Plant::nominal(),
+        Seed::from_number(0),
+        init,
+    );
+    let mut replay = Replay {
+        name: format!("{task} {index}"),
+        impact: first_sharp_change(&init, &puck),
+        contact: usize::MAX,
+        steps: vec![],
+        recorded_puck: puck.clone(),
+        puck: vec![],
+    };
+    for step in 0..puck.len() {
+        if may_touch(&episode.world().mallet(0), &episode.state().puck) {
+            replay.contact = replay.contact.min(step);
+        }
+        let observation = max_difference(&flat(&case["obs"][step]), episode.observation());
+        let outcome = episode.step(&flat(&case["action"][step]));
+        let state = episode.state();
+        let ours = &outcome.constraints;
+        let ours = [ours.joint_pos, ours.joint_vel, ours.ee, ours.link];
+        let [dx, dy] = [0, 1].map(|i| state.puck[i] - puck[step][i]);
+        replay.puck.push(state.puck);
+        replay.steps.push(StepDifferences {
+            observation,
+            joints_rad: max_difference(&q_dq[step][..7], &state.q),
+            constraints: max_difference(&ours, &constraints[step]),
+            puck_m: dx.hypot(dy),
+        });
+        if outcome.end.is_some() {
+            break;
+        }
+    }
+    replay
+}
+
+/// First control step in which the puck hit something, judged on the recording.
+fn first_sharp_change(init: &[f64; 6], puck: &[[f64; 6]]) -> usize {
+    // Free damping over a control step.
+    let decay = 1.0005f64.powi(-20);
+    let mut before = *init;
+    puck.iter()
+        .position(|after| {
+            let change = (after[3] - before[3] * decay).hypot(after[4] - before[4] * decay);
+            before = *after;
+            change > SHARP_M_S
+        })
+        .unwrap_or(puck.len())
+}
+
+/// Whether robot 1's mallet may touch the puck within a control step: closer than their radii and
+/// what they can travel.
+fn may_touch(mallet: &MalletState, puck: &[f64; 6]) -> bool {
+    let distance = (mallet.position[0] - puck[0]).hypot(mallet.position[1] - puck[1]);
+    let speed = (mallet.velocity[0] - puck[3]).hypot(mallet.velocity[1] - puck[4]);
+    distance < PUCK_RADIUS + MALLET_RADIUS + 0.02 * speed + 0.001
+}

@@ -1,0 +1,234 @@
+//! `faceoff verify`: does a published dataset give its published score?
+#![expect(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a command talks to the terminal"
+)]
+
+use anyhow::Context;
+use clap::Args;
+use faceoff_runner::{
+    dataset::{Dataset, DatasetError},
+    verify::{Difference, SeasonClaim, SeasonMismatch, Verified, VerifyError, verify},
+};
+use faceoff_types::{EvaluationResult, Seed};
+use indicatif::{ProgressBar, ProgressStyle};
+use jiff::civil::Date;
+use serde::Serialize;
+use std::{
+    num::NonZero,
+    path::{Path, PathBuf},
+    process::ExitCode,
+    thread,
+    time::{Duration, Instant},
+};
+
+/// Simulates a dataset again from its seeds and recorded actions and compares every state,
+/// observation, constraint value and score bit for bit. Exit status 0: all identical; 1: something
+/// differs; 2: the dataset cannot be read, or not be simulated by this version.
+#[derive(Debug, Args)]
+pub struct VerifyCommand {
+    /// dataset.zip, the folder it was unpacked to, or the folder that `faceoff eval` wrote
+    dataset: PathBuf,
+    /// Threads [default: one per CPU]; what is found does not depend on it
+    #[arg(long, value_name = "W")]
+    workers: Option<NonZero<usize>>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+    /// The season's revealed secret, 64 hexadecimal digits: also check that the seeds derive from it
+    #[arg(long, value_name = "HEX", requires = "day")]
+    secret: Option<Seed>,
+    /// The UTC day of the evaluation
+    #[arg(long, value_name = "YYYY-MM-DD", requires = "secret")]
+    day: Option<Date>,
+    /// The commitment that was published before the season: also check that it is the secret's hash
+    #[arg(long, value_name = "HEX", requires = "secret")]
+    commitment: Option<String>,
+}
+
+/// What is printed with `--json`.
+#[derive(Debug, Serialize)]
+struct Summary {
+    verified: bool,
+    /// The first difference.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    difference: Option<Difference>,
+    /// Why the dataset is not verified, in words.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<String>,
+    #[serde(flatten)]
+    simulated: Option<Simulated>,
+}
+
+#[derive(Debug, Serialize)]
+struct Simulated {
+    episodes: u32,
+    steps: u64,
+    seconds: f64,
+    steps_per_s: f64,
+    /// Were the seeds derived from the season's secret?
+    season: bool,
+    result: EvaluationResult,
+}
+
+/// Why there is no "verified".
+#[derive(Debug, thiserror::Error)]
+enum Failure {
+    #[error(transparent)]
+    Verify(#[from] VerifyError),
+    #[error(transparent)]
+    Season(#[from] SeasonMismatch),
+    #[error("{0:#}")]
+    Here(anyhow::Error),
+}
+
+impl From<DatasetError> for Failure {
+    fn from(error: DatasetError) -> Self {
+        Self::Verify(error.into())
+    }
+}
+
+impl Failure {
+    /// 1 for what differs, 2 for what could not be compared.
+    fn code(&self) -> ExitCode {
+        match self {
+            Self::Season(_)
+            | Self::Verify(
+                VerifyError::Differs(_) | VerifyError::Dataset(DatasetError::Altered(_)),
+            ) => ExitCode::from(1),
+            Self::Verify(_) | Self::Here(_) => ExitCode::from(2),
+        }
+    }
+}
+
+impl VerifyCommand {
+    /// Verifies, prints what was found, and returns the exit status.
+    #[must_use]
+    pub fn run(self) -> ExitCode {
+        let outcome = self.verify();
+        let (summary, code) = match outcome {
+            Ok(simulated) => {
+                if !self.json {
+                    println!("{}", describe(&self.dataset, &simulated));
+                }
+                let summary = Summary {
+                    verified: true,
+                    difference: None,
+                    error: None,
+                    simulated: Some(simulated),
+                };
+                (summary, ExitCode::SUCCESS)
+            }
+            Err(failure) => {
+                eprintln!("error: {}: {failure}", self.dataset.display());
+                let code = failure.code();
+                let summary = Summary {
+                    verified: false,
+                    error: Some(failure.to_string()),
+                    difference: match failure {
+                        Failure::Verify(VerifyError::Differs(difference)) => Some(*difference),
+                        _ => None,
+                    },
+                    simulated: None,
+                };
+                (summary, code)
+            }
+        };
+        if self.json {
+            match serde_json::to_string(&summary) {
+                Ok(line) => println!("{line}"),
+                Err(error) => {
+                    eprintln!("error: writing the summary: {error}");
+                    return ExitCode::from(2);
+                }
+            }
+        }
+        code
+    }
+
+    fn verify(&self) -> Result<Simulated, Failure> {
+        let dataset = Dataset::open(&self.dataset)?;
+        let claim = self.secret.zip(self.day).map(|(secret, day)| SeasonClaim {
+            secret,
+            commitment: self.commitment.clone(),
+            day,
+        });
+        if let Some(claim) = &claim {
+            claim.check(dataset.manifest())?;
+        }
+        let workers = match self.workers {
+            Some(workers) => workers,
+            None => thread::available_parallelism()
+                .context("asking for the number of CPUs; say --workers")
+                .map_err(Failure::Here)?,
+        };
+        let (verified, time) = with_progress(&dataset, workers)?;
+        Ok(Simulated {
+            episodes: verified.episodes,
+            steps: verified.steps,
+            seconds: time.as_secs_f64(),
+            steps_per_s: verified.steps as f64 / time.as_secs_f64(),
+            season: claim.is_some(),
+            result: verified.result,
+        })
+    }
+}
+
+/// Verifies with a progress bar on standard error, if that is a terminal.
+fn with_progress(
+    dataset: &Dataset,
+    workers: NonZero<usize>,
+) -> Result<(Verified, Duration), Failure> {
+    let episodes = dataset.manifest().episodes.values();
+    let bar = ProgressBar::new(episodes.map(|count| u64::from(*count)).sum()).with_style(
+        ProgressStyle::with_template("{bar:40} {pos}/{len} episodes, {per_sec}, {eta} left")
+            .context("the progress bar's template")
+            .map_err(Failure::Here)?,
+    );
+    let start = Instant::now();
+    let verified = verify(dataset, workers, &|| bar.inc(1));
+    bar.finish_and_clear();
+    Ok((verified?, start.elapsed()))
+}
+
+/// Verifies a dataset with all CPUs and says so in one line.
+///
+/// # Errors
+/// If the dataset cannot be read or is not what the simulation gives.
+pub fn verified_line(path: &Path) -> anyhow::Result<String> {
+    let command = VerifyCommand {
+        dataset: path.to_owned(),
+        workers: None,
+        json: false,
+        secret: None,
+        day: None,
+        commitment: None,
+    };
+    let simulated = command.verify()?;
+    Ok(describe(path, &simulated))
+}
+
+fn describe(path: &Path, simulated: &Simulated) -> String {
+    let Simulated {
+        episodes,
+        steps,
+        seconds,
+        steps_per_s,
+        season,
+        result,
+    } = simulated;
+    let seeds = if *season {
+        "; its seeds derive from the season's secret"
+    } else {
+        ""
+    };
+    format!(
+        "verified {}: {episodes} episodes, {steps} control steps, every state and score identical \
+         (score {:.1} %, penalty points {:.1}){seeds}; {seconds:.1} s, {steps_per_s:.0} control \
+         steps/s",
+        path.display(),
+        result.score,
+        result.penalty_points,
+    )
+}
