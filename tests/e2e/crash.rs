@@ -39,6 +39,10 @@ fn an_evaluation_survives_kill_9_and_scores_as_the_local_evaluator_does() {
     )
     .expect("it is JSON");
 
+    // The dataset released the day's seed: from now on the result tells it too.
+    let survived = team.finished(&server, &evaluation);
+    assert_eq!(survived["result"]["seed"], manifest["seed"]);
+
     // The local evaluator, with the published seeds and another number of workers.
     let out = scratch.path().join("local");
     let local = Command::new(program("faceoff"))

@@ -4,6 +4,7 @@ mod bad_agents;
 mod browser;
 mod crash;
 mod demo;
+mod kills;
 mod privacy;
 
 use faceoff_tests::{bundle, server::Server};

@@ -40,21 +40,7 @@ impl Server {
             .and_then(|listener| listener.local_addr())
             .expect("a port is free")
             .port();
-        fs::create_dir_all(data_dir).expect("a scratch folder can be made");
-        let config_file = data_dir.join("faceoff.toml");
-        fs::write(&config_file, config).expect("a scratch file can be written");
-        let mut child = Command::new(program("faceoff"))
-            .arg("serve")
-            .args(["--listen", &format!("127.0.0.1:{port}")])
-            .arg("--data-dir")
-            .arg(data_dir)
-            .arg("--config")
-            .arg(&config_file)
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("the program can be started");
+        let mut child = spawn(data_dir, config, port);
         let log = collect(child.stderr.take().expect("standard error is piped"));
         let client = Client::builder()
             .timeout(Duration::from_secs(60))
@@ -94,6 +80,19 @@ impl Server {
     pub fn kill(mut self) {
         self.child.kill().expect("a child can be killed");
         self.child.wait().expect("a child can be reaped");
+    }
+
+    /// Starts the server and ends it as [`kill`](Self::kill) does, `lifetime` after the process began:
+    /// it may not have come as far as to answer.
+    ///
+    /// # Panics
+    /// If it cannot be started.
+    pub fn start_and_kill(data_dir: &Path, config: &str, lifetime: Duration) {
+        let mut child = spawn(data_dir, config, 0);
+        let _log = collect(child.stderr.take().expect("standard error is piped"));
+        thread::sleep(lifetime);
+        child.kill().expect("a child can be killed");
+        child.wait().expect("a child can be reaped");
     }
 
     /// `GET`, with a token if one is given.
@@ -169,6 +168,25 @@ impl Drop for Server {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
+}
+
+/// The process, with its log on a pipe. Port 0 is any free one.
+fn spawn(data_dir: &Path, config: &str, port: u16) -> Child {
+    fs::create_dir_all(data_dir).expect("a scratch folder can be made");
+    let config_file = data_dir.join("faceoff.toml");
+    fs::write(&config_file, config).expect("a scratch file can be written");
+    Command::new(program("faceoff"))
+        .arg("serve")
+        .args(["--listen", &format!("127.0.0.1:{port}")])
+        .arg("--data-dir")
+        .arg(data_dir)
+        .arg("--config")
+        .arg(&config_file)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program can be started")
 }
 
 /// Drains a child's log so that it never blocks, and hands it over when the child ends.

@@ -167,7 +167,11 @@ async fn the_boards_group_teams_that_the_episodes_cannot_tell_apart() {
     let stored: serde_json::Value = serde_json::from_str(&stored.unwrap()).unwrap();
     assert_eq!(stored["tasks"]["hit"]["successes"]["episodes"], 200);
 
+    let resamples = faceoff_scoring::TIER_CHANGE_RESAMPLES;
+    let rules = include_str!("../../../../docs/rules.md");
+    assert!(rules.contains(&format!("bootstrap: {resamples} times")));
     let page = site.get("/", None).await.body;
+    assert!(page.contains(&format!("from {resamples} random redraws")));
     for part in ["rank group 4", "tier change</abbr> under 0.05 %"] {
         assert!(page.contains(part), "{part:?} is not in {page}");
     }
