@@ -9,3 +9,4 @@ mod dataset;
 mod misbehaviour;
 mod recording;
 mod shard;
+mod verify;

@@ -1,6 +1,7 @@
 //! One file per subcommand.
 
 pub mod admin;
+pub mod dataset;
 pub mod demo;
 pub mod doctor;
 pub mod eval;

@@ -1,4 +1,5 @@
 //! The program as a team calls it.
 #![expect(clippy::unwrap_used, reason = "a helper's failure is its test's")]
 
+mod dataset;
 mod eval;
