@@ -27,6 +27,8 @@ enum Command {
     Compare(commands::compare::CompareCommand),
     /// Simulate a dataset again and compare every state and score.
     Verify(commands::verify::VerifyCommand),
+    /// Look into a dataset, cut pieces out of it, or convert it.
+    Dataset(commands::dataset::DatasetCommand),
     /// Score results by hand: a qualifying board or a tournament.
     Score(commands::score::ScoreCommand),
     /// Simulate open loop, or measure the simulator.
@@ -46,6 +48,7 @@ fn main() -> ExitCode {
         Command::Eval(command) => command.run(),
         Command::Compare(command) => command.run(),
         Command::Verify(command) => return command.run(),
+        Command::Dataset(command) => command.run(),
         Command::Score(command) => command.run(),
         Command::Sim(command) => command.run(),
         Command::Submit(command) => command.run(),

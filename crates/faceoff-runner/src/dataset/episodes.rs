@@ -35,6 +35,10 @@ pub struct EpisodeRecord {
     pub computation_time: ComputationTime,
     /// The agent's fault, if the episode ended by one.
     pub fault: Option<AgentFault>,
+    /// The observation after the last answered step: 23 numbers for `hit`, 20 otherwise, none if no
+    /// step was answered.
+    #[serde(skip)]
+    pub last_observation: Vec<f64>,
 }
 
 /// The table as it is, in batches, its columns checked.
@@ -122,6 +126,15 @@ impl<'a> Columns<'a> {
         column.is_valid(row) && column.value(row)
     }
 
+    fn last_observation(&self, row: usize) -> Vec<f64> {
+        let schema = self.0.schema();
+        let columns = schema.fields().iter().map(|field| field.name());
+        columns
+            .filter(|name| name.starts_with("last_obs_") && self.column(name).is_valid(row))
+            .map(|name| self.float(name, row))
+            .collect()
+    }
+
     fn record(&self, row: usize) -> Result<EpisodeRecord, DatasetError> {
         let wrong =
             |what: &str| DatasetError::Unreadable(format!("{EPISODES_FILE}, row {row}: {what}"));
@@ -160,6 +173,7 @@ impl<'a> Columns<'a> {
                 max_s: self.float("computation_time_max_s", row),
             },
             fault,
+            last_observation: self.last_observation(row),
         })
     }
 }

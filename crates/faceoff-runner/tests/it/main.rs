@@ -10,3 +10,4 @@ mod host_noise;
 mod misbehaviour;
 mod recording;
 mod shard;
+mod verify;

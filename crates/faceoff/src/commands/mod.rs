@@ -2,6 +2,7 @@
 
 pub mod admin;
 pub mod compare;
+pub mod dataset;
 pub mod demo;
 pub mod doctor;
 pub mod eval;

@@ -2,4 +2,5 @@
 #![expect(clippy::unwrap_used, reason = "a helper's failure is its test's")]
 
 mod compare;
+mod dataset;
 mod eval;

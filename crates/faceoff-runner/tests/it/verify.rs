@@ -1,0 +1,670 @@
+//! A sceptic's view: real recordings, forged in one place and made to look whole again.
+
+use crate::{
+    agents::{Agent, sandboxed},
+    recording::{moving, read},
+    shard::{run, spec},
+};
+use arrow_array::{
+    Array, ArrayRef, BooleanArray, Float64Array, Int64Array, ListArray, RecordBatch, StringArray,
+    UInt32Array,
+    builder::{Float64Builder, ListBuilder},
+    cast::AsArray,
+};
+use arrow_schema::{DataType, Field};
+use faceoff_runner::{
+    EvaluationMeta, assemble,
+    dataset::{Dataset, DatasetError},
+    verify::{Difference, SeasonClaim, Verified, VerifyError, verify},
+};
+use faceoff_types::{RULESET, Seed, Task};
+use faceoff_wire::dataset::DatasetManifest;
+use parquet::arrow::ArrowWriter;
+use std::{
+    fs::{self, File},
+    num::NonZero,
+    ops::Range,
+    path::{Path, PathBuf},
+    sync::{
+        Arc, OnceLock,
+        atomic::{AtomicU32, Ordering},
+    },
+};
+use tempfile::TempDir;
+use zip::ZipArchive;
+
+/// A dataset of two tasks, unpacked.
+struct Played {
+    dir: TempDir,
+}
+
+impl Played {
+    fn new(agent: &Agent, shards: &[(Task, Range<u32>)]) -> Self {
+        let dir = tempfile::tempdir().unwrap();
+        let mut dirs = Vec::new();
+        for (task, range) in shards {
+            let out = dir.path().join(format!("{task}-{}", range.start));
+            run(&spec(*task, range.clone()), agent, &sandboxed(), &out).unwrap();
+            dirs.push(out);
+        }
+        let spec = spec(Task::Hit, 0..1);
+        let meta = EvaluationMeta {
+            profile: spec.profile,
+            seed: spec.seed,
+            mismatch_seed: spec.mismatch_seed,
+            agent: "test".into(),
+            ruleset: RULESET.into(),
+        };
+        let played = Self { dir };
+        assemble(&meta, &dirs, &played.archive()).unwrap();
+        ZipArchive::new(File::open(played.archive()).unwrap())
+            .unwrap()
+            .extract(played.folder())
+            .unwrap();
+        played
+    }
+
+    fn archive(&self) -> PathBuf {
+        self.dir.path().join("dataset.zip")
+    }
+
+    fn folder(&self) -> PathBuf {
+        self.dir.path().join("dataset")
+    }
+}
+
+/// One recording for all tests that only read it.
+fn played() -> &'static Played {
+    static PLAYED: OnceLock<Played> = OnceLock::new();
+    PLAYED.get_or_init(|| {
+        Played::new(
+            &moving(),
+            &[(Task::Hit, 0..1), (Task::Hit, 1..2), (Task::Defend, 0..2)],
+        )
+    })
+}
+
+fn check(path: &Path, workers: usize) -> Result<Verified, VerifyError> {
+    verify(
+        &Dataset::open(path)?,
+        NonZero::new(workers).unwrap(),
+        &|| (),
+    )
+}
+
+#[track_caller]
+fn difference(path: &Path, workers: usize) -> Difference {
+    match check(path, workers) {
+        Err(VerifyError::Differs(difference)) => *difference,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// A copy of the recording that a forger changes.
+struct Forgery {
+    dir: TempDir,
+}
+
+impl Forgery {
+    fn new() -> Self {
+        let dir = tempfile::tempdir().unwrap();
+        for entry in played().folder().read_dir().unwrap() {
+            let entry = entry.unwrap();
+            fs::copy(entry.path(), dir.path().join(entry.file_name())).unwrap();
+        }
+        Self { dir }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.dir.path().join(name)
+    }
+
+    /// Rewrites a table.
+    fn table(&self, name: &str, change: impl FnOnce(RecordBatch) -> RecordBatch) {
+        let path = self.path(name);
+        let batch = change(read(&path));
+        let mut writer =
+            ArrowWriter::try_new(File::create(&path).unwrap(), batch.schema(), None).unwrap();
+        writer.write(&batch).unwrap();
+        writer.close().unwrap();
+    }
+
+    /// Rewrites a text file.
+    fn text(&self, name: &str, from: &str, to: &str) {
+        let path = self.path(name);
+        let text = fs::read_to_string(&path).unwrap();
+        assert!(text.contains(from), "{name} lacks {from:?}: {text}");
+        fs::write(&path, text.replacen(from, to, 1)).unwrap();
+    }
+
+    /// Makes the manifest's sizes and hashes those of the files.
+    fn reseal(self) -> Self {
+        let path = self.path("manifest.json");
+        let mut manifest: DatasetManifest =
+            serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+        for (name, digest) in &mut manifest.files {
+            let bytes = fs::read(self.path(name)).unwrap();
+            digest.bytes = bytes.len() as u64;
+            digest.blake3 = blake3::hash(&bytes).to_hex().to_string();
+        }
+        fs::write(&path, serde_json::to_vec_pretty(&manifest).unwrap()).unwrap();
+        self
+    }
+}
+
+/// The column with the lowest bit of one value flipped.
+fn flip(column: &ArrayRef, row: usize) -> ArrayRef {
+    let flip_float = |i: usize, value: f64| {
+        f64::from_bits(if i == row {
+            value.to_bits() ^ 1
+        } else {
+            value.to_bits()
+        })
+    };
+    match column.data_type() {
+        DataType::Float64 => {
+            let column: &Float64Array = column.as_primitive();
+            let flipped = (0..column.len())
+                .map(|i| column.is_valid(i).then(|| flip_float(i, column.value(i))));
+            Arc::new(flipped.collect::<Float64Array>())
+        }
+        DataType::UInt32 => {
+            let column: &UInt32Array = column.as_primitive();
+            let flipped = column.values().iter().enumerate();
+            Arc::new(UInt32Array::from_iter_values(
+                flipped.map(|(i, value)| if i == row { value ^ 1 } else { *value }),
+            ))
+        }
+        DataType::Int64 => {
+            let column: &Int64Array = column.as_primitive();
+            let flipped = column.iter().enumerate();
+            Arc::new(
+                flipped
+                    .map(|(i, value)| value.map(|value| if i == row { value ^ 1 } else { value }))
+                    .collect::<Int64Array>(),
+            )
+        }
+        DataType::Boolean => {
+            let column: &BooleanArray = column.as_boolean();
+            let flipped = (0..column.len()).map(|i| Some(column.value(i) ^ (i == row)));
+            Arc::new(flipped.collect::<BooleanArray>())
+        }
+        DataType::Utf8 => {
+            let column: &StringArray = column.as_string();
+            let flipped = (0..column.len()).map(|i| {
+                let text = column.is_valid(i).then(|| column.value(i).to_owned());
+                if i != row {
+                    return text;
+                }
+                let mut bytes = text.unwrap_or_else(|| "c".to_owned()).into_bytes();
+                *bytes.last_mut().unwrap() ^= 1;
+                Some(String::from_utf8(bytes).unwrap())
+            });
+            Arc::new(flipped.collect::<StringArray>())
+        }
+        DataType::List(item) => {
+            let column: &ListArray = column.as_list();
+            let mut out = ListBuilder::new(Float64Builder::new()).with_field(item.clone());
+            for i in 0..column.len() {
+                let values = column.value(i);
+                let values: &Float64Array = values.as_primitive();
+                for (k, value) in values.values().iter().enumerate() {
+                    // The last number: the velocity of the last joint.
+                    let last = k + 1 == values.len();
+                    out.values()
+                        .append_value(if last { flip_float(i, *value) } else { *value });
+                }
+                out.append(true);
+            }
+            Arc::new(out.finish())
+        }
+        other => panic!("{other}"),
+    }
+}
+
+/// The table with one value changed; without nullability, which a forger may ignore.
+fn flipped(batch: &RecordBatch, name: &str, row: usize) -> RecordBatch {
+    let schema = batch.schema();
+    let (index, _) = schema.column_with_name(name).unwrap();
+    let mut columns = batch.columns().to_vec();
+    columns[index] = flip(&columns[index], row);
+    let fields: Vec<Field> = schema
+        .fields()
+        .iter()
+        .map(|field| Field::clone(field).with_nullable(true))
+        .collect();
+    RecordBatch::try_new(Arc::new(arrow_schema::Schema::new(fields)), columns).unwrap()
+}
+
+fn names(table: &str) -> Vec<String> {
+    let batch = read(&played().folder().join(table));
+    let schema = batch.schema();
+    schema
+        .fields()
+        .iter()
+        .map(|field| field.name().clone())
+        .collect()
+}
+
+#[test]
+fn a_recording_verifies_as_archive_as_folder_and_on_any_number_of_threads() {
+    let played = played();
+    let done = AtomicU32::new(0);
+    let dataset = Dataset::open(&played.archive()).unwrap();
+    let one = verify(&dataset, NonZero::<usize>::MIN, &|| {
+        done.fetch_add(1, Ordering::Relaxed);
+    })
+    .unwrap();
+    assert_eq!((one.episodes, done.into_inner()), (4, 4));
+    assert_eq!(one.result, dataset.results().unwrap());
+    assert_eq!(
+        one.steps,
+        one.result
+            .tasks
+            .values()
+            .map(|task| task.steps)
+            .sum::<u64>()
+    );
+    assert_eq!(check(&played.folder(), 8).unwrap(), one);
+    assert_eq!(
+        check(played.dir.path(), 3).unwrap(),
+        one,
+        "as `faceoff eval` leaves it"
+    );
+    // Rewritten by another program, the same numbers are the same dataset.
+    let rewritten = Forgery::new();
+    rewritten.table("steps.parquet", |batch| batch);
+    assert_eq!(check(rewritten.reseal().dir.path(), 2).unwrap(), one);
+}
+
+#[test]
+fn one_bit_of_any_column_of_a_step_is_found_where_it_is() {
+    let steps = read(&played().folder().join("steps.parquet"));
+    // Some step in the midst of `hit`, episode 1.
+    let tasks: &StringArray = steps["task"].as_string();
+    let episodes: &UInt32Array = steps["episode"].as_primitive();
+    let start = (0..steps.num_rows())
+        .find(|row| tasks.value(*row) == "hit" && episodes.value(*row) == 1)
+        .unwrap();
+    let row = start + 17;
+    for name in names("steps.parquet") {
+        let forgery = Forgery::new();
+        forgery.table("steps.parquet", |batch| flipped(&batch, &name, row));
+        let found = difference(forgery.reseal().dir.path(), 2);
+        assert_eq!(
+            (found.task, found.episode),
+            (Some(Task::Hit), Some(1)),
+            "{name}: {found}"
+        );
+        match name.as_str() {
+            // The digest tells what moves nothing or follows from nothing.
+            "computation_time_ns" | "cpu_time_ns" => {
+                assert_eq!(found.step, None, "{found}");
+                let fields = ["computation_time_mean_s", "times_blake3"];
+                assert!(fields.contains(&found.field.as_str()), "{found}");
+            }
+            "action" => {
+                let digest = found.field == "actions_blake3" && found.step.is_none();
+                assert!(digest || found.step >= Some(17), "{found}");
+            }
+            _ => assert_eq!((found.step, &found.field), (Some(17), &name), "{found}"),
+        }
+    }
+}
+
+#[test]
+fn an_action_that_moves_the_arm_is_found_at_its_step() {
+    let forgery = Forgery::new();
+    forgery.table("steps.parquet", |batch| {
+        let (index, _) = batch
+            .schema()
+            .column_with_name("action")
+            .map(|(i, f)| (i, f.clone()))
+            .unwrap();
+        let column: &ListArray = batch.column(index).as_list();
+        let DataType::List(item) = column.data_type() else {
+            panic!("actions are lists");
+        };
+        let mut out = ListBuilder::new(Float64Builder::new()).with_field(item.clone());
+        for i in 0..column.len() {
+            let values = column.value(i);
+            let values: &Float64Array = values.as_primitive();
+            for (k, value) in values.values().iter().enumerate() {
+                out.values()
+                    .append_value(value + if (i, k) == (5, 0) { 1e-9 } else { 0.0 });
+            }
+            out.append(true);
+        }
+        let mut columns = batch.columns().to_vec();
+        columns[index] = Arc::new(out.finish());
+        RecordBatch::try_new(batch.schema(), columns).unwrap()
+    });
+    let forgery = forgery.reseal();
+    let found = difference(forgery.dir.path(), 1);
+    assert_eq!(
+        (found.task, found.episode, found.step),
+        (Some(Task::Hit), Some(0), Some(5))
+    );
+    assert!(
+        found
+            .to_string()
+            .starts_with("steps.parquet, hit, episode 0, step 5, "),
+        "{found}"
+    );
+    assert_eq!(
+        found,
+        difference(forgery.dir.path(), 8),
+        "on any number of threads"
+    );
+}
+
+#[test]
+fn one_bit_of_any_column_of_an_episode_is_found() {
+    for name in names("episodes.parquet") {
+        // The opponent's columns are absent in `defend`: take `hit`.
+        let forgery = Forgery::new();
+        forgery.table("episodes.parquet", |batch| flipped(&batch, &name, 1));
+        let found = difference(forgery.reseal().dir.path(), 2);
+        assert_eq!(
+            (found.task, found.episode),
+            (Some(Task::Hit), Some(1)),
+            "{name}: {found}"
+        );
+        match name.as_str() {
+            // Another interpolation cannot read the recorded actions; other steps are missing.
+            "interpolation" => assert_eq!(found.file, "steps.parquet", "{found}"),
+            "steps" => {}
+            _ => assert_eq!(
+                (&found.field, &*found.file),
+                (&name, "episodes.parquet"),
+                "{found}"
+            ),
+        }
+    }
+}
+
+#[test]
+fn forged_scores_are_found() {
+    for (name, from, to, field) in [
+        (
+            "results.json",
+            "\"successes\": ",
+            "\"successes\": 1",
+            "tasks.hit.successes",
+        ),
+        ("results.json", "\"score\": ", "\"score\": 1", "score"),
+        (
+            "results.json",
+            "\"tier\": \"",
+            "\"tier\": \"x",
+            "tasks.hit.tier",
+        ),
+        ("results.json", "{\n", "{ \n", "byte 1"),
+        (
+            "violations.json",
+            "\"joint_pos\": []",
+            "\"joint_pos\": [7]",
+            "tasks.hit.joint_pos[0]",
+        ),
+    ] {
+        let forgery = Forgery::new();
+        forgery.text(name, from, to);
+        // Unsealed, the hash tells; sealed, the simulation does.
+        match Dataset::open(forgery.dir.path()) {
+            Err(DatasetError::Altered(what)) => assert!(what.starts_with(name), "{what}"),
+            other => panic!("{other:?}"),
+        }
+        let found = difference(forgery.reseal().dir.path(), 2);
+        assert_eq!(found.file, name);
+        assert_eq!(found.field, field, "{found}");
+    }
+}
+
+#[test]
+fn forged_seeds_and_profiles_give_other_episodes() {
+    let seed = spec(Task::Hit, 0..1).seed;
+    for (from, to) in [
+        (seed.to_string(), Seed::from_number(8).to_string()),
+        (seed.model_mismatch().to_string(), seed.to_string()),
+        (
+            "\"profile\": \"evaluation\"".into(),
+            "\"profile\": \"ideal\"".into(),
+        ),
+    ] {
+        let forgery = Forgery::new();
+        forgery.text("manifest.json", &from, &to);
+        let found = difference(forgery.dir.path(), 2);
+        assert_eq!(
+            (found.task, found.episode, found.step),
+            (Some(Task::Hit), Some(0), Some(0)),
+            "{found}"
+        );
+    }
+}
+
+#[test]
+fn episodes_and_steps_that_are_missing_twice_or_too_many_are_found() {
+    let without = |table: &str, row: usize| {
+        let forgery = Forgery::new();
+        forgery.table(table, |batch| {
+            let parts = [
+                batch.slice(0, row),
+                batch.slice(row + 1, batch.num_rows() - row - 1),
+            ];
+            concat(&parts)
+        });
+        difference(forgery.reseal().dir.path(), 2)
+    };
+    let twice = |table: &str, row: usize| {
+        let forgery = Forgery::new();
+        forgery.table(table, |batch| {
+            concat(&[
+                batch.slice(0, row + 1),
+                batch.slice(row, batch.num_rows() - row),
+            ])
+        });
+        difference(forgery.reseal().dir.path(), 2)
+    };
+    let last = read(&played().folder().join("steps.parquet")).num_rows() - 1;
+    let place = |found: &Difference| (found.task, found.episode, found.step);
+    let (hit, defend) = (Some(Task::Hit), Some(Task::Defend));
+    assert_eq!(place(&without("steps.parquet", 3)), (hit, Some(0), Some(3)));
+    assert_eq!(place(&twice("steps.parquet", 3)), (hit, Some(0), Some(4)));
+    let found = without("steps.parquet", last);
+    assert_eq!((found.task, found.episode), (defend, Some(1)), "{found}");
+    let found = twice("steps.parquet", last);
+    assert_eq!(
+        (found.task, found.episode, &*found.field),
+        (defend, Some(1), "rows")
+    );
+    let found = without("episodes.parquet", 1);
+    assert_eq!(
+        (place(&found), &*found.field),
+        ((hit, Some(1), None), "task")
+    );
+    let found = twice("episodes.parquet", 0);
+    assert_eq!(
+        (place(&found), &*found.field),
+        ((hit, Some(1), None), "episode")
+    );
+    let found = without("episodes.parquet", 3);
+    assert_eq!(
+        (place(&found), &*found.recorded),
+        ((defend, Some(1), None), "nothing")
+    );
+    let found = twice("episodes.parquet", 3);
+    assert_eq!(
+        (place(&found), &*found.field),
+        ((defend, Some(1), None), "rows")
+    );
+}
+
+/// One batch of several.
+fn concat(parts: &[RecordBatch]) -> RecordBatch {
+    // Through a file, as a forger would.
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let mut writer = ArrowWriter::try_new(file.reopen().unwrap(), parts[0].schema(), None).unwrap();
+    for part in parts {
+        writer.write(part).unwrap();
+    }
+    writer.close().unwrap();
+    read(file.path())
+}
+
+#[test]
+fn damaged_and_truncated_archives_are_refused() {
+    let good = fs::read(played().archive()).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("dataset.zip");
+    let refused = |bytes: &[u8], what: &str| {
+        fs::write(&path, bytes).unwrap();
+        match Dataset::open(&path) {
+            Err(DatasetError::Altered(_) | DatasetError::Unreadable(_)) => {}
+            other => panic!("{what}: {other:?}"),
+        }
+    };
+    // Every byte of the ends, where the framing is, and some of the rest.
+    let tail = good.len() - 2048;
+    let places = (0..128)
+        .chain((128..tail).step_by(tail / 200))
+        .chain(tail..good.len());
+    for at in places {
+        let mut bytes = good.clone();
+        bytes[at] ^= 1 << (at % 8);
+        refused(&bytes, &format!("byte {at} flipped"));
+    }
+    for length in [0, 1, 100, good.len() / 2, good.len() - 100, good.len() - 1] {
+        refused(&good[..length], &format!("{length} bytes"));
+    }
+    refused(&[&good[..], b"x"].concat(), "a byte more");
+    fs::write(&path, &good).unwrap();
+    assert!(Dataset::open(&path).is_ok());
+}
+
+#[test]
+fn damaged_tables_are_refused_in_a_folder_too() {
+    for name in [
+        "steps.parquet",
+        "episodes.parquet",
+        "agent.log",
+        "results.json",
+    ] {
+        let forgery = Forgery::new();
+        let good = fs::read(forgery.path(name)).unwrap();
+        for at in (0..good.len()).step_by(good.len().div_ceil(40)) {
+            let mut bytes = good.clone();
+            bytes[at] ^= 0x10;
+            fs::write(forgery.path(name), &bytes).unwrap();
+            match Dataset::open(forgery.dir.path()) {
+                Err(DatasetError::Altered(what)) => assert!(what.starts_with(name), "{what}"),
+                other => panic!("{name}, byte {at}: {other:?}"),
+            }
+        }
+        fs::remove_file(forgery.path(name)).unwrap();
+        assert!(
+            Dataset::open(forgery.dir.path()).is_err(),
+            "{name} is missing"
+        );
+    }
+    // Hashes that fit do not make a table readable.
+    let forgery = Forgery::new();
+    let steps = fs::read(forgery.path("steps.parquet")).unwrap();
+    fs::write(forgery.path("steps.parquet"), &steps[..steps.len() / 2]).unwrap();
+    let result = check(forgery.reseal().dir.path(), 2);
+    assert!(
+        matches!(
+            result,
+            Err(VerifyError::Dataset(DatasetError::Unreadable(_)))
+        ),
+        "{result:?}"
+    );
+}
+
+#[test]
+fn other_layouts_rulesets_and_simulators_are_named() {
+    let fingerprint = Dataset::open(&played().archive())
+        .unwrap()
+        .manifest()
+        .simulator
+        .fingerprint
+        .clone();
+    for (from, to, words) in [
+        (
+            "faceoff-dataset/2",
+            "faceoff-dataset/1",
+            "layout is \"faceoff-dataset/1\"",
+        ),
+        (RULESET, "airhockey-1999", "ruleset \"airhockey-1999\""),
+        (
+            &*fingerprint,
+            "00",
+            "verify it with the version that made it",
+        ),
+    ] {
+        let forgery = Forgery::new();
+        forgery.text("manifest.json", from, to);
+        match check(forgery.dir.path(), 1) {
+            Err(VerifyError::Dataset(DatasetError::Foreign(what))) => {
+                assert!(what.contains(words), "{what}");
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn agents_that_fault_verify_too() {
+    let agent = Agent::with(
+        "now = 0\n\
+         def on_reset(episode):\n    global now; now = episode\n    \
+         if episode == 2: sys.exit(3)\n\
+         def on_step(step, answer):\n    \
+         return 'oops' if (now, step) == (1, 4) else json.dumps(answer)",
+    );
+    let faulty = Played::new(&agent, &[(Task::Prepare, 0..4)]);
+    let verified = check(&faulty.archive(), 2).unwrap();
+    assert_eq!(verified.episodes, 4);
+    assert_eq!(
+        verified.result.tasks[&Task::Prepare]
+            .violations
+            .computation_time,
+        2
+    );
+    let silent = Played::new(
+        &Agent::script("import sys\nsys.exit('no model')"),
+        &[(Task::Hit, 0..2)],
+    );
+    assert_eq!(check(&silent.archive(), 1).unwrap().steps, 0);
+}
+
+#[test]
+fn seeds_follow_from_the_revealed_secret() {
+    let day = "2026-11-21".parse().unwrap();
+    let secret = Seed::from_number(42);
+    let mut manifest = Dataset::open(&played().archive())
+        .unwrap()
+        .manifest()
+        .clone();
+    manifest.seed = secret.day(day);
+    manifest.mismatch_seed = secret.model_mismatch();
+    let claim = SeasonClaim {
+        secret,
+        commitment: Some(blake3::hash(secret.as_bytes()).to_hex().to_uppercase()),
+        day,
+    };
+    assert_eq!(claim.check(&manifest), Ok(()));
+    let what =
+        |claim: &SeasonClaim, manifest: &DatasetManifest| claim.check(manifest).unwrap_err().what;
+    let other_day = SeasonClaim {
+        day: "2026-11-22".parse().unwrap(),
+        ..claim.clone()
+    };
+    assert_eq!(what(&other_day, &manifest), "the evaluation's seed");
+    let broken = SeasonClaim {
+        commitment: Some("00".repeat(32)),
+        ..claim.clone()
+    };
+    assert_eq!(what(&broken, &manifest), "the commitment");
+    manifest.mismatch_seed = manifest.seed;
+    assert_eq!(what(&claim, &manifest), "the seed of the model mismatch");
+}

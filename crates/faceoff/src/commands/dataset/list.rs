@@ -1,0 +1,48 @@
+use clap::Args;
+use faceoff_runner::dataset::Dataset;
+use std::{
+    io::{BufWriter, Write, stdout},
+    path::PathBuf,
+};
+
+/// Prints a row per episode.
+#[derive(Debug, Args)]
+pub struct ListArgs {
+    /// dataset.zip, the folder it was unpacked to, or the folder that `faceoff eval` wrote
+    dataset: PathBuf,
+    /// Print one JSON object per line
+    #[arg(long)]
+    json: bool,
+}
+
+impl ListArgs {
+    pub fn run(self) -> anyhow::Result<()> {
+        let episodes = Dataset::open(&self.dataset)?.episodes()?;
+        let mut out = BufWriter::new(stdout().lock());
+        if !self.json {
+            writeln!(
+                out,
+                "{:<8} {:>7} {:>6} {:<14} {:<8} {:>6}",
+                "task", "episode", "steps", "end", "success", "points"
+            )?;
+        }
+        for episode in episodes {
+            if self.json {
+                serde_json::to_writer(&mut out, &episode)?;
+                writeln!(out)?;
+            } else {
+                writeln!(
+                    out,
+                    "{:<8} {:>7} {:>6} {:<14} {:<8} {:>6}",
+                    episode.task,
+                    episode.episode,
+                    episode.steps,
+                    episode.end,
+                    if episode.success { "yes" } else { "no" },
+                    episode.penalty_points,
+                )?;
+            }
+        }
+        Ok(out.flush()?)
+    }
+}

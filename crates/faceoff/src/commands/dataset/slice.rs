@@ -1,0 +1,156 @@
+use anyhow::{Context, bail, ensure};
+use arrow_array::{
+    Array, RecordBatch,
+    cast::AsArray,
+    types::{Float64Type, Int64Type, UInt32Type},
+};
+use arrow_schema::DataType;
+use clap::{Args, ValueEnum};
+use faceoff_runner::dataset::Dataset;
+use faceoff_types::Task;
+use serde_json::{Map, Value};
+use std::{
+    fs::File,
+    io::{BufWriter, Write, stdout},
+    ops::Range,
+    path::PathBuf,
+    str::FromStr,
+};
+
+/// Writes the control steps of one episode.
+#[derive(Debug, Args)]
+pub struct SliceArgs {
+    /// dataset.zip, the folder it was unpacked to, or the folder that `faceoff eval` wrote
+    dataset: PathBuf,
+    /// The task
+    #[arg(long)]
+    task: Task,
+    /// The episode, from 0
+    #[arg(long, value_name = "N")]
+    episode: u32,
+    /// Only these control steps: A and those before B
+    #[arg(long, value_name = "A..B")]
+    steps: Option<Steps>,
+    /// Only these columns, in this order [default: all]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    columns: Option<Vec<String>>,
+    /// How rows are written
+    #[arg(long, value_enum, default_value_t = Format::Csv)]
+    format: Format,
+    /// A file instead of standard output
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Format {
+    /// A header and a line per step; an action is a JSON array, an absent value is empty
+    Csv,
+    /// A JSON object per line
+    Jsonl,
+}
+
+/// A range of steps, `A..B`, either end may be left out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Steps(Range<u32>);
+
+impl FromStr for Steps {
+    type Err = String;
+    fn from_str(s: &str) -> Result<Self, String> {
+        let wrong = || format!("expected A..B, such as 10..20, got {s:?}");
+        let (from, to) = s.split_once("..").ok_or_else(wrong)?;
+        let end = |text: &str, open: u32| match text {
+            "" => Ok(open),
+            number => number.parse().map_err(|_| wrong()),
+        };
+        Ok(Self(end(from, 0)?..end(to, u32::MAX)?))
+    }
+}
+
+impl SliceArgs {
+    pub fn run(self) -> anyhow::Result<()> {
+        let dataset = Dataset::open(&self.dataset)?;
+        let Self { task, episode, .. } = self;
+        let episodes = dataset.manifest().episodes.get(&task).copied();
+        match episodes {
+            None => bail!("the dataset holds no episode of {task}"),
+            Some(count) => ensure!(
+                episode < count,
+                "there is no episode {episode} of {task}: there are {count}, from 0"
+            ),
+        }
+        let table = dataset.steps()?;
+        let names = self.columns.clone().unwrap_or_else(|| table.columns());
+        let mut wanted = names.clone();
+        wanted.push("step".to_owned());
+        let batches = table.episode(task, episode, Some(&wanted))?;
+        let mut out: Box<dyn Write> = match &self.out {
+            Some(path) => Box::new(BufWriter::new(
+                File::create(path).with_context(|| format!("creating {}", path.display()))?,
+            )),
+            None => Box::new(BufWriter::new(stdout().lock())),
+        };
+        if self.format == Format::Csv {
+            writeln!(out, "{}", names.join(","))?;
+        }
+        let steps = self.steps.map_or(0..u32::MAX, |steps| steps.0);
+        for batch in &batches {
+            let numbers = batch["step"].as_primitive::<UInt32Type>();
+            for row in 0..batch.num_rows() {
+                if steps.contains(&numbers.value(row)) {
+                    write_row(&mut out, self.format, &names, batch, row)?;
+                }
+            }
+        }
+        Ok(out.flush()?)
+    }
+}
+
+fn write_row(
+    out: &mut dyn Write,
+    format: Format,
+    names: &[String],
+    batch: &RecordBatch,
+    row: usize,
+) -> anyhow::Result<()> {
+    let cells = names
+        .iter()
+        .map(|name| (name, json(&batch[name.as_str()], row)));
+    match format {
+        Format::Jsonl => {
+            let object: Map<String, Value> =
+                cells.map(|(name, cell)| (name.clone(), cell)).collect();
+            writeln!(out, "{}", Value::Object(object))?;
+        }
+        Format::Csv => {
+            let cells: Vec<String> = cells
+                .map(|(_, cell)| match cell {
+                    Value::Null => String::new(),
+                    Value::String(text) => text,
+                    list @ Value::Array(_) => format!("\"{list}\""),
+                    other => other.to_string(),
+                })
+                .collect();
+            writeln!(out, "{}", cells.join(","))?;
+        }
+    }
+    Ok(())
+}
+
+/// A cell; numbers are written with the fewest digits that give the same bits again.
+fn json(column: &dyn Array, row: usize) -> Value {
+    if column.is_null(row) {
+        return Value::Null;
+    }
+    match column.data_type() {
+        DataType::Float64 => column.as_primitive::<Float64Type>().value(row).into(),
+        DataType::Int64 => column.as_primitive::<Int64Type>().value(row).into(),
+        DataType::UInt32 => column.as_primitive::<UInt32Type>().value(row).into(),
+        DataType::Utf8 => column.as_string::<i32>().value(row).into(),
+        DataType::List(_) => {
+            let values = column.as_list::<i32>().value(row);
+            (0..values.len()).map(|i| json(&values, i)).collect()
+        }
+        other => format!("{other}").into(),
+    }
+}

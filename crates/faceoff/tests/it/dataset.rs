@@ -1,0 +1,360 @@
+//! What `faceoff eval` records, `verify` confirms and `dataset` converts: the program itself.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output},
+    sync::OnceLock,
+};
+use tempfile::TempDir;
+
+fn faceoff(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_faceoff"))
+        .args(args)
+        .output()
+        .unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn eval(out: &Path, extra: &[&str]) {
+    let bundle = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../agents/hold");
+    let mut args = vec![
+        "eval",
+        bundle.to_str().unwrap(),
+        "--out",
+        out.to_str().unwrap(),
+    ];
+    args.extend(["--task", "hit,defend", "--episodes", "2", "--seed", "5"]);
+    args.extend(extra);
+    let output = Command::new(env!("CARGO_BIN_EXE_faceoff"))
+        .args(args)
+        .current_dir(out.parent().unwrap())
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+}
+
+/// A sandboxed evaluation of two tasks, its folder.
+fn evaluated() -> PathBuf {
+    static DIR: OnceLock<TempDir> = OnceLock::new();
+    let dir = DIR.get_or_init(|| {
+        let dir = tempfile::tempdir().unwrap();
+        eval(&dir.path().join("out"), &["--workers", "2"]);
+        dir
+    });
+    dir.path().join("out")
+}
+
+fn stdout(args: &[&str]) -> String {
+    let output = faceoff(args);
+    assert!(
+        output.status.success(),
+        "{args:?}: {}",
+        text(&output.stderr)
+    );
+    text(&output.stdout)
+}
+
+/// A program's words about the export or the archive.
+fn python(program: &str, argument: &Path) -> String {
+    let output = Command::new("python3")
+        .args(["-c", program])
+        .arg(argument)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    text(&output.stdout)
+}
+
+#[test]
+fn an_evaluation_verifies_with_any_number_of_workers() {
+    let out = evaluated();
+    let dir = out.to_str().unwrap();
+    let line = stdout(&["verify", dir]);
+    assert!(line.contains("4 episodes"), "{line}");
+    assert!(line.contains("every state and score identical"), "{line}");
+    let summary = |workers: &str| -> serde_json::Value {
+        let line = stdout(&["verify", dir, "--json", "--workers", workers]);
+        let mut summary: serde_json::Value = serde_json::from_str(&line).unwrap();
+        for measured in ["seconds", "steps_per_s"] {
+            let value = summary.as_object_mut().unwrap().remove(measured).unwrap();
+            assert!(value.as_f64().unwrap() > 0.0);
+        }
+        summary
+    };
+    assert_eq!(summary("1"), summary("8"));
+    assert_eq!(summary("1")["verified"], true);
+    let results: serde_json::Value =
+        serde_json::from_slice(&fs::read(out.join("results.json")).unwrap()).unwrap();
+    assert_eq!(summary("3")["result"], results);
+}
+
+#[test]
+fn what_differs_ends_with_1_and_what_cannot_be_read_with_2() {
+    let dir = tempfile::tempdir().unwrap();
+    let copy = dir.path().join("dataset.zip");
+    let good = fs::read(evaluated().join("dataset.zip")).unwrap();
+    let verify = |bytes: &[u8], extra: &[&str]| {
+        fs::write(&copy, bytes).unwrap();
+        let output = faceoff(&[&["verify", copy.to_str().unwrap()], extra].concat());
+        (output.status.code().unwrap(), text(&output.stderr))
+    };
+    assert_eq!(verify(&good, &[]).0, 0);
+    let mut flipped = good.clone();
+    flipped[good.len() / 2] ^= 1;
+    let (code, words) = verify(&flipped, &[]);
+    assert!(
+        code == 1 && words.contains("damaged or altered"),
+        "{code}: {words}"
+    );
+    let (code, words) = verify(&good[..good.len() / 2], &[]);
+    assert!(
+        code == 2 && words.contains("not a readable dataset"),
+        "{code}: {words}"
+    );
+    let (code, words) = verify(
+        &good,
+        &["--secret", &"00".repeat(32), "--day", "2026-11-21"],
+    );
+    assert!(
+        code == 1 && words.contains("seed does not follow from the season's secret"),
+        "{code}: {words}"
+    );
+    let (code, words) = verify(&good, &["--day", "2026-11-21"]);
+    assert!(code == 2 && words.contains("--secret"), "{code}: {words}");
+    let missing = faceoff(&["verify", dir.path().join("none").to_str().unwrap()]);
+    assert_eq!(missing.status.code(), Some(2));
+
+    // A score beside the archive that is not the one inside.
+    fs::write(&copy, &good).unwrap();
+    fs::write(dir.path().join("results.json"), "{}").unwrap();
+    let output = faceoff(&["verify", dir.path().to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+}
+
+#[test]
+fn episodes_are_listed_and_steps_are_cut_out() {
+    let out = evaluated();
+    let dir = out.to_str().unwrap();
+    let list = stdout(&["dataset", "list", dir]);
+    assert_eq!(list.lines().count(), 5, "{list}");
+    assert!(
+        list.lines()
+            .nth(1)
+            .unwrap()
+            .starts_with("hit            0    500 horizon"),
+        "{list}"
+    );
+    let json: Vec<serde_json::Value> = stdout(&["dataset", "list", dir, "--json"])
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(json.len(), 4);
+    assert_eq!(
+        (&json[3]["task"], &json[3]["episode"]),
+        (&"defend".into(), &1.into())
+    );
+
+    let slice = |args: &[&str]| {
+        let mut all = vec!["dataset", "slice", dir, "--task", "hit", "--episode", "1"];
+        all.extend(args);
+        stdout(&all)
+    };
+    let columns = ["--columns", "step,puck_x,action", "--steps", "10..12"];
+    let csv = slice(&columns);
+    let lines: Vec<&str> = csv.lines().collect();
+    assert_eq!((lines.len(), lines[0]), (3, "step,puck_x,action"));
+    assert!(
+        lines[1].starts_with("10,") && lines[2].starts_with("11,"),
+        "{csv}"
+    );
+    let jsonl = slice(&[&columns[..], &["--format", "jsonl"]].concat());
+    let first: serde_json::Value = serde_json::from_str(jsonl.lines().next().unwrap()).unwrap();
+    assert_eq!(first["step"], 10);
+    assert_eq!(first["action"].as_array().unwrap().len(), 14);
+    assert!(
+        lines[1].contains(&format!(",{},\"[", first["puck_x"])),
+        "{csv}"
+    );
+    let file = tempfile::NamedTempFile::new().unwrap();
+    slice(&["--out", file.path().to_str().unwrap()]);
+    assert_eq!(
+        fs::read_to_string(file.path()).unwrap().lines().count(),
+        501
+    );
+
+    for (args, words) in [
+        (
+            ["--task", "prepare", "--episode", "0"],
+            "no episode of prepare",
+        ),
+        (["--task", "hit", "--episode", "2"], "there are 2, from 0"),
+    ] {
+        let output = faceoff(&[&["dataset", "slice", dir][..], &args].concat());
+        assert_eq!(output.status.code(), Some(1));
+        assert!(
+            text(&output.stderr).contains(words),
+            "{}",
+            text(&output.stderr)
+        );
+    }
+    let output = faceoff(&[
+        "dataset",
+        "slice",
+        dir,
+        "--task",
+        "hit",
+        "--episode",
+        "0",
+        "--columns",
+        "speed",
+    ]);
+    assert!(
+        text(&output.stderr).contains("no column \"speed\""),
+        "{}",
+        text(&output.stderr)
+    );
+}
+
+/// Reads the export with nothing but Python's own library: an array is what `numpy.array` is called
+/// with. Prints what the test compares.
+const READ_EXPORT: &str = r#"
+import ast, json, pickle, struct, sys
+class Reader(pickle.Unpickler):
+    def find_class(self, module, name):
+        assert (module, name) == ("numpy", "array")
+        return list
+def npy(path):
+    data = open(path, "rb").read()
+    assert data[:8] == b"\x93NUMPY\x01\x00"
+    length, = struct.unpack("<H", data[8:10])
+    assert (10 + length) % 64 == 0
+    header = ast.literal_eval(data[10:10 + length].decode())
+    assert header["descr"] == "<f8" and not header["fortran_order"]
+    return header["shape"], [x for x, in struct.iter_unpack("<d", data[10 + length:])]
+out = {}
+for task in ("7dof-hit", "7dof-defend"):
+    folder = sys.argv[1] + "/" + task
+    steps = Reader(open(folder + "/dataset.pkl", "rb")).load()
+    arrays = {n: npy(f"{folder}/{n}.npy") for n in
+        ("computation_time", "ee_constr", "joint_pos_constr", "joint_vel_constr", "link_constr")}
+    for i, (state, action, reward, after, absorbing, last) in enumerate(steps):
+        assert reward == 0.0 and len(action) == 2 and len(action[0]) == 7
+        assert last or after == steps[i + 1][0]
+        assert last or not absorbing
+    violations = json.load(open(folder + "/violations.json"))
+    out[task] = {
+        "steps": len(steps), "state": len(steps[0][0]), "after": len(steps[-1][3]),
+        "first": steps[0][0][0], "episodes": sum(s[5] for s in steps),
+        "absorbing": sum(s[4] for s in steps),
+        "shapes": [shape for shape, _ in arrays.values()],
+        "sizes": [len(numbers) for _, numbers in arrays.values()],
+        "violations": violations["violation summary"]["Total"],
+    }
+print(json.dumps(out))
+"#;
+
+#[test]
+fn the_layout_of_2023_is_read_by_python() {
+    let out = evaluated();
+    let dir = tempfile::tempdir().unwrap();
+    let target = dir.path().join("export");
+    stdout(&[
+        "dataset",
+        "export",
+        out.to_str().unwrap(),
+        "--out",
+        target.to_str().unwrap(),
+    ]);
+    let found: serde_json::Value = serde_json::from_str(&python(READ_EXPORT, &target)).unwrap();
+    let results: serde_json::Value =
+        serde_json::from_slice(&fs::read(out.join("results.json")).unwrap()).unwrap();
+    for (task, folder, state) in [("hit", "7dof-hit", 23), ("defend", "7dof-defend", 20)] {
+        let (found, steps) = (&found[folder], &results["tasks"][task]["steps"]);
+        assert_eq!(&found["steps"], steps, "{found}");
+        assert_eq!(
+            (&found["state"], &found["after"]),
+            (&state.into(), &state.into())
+        );
+        assert_eq!(found["episodes"], 2);
+        assert_eq!(found["shapes"][0], serde_json::json!([steps]));
+        for array in 1..5 {
+            assert_eq!(found["shapes"][array], serde_json::json!([steps, 1]));
+            assert_eq!(&found["sizes"][array], steps);
+        }
+    }
+    // Both `hit` episodes of an agent that holds still last to the end: nothing absorbs.
+    assert_eq!(found["7dof-hit"]["absorbing"], 0);
+    let slice = stdout(&[
+        "dataset",
+        "slice",
+        out.to_str().unwrap(),
+        "--task",
+        "hit",
+        "--episode",
+        "0",
+        "--columns",
+        "obs_puck_x",
+        "--steps",
+        "0..1",
+    ]);
+    assert_eq!(
+        slice.lines().nth(1).unwrap(),
+        found["7dof-hit"]["first"].to_string()
+    );
+    let old: serde_json::Value =
+        serde_json::from_slice(&fs::read(target.join("results.json")).unwrap()).unwrap();
+    assert_eq!(
+        old["7dof-defend"]["Success"],
+        results["tasks"]["defend"]["success_rate"]
+    );
+    // An export is not written over another.
+    let again = faceoff(&[
+        "dataset",
+        "export",
+        out.to_str().unwrap(),
+        "--out",
+        target.to_str().unwrap(),
+    ]);
+    assert_eq!(again.status.code(), Some(1));
+}
+
+#[test]
+fn workers_and_shards_change_nothing_but_times() {
+    let dir = tempfile::tempdir().unwrap();
+    let measured = ["penalty_points", "computation_time", "fault"];
+    let mut runs = Vec::new();
+    for workers in ["1", "2", "8"] {
+        let out = dir.path().join(workers);
+        eval(&out, &["--workers", workers]);
+        let list = stdout(&["dataset", "list", out.to_str().unwrap(), "--json"]);
+        let episodes: Vec<serde_json::Value> = list
+            .lines()
+            .map(|line| {
+                let mut episode: serde_json::Value = serde_json::from_str(line).unwrap();
+                for key in measured {
+                    episode.as_object_mut().unwrap().remove(key).unwrap();
+                }
+                episode
+            })
+            .collect();
+        let columns = "step,obs_puck_x,obs_dq_3,action,puck_x,q_1,dq_7,ee_z,constraint_ee";
+        let slice = stdout(&[
+            "dataset",
+            "slice",
+            out.to_str().unwrap(),
+            "--task",
+            "defend",
+            "--episode",
+            "1",
+            "--columns",
+            columns,
+        ]);
+        runs.push((episodes, slice));
+    }
+    assert_eq!(runs[0], runs[1]);
+    assert_eq!(runs[0], runs[2]);
+}
