@@ -1,6 +1,7 @@
 //! The pages: server-rendered, complete without JavaScript. One file per page; the templates are in
 //! `web/templates`, the styles in `web/static`, all compiled into the binary.
 
+mod ablation;
 mod assets;
 mod board;
 mod evaluation;
@@ -30,6 +31,7 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .route("/", get(board::overall))
         .route("/tasks/{task}", get(board::by_task))
         .route("/evaluations/{id}", get(evaluation::page))
+        .route("/submissions/{id}/ablation", get(ablation::page))
         .route("/problems", get(problems::page))
         .route(assets::STYLE_PATH, get(assets::style))
         .route(assets::ICON_PATH, get(assets::icon))

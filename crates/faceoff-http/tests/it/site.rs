@@ -296,7 +296,7 @@ pub fn text(value: &Value) -> String {
         .to_owned()
 }
 
-fn outcome(task: Task, episode: u32, faulty: bool) -> EpisodeOutcome {
+pub fn outcome(task: Task, episode: u32, faulty: bool) -> EpisodeOutcome {
     let fault = faulty.then(|| AgentFault {
         fault: AgentFaultKind::NonFinite,
         task,
