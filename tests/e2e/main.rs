@@ -101,7 +101,7 @@ fn without_times(result: &Value) -> Value {
         }
     }
     let mut result = result.clone();
-    remove(&mut result, &["penalty_points", "tier"]);
+    remove(&mut result, &["penalty_points", "tier", "timing"]);
     for task in result["tasks"]
         .as_object_mut()
         .expect("a result has tasks")

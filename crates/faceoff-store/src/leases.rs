@@ -1,7 +1,11 @@
 //! What a worker does with a lease: renew it, hand it back, or turn it into a commit.
 
-use crate::{Event, Store, StoreError, column::Instant, queue};
-use faceoff_types::{EvaluationId, ShardId, SubmissionId};
+use crate::{
+    Event, Store, StoreError,
+    column::Instant,
+    queue::{self, Owner},
+};
+use faceoff_types::{AblationRunId, EvaluationId, ShardId, SubmissionId};
 use jiff::{SignedDuration, Timestamp};
 use sqlx::{SqliteConnection, types::Text};
 use uuid::Uuid;
@@ -35,6 +39,7 @@ pub(crate) struct Unit {
     pub(crate) submission: SubmissionId,
     pub(crate) evaluation: Option<EvaluationId>,
     shard: Option<ShardId>,
+    pub(crate) ablation_run: Option<AblationRunId>,
     failures: u32,
 }
 
@@ -49,6 +54,11 @@ impl Unit {
     /// Its shard.
     pub(crate) fn shard(&self) -> Result<ShardId, StoreError> {
         self.shard.ok_or_else(|| self.other_than("shard"))
+    }
+
+    /// Its run of an ablation.
+    pub(crate) fn ablation_run(&self) -> Result<AblationRunId, StoreError> {
+        self.ablation_run.ok_or_else(|| self.other_than("ablation"))
     }
 
     pub(crate) fn other_than(&self, kind: &str) -> StoreError {
@@ -86,7 +96,9 @@ pub(crate) async fn hold(
         r#"SELECT kind AS "kind!", state AS "state!",
                   submission_id AS "submission!: Text<SubmissionId>",
                   evaluation_id AS "evaluation?: Text<EvaluationId>",
-                  shard_id AS "shard?: Text<ShardId>", failures AS "failures!: u32"
+                  shard_id AS "shard?: Text<ShardId>",
+                  ablation_run_id AS "ablation_run?: Text<AblationRunId>",
+                  failures AS "failures!: u32"
            FROM work_units WHERE id = ? AND nonce = ?"#,
         id,
         nonce,
@@ -99,6 +111,7 @@ pub(crate) async fn hold(
             submission: row.submission.0,
             evaluation: row.evaluation.map(|id| id.0),
             shard: row.shard.map(|id| id.0),
+            ablation_run: row.ablation_run.map(|id| id.0),
             failures: row.failures,
         }),
         Some(_) => Hold::DoneBefore,
@@ -200,15 +213,8 @@ impl Store {
         .execute(&mut *tx)
         .await?;
         if failures >= queue::MAX_ATTEMPTS {
-            queue::give_up(
-                &mut tx,
-                claim.unit,
-                unit.submission,
-                unit.evaluation,
-                reason,
-                now,
-            )
-            .await?;
+            let owner = Owner::of(unit.evaluation, unit.ablation_run, unit.submission);
+            queue::give_up(&mut tx, claim.unit, owner, reason, now).await?;
         }
         tx.commit().await?;
         self.signals.changed(unit.event());

@@ -16,6 +16,7 @@
 //! without a database; after a change of SQL or of a migration run `crates/faceoff-store/prepare.sh`
 //! (`--check` compares instead of writing).
 
+mod ablations;
 mod artifacts;
 mod board;
 mod column;
@@ -37,6 +38,7 @@ mod submissions;
 mod summaries;
 mod teams;
 
+pub use ablations::{Ablation, AblationRun, AblationState};
 pub use artifacts::{ArtifactStream, Artifacts};
 pub use board::BoardRecord;
 pub use error::StoreError;

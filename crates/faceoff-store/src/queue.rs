@@ -1,8 +1,9 @@
 use crate::{
-    BundleRef, Claim, Evaluation, Event, Shard, Store, StoreError, Submission, column::Instant,
-    evaluation_ends, evaluations, leases, shards, smoke_runs, submissions,
+    AblationRun, BundleRef, Claim, Evaluation, Event, Shard, Store, StoreError, Submission,
+    ablations, column::Instant, evaluation_ends, evaluations, leases, shards, smoke_runs,
+    submissions,
 };
-use faceoff_types::{EvaluationId, ShardId, SubmissionId};
+use faceoff_types::{AblationRunId, EvaluationId, ShardId, SubmissionId};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 use uuid::Uuid;
@@ -45,6 +46,15 @@ pub enum Work {
         /// The agent's own name.
         agent_name: String,
     },
+    /// Play one task of an ablation under one profile.
+    Ablation {
+        /// Proof of the lease.
+        claim: Claim,
+        /// What to play.
+        run: AblationRun,
+        /// The agent.
+        bundle: BundleRef,
+    },
 }
 
 impl Work {
@@ -54,7 +64,8 @@ impl Work {
         match self {
             Self::Smoke { claim, .. }
             | Self::Shard { claim, .. }
-            | Self::Finalise { claim, .. } => claim,
+            | Self::Finalise { claim, .. }
+            | Self::Ablation { claim, .. } => claim,
         }
     }
 }
@@ -65,6 +76,7 @@ struct Leased {
     submission: Text<SubmissionId>,
     evaluation: Option<Text<EvaluationId>>,
     shard: Option<Text<ShardId>>,
+    ablation_run: Option<Text<AblationRunId>>,
     attempts: u32,
 }
 
@@ -111,24 +123,47 @@ pub(crate) async fn insert_finalise(
     Ok(())
 }
 
+/// What a unit belongs to.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Owner {
+    Evaluation(EvaluationId),
+    Ablation(AblationRunId),
+    /// Its smoke run.
+    Submission(SubmissionId),
+}
+
+impl Owner {
+    pub(crate) fn of(
+        evaluation: Option<EvaluationId>,
+        ablation_run: Option<AblationRunId>,
+        submission: SubmissionId,
+    ) -> Self {
+        match (evaluation, ablation_run) {
+            (Some(id), _) => Self::Evaluation(id),
+            (None, Some(run)) => Self::Ablation(run),
+            (None, None) => Self::Submission(submission),
+        }
+    }
+}
+
 /// Ends what a unit belongs to by our fault.
 pub(crate) async fn give_up(
     connection: &mut SqliteConnection,
     unit: Uuid,
-    submission: SubmissionId,
-    evaluation: Option<EvaluationId>,
+    owner: Owner,
     reason: &str,
     now: Timestamp,
 ) -> Result<(), StoreError> {
-    match evaluation {
-        Some(id) => evaluation_ends::fail_platform(connection, id, reason, now).await,
-        None => smoke_runs::give_up(connection, unit, submission, reason).await,
+    match owner {
+        Owner::Evaluation(id) => evaluation_ends::fail_platform(connection, id, reason, now).await,
+        Owner::Ablation(run) => ablations::fail(connection, run, reason, now).await,
+        Owner::Submission(id) => smoke_runs::give_up(connection, unit, id, reason).await,
     }
 }
 
 impl Store {
     /// Leases the next unit of work for `lease_s` seconds: smoke runs first, then finalisations, then
-    /// shards in evaluation order. A unit whose lease is over is leased again. `None`: nothing to do
+    /// shards in evaluation order, then runs of ablations. A unit whose lease is over is leased again. `None`: nothing to do
     /// now (see [`Store::work_signal`]).
     pub async fn claim(
         &self,
@@ -164,15 +199,9 @@ impl Store {
                 }
             };
             let evaluation = unit.evaluation.map(|id| id.0);
-            give_up(
-                &mut tx,
-                unit.id.0,
-                unit.submission.0,
-                evaluation,
-                &reason,
-                now,
-            )
-            .await?;
+            let run = unit.ablation_run.map(|id| id.0);
+            let owner = Owner::of(evaluation, run, unit.submission.0);
+            give_up(&mut tx, unit.id.0, owner, &reason, now).await?;
             given_up
                 .push(evaluation.map_or(Event::Submission(unit.submission.0), Event::Evaluation));
         };
@@ -187,7 +216,7 @@ impl Store {
             Some(Work::Shard { evaluation, .. } | Work::Finalise { evaluation, .. }) => {
                 self.signals.changed(Event::Evaluation(evaluation.id));
             }
-            None => {}
+            Some(Work::Ablation { .. }) | None => {}
         }
         Ok(work)
     }
@@ -213,7 +242,9 @@ async fn lease_next(
            RETURNING id AS "id!: Text<Uuid>", kind AS "kind!",
                      submission_id AS "submission!: Text<SubmissionId>",
                      evaluation_id AS "evaluation?: Text<EvaluationId>",
-                     shard_id AS "shard?: Text<ShardId>", attempts AS "attempts!: u32""#,
+                     shard_id AS "shard?: Text<ShardId>",
+                     ablation_run_id AS "ablation_run?: Text<AblationRunId>",
+                     attempts AS "attempts!: u32""#,
         worker,
         nonce,
         until,
@@ -250,6 +281,14 @@ async fn describe(
                 .agent_name
                 .ok_or_else(|| unit.missing("an agent's name"))?,
         }),
+        "ablation" => {
+            let run = unit.ablation_run.ok_or_else(|| unit.missing("a run"))?.0;
+            Ok(Work::Ablation {
+                claim,
+                run: ablations::find_run(connection, run).await?,
+                bundle: submission.bundle,
+            })
+        }
         _ => Err(unit.missing("a known kind")),
     }
 }

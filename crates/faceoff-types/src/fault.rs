@@ -88,7 +88,10 @@ impl fmt::Display for AgentFaultKind {
             }
             Self::ClosedOutput => f.write_str("the agent closed its standard output"),
             Self::Exited { code } => write!(f, "the agent exited with status {code}"),
-            Self::Signalled { signal } => write!(f, "the agent was ended by signal {signal}"),
+            Self::Signalled { signal } => {
+                write!(f, "the agent was ended by signal {signal}")?;
+                f.write_str(signal_note(*signal))
+            }
             Self::LimitExceeded {
                 limit,
                 allowed,
@@ -101,6 +104,21 @@ impl fmt::Display for AgentFaultKind {
             }
             Self::CannotStart { detail } => write!(f, "the agent cannot be started: {detail}"),
         }
+    }
+}
+
+/// What a signal usually means, for those that an agent meets. An agent is the first process of its
+/// sandbox, which the kernel spares the signal of `abort`; the C library then ends it by an invalid
+/// access instead.
+const fn signal_note(signal: i32) -> &'static str {
+    match signal {
+        4 => " (SIGILL: an instruction that this CPU does not know, or a trap of the runtime)",
+        6 => " (SIGABRT: it called abort)",
+        7 => " (SIGBUS: an access beyond a mapped file)",
+        8 => " (SIGFPE: a division by zero)",
+        9 => " (SIGKILL)",
+        11 => " (SIGSEGV: an invalid access, or a call of abort, which ends so in the sandbox)",
+        _ => "",
     }
 }
 
@@ -133,5 +151,18 @@ impl fmt::Display for AgentFault {
             write!(f, " (line: {line})")?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_crash_in_the_sandbox_does_not_hide_that_it_may_have_been_an_abort() {
+        let told = |signal| AgentFaultKind::Signalled { signal }.to_string();
+        assert!(told(11).starts_with("the agent was ended by signal 11 (SIGSEGV"));
+        assert!(told(11).contains("abort"));
+        assert_eq!(told(12), "the agent was ended by signal 12");
     }
 }

@@ -76,6 +76,16 @@ id!(
     "evaluation"
 );
 id!(
+    /// A submission under each perturbation alone.
+    AblationId,
+    "ablation"
+);
+id!(
+    /// One task under one profile of an ablation; a unit of work of a worker slot.
+    AblationRunId,
+    "ablation run"
+);
+id!(
     /// A range of episodes of one task of one evaluation; the unit of work of a worker slot.
     ShardId,
     "shard"

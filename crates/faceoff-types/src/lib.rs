@@ -21,7 +21,9 @@ mod timing;
 pub use computation_time::ComputationTime;
 pub use constraint::{Constraint, Violations};
 pub use fault::{AgentFault, AgentFaultKind};
-pub use ids::{EvaluationId, ParseIdError, ShardId, SubmissionId, TeamId};
+pub use ids::{
+    AblationId, AblationRunId, EvaluationId, ParseIdError, ShardId, SubmissionId, TeamId,
+};
 pub use outcome::{EpisodeEnd, EpisodeOutcome};
 pub use profile::{Factor, Factors, ParseProfileError, Profile};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult, ViolationCounts};

@@ -97,6 +97,16 @@ pub enum Profile {
 }
 
 impl Profile {
+    /// What an ablation compares: nothing, each factor that counts alone, and all of them.
+    pub const ABLATION: [Self; 6] = [
+        Self::Ideal,
+        Self::ModelMismatch,
+        Self::ObservationNoise,
+        Self::Disturbance,
+        Self::TrackingLoss,
+        Self::Evaluation,
+    ];
+
     /// All profiles.
     pub const ALL: [Self; 7] = [
         Self::Ideal,

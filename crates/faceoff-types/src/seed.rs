@@ -45,6 +45,12 @@ impl Seed {
         self.derive("day", day.to_string().as_bytes())
     }
 
+    /// Season secret → the seed of all ablations: not that of any day, whose episodes may still count.
+    #[must_use]
+    pub fn ablation(&self) -> Self {
+        self.derive("ablation", &[])
+    }
+
     /// Season secret (or a local seed) → the seed of the season's model mismatch.
     #[must_use]
     pub fn model_mismatch(&self) -> Self {

@@ -23,5 +23,5 @@ mod tests;
 mod units;
 
 pub use cpus::{CpuLayout, SlotCpus};
-pub use schedule::run_schedule;
+pub use schedule::{DailyPlan, run_schedule};
 pub use service::{WorkerConfig, run};

@@ -1,30 +1,46 @@
 use crate::clock::Clock;
 use anyhow::Context as _;
-use faceoff_store::{EvaluationPlan, Store};
+use faceoff_store::{Evaluation, EvaluationPlan, Store};
 use jiff::{Timestamp, civil::Time, tz::TimeZone};
-use std::time::Duration;
+use std::{num::NonZeroU32, time::Duration};
 use tokio_util::sync::CancellationToken;
 
 /// The longest sleep: a machine's clock may be set, or the machine suspended, while we wait.
 const LONGEST_SLEEP: Duration = Duration::from_secs(60);
 
-/// Starts the evaluations of each UTC day once, at `at`, until `shutdown` is cancelled. A day whose
+/// What the schedule does each day.
+#[derive(Debug, Clone)]
+pub struct DailyPlan {
+    /// The UTC time at which it does so.
+    pub at: Time,
+    /// What every team plays.
+    pub evaluation: EvaluationPlan,
+    /// Episodes of each task and profile of an ablation of every submission that was started and has
+    /// none yet; `None`: no ablations.
+    pub ablation_episodes: Option<NonZeroU32>,
+}
+
+/// Starts the evaluations of each UTC day once, at its time, until `shutdown` is cancelled. A day whose
 /// time passed while the server was down is started when it comes up, the same day still. A failing
 /// database is tried again every minute.
 pub async fn run_schedule(
     store: Store,
-    plan: EvaluationPlan,
-    at: Time,
+    daily: DailyPlan,
     shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
     let clock = Clock::system();
     loop {
         let now = clock.now();
-        let wait = match until_next(now, at).context("reckoning the time of the daily start")? {
+        let wait = match until_next(now, daily.at)
+            .context("reckoning the time of the daily start")?
+        {
             Due::In(wait) => wait,
-            Due::Today { next } => match store.start_scheduled_day(&plan, now).await {
+            Due::Today { next } => match store.start_scheduled_day(&daily.evaluation, now).await {
                 Ok(Some(started)) => {
                     tracing::info!(evaluations = started.len(), "the day was started");
+                    if let Some(episodes) = daily.ablation_episodes {
+                        order_ablations(&store, &started, episodes, &daily.evaluation, now).await;
+                    }
                     next
                 }
                 Ok(None) => next,
@@ -37,6 +53,32 @@ pub async fn run_schedule(
         tokio::select! {
             () = shutdown.cancelled() => return Ok(()),
             () = tokio::time::sleep(wait.min(LONGEST_SLEEP)) => {}
+        }
+    }
+}
+
+/// Orders an ablation of each submission that has none. One that cannot be ordered is the organiser's
+/// to order by hand: what counts must not wait for it.
+async fn order_ablations(
+    store: &Store,
+    started: &[Evaluation],
+    episodes: NonZeroU32,
+    plan: &EvaluationPlan,
+    now: Timestamp,
+) {
+    for evaluation in started {
+        let submission = evaluation.submission;
+        let ordered = match store.newest_ablation(submission).await {
+            Ok(Some(_)) => continue,
+            Ok(None) => {
+                store
+                    .create_ablation(submission, episodes.get(), plan.max_faults, now)
+                    .await
+            }
+            Err(error) => Err(error),
+        };
+        if let Err(error) = ordered {
+            tracing::error!(%submission, %error, "an ablation could not be ordered");
         }
     }
 }

@@ -102,6 +102,9 @@ impl Slot {
                 evaluation,
                 agent_name,
             } => self.tools.finalise(claim, evaluation, agent_name),
+            Work::Ablation { claim, run, bundle } => {
+                self.tools.ablation(claim, run, bundle, keeper.progress())
+            }
         }
     }
 
@@ -170,6 +173,13 @@ impl std::fmt::Display for Description<'_> {
             ),
             Work::Finalise { evaluation, .. } => {
                 write!(f, "finalisation of evaluation {}", evaluation.id)
+            }
+            Work::Ablation { run, .. } => {
+                write!(
+                    f,
+                    "{} with {} of ablation {}",
+                    run.task, run.profile, run.ablation
+                )
             }
         }
     }

@@ -1,4 +1,4 @@
-//! The three kinds of work, each from claim to commit.
+//! The four kinds of work, each from claim to commit.
 
 use crate::{
     bundle_cache::{BundleCache, FetchError},
@@ -11,7 +11,8 @@ use faceoff_runner::{
     AgentEnvironment, EvaluationMeta, PlatformFault, ShardSpec, bundle::BundleLimits,
 };
 use faceoff_store::{
-    BundleRef, Claim, Committed, Evaluation, Shard, ShardCommit, SmokeOutcome, Store, Submission,
+    AblationRun, BundleRef, Claim, Committed, Evaluation, Shard, ShardCommit, SmokeOutcome, Store,
+    Submission,
 };
 use faceoff_types::RULESET;
 use std::path::{Path, PathBuf};
@@ -153,6 +154,48 @@ impl Tools {
                 Ok(End::Stopped)
             }
         }
+    }
+
+    /// Plays one task of an ablation under one profile. Only the outcomes are kept.
+    pub(crate) fn ablation(
+        &mut self,
+        claim: &Claim,
+        run: &AblationRun,
+        bundle: &BundleRef,
+        mut progress: Progress,
+    ) -> Ended {
+        let bundle = match self.bundle(bundle) {
+            Ok(bundle) => bundle,
+            Err(FetchError::Invalid(reason) | FetchError::Platform(reason)) => {
+                anyhow::bail!(reason)
+            }
+        };
+        let secret = self.handle.block_on(self.store.season())?.secret;
+        let spec = ShardSpec {
+            task: run.task,
+            episodes: 0..run.episodes,
+            profile: run.profile,
+            seed: secret.ablation(),
+            mismatch_seed: secret.model_mismatch(),
+            max_faults: run.max_faults,
+        };
+        let out = self.folder("recording")?;
+        let played = self
+            .evaluator
+            .play(&spec, &bundle, &self.agent, out.path(), &mut progress);
+        let report = match played {
+            Ok(report) => report,
+            Err(PlatformFault::Cancelled) if progress.stopped() => return Ok(End::Stopped),
+            Err(fault) => return Err(fault.into()),
+        };
+        let outcomes = (!report.stopped_by_faults).then_some(&report.outcomes[..]);
+        let committed = self
+            .store
+            .commit_ablation_run(claim, outcomes, self.clock.now());
+        Ok(match self.handle.block_on(committed)? {
+            Committed::Now | Committed::Before => End::Committed,
+            Committed::LeaseLost => End::Stopped,
+        })
     }
 
     /// Joins the shards' recordings into the dataset, scores them, and publishes both together.

@@ -89,6 +89,9 @@ pub struct EvaluationConfig {
     pub at: Option<Time>,
     /// More agent faults than this end an evaluation without a score.
     pub max_faults: u32,
+    /// Episodes of each task and profile of the ablation that the schedule orders of every submission
+    /// it starts; 0: none.
+    pub ablation_episodes: u32,
 }
 
 impl Default for EvaluationConfig {
@@ -100,6 +103,7 @@ impl Default for EvaluationConfig {
             episodes_per_shard: 50,
             at: None,
             max_faults: 10,
+            ablation_episodes: 0,
         }
     }
 }
@@ -187,6 +191,11 @@ impl Config {
         ensure!(
             evaluation.episodes_per_shard >= 1,
             "evaluation.episodes_per_shard: expected at least 1, got 0"
+        );
+        ensure!(
+            evaluation.ablation_episodes <= 100_000,
+            "evaluation.ablation_episodes: expected at most 100000, got {}",
+            evaluation.ablation_episodes
         );
         ensure!(
             !evaluation.tasks.is_empty(),

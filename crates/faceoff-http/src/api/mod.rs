@@ -2,6 +2,7 @@
 //!
 //! The views are public: the command line's client reads the very types that the server writes.
 
+pub mod ablations;
 pub mod board;
 pub mod comparisons;
 pub mod days;
@@ -82,6 +83,7 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(submissions::list_submissions))
         .routes(routes!(submissions::submission))
         .routes(routes!(submissions::evaluate_submission))
+        .routes(routes!(ablations::ablation, ablations::order_ablation))
         .routes(routes!(evaluations::list_evaluations))
         .routes(routes!(evaluations::evaluation))
         .routes(routes!(evaluations::cancel_evaluation))

@@ -149,10 +149,39 @@ pub(crate) struct SlotTiming {
     host_noise_reruns: u32,
 }
 
+/// How an agent did in one task under one profile, beside the ideal one on the same episodes.
+#[derive(ToSchema)]
+#[cfg_attr(test, derive(serde::Deserialize), serde(deny_unknown_fields))]
+pub(crate) struct ProfileEffect {
+    /// The perturbations.
+    profile: String,
+    /// Episodes played.
+    episodes: u32,
+    /// Episodes that ended in success.
+    successes: u32,
+    /// Fraction of successes.
+    success_rate: f64,
+    /// 95 % Wilson interval of the success rate, as fractions.
+    #[schema(value_type = Vec<f64>, min_items = 2, max_items = 2)]
+    success_ci95: [f64; 2],
+    /// Penalty points over all episodes.
+    penalty_points: f64,
+    /// The success rate less the ideal profile's, as a fraction.
+    difference: f64,
+    /// Episodes that succeed in the ideal profile only.
+    lost: u32,
+    /// Episodes that succeed in this profile only.
+    gained: u32,
+    /// McNemar's exact test against the ideal profile, two-sided.
+    p_value: f64,
+}
+
 #[cfg(test)]
 mod tests {
     use faceoff_scoring::{OverallComparison, TaskComparison};
-    use faceoff_types::{ComputationTimeSummary, SlotTiming, TaskResult, Tier, ViolationCounts};
+    use faceoff_types::{
+        ComputationTimeSummary, Profile, SlotTiming, TaskResult, Tier, ViolationCounts,
+    };
 
     fn describes<Schema: serde::de::DeserializeOwned>(real: &impl serde::Serialize) {
         let json = serde_json::to_string(real).unwrap();
@@ -200,6 +229,22 @@ mod tests {
             difference_ci95: [-20.0, 12.0],
             p_value: 1.0,
             told_apart: false,
+        });
+    }
+
+    #[test]
+    fn the_document_describes_a_profiles_real_effect() {
+        describes::<super::ProfileEffect>(&faceoff_scoring::ProfileEffect {
+            profile: Profile::Ideal,
+            episodes: 1,
+            successes: 1,
+            success_rate: 1.0,
+            success_ci95: [0.2, 1.0],
+            penalty_points: 0.0,
+            difference: 0.0,
+            lost: 0,
+            gained: 0,
+            p_value: 1.0,
         });
     }
 }

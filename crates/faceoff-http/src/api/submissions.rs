@@ -334,7 +334,11 @@ pub(crate) async fn evaluate_submission(
 }
 
 /// The submission, if the caller may see it; another team's looks like none at all.
-async fn visible(app: &App, caller: &Caller, id: SubmissionId) -> Result<Submission, Problem> {
+pub(super) async fn visible(
+    app: &App,
+    caller: &Caller,
+    id: SubmissionId,
+) -> Result<Submission, Problem> {
     let submission = app.store.submission(id).await?;
     if caller.may_see(submission.team) {
         Ok(submission)

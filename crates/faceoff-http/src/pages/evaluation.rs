@@ -145,6 +145,8 @@ struct Page {
     agent: Option<String>,
     day: civil::Date,
     profile: Profile,
+    /// Path of the page of its submission's ablation, if there is one.
+    ablation: Option<String>,
     /// Said when there is no result.
     state: &'static str,
     progress: Option<Progress>,
@@ -160,6 +162,7 @@ pub(super) async fn page(
     let evaluation = app.store.evaluation(id).await?;
     let team = app.store.team(evaluation.team).await?;
     let submission = app.store.submission(evaluation.submission).await?;
+    let ablation = app.store.newest_ablation(submission.id).await?;
     let season = app.store.season().await?;
     let progress = Progress::of(&evaluation);
     let (state, moving) = match &evaluation.state {
@@ -209,6 +212,7 @@ pub(super) async fn page(
         agent: submission.agent_name,
         day: evaluation.day,
         profile: evaluation.plan.profile,
+        ablation: ablation.map(|ablation| format!("/submissions/{}/ablation", ablation.submission)),
         state,
         progress: moving.then_some(progress),
         finished,

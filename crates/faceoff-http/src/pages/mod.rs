@@ -1,6 +1,7 @@
 //! The pages: server-rendered, complete without JavaScript. One file per page; the templates are in
 //! `web/templates`, the styles in `web/static`, all compiled into the binary.
 
+mod ablation;
 mod assets;
 mod board;
 mod comparison;
@@ -34,6 +35,7 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .route("/evaluations/{id}", get(evaluation::page))
         .route("/evaluations/{id}/compare/{other}", get(comparison::page))
         .route("/season", get(season::page))
+        .route("/submissions/{id}/ablation", get(ablation::page))
         .route("/problems", get(problems::page))
         .route(assets::STYLE_PATH, get(assets::style))
         .route(assets::ICON_PATH, get(assets::icon))

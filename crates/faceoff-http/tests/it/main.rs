@@ -4,6 +4,7 @@
     reason = "helpers of tests fail as tests do: by panicking"
 )]
 
+mod ablations;
 mod board;
 mod board_load;
 mod comparisons;

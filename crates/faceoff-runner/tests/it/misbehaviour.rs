@@ -1,7 +1,7 @@
 //! What agents do wrong, and the verdict on each.
 
 use crate::agents::{Agent, impatient, sandboxed};
-use faceoff_runner::{AgentEnvironment, SmokeReport, smoke};
+use faceoff_runner::{AgentEnvironment, PlatformFault, SmokeReport, smoke};
 use faceoff_types::AgentFaultKind;
 
 fn verdict_in(agent: &Agent, env: &AgentEnvironment) -> (AgentFaultKind, SmokeReport) {
@@ -24,6 +24,22 @@ fn a_behaving_agent_passes_the_smoke_run() {
             log: "goodbye\n".repeat(3)
         }
     );
+}
+
+#[test]
+fn a_smoke_run_stops_when_it_is_told_to() {
+    let asked = std::cell::Cell::new(0);
+    let stop_at_the_third_step = || {
+        asked.set(asked.get() + 1);
+        asked.get() == 3
+    };
+    let stopped = smoke(
+        &Agent::behaving().bundle,
+        &sandboxed(),
+        &stop_at_the_third_step,
+    );
+    assert!(matches!(stopped, Err(PlatformFault::Cancelled)));
+    assert_eq!(asked.get(), 3);
 }
 
 #[test]

@@ -66,7 +66,9 @@ impl Played {
                     Err(error) => panic!("{error}"),
                 }
             }
-            Work::Smoke { .. } => unreachable!("the only smoke run is over"),
+            Work::Smoke { .. } | Work::Ablation { .. } => {
+                unreachable!("the only smoke run is over, and no ablation was ordered")
+            }
         };
         if now {
             *self.commits.entry(claim.unit).or_default() += 1;

@@ -84,6 +84,7 @@ async fn child() {
                         .unwrap();
                     tell(format!("finished {}", evaluation.id));
                 }
+                Some(Work::Ablation { .. }) => unreachable!("no ablation was ordered"),
                 None => break,
             }
         }

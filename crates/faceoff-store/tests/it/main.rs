@@ -1,6 +1,7 @@
 //! The store on real SQLite files and real artifact folders.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod ablations;
 mod artifacts;
 mod competition;
 mod faults;

@@ -172,13 +172,18 @@ async fn the_schedule_starts_a_missed_day_once() {
     for _ in 0..2 {
         let mut events = server.store.events();
         let shutdown = CancellationToken::new();
-        let at = jiff::civil::Time::midnight();
-        let schedule =
-            crate::run_schedule(server.store.clone(), plan.clone(), at, shutdown.clone());
+        let daily = crate::DailyPlan {
+            at: jiff::civil::Time::midnight(),
+            evaluation: plan.clone(),
+            ablation_episodes: std::num::NonZeroU32::new(2),
+        };
+        let schedule = crate::run_schedule(server.store.clone(), daily, shutdown.clone());
         let schedule = tokio::spawn(schedule);
         if server.store.last_scheduled_day().await.unwrap().is_none() {
             let event = events.recv().await.unwrap();
             assert!(matches!(event, Event::Evaluation(_)));
+            let event = events.recv().await.unwrap();
+            assert_eq!(event, Event::Submission(submission.id), "the ablation");
         }
         shutdown.cancel();
         schedule.await.unwrap().unwrap();
@@ -192,4 +197,67 @@ async fn the_schedule_starts_a_missed_day_once() {
             1
         );
     }
+}
+
+#[tokio::test]
+async fn an_ablation_is_played_on_episodes_of_its_own_in_every_profile() {
+    let server = Server::new().await;
+    let evaluation = server.evaluation().await;
+    let submission = server
+        .store
+        .evaluation(evaluation)
+        .await
+        .unwrap()
+        .submission;
+    let specs = std::sync::Arc::new(std::sync::Mutex::new(Vec::new()));
+    let seen = std::sync::Arc::clone(&specs);
+    let evaluator = Scripted::new(move |spec, _| {
+        seen.lock().unwrap().push(spec.clone());
+        Ok(())
+    });
+    server
+        .store
+        .create_ablation(submission, 3, 0, server.now())
+        .await
+        .unwrap();
+    let mut events = server.store.events();
+    let running = server.work(1, &evaluator);
+    let ablation = loop {
+        let newest = server.store.newest_ablation(submission).await.unwrap();
+        match newest {
+            Some(ablation) if matches!(ablation.state, AblationState::Finished { .. }) => {
+                break ablation;
+            }
+            // a lagging receiver has missed something: look again
+            _ => drop(events.recv().await),
+        }
+    };
+    running.stop().await;
+    let secret = server.store.season().await.unwrap().secret;
+    let specs = std::mem::take(&mut *specs.lock().unwrap());
+    let runs: Vec<_> = specs
+        .iter()
+        .filter(|spec| spec.seed == secret.ablation())
+        .collect();
+    assert_eq!((specs.len(), runs.len()), (6 + 18, 18));
+    for (run, profile) in runs.chunks(3).zip(Profile::ABLATION) {
+        for (run, task) in run.iter().zip(Task::ALL) {
+            assert_eq!(
+                (run.profile, run.task, &run.episodes),
+                (profile, task, &(0..3))
+            );
+            assert_eq!(run.mismatch_seed, secret.model_mismatch());
+        }
+    }
+    let outcomes = server.store.ablation_outcomes(ablation.id).await.unwrap();
+    assert!(outcomes.values().all(|outcomes| outcomes.len() == 9));
+    assert!(
+        server
+            .store
+            .evaluation(evaluation)
+            .await
+            .unwrap()
+            .state
+            .is_over()
+    );
 }

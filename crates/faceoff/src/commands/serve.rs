@@ -9,12 +9,13 @@ use faceoff_http::{
 };
 use faceoff_sandbox::{HostFeature, Layer, probe_host};
 use faceoff_store::Store;
-use faceoff_worker::WorkerConfig;
+use faceoff_worker::{DailyPlan, WorkerConfig};
 use jiff::Timestamp;
 use std::{
     fs::{self, OpenOptions},
     io::{IsTerminal as _, Write as _},
     net::SocketAddr,
+    num::NonZeroU32,
     os::unix::fs::{DirBuilderExt, OpenOptionsExt},
     path::{Path, PathBuf},
     time::Duration,
@@ -151,10 +152,14 @@ async fn serve(config: Config) -> anyhow::Result<()> {
         shutdown.clone(),
     ));
     if let Some(at) = config.evaluation.at {
+        let daily = DailyPlan {
+            at,
+            evaluation: plan,
+            ablation_episodes: NonZeroU32::new(config.evaluation.ablation_episodes),
+        };
         parts.spawn(faceoff_worker::run_schedule(
             store.clone(),
-            plan,
-            at,
+            daily,
             shutdown.clone(),
         ));
     }

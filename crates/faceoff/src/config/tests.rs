@@ -26,6 +26,7 @@ fn every_section_is_read() {
         tasks = ["hit"]
         episodes_per_task = 7
         at = "00:30"
+        ablation_episodes = 50
         [workers]
         slots = 3
         agent_cpus = [1]
@@ -47,6 +48,7 @@ fn every_section_is_read() {
     assert_eq!(config.season.name.as_deref(), Some("Practice"));
     assert_eq!(config.plan().episodes_per_task, 7);
     assert_eq!(config.evaluation.at, Some(jiff::civil::time(0, 30, 0, 0)));
+    assert_eq!(config.evaluation.ablation_episodes, 50);
     assert_eq!(config.slots(), 3);
     assert_eq!(config.limits.pids, 9);
     assert_eq!(config.limits.open_files, Limits::default().open_files);
@@ -70,6 +72,9 @@ fn an_error_names_the_field() {
     assert!(error("[evaluation]\ntasks = []").contains("evaluation.tasks"));
     assert!(error("[evaluation]\ntasks = [\"hit\", \"hit\"]").contains("evaluation.tasks"));
     assert!(error("[evaluation]\nprofile = \"easy\"").contains("easy"));
+    assert!(
+        error("[evaluation]\nablation_episodes = 1000000").contains("evaluation.ablation_episodes")
+    );
     assert!(error("[workers]\nslots = 0").contains("workers.slots"));
     assert!(error("[workers]\nlease_s = 1").contains("workers.lease_s"));
     assert!(error("[time]\nstep_s = -1.0").contains("time.step_s"));

@@ -1,0 +1,132 @@
+//! Ablations: ordered by the organiser, shown to everybody, in the way of nobody.
+
+use crate::site::{ADMIN, Site, TestTeam, outcome};
+use faceoff_store::Work;
+use faceoff_types::Profile;
+use scraper::{Html, Selector};
+use serde_json::json;
+
+/// Plays the ablation that comes next: in `ideal` all episodes succeed, with tracking loss none, in the
+/// other profiles every second.
+async fn play(site: &Site) {
+    for _ in 0..18 {
+        let Work::Ablation { claim, run, .. } = site.claim().await else {
+            panic!("expected a run of an ablation");
+        };
+        let outcomes: Vec<_> = (0..run.episodes)
+            .map(|episode| {
+                let mut outcome = outcome(run.task, episode, false);
+                outcome.success = match run.profile {
+                    Profile::Ideal => true,
+                    Profile::TrackingLoss => false,
+                    _ => episode % 2 == 0,
+                };
+                outcome
+            })
+            .collect();
+        site.store
+            .commit_ablation_run(&claim, Some(&outcomes), site.now())
+            .await
+            .unwrap();
+    }
+}
+
+async fn competitor(site: &Site) -> (TestTeam, String, String) {
+    let team = site.team("Alpha").await;
+    let submission = site.valid_submission(&team, "striker").await;
+    let api = format!("{submission}/ablation");
+    let page = api.replace("/api/v1", "");
+    (team, api, page)
+}
+
+#[tokio::test]
+async fn an_organiser_orders_one_and_its_team_and_visitors_see_what_came_of_it() {
+    let site = Site::start().await;
+    let (team, api, page) = competitor(&site).await;
+    site.get(&api, Some(&team.token))
+        .await
+        .problem(404, "not-found", &["ablation"]);
+    assert_eq!(site.get(&page, None).await.status.as_u16(), 404);
+
+    let order = json!({ "episodes_per_task": 8 });
+    let ordered = site.post(&api, Some(ADMIN), &order).await.json(201);
+    assert_eq!(ordered["state"], "open");
+    assert_eq!(
+        ordered["progress"],
+        json!({ "episodes_done": 0, "episodes_total": 8 * 18 })
+    );
+    site.post(&api, Some(ADMIN), &order)
+        .await
+        .problem(409, "conflict", &["under way"]);
+    assert!(
+        site.get(&page, None)
+            .await
+            .body
+            .contains("0 of 144 episodes")
+    );
+
+    play(&site).await;
+    let view = site.get(&api, Some(&team.token)).await.json(200);
+    assert_eq!(view["state"], "finished");
+    let hit = view["tasks"]["hit"].as_array().unwrap();
+    assert_eq!((hit.len(), &hit[0]["profile"]), (6, &json!("ideal")));
+    let loss = &hit[4];
+    assert_eq!(loss["profile"], "tracking_loss");
+    assert_eq!(
+        (&loss["difference"], &loss["lost"]),
+        (&json!(-1.0), &json!(8))
+    );
+    assert!((loss["p_value"].as_f64().unwrap() - 2.0 / 256.0).abs() < 1e-12);
+
+    let html = Html::parse_document(&site.get(&page, None).await.body);
+    let count = |selector: &str| html.select(&Selector::parse(selector).unwrap()).count();
+    assert_eq!(count("svg rect.fill"), 18);
+    assert_eq!(count("svg line.whisker"), 18);
+    assert_eq!(count("table tbody tr"), 18);
+    assert_eq!(count("table th:not([scope])"), 0);
+    let rows = Selector::parse("table tbody tr").unwrap();
+    let row: String = html.select(&rows).nth(4).unwrap().text().collect();
+    for part in [
+        "hit",
+        "T · tracking_loss",
+        "0 of 8",
+        "-100.0",
+        "0.008",
+        "told apart",
+    ] {
+        assert!(row.contains(part), "{part:?} is not in {row:?}");
+    }
+}
+
+#[tokio::test]
+async fn only_the_organiser_orders_and_other_teams_see_nothing_in_the_api() {
+    let site = Site::start().await;
+    let (team, api, _) = competitor(&site).await;
+    let refused = site.post(&api, Some(&team.token), &json!({})).await;
+    assert_eq!(refused.status.as_u16(), 403);
+    site.post(&api, Some(ADMIN), &json!({ "episodes_per_task": 0 }))
+        .await
+        .problem(422, "invalid-content", &["episodes_per_task"]);
+    let ordered = site.post(&api, Some(ADMIN), &json!({})).await.json(201);
+    assert_eq!(ordered["episodes_per_task"], 100);
+    let other = site.team("Beta").await;
+    site.get(&api, Some(&other.token))
+        .await
+        .problem(404, "not-found", &[]);
+}
+
+#[tokio::test]
+async fn it_takes_no_turn_and_leaves_the_board_alone_and_the_evaluation_leads_to_it() {
+    let site = Site::start().await;
+    let (team, api, page) = competitor(&site).await;
+    site.post(&api, Some(ADMIN), &json!({ "episodes_per_task": 1 }))
+        .await
+        .json(201);
+    play(&site).await;
+    let board = site.get("/api/v1/board", None).await.json(200);
+    assert_eq!(board["rows"], json!([]));
+    let submission = api.replace("/ablation", "");
+    let evaluation = site.evaluate(&team, &submission).await;
+    let shown = site.get(&evaluation.replace("/api/v1", ""), None).await;
+    assert!(shown.body.contains(&format!("href=\"{page}\"")));
+}
