@@ -27,7 +27,7 @@ use std::{
     collections::BTreeMap,
     num::NonZero,
     sync::{
-        Mutex, PoisonError,
+        Arc, Mutex, PoisonError,
         atomic::{AtomicBool, Ordering},
         mpsc::{Receiver, sync_channel},
     },
@@ -100,16 +100,19 @@ pub fn verify(
     let replay = Replay::new(manifest);
     let stop = AtomicBool::new(false);
     let (send, receive) = sync_channel::<Job>(2 * workers.get());
-    let receive = Mutex::new(receive);
+    let receive = Arc::new(Mutex::new(receive));
     let (fed, replayed) = thread::scope(|scope| {
-        let (receive, replay, stop) = (&receive, &replay, &stop);
+        let (replay, stop) = (&replay, &stop);
         let threads = (0..workers.get())
             .map(|index| {
+                let receive = receive.clone();
                 thread::Builder::new()
                     .name(format!("verify-{index}"))
-                    .spawn_scoped(scope, move || work(receive, replay, stop, progress))
+                    .spawn_scoped(scope, move || work(&receive, replay, stop, progress))
             })
             .collect::<Vec<_>>();
+        // The workers alone hold the receiver: should all of them panic, sending ends, too.
+        drop(receive);
         let fed = if threads.iter().any(Result::is_ok) {
             hand_out(&mut feed, send, stop)
         } else {

@@ -278,6 +278,16 @@ fn a_recording_verifies_as_archive_as_folder_and_on_any_number_of_threads() {
 }
 
 #[test]
+fn a_worker_that_panics_does_not_leave_the_others_waiting() {
+    let dataset = Dataset::open(&played().archive()).unwrap();
+    let panic = std::panic::catch_unwind(|| {
+        verify(&dataset, NonZero::<usize>::MIN, &|| panic!("stop here")).unwrap()
+    })
+    .unwrap_err();
+    assert_eq!(panic.downcast_ref::<&str>(), Some(&"stop here"));
+}
+
+#[test]
 fn one_bit_of_any_column_of_a_step_is_found_where_it_is() {
     let steps = read(&played().folder().join("steps.parquet"));
     // Some step in the midst of `hit`, episode 1.
