@@ -5,7 +5,7 @@ use crate::{
     Claim, Committed, Event, Store, StoreError, SubmissionState,
     column::{Instant, Json},
     leases::{self, Hold},
-    submissions,
+    season, submissions,
 };
 use faceoff_types::{AblationId, AblationRunId, EpisodeOutcome, Profile, SubmissionId, Task};
 use jiff::Timestamp;
@@ -126,7 +126,8 @@ pub(crate) async fn fail(
 
 impl Store {
     /// Orders an ablation of a valid submission: every profile, every task.
-    /// [`StoreError::Conflict`] if the submission is not valid, or one of it is under way.
+    /// [`StoreError::Conflict`] if the submission is not valid, or one of it is under way;
+    /// [`StoreError::SeasonClosed`] once the season is over.
     pub async fn create_ablation(
         &self,
         submission: SubmissionId,
@@ -140,6 +141,7 @@ impl Store {
             ));
         }
         let mut tx = self.database.begin().await?;
+        season::check_open(&mut tx).await?;
         let found = submissions::find(&mut tx, submission).await?;
         if !matches!(found.state, SubmissionState::Valid { .. }) {
             return Err(StoreError::Conflict(

@@ -145,7 +145,7 @@ pub(crate) async fn ablation(
     responses(
         (status = 201, body = AblationView),
         (status = 404, body = ProblemBody, content_type = "application/problem+json"),
-        (status = 409, description = "one is under way, or the submission is not valid", body = ProblemBody, content_type = "application/problem+json"),
+        (status = 409, description = "one is under way, the submission is not valid, or the season is closed", body = ProblemBody, content_type = "application/problem+json"),
         (status = 422, body = ProblemBody, content_type = "application/problem+json"),
     )
 )]

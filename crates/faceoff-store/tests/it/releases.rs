@@ -165,6 +165,8 @@ async fn a_closed_season_takes_nothing_more_and_stays_closed() {
     let evaluation = site.store.create_evaluation(submission.id, &plan, site.now);
     closed(evaluation.await.unwrap_err());
     closed(site.store.start_day(&plan, site.now).await.unwrap_err());
+    let ablation = site.store.create_ablation(submission.id, 1, 0, site.now);
+    closed(ablation.await.unwrap_err());
     assert_eq!(
         site.store
             .start_scheduled_day(&plan, site.now)
