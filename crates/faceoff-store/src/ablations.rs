@@ -170,7 +170,7 @@ impl Store {
                 error.into()
             }
         })?;
-        for profile in Profile::ALL {
+        for profile in Profile::ABLATION {
             for task in Task::ALL {
                 let run = Text(AblationRunId::new());
                 let (unit, profile, task) = (Text(Uuid::now_v7()), Text(profile), Text(task));

@@ -121,6 +121,17 @@ impl Profile {
             Self::Evaluation => Factors::ALL,
         }
     }
+
+    /// The profiles of the paper's ablation figure: ideal, each factor of `evaluation` alone, and all
+    /// of them. Profiles that do not count are no part of it.
+    pub const ABLATION: [Self; 6] = [
+        Self::Ideal,
+        Self::ModelMismatch,
+        Self::ObservationNoise,
+        Self::Disturbance,
+        Self::TrackingLoss,
+        Self::Evaluation,
+    ];
 }
 
 impl fmt::Display for Profile {

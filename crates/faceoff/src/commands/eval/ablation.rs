@@ -22,7 +22,7 @@ struct AblationFile {
 /// Plays every profile, each into a folder of its name, and compares them.
 pub(super) fn run(command: &EvalCommand, ground: &Ground) -> anyhow::Result<()> {
     let mut runs = BTreeMap::new();
-    for profile in Profile::ALL {
+    for profile in Profile::ABLATION {
         let played = command
             .play(ground, profile, &command.out.join(profile.as_str()))
             .with_context(|| format!("profile {profile}"))?;
