@@ -27,12 +27,13 @@ slots = 1
 /// A server's lives that end with `kill -9`.
 const KILLS: u64 = 28;
 /// What no run can repeat.
-const TIMES: [&str; 6] = [
+const TIMES: [&str; 7] = [
     "computation_time_ns",
     "cpu_time_ns",
     "computation_time_mean_s",
     "computation_time_max_s",
     "times_blake3",
+    "host_noise_reruns",
     // of which computation time is a part; `results.json` has the counts of the others
     "penalty_points",
 ];
