@@ -53,6 +53,16 @@ impl Tools {
         )
     }
 
+    /// The bundle of a valid submission: it passed its smoke run, so that the archive is not to blame.
+    fn valid_bundle(
+        &mut self,
+        bundle: &BundleRef,
+    ) -> anyhow::Result<faceoff_runner::bundle::Bundle> {
+        self.bundle(bundle).map_err(|error| match error {
+            FetchError::Invalid(reason) | FetchError::Platform(reason) => anyhow::anyhow!(reason),
+        })
+    }
+
     /// An empty folder that vanishes with its guard.
     fn folder(&self, purpose: &str) -> anyhow::Result<tempfile::TempDir> {
         tempfile::Builder::new()
@@ -108,13 +118,7 @@ impl Tools {
         bundle: &BundleRef,
         mut progress: Progress,
     ) -> Ended {
-        let bundle = match self.bundle(bundle) {
-            Ok(bundle) => bundle,
-            // it passed its smoke run, so the archive is not to blame
-            Err(FetchError::Invalid(reason) | FetchError::Platform(reason)) => {
-                anyhow::bail!(reason)
-            }
-        };
+        let bundle = self.valid_bundle(bundle)?;
         let secret = self.handle.block_on(self.store.season())?.secret;
         let spec = ShardSpec {
             task: shard.task,
@@ -164,12 +168,7 @@ impl Tools {
         bundle: &BundleRef,
         mut progress: Progress,
     ) -> Ended {
-        let bundle = match self.bundle(bundle) {
-            Ok(bundle) => bundle,
-            Err(FetchError::Invalid(reason) | FetchError::Platform(reason)) => {
-                anyhow::bail!(reason)
-            }
-        };
+        let bundle = self.valid_bundle(bundle)?;
         let secret = self.handle.block_on(self.store.season())?.secret;
         let spec = ShardSpec {
             task: run.task,
