@@ -11,7 +11,7 @@
 
 use super::{
     geometry::{PUCK, TABLE},
-    mallet_cylinder::MalletCylinder,
+    mallet_cylinder::{FARTHEST_M, MalletCylinder},
 };
 use rapier3d_f64::{
     geometry::{Collider, ColliderBuilder},
@@ -182,6 +182,8 @@ pub fn rims(puck: [f64; 2], mut found: impl FnMut(Touch)) {
 /// Contact of a mallet with the puck, normal into the puck. A leaning cylinder meets the puck first at
 /// the puck's upper or lower edge, and pushes at right angles to its axis.
 pub fn mallet_and_puck(mallet: &MalletCylinder, puck: [f64; 2]) -> Option<Touch> {
+    let [x, y, _] = mallet.centre;
+    within([x, y], puck, FARTHEST_M + PUCK.radius_m)?;
     let [low, high] = mallet.heights();
     deepest_of([low.max(0.0), high.min(PUCK.height_m)], |z| {
         let axis = mallet.at(z);
@@ -196,6 +198,8 @@ pub fn mallet_and_puck(mallet: &MalletCylinder, puck: [f64; 2]) -> Option<Touch>
 
 /// Contact of the two mallets, normal into the second.
 pub fn mallets(first: &MalletCylinder, second: &MalletCylinder) -> Option<Touch> {
+    let ([x_1, y_1, _], [x_2, y_2, _]) = (first.centre, second.centre);
+    within([x_1, y_1], [x_2, y_2], 2.0 * FARTHEST_M)?;
     let ([low_1, high_1], [low_2, high_2]) = (first.heights(), second.heights());
     deepest_of([low_1.max(low_2), high_1.min(high_2)], |z| {
         let (a, b) = (first.at(z), second.at(z));

@@ -18,6 +18,10 @@ pub struct MalletCylinder {
 /// Beyond this lean the mallet lies on its side, and horizontal cuts say nothing about it.
 const STEEPEST_LEAN: f64 = 1.0;
 
+/// No cut reaches further from the centre than this, m, whatever the lean: an axis of half height times √2
+/// and a radius times √3.
+pub const FARTHEST_M: f64 = 1.415 * TOOL.cylinder_half_height_m + 1.733 * TOOL.cylinder_radius_m;
+
 impl MalletCylinder {
     /// Upright.
     #[must_use]
@@ -69,9 +73,7 @@ impl MalletCylinder {
         }
         TOOL.cylinder_radius_m * (1.0 + along * along / square).sqrt()
     }
-}
 
-impl MalletCylinder {
     /// The unit normal of its side where that is met in a horizontal direction: at right angles to
     /// its axis.
     #[inline(always)]
