@@ -23,6 +23,12 @@ pub enum PlatformFault {
     Cancelled,
 }
 
+impl From<faceoff_episode::RecordError> for PlatformFault {
+    fn from(error: faceoff_episode::RecordError) -> Self {
+        Self::Recording(error.to_string())
+    }
+}
+
 impl PlatformFault {
     /// Turns an I/O error into a fault that says what was attempted.
     pub(crate) fn io(what: impl Into<String>) -> impl FnOnce(io::Error) -> Self {

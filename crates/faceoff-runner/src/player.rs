@@ -3,8 +3,8 @@ use crate::{
     bundle::Bundle,
     host_noise::{Late, Times},
     log::Log,
-    recording::{EpisodeStart, StepRow, StepSink},
 };
+use faceoff_episode::{EpisodeStart, StepRow, StepSink};
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
 use faceoff_types::{
     AgentFault, AgentFaultKind, EpisodeEnd, EpisodeOutcome, Factor, Profile, Seed, Task,

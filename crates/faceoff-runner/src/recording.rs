@@ -8,10 +8,9 @@ mod parquet_file;
 mod steps;
 mod times;
 
-use crate::{PlatformFault, session::Answered};
-use faceoff_sim::{ConstraintValues, EpisodeState};
-use faceoff_types::{EpisodeOutcome, Seed, Task};
-use faceoff_wire::InterpolationCode;
+use crate::PlatformFault;
+use faceoff_episode::{EpisodeStart, RecordError, StepRow, StepSink};
+use faceoff_types::{EpisodeOutcome, Task};
 
 pub(crate) use digest::HashingWriter;
 pub(crate) use episodes::{EpisodeRows, end_name};
@@ -21,54 +20,6 @@ pub(crate) use steps::{StepRows, StepScan, scan_steps};
 pub(crate) use times::seconds;
 
 use parquet_file::TableWriter;
-
-/// How an episode begins.
-pub(crate) struct EpisodeStart<'a> {
-    pub episode: u32,
-    pub seed: Seed,
-    /// `None` when the agent did not get as far as to say.
-    pub interpolation: Option<InterpolationCode>,
-    pub state: &'a EpisodeState,
-}
-
-/// One answered control step; the observation was given before.
-pub(crate) struct StepRow<'a> {
-    pub step: u32,
-    pub action: &'a [f64],
-    pub answered: Answered,
-    /// The true state after the step.
-    pub state: &'a EpisodeState,
-    pub constraints: ConstraintValues,
-    /// The observation after the step.
-    pub next_observation: &'a [f64],
-}
-
-/// Where an episode's course goes.
-pub(crate) trait StepSink {
-    /// Begins an episode. What was begun before and has not ended is dropped: it is played again.
-    fn begin(&mut self, start: EpisodeStart<'_>);
-    /// The observation that the agent was given, before the step.
-    fn observe(&mut self, observation: &[f64]);
-    fn step(&mut self, row: &StepRow<'_>);
-    /// Ends it; `host_noise_reruns` tries were dropped before this one.
-    fn end(
-        &mut self,
-        outcome: &EpisodeOutcome,
-        host_noise_reruns: u32,
-    ) -> Result<(), PlatformFault>;
-}
-
-/// Records nothing.
-pub(crate) struct Nowhere;
-
-impl StepSink for Nowhere {
-    fn begin(&mut self, _: EpisodeStart<'_>) {}
-    fn observe(&mut self, _: &[f64]) {}
-    fn step(&mut self, _: &StepRow<'_>) {}
-    fn end(&mut self, _: &EpisodeOutcome, _: u32) -> Result<(), PlatformFault> {
-        Ok(())
-    }
-}
 
 /// Writes both tables. Memory is bounded by one episode and one row group, whatever the shard's
 /// size.
@@ -92,6 +43,19 @@ impl Recorder {
             steps,
             episodes,
         })
+    }
+
+    fn end_episode(
+        &mut self,
+        outcome: &EpisodeOutcome,
+        host_noise_reruns: u32,
+    ) -> Result<(), PlatformFault> {
+        self.steps_file.write(self.steps.take())?;
+        self.episodes.end(outcome, host_noise_reruns)?;
+        if self.episodes.len() >= EPISODES_BATCH {
+            self.episodes_file.write(self.episodes.take())?;
+        }
+        Ok(())
     }
 
     /// Writes what is left and closes both tables.
@@ -121,13 +85,12 @@ impl StepSink for Recorder {
         &mut self,
         outcome: &EpisodeOutcome,
         host_noise_reruns: u32,
-    ) -> Result<(), PlatformFault> {
-        self.steps_file.write(self.steps.take())?;
-        self.episodes.end(outcome, host_noise_reruns)?;
-        if self.episodes.len() >= EPISODES_BATCH {
-            self.episodes_file.write(self.episodes.take())?;
-        }
-        Ok(())
+    ) -> Result<(), RecordError> {
+        self.end_episode(outcome, host_noise_reruns)
+            .map_err(|fault| RecordError {
+                what: "recording an episode".to_owned(),
+                source: fault.into(),
+            })
     }
 }
 

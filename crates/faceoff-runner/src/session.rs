@@ -1,4 +1,5 @@
 use crate::{AgentEnvironment, PlatformFault, TimeLimits, bundle::Bundle, wire_env::wire_env};
+use faceoff_episode::Answered;
 use faceoff_sandbox::{AgentProcess, ReadLine, SpawnError, SpawnSpec, WriteError};
 use faceoff_types::{AgentFaultKind, Task};
 use faceoff_wire::{InterpolationCode, MAX_LINE_BYTES, Message, answer, quote_line};
@@ -25,16 +26,6 @@ impl From<PlatformFault> for Trouble {
     fn from(fault: PlatformFault) -> Self {
         Self::Platform(fault)
     }
-}
-
-/// The measurements of one answered step.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Answered {
-    /// Wall time from the last byte of the question written to the last byte of the answer read,
-    /// in seconds.
-    pub computation_time_s: f64,
-    /// CPU time that the agent's process tree used meanwhile, in seconds, where the host tells.
-    pub cpu_time_s: Option<f64>,
 }
 
 /// One agent process and the conversation with it. Every wait has a deadline. Dropping it kills

@@ -1,7 +1,8 @@
 use crate::{
     AgentEnvironment, PlatformFault, bundle::Bundle, host_watch::StallWatch, log::Log,
-    player::Player, recording,
+    player::Player,
 };
+use faceoff_episode::Nowhere;
 use faceoff_types::{AgentFault, Profile, Seed, Task};
 use serde::{Deserialize, Serialize};
 
@@ -44,7 +45,7 @@ pub fn smoke(
             seed.model_mismatch(),
             &watch,
         );
-        let outcome = player.play(0, SMOKE_STEPS, &mut recording::Nowhere, cancelled)?;
+        let outcome = player.play(0, SMOKE_STEPS, &mut Nowhere, cancelled)?;
         log.add(&player.close()?, None);
         if let Some(fault) = outcome.fault {
             return Ok(SmokeReport {

@@ -1,5 +1,6 @@
 use super::times::nanoseconds;
-use crate::{Answered, PlatformFault};
+use crate::PlatformFault;
+use faceoff_episode::Answered;
 use faceoff_wire::dataset::FileDigest;
 use std::{
     fs::File,

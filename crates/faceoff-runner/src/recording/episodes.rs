@@ -1,5 +1,4 @@
 use super::{
-    EpisodeStart, StepRow,
     columns::FloatColumns,
     digest::StepDigests,
     steps::{observation_columns, put_observation},
@@ -10,6 +9,7 @@ use arrow_array::{
     builder::{ArrayBuilder, BooleanBuilder, StringBuilder, UInt32Builder},
 };
 use arrow_schema::{DataType, Field, Schema, SchemaRef};
+use faceoff_episode::{EpisodeStart, StepRow};
 use faceoff_sim::EpisodeState;
 use faceoff_types::{EpisodeEnd, EpisodeOutcome};
 use std::sync::Arc;

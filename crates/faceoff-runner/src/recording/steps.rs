@@ -1,5 +1,4 @@
 use super::{
-    StepRow,
     columns::{FloatColumns, joints},
     parquet_file,
     times::{nanoseconds, seconds},
@@ -12,6 +11,7 @@ use arrow_array::{
     types::{Float64Type, Int64Type, UInt32Type},
 };
 use arrow_schema::{DataType, Field, Schema, SchemaRef};
+use faceoff_episode::StepRow;
 use faceoff_sim::ConstraintValues;
 use faceoff_types::Task;
 use faceoff_wire::dataset::ConstraintViolation;

@@ -1,10 +1,9 @@
 use super::{Difference, compare, feed::Recorded};
 use crate::{
-    Answered,
     dataset::Columns,
     host_noise::Times,
     recording::{
-        EPISODES_FILE, EpisodeRows, EpisodeStart, STEPS_FILE, StepRow, StepRows, StepScan,
+        EPISODES_FILE, EpisodeRows, STEPS_FILE, StepRows, StepScan,
         end_name, seconds,
     },
 };
@@ -13,6 +12,7 @@ use arrow_array::{
     cast::AsArray,
     types::{Float64Type, Int64Type},
 };
+use faceoff_episode::{Answered, EpisodeStart, StepRow};
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
 use faceoff_types::{AgentFault, EpisodeEnd, EpisodeOutcome, Factor, Profile, Seed};
 use faceoff_wire::{InterpolationCode, dataset::DatasetManifest};

@@ -1,0 +1,8 @@
+//! Plays episodes from answers, wherever they come from: a process, a recording, a program in the same
+//! address space. What an episode leads to and what is recorded of it is decided here, once.
+//!
+//! This crate starts no process, opens no file and reads no clock.
+
+mod record;
+
+pub use record::{Answered, EpisodeStart, Nowhere, RecordError, StepRow, StepSink};

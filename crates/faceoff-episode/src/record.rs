@@ -1,0 +1,83 @@
+//! What is recorded of an episode, and where it goes.
+
+use faceoff_sim::{ConstraintValues, EpisodeState};
+use faceoff_types::{EpisodeOutcome, Seed};
+use faceoff_wire::InterpolationCode;
+
+/// The measurements of one answered step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Answered {
+    /// Wall time from the last byte of the question written to the last byte of the answer read,
+    /// in seconds.
+    pub computation_time_s: f64,
+    /// CPU time that the agent's process tree used meanwhile, in seconds, where the host tells.
+    pub cpu_time_s: Option<f64>,
+}
+
+/// How an episode begins.
+#[derive(Debug, Clone, Copy)]
+pub struct EpisodeStart<'a> {
+    /// Index within the evaluation.
+    pub episode: u32,
+    /// The episode's own seed.
+    pub seed: Seed,
+    /// `None` when the agent did not get as far as to say.
+    pub interpolation: Option<InterpolationCode>,
+    /// The true initial state.
+    pub state: &'a EpisodeState,
+}
+
+/// One answered control step; the observation was given before.
+#[derive(Debug, Clone, Copy)]
+pub struct StepRow<'a> {
+    /// The control step, from 0.
+    pub step: u32,
+    /// The agent's action, row-major.
+    pub action: &'a [f64],
+    /// How long the answer took.
+    pub answered: Answered,
+    /// The true state after the step.
+    pub state: &'a EpisodeState,
+    /// The constraints at that state; violated when above 0.
+    pub constraints: ConstraintValues,
+    /// The observation after the step.
+    pub next_observation: &'a [f64],
+}
+
+/// A recording that could not be written; never the agent's fault.
+#[derive(Debug, thiserror::Error)]
+#[error("{what}: {source}")]
+pub struct RecordError {
+    /// What was attempted.
+    pub what: String,
+    /// Why it failed.
+    pub source: Box<dyn std::error::Error + Send + Sync>,
+}
+
+/// Where an episode's course goes.
+pub trait StepSink {
+    /// Begins an episode. What was begun before and has not ended is dropped: it is played again.
+    fn begin(&mut self, start: EpisodeStart<'_>);
+    /// The observation that the agent was given, before the step.
+    fn observe(&mut self, observation: &[f64]);
+    /// The step that followed.
+    fn step(&mut self, row: &StepRow<'_>);
+    /// Ends it; `host_noise_reruns` tries were dropped before this one.
+    ///
+    /// # Errors
+    /// The recording could not be written.
+    fn end(&mut self, outcome: &EpisodeOutcome, host_noise_reruns: u32) -> Result<(), RecordError>;
+}
+
+/// Records nothing.
+#[derive(Debug, Clone, Copy)]
+pub struct Nowhere;
+
+impl StepSink for Nowhere {
+    fn begin(&mut self, _: EpisodeStart<'_>) {}
+    fn observe(&mut self, _: &[f64]) {}
+    fn step(&mut self, _: &StepRow<'_>) {}
+    fn end(&mut self, _: &EpisodeOutcome, _: u32) -> Result<(), RecordError> {
+        Ok(())
+    }
+}
