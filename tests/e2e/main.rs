@@ -6,6 +6,7 @@ mod crash;
 mod demo;
 mod kills;
 mod privacy;
+mod upgrade;
 
 use faceoff_tests::{bundle, server::Server};
 use serde_json::{Value, json};

@@ -1,0 +1,161 @@
+//! A data folder of an earlier version, cut off in the middle of its work, opens, migrates and continues.
+
+use faceoff_tests::{program, repository, server::Server};
+use flate2::read::GzDecoder;
+use serde_json::Value;
+use std::{
+    fs::{self, File},
+    path::Path,
+    process::Command,
+};
+
+/// As the folder's own server was configured.
+const CONFIG: &str = r#"
+[evaluation]
+episodes_per_task = 2
+episodes_per_shard = 1
+max_faults = 1
+[workers]
+slots = 1
+lease_s = 5
+"#;
+
+/// What a client of the earlier version saw last.
+struct Told(Value);
+
+impl Told {
+    fn read(data_dir: &Path) -> Self {
+        let text = fs::read(data_dir.join("told.json")).expect("the fixture tells what it holds");
+        Self(serde_json::from_slice(&text).expect("it is JSON"))
+    }
+
+    fn token(&self, team: &str) -> &str {
+        self.0["tokens"][team].as_str().expect("a team has a token")
+    }
+
+    fn answer(&self, name: &str) -> &Value {
+        let answer = &self.0["answers"][name];
+        assert!(answer.is_object(), "the fixture tells nothing of {name}");
+        answer
+    }
+
+    /// The path of the evaluation or submission that was told of.
+    fn path(&self, kind: &str, name: &str) -> String {
+        let id = self.answer(name)["id"].as_str().expect("it has an id");
+        format!("/api/v1/{kind}/{id}")
+    }
+}
+
+fn unpack(archive: &str, into: &Path) {
+    let file = File::open(repository().join("tests/fixtures").join(archive)).expect("a fixture");
+    tar::Archive::new(GzDecoder::new(file))
+        .unpack(into)
+        .expect("the fixture unpacks");
+}
+
+fn get(server: &Server, path: &str, token: &str) -> Value {
+    let answer = server.get(path, Some(token));
+    assert_eq!(answer.status(), 200, "{path}");
+    answer.json().expect("the API speaks JSON")
+}
+
+/// Downloads a dataset and simulates it again.
+fn verify(server: &Server, evaluation: &str, token: &str, folder: &Path) {
+    let answer = server.get(&format!("{evaluation}/dataset"), Some(token));
+    assert_eq!(answer.status(), 200, "the dataset of {evaluation}");
+    let file = folder.join("dataset.zip");
+    fs::write(&file, answer.bytes().expect("the download completes")).expect("a scratch file");
+    let verified = Command::new(program("faceoff"))
+        .arg("verify")
+        .arg(&file)
+        .output()
+        .expect("the program starts");
+    assert!(
+        verified.status.success(),
+        "{evaluation}: {}",
+        String::from_utf8_lossy(&verified.stderr)
+    );
+}
+
+#[test]
+fn a_data_folder_of_the_first_release_continues_where_it_was_cut_off() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    unpack("data-folder-e67a08c.tar.gz", scratch.path());
+    let data_dir = scratch.path().join("data");
+    let told = Told::read(&data_dir);
+    let server = Server::start(&data_dir, CONFIG);
+    let admin = server.admin_token.clone();
+
+    // What was over is what it was.
+    for over in [
+        "day one Alpha",
+        "day one Beta",
+        "day two Delta",
+        "day two Gamma",
+    ] {
+        assert_eq!(
+            &get(&server, &told.path("evaluations", over), &admin),
+            told.answer(over),
+            "{over}"
+        );
+    }
+    for (ablation, evaluation) in [
+        ("ablation Alpha", "day one Alpha"),
+        ("ablation Beta", "day one Beta"),
+    ] {
+        let submission = told.answer(evaluation)["submission"]
+            .as_str()
+            .expect("an id");
+        let path = format!("/api/v1/submissions/{submission}/ablation");
+        assert_eq!(
+            &get(&server, &path, &admin),
+            told.answer(ablation),
+            "{ablation}"
+        );
+    }
+
+    // What was under way is carried on, in all its kinds.
+    let alpha = told.token("Alpha");
+    for (name, team) in [("day two Alpha", "Alpha"), ("day two Epsilon", "Epsilon")] {
+        let path = told.path("evaluations", name);
+        let finished = server.poll(&path, told.token(team), |answer| {
+            !["queued", "running", "finalising"].contains(&answer["state"].as_str().unwrap_or(""))
+        });
+        assert_eq!(finished["state"], "finished", "{name}: {finished:#}");
+        assert_eq!(finished["result"]["tasks"]["hit"]["episodes"], 2, "{name}");
+    }
+    let waiting = server.poll(
+        &told.path("submissions", "submission Beta"),
+        told.token("Beta"),
+        |answer| answer["state"] != "validating",
+    );
+    assert_eq!(waiting["state"], "valid", "{waiting:#}");
+    let slow = told.answer("day two Alpha")["submission"]
+        .as_str()
+        .expect("an id");
+    let ablation = server.poll(
+        &format!("/api/v1/submissions/{slow}/ablation"),
+        alpha,
+        |answer| answer["state"] != "open",
+    );
+    assert_eq!(ablation["state"], "finished", "{ablation:#}");
+    assert_eq!(ablation["tasks"]["hit"].as_array().map(Vec::len), Some(6));
+
+    // Episodes of two versions, one dataset: simulated again, they are what was recorded.
+    for name in ["day one Alpha", "day two Alpha"] {
+        verify(
+            &server,
+            &told.path("evaluations", name),
+            alpha,
+            scratch.path(),
+        );
+    }
+    let board = get(&server, "/api/v1/board", &admin);
+    let teams: Vec<&Value> = board["rows"]
+        .as_array()
+        .expect("a board has rows")
+        .iter()
+        .map(|row| &row["team"])
+        .collect();
+    assert_eq!(teams.len(), 2, "Alpha and Epsilon have scores: {board:#}");
+}
