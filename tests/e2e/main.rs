@@ -4,6 +4,7 @@ mod bad_agents;
 mod browser;
 mod crash;
 mod demo;
+mod house;
 mod kills;
 mod privacy;
 mod upgrade;
