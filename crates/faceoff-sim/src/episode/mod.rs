@@ -7,12 +7,14 @@ pub mod task;
 
 use crate::{
     link::{Command, Link, observation},
-    perturbation::{settings::PerturbationSettings, stream::Stream, table_factors::TableFactors},
-    robot::{interpolation::Interpolation, model::JOINTS, plant::Plant},
+    model::JOINTS,
+    perturbation::{settings::PerturbationSettings, table_factors::TableFactors},
+    robot::plant::Plant,
+    stream::Stream,
     world::World,
 };
 use constraints::ConstraintValues;
-use faceoff_types::{EpisodeEnd, Factors, Seed, Task, Violations};
+use faceoff_types::{EpisodeEnd, Factors, Interpolation, Seed, Task, Violations};
 use opponent::Opponent;
 
 /// Control steps of a qualifying episode.
