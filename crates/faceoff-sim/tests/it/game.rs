@@ -190,8 +190,9 @@ fn both_robots_see_the_same_picture() {
             world.command(1 - k, Interpolation::Cubic, &actions[1]);
             world.control_step(|_| [0.0; 2]);
         }
-        let seen = [(0, 0), (1, 1)]
-            .map(|(world, robot)| faceoff_sim::link::observation::observe(&worlds[world], robot));
+        let seen = [(0, 0), (1, 1)].map(|(world, robot)| {
+            faceoff_sim::channel::observation::observe(&worlds[world], robot)
+        });
         assert!(
             max_difference(&seen[0], &seen[1]) <= 1e-9,
             "step {step}: {seen:?}"

@@ -4,7 +4,7 @@ use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
 use faceoff_sim::{
     Command, Episode, Game, GameSetup, Interpolation, PerturbationSettings, Plant, SUBSTEPS,
-    WINDOW_STEPS, robot::model::INITIAL_Q,
+    WINDOW_STEPS, model::INITIAL_Q,
 };
 use faceoff_types::{Factor, Profile, Seed, Task};
 use serde::Serialize;
