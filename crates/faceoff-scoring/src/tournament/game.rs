@@ -1,6 +1,6 @@
-use super::rules::{FOULS_PER_POINT, GAME_WINDOWS, Side, WINDOW_STEPS, final_score, winner};
+use super::rules::{Side, final_score, winner};
 use crate::episode::MAX_EPISODE_PENALTY;
-use faceoff_types::TeamName;
+use faceoff_types::{FOULS_PER_POINT, GAME_WINDOWS, TeamName, WINDOW_STEPS};
 use serde::{Deserialize, Serialize};
 
 /// A played game, one entry of `games.json`. Pairs are `[home, away]`.

@@ -83,16 +83,7 @@ impl Episode {
     /// One control step. `action` is row-major, of length [`Interpolation::len`], finite. Must not
     /// be called after an end.
     pub fn step(&mut self, action: &[f64]) -> StepOutcome {
-        self.advance(Command::Act(action))
-    }
-
-    /// One control step in which no action came in time.
-    pub fn step_late(&mut self) -> StepOutcome {
-        self.advance(Command::Late)
-    }
-
-    fn advance(&mut self, command: Command<'_>) -> StepOutcome {
-        self.channel.command(&mut self.world, command);
+        self.channel.command(&mut self.world, Command::Act(action));
         if let Some(opponent) = &mut self.opponent {
             self.world
                 .command(1, Interpolation::LinearBoth, &opponent.action());

@@ -10,14 +10,8 @@ use crate::{
     stream::Stream,
     world::World,
 };
-use faceoff_types::{Factors, Interpolation, Seed, Violations};
+use faceoff_types::{Factors, Interpolation, Seed, Violations, WINDOW_STEPS};
 use referee::{GAME_RULES, RallyEnd, Referee};
-
-/// Control steps of a game: 15 minutes.
-pub const GAME_STEPS: u32 = 45_000;
-
-/// Control steps of a window: the same violation counts once in each.
-pub const WINDOW_STEPS: u32 = 500;
 
 /// What a game is played with.
 #[derive(Debug, Clone)]
@@ -87,8 +81,8 @@ impl Game {
         self.rally.channels[robot].observation()
     }
 
-    /// One control step of both robots. Whether the game is over, [`GAME_STEPS`] say, is the caller's
-    /// to decide.
+    /// One control step of both robots. When the game is over is the caller's to
+    /// decide.
     pub fn step(&mut self, commands: [Command<'_>; 2]) -> GameStep {
         let Rally {
             world,

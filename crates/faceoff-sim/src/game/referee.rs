@@ -4,6 +4,7 @@ use crate::{
     model::CONTROL_STEP_S,
     table::{geometry::TABLE, puck::Puck},
 };
+use faceoff_types::FOULS_PER_POINT;
 
 /// Numbers of the game's rules, table frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,8 +17,6 @@ pub struct GameRules {
     pub middle_x_m: f64,
     /// A puck in the middle is stuck below this |vx|, m/s.
     pub stuck_vx_m_s: f64,
-    /// Fouls that give the opponent a point.
-    pub fouls_per_point: u32,
     /// A faster puck is taken as gone, m/s.
     pub lost_speed_m_s: f64,
 }
@@ -28,7 +27,6 @@ pub const GAME_RULES: GameRules = GameRules {
     foul_after_s: 15.0,
     middle_x_m: 0.15,
     stuck_vx_m_s: 0.025,
-    fouls_per_point: 3,
     lost_speed_m_s: 100.0,
 };
 
@@ -83,7 +81,7 @@ impl Referee {
     /// Goals and the points for the opponent's fouls.
     #[must_use]
     pub fn score(&self) -> [u32; 2] {
-        [0, 1].map(|robot| self.goals[robot] + self.fouls[1 - robot] / GAME_RULES.fouls_per_point)
+        [0, 1].map(|robot| self.goals[robot] + self.fouls[1 - robot] / FOULS_PER_POINT)
     }
 
     /// Judges the true puck after a control step. An end sets who serves next and resets the clock.

@@ -97,11 +97,6 @@ impl World {
         &self.puck
     }
 
-    /// Puts the puck somewhere else.
-    pub fn set_puck(&mut self, puck: [f64; 6]) {
-        self.puck = Puck::from_state(puck);
-    }
-
     /// Positions of a robot's driven joints, rad.
     #[must_use]
     pub fn joints(&self, robot: usize) -> [f64; JOINTS] {

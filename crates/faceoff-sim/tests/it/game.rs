@@ -5,12 +5,11 @@ use crate::{
     reference::{array, max_difference, recording},
 };
 use faceoff_sim::{
-    Command, Game, GameSetup, Interpolation, PerturbationSettings, Plant, RallyEnd, WINDOW_STEPS,
-    World,
+    Command, Game, GameSetup, Interpolation, PerturbationSettings, Plant, RallyEnd, World,
     game::referee::Referee,
     model::{EE_DESIRED_HEIGHT_M, INITIAL_Q},
 };
-use faceoff_types::{Factors, Seed, Violations};
+use faceoff_types::{Factors, Seed, Violations, WINDOW_STEPS};
 use serde_json::Value;
 
 fn setup(factors: Factors, seed: u64) -> GameSetup {
