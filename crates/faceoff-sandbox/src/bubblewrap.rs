@@ -89,8 +89,8 @@ impl Bubblewrap {
         }))
     }
 
-    /// The command line for `spec`, with what the child needs for it. `private_mounts`: bubblewrap runs as a user
-    /// who may be unable to reach the files by name.
+    /// The command line for `spec`, with what the child needs for it. `private_mounts`: bubblewrap runs
+    /// as a user who may be unable to reach the files by name.
     pub(crate) fn command(
         &self,
         spec: &SpawnSpec,
