@@ -7,6 +7,6 @@ mod game;
 mod rules;
 mod standings;
 
-pub use game::{Game, InvalidGame, ScoredGame};
+pub use game::{InvalidGame, PlayedGame, ScoredGame};
 pub use rules::{POINTS_DRAW, POINTS_LOSS, POINTS_WIN, Side, final_score, winner};
 pub use standings::{RepeatedPairing, Standing, Tournament, score_tournament};
