@@ -316,10 +316,6 @@ fn given(recorded: &Recorded) -> Result<Given, Difference> {
     })
 }
 
-fn shown(code: Option<i64>) -> String {
-    code.map_or_else(|| "null".to_owned(), |code| code.to_string())
-}
-
 fn in_row(
     recorded: &Recorded,
     field: &str,
