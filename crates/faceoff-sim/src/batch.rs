@@ -5,12 +5,12 @@
 //! rayon's current pool, so that a caller chooses their number with `ThreadPool::install`.
 
 use crate::{
+    channel::observation::OBSERVATION_WITH_OPPONENT_LEN,
     episode::{Episode, StepOutcome},
-    link::observation::OBSERVATION_WITH_OPPONENT_LEN,
     perturbation::settings::PerturbationSettings,
-    robot::{interpolation::Interpolation, plant::Plant},
+    robot::plant::Plant,
 };
-use faceoff_types::{Factors, Seed, Task};
+use faceoff_types::{Factors, Interpolation, Seed, Task};
 use rayon::prelude::*;
 
 /// Worlds that a thread takes at a time: below this, handing out work costs more than it gains.
@@ -154,7 +154,7 @@ impl BatchSetup {
     }
 
     fn observation_len(&self) -> usize {
-        crate::link::observation::len(self.task)
+        crate::channel::observation::len(self.task)
     }
 }
 

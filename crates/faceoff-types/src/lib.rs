@@ -8,6 +8,7 @@ mod computation_time;
 mod constraint;
 mod fault;
 mod ids;
+mod interpolation;
 mod outcome;
 mod profile;
 mod result;
@@ -24,10 +25,11 @@ pub use fault::{AgentFault, AgentFaultKind};
 pub use ids::{
     AblationId, AblationRunId, EvaluationId, ParseIdError, ShardId, SubmissionId, TeamId,
 };
+pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, UnknownInterpolation};
 pub use outcome::{EpisodeEnd, EpisodeOutcome};
 pub use profile::{Factor, Factors, ParseProfileError, Profile};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult, ViolationCounts};
-pub use ruleset::RULESET;
+pub use ruleset::{FOULS_PER_POINT, GAME_WINDOWS, RULESET, WINDOW_STEPS};
 pub use seed::{ParseSeedError, Seed};
 pub use task::{ParseTaskError, Task};
 pub use team_name::{InvalidTeamName, TeamName};

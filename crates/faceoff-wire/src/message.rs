@@ -1,7 +1,7 @@
 //! What the evaluator says to an agent, one JSON object per line.
 
-use crate::PROTOCOL_VERSION;
-use faceoff_types::Task;
+use crate::protocol::PROTOCOL_VERSION;
+use faceoff_types::{JOINTS, Task};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
@@ -118,13 +118,13 @@ pub struct Env {
     pub joint_vel_ids: Vec<usize>,
     /// Where the opponent's end effector is in an observation; empty without an opponent.
     pub opponent_ee_ids: Vec<usize>,
-    /// The table.
+    /// Playing surface and goal mouths.
     pub table: TableEnv,
-    /// The puck.
+    /// Mass and friction are not told.
     pub puck: DiscEnv,
-    /// The mallet.
+    /// The striking cylinder.
     pub mallet: DiscEnv,
-    /// The robot.
+    /// Always the nominal one, whatever the profile does to the plant.
     pub robot: RobotEnv,
     /// Control steps after which an episode ends at the latest.
     pub episode_steps: u32,
@@ -146,7 +146,7 @@ pub struct TableEnv {
 /// A round body on the table.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DiscEnv {
-    /// Its radius in metres.
+    /// In metres.
     pub radius: f64,
 }
 
@@ -162,25 +162,24 @@ pub struct RobotEnv {
     /// Control steps per second.
     pub control_frequency: f64,
     /// Lower and upper joint limits, rad.
-    pub joint_pos_limit: [[f64; 7]; 2],
+    pub joint_pos_limit: [[f64; JOINTS]; 2],
     /// Lower and upper velocity limits, rad/s.
-    pub joint_vel_limit: [[f64; 7]; 2],
+    pub joint_vel_limit: [[f64; JOINTS]; 2],
     /// Lower and upper acceleration limits, rad/s².
-    pub joint_acc_limit: [[f64; 7]; 2],
+    pub joint_acc_limit: [[f64; JOINTS]; 2],
     /// `table_from_robot`, homogeneous and row-major, one per robot, the agent's own first.
     pub base_frame: Vec<[[f64; 4]; 4]>,
 }
 
-/// Index ranges of an observation, as `env` names them.
 impl Env {
     /// Indices of the puck's x, y, yaw.
     pub const PUCK_POS_IDS: [usize; 3] = [0, 1, 2];
     /// Indices of the puck's velocities.
     pub const PUCK_VEL_IDS: [usize; 3] = [3, 4, 5];
     /// Indices of the joint positions.
-    pub const JOINT_POS_IDS: [usize; 7] = [6, 7, 8, 9, 10, 11, 12];
+    pub const JOINT_POS_IDS: [usize; JOINTS] = [6, 7, 8, 9, 10, 11, 12];
     /// Indices of the joint velocities.
-    pub const JOINT_VEL_IDS: [usize; 7] = [13, 14, 15, 16, 17, 18, 19];
+    pub const JOINT_VEL_IDS: [usize; JOINTS] = [13, 14, 15, 16, 17, 18, 19];
     /// Indices of the opponent's end effector, where there is an opponent.
     pub const OPPONENT_EE_IDS: [usize; 3] = [20, 21, 22];
 }

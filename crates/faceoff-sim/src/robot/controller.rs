@@ -1,10 +1,7 @@
 //! The 1 kHz torque controller with its safety limiter (MODEL, "Controller").
 
-use super::{
-    interpolation::Setpoint,
-    model::{JOINTS, LINKS, SUBSTEP_S},
-    plant::Plant,
-};
+use super::{plant::Plant, trajectory::Setpoint};
+use crate::model::{JOINTS, LINKS, SUBSTEP_S};
 
 /// How fast the limiter lets a joint approach its stop, 1/s (ref).
 const LIMITER_GAIN: f64 = 20.0;
@@ -20,9 +17,9 @@ pub struct Limiter {
     commanded: [f64; JOINTS],
 }
 
-/// A limited command: position, rad, and velocity, rad/s.
+/// A setpoint within the limits: position, rad, and velocity, rad/s.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Command {
+pub struct LimitedSetpoint {
     position: [f64; JOINTS],
     velocity: [f64; JOINTS],
 }
@@ -35,8 +32,8 @@ impl Limiter {
 
     /// Limits the desired motion of one substep.
     #[inline(always)]
-    pub fn limit(&mut self, desired: &Setpoint) -> Command {
-        let mut command = Command {
+    pub fn limit(&mut self, desired: &Setpoint) -> LimitedSetpoint {
+        let mut command = LimitedSetpoint {
             position: [0.0; JOINTS],
             velocity: [0.0; JOINTS],
         };
@@ -62,7 +59,7 @@ impl Limiter {
 #[inline(always)]
 pub fn torque(
     plant: &Plant,
-    command: &Command,
+    command: &LimitedSetpoint,
     q: &[f64],
     dq_filtered: &[f64; JOINTS],
     feed_forward: &[f64; JOINTS],

@@ -1,9 +1,11 @@
 //! What physically moves: nominal, or off by the season's model mismatch.
 
-use super::model::{DOFS, JOINTS, LINKS};
-use crate::dynamics::{
-    arm::{Bodies, Kinematics, mass_matrix},
-    factor::Factor,
+use crate::{
+    dynamics::{
+        arm::{Bodies, Kinematics, mass_matrix},
+        ldlt::Ldlt,
+    },
+    model::{DOFS, JOINTS, LINKS},
 };
 
 /// The robot as it really is: masses, gains, damping and dry friction. Made once per season and
@@ -48,7 +50,7 @@ impl Plant {
     ) -> Self {
         let kinematics = Kinematics::new(&[0.0; DOFS]);
         let bodies = Bodies::new(&kinematics).plant(&mass_scale);
-        let factor = Factor::new(&mass_matrix(&kinematics, &bodies));
+        let factor = Ldlt::new(&mass_matrix(&kinematics, &bodies));
         let inverse_inertia = std::array::from_fn(|i| {
             let mut unit = [0.0; DOFS];
             unit[i] = 1.0;

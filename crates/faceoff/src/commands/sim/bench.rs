@@ -4,9 +4,9 @@ use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
 use faceoff_sim::{
     Command, Episode, Game, GameSetup, Interpolation, PerturbationSettings, Plant, SUBSTEPS,
-    WINDOW_STEPS, robot::model::INITIAL_Q,
+    model::INITIAL_Q,
 };
-use faceoff_types::{Factor, Profile, Seed, Task};
+use faceoff_types::{Factor, Profile, Seed, Task, WINDOW_STEPS};
 use serde::Serialize;
 use std::{
     hint::black_box,
