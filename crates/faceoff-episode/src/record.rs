@@ -1,8 +1,7 @@
 //! What is recorded of an episode, and where it goes.
 
 use faceoff_sim::{ConstraintValues, EpisodeState};
-use faceoff_types::{EpisodeOutcome, Seed};
-use faceoff_wire::InterpolationCode;
+use faceoff_types::{EpisodeOutcome, Interpolation, Seed};
 
 /// The measurements of one answered step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,7 +21,7 @@ pub struct EpisodeStart<'a> {
     /// The episode's own seed.
     pub seed: Seed,
     /// `None` when the agent did not get as far as to say.
-    pub interpolation: Option<InterpolationCode>,
+    pub interpolation: Option<Interpolation>,
     /// The true initial state.
     pub state: &'a EpisodeState,
 }

@@ -5,9 +5,10 @@ use crate::{
     log::Log,
 };
 use faceoff_episode::{EpisodeStart, StepRow, StepSink};
-use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
+use faceoff_sim::{Episode, PerturbationSettings, Plant};
 use faceoff_types::{
-    AgentFault, AgentFaultKind, EpisodeEnd, EpisodeOutcome, Factor, Profile, Seed, Task,
+    AgentFault, AgentFaultKind, EpisodeEnd, EpisodeOutcome, Factor, Interpolation, Profile, Seed,
+    Task,
 };
 
 /// Plays episodes of one task with one agent, which is restarted after a fault. An episode that the
@@ -126,14 +127,10 @@ impl<'a> Player<'a> {
         };
         // Without an agent the initial state is still of interest; it is the same for all.
         let interpolation = self.session.as_ref().map(Session::interpolation);
-        let code = interpolation.map_or(Some(3), |code| code.code());
-        let interpolation_of_sim = Interpolation::from_code(code).ok_or_else(|| {
-            PlatformFault::Recording(format!("the simulator lacks interpolation {code:?}"))
-        })?;
         let seed = self.seed.episode(self.task, episode);
         let mut world = Episode::new(
             self.task,
-            interpolation_of_sim,
+            interpolation.unwrap_or(Interpolation::Cubic),
             self.profile.factors(),
             &self.settings,
             &self.plant,

@@ -1,8 +1,8 @@
 use crate::{AgentEnvironment, PlatformFault, TimeLimits, bundle::Bundle, wire_env::wire_env};
 use faceoff_episode::Answered;
 use faceoff_sandbox::{AgentProcess, ReadLine, SpawnError, SpawnSpec, WriteError};
-use faceoff_types::{AgentFaultKind, Task};
-use faceoff_wire::{InterpolationCode, MAX_LINE_BYTES, Message, answer, quote_line};
+use faceoff_types::{AgentFaultKind, Interpolation, Task};
+use faceoff_wire::{MAX_LINE_BYTES, Message, answer, quote_line};
 use std::time::{Duration, Instant};
 
 /// How long an agent that has closed its output gets to end, so that its exit status can be told.
@@ -34,7 +34,7 @@ impl From<PlatformFault> for Trouble {
 pub struct Session {
     process: AgentProcess,
     time: TimeLimits,
-    interpolation: InterpolationCode,
+    interpolation: Interpolation,
     /// The message being written; its memory is reused.
     line: Vec<u8>,
     cpu_time_s: Option<f64>,
@@ -96,7 +96,7 @@ impl Session {
         let mut session = Self {
             process,
             time: env.time.clone(),
-            interpolation: InterpolationCode::new(None).expect("null is a code"),
+            interpolation: Interpolation::Trajectory,
             line: Vec::with_capacity(4096),
             cpu_time_s: None,
             waited: None,
@@ -130,7 +130,7 @@ impl Session {
 
     /// What the agent's actions mean.
     #[must_use]
-    pub const fn interpolation(&self) -> InterpolationCode {
+    pub const fn interpolation(&self) -> Interpolation {
         self.interpolation
     }
 

@@ -67,21 +67,6 @@ pub(crate) fn wire_env(task: Task) -> Env {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use faceoff_sim::Interpolation;
-    use faceoff_wire::InterpolationCode;
-
-    #[test]
-    fn simulator_and_protocol_agree_on_every_interpolation() {
-        for code in [Some(1), Some(2), Some(3), Some(4), Some(5), Some(-1), None] {
-            let (sim, wire) = (
-                Interpolation::from_code(code).unwrap(),
-                InterpolationCode::new(code).unwrap(),
-            );
-            assert_eq!(sim.shape(), wire.shape(), "{code:?}");
-            assert_eq!(sim.code(), wire.code());
-        }
-        assert_eq!(Interpolation::from_code(Some(6)), None);
-    }
 
     #[test]
     fn hello_states_the_rules_constants() {

@@ -3,7 +3,7 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use faceoff_sim::{
     Batch, BatchSetup, Command, Episode, Game, GameSetup, Interpolation, JOINTS,
-    PerturbationSettings, Plant, robot::model::INITIAL_Q,
+    PerturbationSettings, Plant, model::INITIAL_Q,
 };
 use faceoff_types::{Factors, Seed, Task};
 use std::hint::black_box;

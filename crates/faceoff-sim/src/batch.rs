@@ -8,9 +8,9 @@ use crate::{
     episode::{Episode, StepOutcome},
     link::observation::OBSERVATION_WITH_OPPONENT_LEN,
     perturbation::settings::PerturbationSettings,
-    robot::{interpolation::Interpolation, plant::Plant},
+    robot::plant::Plant,
 };
-use faceoff_types::{Factors, Seed, Task};
+use faceoff_types::{Factors, Interpolation, Seed, Task};
 use rayon::prelude::*;
 
 /// Worlds that a thread takes at a time: below this, handing out work costs more than it gains.

@@ -20,8 +20,10 @@ pub mod dynamics;
 pub mod episode;
 pub mod game;
 pub mod link;
+pub mod model;
 pub mod perturbation;
 pub mod robot;
+pub mod stream;
 pub mod table;
 pub mod world;
 
@@ -32,11 +34,9 @@ pub use episode::{
     env_info::{EnvInfo, env_info, env_info_for},
 };
 pub use game::{GAME_STEPS, Game, GameSetup, GameStep, WINDOW_STEPS, referee::RallyEnd};
+// Actions and joint states are in terms of these.
+pub use faceoff_types::{Interpolation, JOINTS, SUBSTEPS};
 pub use link::Command;
 pub use perturbation::settings::PerturbationSettings;
-pub use robot::{
-    interpolation::Interpolation,
-    model::{JOINTS, SUBSTEPS},
-    plant::Plant,
-};
+pub use robot::plant::Plant;
 pub use world::{MalletState, World};

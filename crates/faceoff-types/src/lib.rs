@@ -9,6 +9,7 @@ mod constraint;
 mod contest;
 mod fault;
 mod ids;
+mod interpolation;
 mod outcome;
 mod profile;
 mod result;
@@ -26,6 +27,7 @@ pub use fault::{AgentFault, AgentFaultKind, Phase};
 pub use ids::{
     AblationId, AblationRunId, EvaluationId, ParseIdError, ShardId, SubmissionId, TeamId,
 };
+pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, UnknownInterpolation};
 pub use outcome::{EpisodeEnd, EpisodeOutcome};
 pub use profile::{Factor, Factors, ParseProfileError, Profile};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult, ViolationCounts};

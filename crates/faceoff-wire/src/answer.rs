@@ -5,22 +5,24 @@
 //! Unknown fields are skipped without recursion, and known fields refuse to nest, so that no line
 //! can exhaust the stack.
 
-use crate::{InterpolationCode, MAX_LINE_BYTES, PROTOCOL_VERSION};
-use faceoff_types::AgentFaultKind;
+use crate::protocol::PROTOCOL_VERSION;
+use faceoff_types::{AgentFaultKind, Interpolation};
 use fields::Fields;
 
 mod action;
 mod diagnosis;
 mod fields;
+mod marks;
 mod scalar;
 
+pub use diagnosis::too_long;
 pub use scalar::Scalar;
 
 /// The answer to `hello`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Ready {
     /// How the agent's actions become a trajectory.
-    pub interpolation: InterpolationCode,
+    pub interpolation: Interpolation,
     /// The agent's name for itself, if it gave one as a string.
     pub name: Option<String>,
     /// Its version, likewise.
@@ -47,7 +49,7 @@ pub fn parse_ready(line: &[u8]) -> Result<Ready, AgentFaultKind> {
         Some(Scalar::Integer(code)) => Some(*code),
         Some(other) => return Err(wrong(format!("ready with interpolation {other}"))),
     };
-    let interpolation = InterpolationCode::new(code)
+    let interpolation = Interpolation::from_code(code)
         .map_err(|unknown| wrong(format!("ready with interpolation {}", unknown.0)))?;
     let text = |field: &Option<Scalar<'_>>| match field {
         Some(Scalar::Text(text)) => Some(text.chars().take(100).collect()),
@@ -73,7 +75,7 @@ pub fn parse_reset_ready(line: &[u8], episode: u32) -> Result<(), AgentFaultKind
 
 /// Parses the answer to `step` into `action`, row-major. The line comes without its newline.
 ///
-/// On success `action` holds exactly [`InterpolationCode::action_len`] finite numbers; after an
+/// On success `action` holds exactly [`Interpolation::len`] finite numbers; after an
 /// error its content is meaningless.
 ///
 /// # Errors
@@ -82,7 +84,7 @@ pub fn parse_reset_ready(line: &[u8], episode: u32) -> Result<(), AgentFaultKind
 pub fn parse_act(
     line: &[u8],
     step: u32,
-    interpolation: InterpolationCode,
+    interpolation: Interpolation,
     action: &mut Vec<f64>,
 ) -> Result<(), AgentFaultKind> {
     action.clear();
@@ -99,13 +101,5 @@ pub fn parse_act(
             expected: format!("act with step {step} and an action"),
             got: "act without action".to_owned(),
         })
-    }
-}
-
-/// The fault of a line longer than the protocol allows.
-#[must_use]
-pub const fn too_long() -> AgentFaultKind {
-    AgentFaultKind::LineTooLong {
-        limit_bytes: MAX_LINE_BYTES as u64,
     }
 }

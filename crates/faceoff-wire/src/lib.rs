@@ -13,60 +13,12 @@
 
 pub mod answer;
 pub mod dataset;
-mod interpolation;
 mod manifest;
 pub mod message;
+mod protocol;
+mod quote;
 
-pub use interpolation::{InterpolationCode, UnknownInterpolation};
 pub use manifest::{MANIFEST_MAX_BYTES, Manifest, ManifestError};
 pub use message::{Env, Message, ProtocolTask};
-
-/// Version of the agent protocol, the `protocol` of `hello` and `ready`.
-pub const PROTOCOL_VERSION: u32 = 1;
-
-/// Longest line in either direction, in bytes, the newline not counted.
-pub const MAX_LINE_BYTES: usize = 64 * 1024;
-
-/// Joints of the arm: the innermost length of every action.
-pub const JOINTS: usize = 7;
-
-/// Substeps of a control step: the outermost length of a whole-trajectory action.
-pub const SUBSTEPS: usize = 20;
-
-/// Characters of an offending line that are kept in a fault.
-const QUOTED_CHARS: usize = 400;
-
-/// An offending line as a fault shows it: lossy UTF-8, cut to 400 characters.
-#[must_use]
-pub fn quote_line(line: &[u8]) -> String {
-    // Four bytes hold any character, so that a long line is not decoded as a whole.
-    let head = &line[..line.len().min(4 * QUOTED_CHARS)];
-    let text = String::from_utf8_lossy(head);
-    let mut quoted: String = text.chars().take(QUOTED_CHARS).collect();
-    if quoted.len() < text.len() || head.len() < line.len() {
-        quoted.push('…');
-        if quoted.chars().count() > QUOTED_CHARS {
-            quoted = quoted.chars().take(QUOTED_CHARS - 1).chain(['…']).collect();
-        }
-    }
-    quoted
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_quoted_line_is_cut_to_400_characters_and_says_so() {
-        assert_eq!(quote_line(b"{}"), "{}");
-        assert_eq!(quote_line(&[b'a'; 400]), "a".repeat(400));
-        let cut = quote_line(&[b'a'; 401]);
-        assert_eq!(cut.chars().count(), 400);
-        assert!(cut.ends_with("a…"));
-        assert_eq!(
-            quote_line("é".repeat(50_000).as_bytes()).chars().count(),
-            400
-        );
-        assert_eq!(quote_line(&[0xff]), "\u{fffd}");
-    }
-}
+pub use protocol::{MAX_LINE_BYTES, PROTOCOL_VERSION};
+pub use quote::quote_line;

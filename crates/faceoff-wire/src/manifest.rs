@@ -1,4 +1,4 @@
-use crate::{InterpolationCode, UnknownInterpolation};
+use faceoff_types::Interpolation;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -57,16 +57,6 @@ impl Manifest {
         Ok(manifest)
     }
 
-    /// The interpolation stated here, if any.
-    ///
-    /// # Errors
-    /// The number is none of the protocol's; [`Manifest::parse`] has excluded that.
-    pub fn stated_interpolation(&self) -> Result<Option<InterpolationCode>, UnknownInterpolation> {
-        self.interpolation
-            .map(|code| InterpolationCode::new(Some(code)))
-            .transpose()
-    }
-
     fn check(&self) -> Result<(), ManifestError> {
         let chars = self.name.chars().count();
         require(
@@ -104,15 +94,16 @@ impl Manifest {
             "runtime",
             "must be a runtime's name: letters, digits, dots, dashes and underscores",
         )?;
-        self.stated_interpolation()
-            .map_err(|unknown| ManifestError::Value {
-                key: "interpolation".to_owned(),
-                problem: format!(
-                    "is {}: expected 1, 2, 3, 4, 5 or -1; for whole trajectories leave it out \
-                     and answer hello with null",
-                    unknown.0
+        if let Some(code) = self.interpolation {
+            require(
+                Interpolation::from_code(Some(code)).is_ok(),
+                "interpolation",
+                &format!(
+                    "is {code}: expected 1, 2, 3, 4, 5 or -1; for whole trajectories leave it out \
+                     and answer hello with null"
                 ),
-            })?;
+            )?;
+        }
         require(
             self.env.len() <= 64,
             "env",

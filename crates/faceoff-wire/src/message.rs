@@ -1,7 +1,7 @@
 //! What the evaluator says to an agent, one JSON object per line.
 
-use crate::PROTOCOL_VERSION;
-use faceoff_types::{Contest, Task};
+use crate::protocol::PROTOCOL_VERSION;
+use faceoff_types::{Contest, JOINTS, Task};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
@@ -163,11 +163,11 @@ pub struct RobotEnv {
     /// Control steps per second.
     pub control_frequency: f64,
     /// Lower and upper joint limits, rad.
-    pub joint_pos_limit: [[f64; 7]; 2],
+    pub joint_pos_limit: [[f64; JOINTS]; 2],
     /// Lower and upper velocity limits, rad/s.
-    pub joint_vel_limit: [[f64; 7]; 2],
+    pub joint_vel_limit: [[f64; JOINTS]; 2],
     /// Lower and upper acceleration limits, rad/s².
-    pub joint_acc_limit: [[f64; 7]; 2],
+    pub joint_acc_limit: [[f64; JOINTS]; 2],
     /// `table_from_robot`, homogeneous and row-major, one per robot, the agent's own first.
     pub base_frame: Vec<[[f64; 4]; 4]>,
 }
@@ -179,9 +179,9 @@ impl Env {
     /// Indices of the puck's velocities.
     pub const PUCK_VEL_IDS: [usize; 3] = [3, 4, 5];
     /// Indices of the joint positions.
-    pub const JOINT_POS_IDS: [usize; 7] = [6, 7, 8, 9, 10, 11, 12];
+    pub const JOINT_POS_IDS: [usize; JOINTS] = [6, 7, 8, 9, 10, 11, 12];
     /// Indices of the joint velocities.
-    pub const JOINT_VEL_IDS: [usize; 7] = [13, 14, 15, 16, 17, 18, 19];
+    pub const JOINT_VEL_IDS: [usize; JOINTS] = [13, 14, 15, 16, 17, 18, 19];
     /// Indices of the opponent's end effector, where there is an opponent.
     pub const OPPONENT_EE_IDS: [usize; 3] = [20, 21, 22];
 }

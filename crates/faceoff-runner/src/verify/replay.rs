@@ -13,9 +13,11 @@ use arrow_array::{
     types::{Float64Type, Int64Type},
 };
 use faceoff_episode::{Answered, EpisodeStart, StepRow};
-use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
-use faceoff_types::{AgentFault, EpisodeEnd, EpisodeOutcome, Factor, Profile, Seed};
-use faceoff_wire::{InterpolationCode, dataset::DatasetManifest};
+use faceoff_sim::{Episode, PerturbationSettings, Plant};
+use faceoff_types::{
+    AgentFault, EpisodeEnd, EpisodeOutcome, Factor, Interpolation, Profile, Seed,
+};
+use faceoff_wire::dataset::DatasetManifest;
 
 /// What it takes to simulate the episodes of an evaluation again.
 pub(super) struct Replay {
@@ -47,7 +49,7 @@ struct Course<'a> {
 
 /// What the agent made of the episode, as far as it cannot be simulated.
 struct Given {
-    interpolation: Option<InterpolationCode>,
+    interpolation: Option<Interpolation>,
     fault: Option<AgentFault>,
 }
 
@@ -71,15 +73,7 @@ impl Replay {
     pub fn episode(&self, recorded: &Recorded) -> Result<Replayed, Difference> {
         let given = given(recorded)?;
         // As for the player: an agent that never said anything has no interpolation.
-        let code = given.interpolation.map_or(Some(3), InterpolationCode::code);
-        let interpolation = Interpolation::from_code(code).ok_or_else(|| {
-            in_row(
-                recorded,
-                "interpolation",
-                shown(code),
-                "one of the protocol",
-            )
-        })?;
+        let interpolation = given.interpolation.unwrap_or(Interpolation::Cubic);
         let seed = self.seed.episode(recorded.task, recorded.episode);
         let world = Episode::new(
             recorded.task,
@@ -301,7 +295,7 @@ fn given(recorded: &Recorded) -> Result<Given, Difference> {
                 "null" => Some(None),
                 number => number.parse().ok().map(Some),
             };
-            let code = code.and_then(|code| InterpolationCode::new(code).ok());
+            let code = code.and_then(|code| Interpolation::from_code(code).ok());
             let expected = "1 to 5, -1 or null";
             Some(code.ok_or_else(|| in_row(recorded, "interpolation", text, expected))?)
         }

@@ -4,7 +4,7 @@ use super::{
     lanes::Lanes,
     spatial::{Force, Frame, Inertia, Motion, Vec3},
 };
-use crate::robot::model::{DOFS, GRAVITY_M_S2, JOINTS, LINKS, Mount, Offset, SUBSTEP_S, TOOL};
+use crate::model::{DOFS, GRAVITY_M_S2, JOINTS, LINKS, Mount, Offset, SUBSTEP_S, TOOL};
 
 /// Where everything is: frames and joint axes in the base frame.
 #[derive(Debug, Clone, Copy)]

@@ -1,7 +1,7 @@
 //! Factorisation of the joint-space inertia.
 
 use super::lanes::Lanes;
-use crate::robot::model::DOFS;
+use crate::model::DOFS;
 
 /// `L D Lᵀ` of a symmetric positive definite matrix.
 #[derive(Debug, Clone, Copy)]

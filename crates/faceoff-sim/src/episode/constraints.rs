@@ -2,7 +2,7 @@
 
 use crate::{
     dynamics::arm::Kinematics,
-    robot::model::{EE_DESIRED_HEIGHT_M, JOINTS, LIMIT_FRACTION, LINKS, TOOL},
+    model::{EE_DESIRED_HEIGHT_M, JOINTS, LIMIT_FRACTION, LINKS, TOOL},
     table::geometry::TABLE,
     world::World,
 };

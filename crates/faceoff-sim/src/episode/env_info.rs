@@ -1,7 +1,7 @@
 //! What an agent is told about its environment (PROTOCOL, "env").
 
 use crate::{
-    robot::model::{CONTROL_STEP_S, EE_DESIRED_HEIGHT_M, JOINTS, LINKS, TOOL},
+    model::{CONTROL_STEP_S, EE_DESIRED_HEIGHT_M, JOINTS, LINKS, TOOL},
     table::geometry::{PUCK, TABLE},
 };
 use faceoff_types::Task;

@@ -9,12 +9,14 @@ pub use task::EPISODE_STEPS;
 
 use crate::{
     link::{Command, Link, observation},
-    perturbation::{settings::PerturbationSettings, stream::Stream, table_factors::TableFactors},
-    robot::{interpolation::Interpolation, model::JOINTS, plant::Plant},
+    model::JOINTS,
+    perturbation::{settings::PerturbationSettings, table_factors::TableFactors},
+    robot::plant::Plant,
+    stream::Stream,
     world::World,
 };
 use constraints::ConstraintValues;
-use faceoff_types::{EpisodeEnd, Factors, Seed, Task, Violations};
+use faceoff_types::{EpisodeEnd, Factors, Interpolation, Seed, Task, Violations};
 use opponent::Opponent;
 
 /// One qualifying episode. Deterministic: no clock, no I/O. Clone saves and restores it exactly.

@@ -1,8 +1,8 @@
 //! The opponent of `hit`: robot 2 on a fixed figure of eight (MODEL, "The opponent of hit").
 
-use crate::robot::{
-    inverse_kinematics::inverse_kinematics,
+use crate::{
     model::{CONTROL_STEP_S, EE_DESIRED_HEIGHT_M, INITIAL_Q, JOINTS},
+    robot::inverse_kinematics::inverse_kinematics,
 };
 use std::f64::consts::FRAC_PI_2;
 

@@ -2,8 +2,8 @@
 //! (RULES, "Tasks").
 
 use crate::{
-    perturbation::stream::Stream,
-    robot::model::TOOL,
+    model::TOOL,
+    stream::Stream,
     table::{
         geometry::{PUCK, TABLE},
         puck::Puck,

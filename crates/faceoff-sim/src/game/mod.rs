@@ -5,11 +5,12 @@ pub mod referee;
 use crate::{
     episode::{constraints::ConstraintValues, task::PLAYABLE_Y_M},
     link::{Command, Link, observation::OBSERVATION_WITH_OPPONENT_LEN},
-    perturbation::{settings::PerturbationSettings, stream::Stream, table_factors::TableFactors},
-    robot::{interpolation::Interpolation, plant::Plant},
+    perturbation::{settings::PerturbationSettings, table_factors::TableFactors},
+    robot::plant::Plant,
+    stream::Stream,
     world::World,
 };
-use faceoff_types::{Factors, Seed, Violations};
+use faceoff_types::{Factors, Interpolation, Seed, Violations};
 use referee::{RULES, RallyEnd, Referee};
 
 /// Control steps of a game: 15 minutes.

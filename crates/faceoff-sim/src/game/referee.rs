@@ -1,7 +1,7 @@
 //! Goals, fouls and stuck pucks (RULES, "Tournament").
 
 use crate::{
-    robot::model::CONTROL_STEP_S,
+    model::CONTROL_STEP_S,
     table::{geometry::TABLE, puck::Puck},
 };
 

@@ -1,11 +1,8 @@
 //! Late observations and late actions (RULES, factor `delay`).
 
 use super::Command;
-use crate::{
-    perturbation::{settings::DelaySettings, stream::Stream},
-    robot::interpolation::Interpolation,
-    world::World,
-};
+use crate::{perturbation::settings::DelaySettings, stream::Stream, world::World};
+use faceoff_types::Interpolation;
 
 /// Numbers of an observation that describe the puck, the part that arrives late.
 const PUCK_LEN: usize = 6;

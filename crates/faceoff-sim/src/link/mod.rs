@@ -5,11 +5,11 @@ mod latency;
 pub mod observation;
 
 use crate::{
-    perturbation::{noise::ObservationNoise, settings::PerturbationSettings, stream::Stream},
-    robot::interpolation::Interpolation,
+    perturbation::{noise::ObservationNoise, settings::PerturbationSettings},
+    stream::Stream,
     world::World,
 };
-use faceoff_types::{Factor, Factors, Seed};
+use faceoff_types::{Factor, Factors, Interpolation, Seed};
 use latency::Latency;
 use observation::{OBSERVATION_WITH_OPPONENT_LEN, observe, wrap};
 

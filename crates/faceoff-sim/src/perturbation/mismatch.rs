@@ -1,17 +1,15 @@
 //! The season's plant.
 
-use super::{
-    settings::{MismatchSettings, PerturbationSettings},
-    stream::Stream,
-};
+use super::settings::{MismatchSettings, PerturbationSettings};
 use crate::{
     dynamics::arm::{Bodies, Kinematics, controller_torques, plant_bias},
+    model::{DOFS, EE_DESIRED_HEIGHT_M, INITIAL_Q, JOINTS, LINKS},
     robot::{
         inverse_kinematics::{full, inverse_kinematics},
-        model::{DOFS, EE_DESIRED_HEIGHT_M, INITIAL_Q, JOINTS, LINKS},
         plant::Plant,
         universal_joint::vertical,
     },
+    stream::Stream,
 };
 use faceoff_types::{Factor, Factors, Seed};
 

@@ -5,6 +5,5 @@ mod mismatch;
 pub mod noise;
 pub mod rehearsal_table;
 pub mod settings;
-pub mod stream;
 pub mod table_factors;
 pub mod tracking_loss;

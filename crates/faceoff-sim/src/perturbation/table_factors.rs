@@ -2,9 +2,10 @@
 
 use super::{
     disturbance::Disturbance, rehearsal_table::RehearsalTable, settings::PerturbationSettings,
-    stream::Stream, tracking_loss::TrackingLoss,
+    tracking_loss::TrackingLoss,
 };
 use crate::{
+    stream::Stream,
     table::{geometry::PUCK, puck::Puck},
     world::World,
 };

@@ -1,6 +1,7 @@
 //! Losing sight of the puck.
 
-use super::{settings::TrackingLossSettings, stream::Stream};
+use super::settings::TrackingLossSettings;
+use crate::stream::Stream;
 
 /// Decides at which control steps the puck is not seen.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,10 +1,7 @@
 //! The 1 kHz torque controller with its safety limiter (MODEL, "Controller").
 
-use super::{
-    interpolation::Setpoint,
-    model::{JOINTS, LINKS, SUBSTEP_S},
-    plant::Plant,
-};
+use super::{plant::Plant, trajectory::Setpoint};
+use crate::model::{JOINTS, LINKS, SUBSTEP_S};
 
 /// How fast the limiter lets a joint approach its stop, 1/s (ref).
 const LIMITER_GAIN: f64 = 20.0;

@@ -1,7 +1,9 @@
 //! Damped least-squares inverse kinematics of the end effector's position (MODEL, "The opponent").
 
-use super::model::{DOFS, JOINTS, LIMIT_FRACTION, LINKS};
-use crate::dynamics::{arm::Kinematics, spatial::Vec3};
+use crate::{
+    dynamics::{arm::Kinematics, spatial::Vec3},
+    model::{DOFS, JOINTS, LIMIT_FRACTION, LINKS},
+};
 use nalgebra::{Matrix3, Vector3};
 
 /// Added to the diagonal of the normal equations (ref).

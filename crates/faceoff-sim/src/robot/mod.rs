@@ -1,8 +1,7 @@
-//! The robot: its numbers, its controller and its inverse kinematics.
+//! The robot: its plant, its trajectories, its controllers and its inverse kinematics.
 
 pub mod controller;
-pub mod interpolation;
 pub mod inverse_kinematics;
-pub mod model;
 pub mod plant;
+pub mod trajectory;
 pub mod universal_joint;

@@ -1,9 +1,11 @@
 //! What physically moves: nominal, or off by the season's model mismatch.
 
-use super::model::{DOFS, JOINTS, LINKS};
-use crate::dynamics::{
-    arm::{Bodies, Kinematics, mass_matrix},
-    factor::Factor,
+use crate::{
+    dynamics::{
+        arm::{Bodies, Kinematics, mass_matrix},
+        factor::Factor,
+    },
+    model::{DOFS, JOINTS, LINKS},
 };
 
 /// The robot as it really is: masses, gains, damping and dry friction. Made once per season and

@@ -4,7 +4,7 @@
 //! A lean of 0.05 rad brings the cylinder's side half a millimetre closer to the puck at the height of
 //! the puck's edge, as much as a glancing contact is deep.
 
-use crate::robot::model::TOOL;
+use crate::model::TOOL;
 
 /// A leaning cylinder in the table frame.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,7 +1,7 @@
 //! The puck's motion.
 
 use super::geometry::PUCK;
-use crate::robot::model::SUBSTEP_S;
+use crate::model::SUBSTEP_S;
 
 /// The puck in the table frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

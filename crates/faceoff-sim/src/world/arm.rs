@@ -3,15 +3,16 @@
 use super::joints::JointConstraints;
 use crate::{
     dynamics::arm::Kinematics,
+    model::{DOFS, JOINTS, SUBSTEP_S, SUBSTEPS},
     robot::{
         controller::Limiter,
-        interpolation::{Interpolation, Setpoint, Trajectory, interpolate},
         inverse_kinematics::full,
-        model::{DOFS, JOINTS, SUBSTEP_S, SUBSTEPS},
         plant::Plant,
+        trajectory::{Setpoint, Trajectory, interpolate},
         universal_joint::{UniversalJoint, vertical},
     },
 };
+use faceoff_types::Interpolation;
 
 /// One arm with its controller, exactly as far as its future depends on it.
 #[derive(Debug, Clone, PartialEq)]

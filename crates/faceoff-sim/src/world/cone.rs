@@ -177,7 +177,7 @@ fn eliminate<const N: usize>(matrix: &[[f64; N]; N], target: &[f64; N], n: usize
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::perturbation::stream::Stream;
+    use crate::stream::Stream;
     use faceoff_types::Seed;
 
     /// A random symmetric, positive definite matrix and a target whose pushes are as often off as on.

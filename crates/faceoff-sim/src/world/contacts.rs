@@ -2,7 +2,7 @@
 
 use super::cone::{DIRECTIONS, solve_cone};
 use crate::{
-    robot::model::DOFS,
+    model::DOFS,
     table::{
         contact_finder::Touch,
         contact_law::{MALLET_INVERSE_INERTIA, Material},

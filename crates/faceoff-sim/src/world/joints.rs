@@ -5,10 +5,8 @@
 //! set, all forces follow from one linear solve, and the set is corrected until it agrees with them.
 
 use crate::{
-    robot::{
-        model::{DOFS, JOINTS, LINKS},
-        plant::Plant,
-    },
+    model::{DOFS, JOINTS, LINKS},
+    robot::plant::Plant,
     table::contact_law::{JOINT, Material},
 };
 use std::f64::consts::FRAC_PI_2;

@@ -9,11 +9,8 @@ mod substep;
 
 use crate::{
     dynamics::arm::Kinematics,
-    robot::{
-        interpolation::Interpolation,
-        model::{DOFS, INITIAL_Q, JOINTS, SUBSTEPS},
-        plant::Plant,
-    },
+    model::{DOFS, INITIAL_Q, JOINTS, SUBSTEPS},
+    robot::plant::Plant,
     table::{
         contact_finder,
         contact_law::{MALLET, RIM},
@@ -24,6 +21,7 @@ use crate::{
 };
 pub use arm::Arm;
 use contacts::{Contacts, MalletMotion, Pair};
+use faceoff_types::Interpolation;
 use solver::add;
 use wide::f64x2;
 

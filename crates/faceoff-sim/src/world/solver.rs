@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     dynamics::{factor::Factor, lanes::Lanes},
-    robot::model::DOFS,
+    model::DOFS,
 };
 
 /// Newton steps before the last one is taken as it is; two or three are usual where one is not

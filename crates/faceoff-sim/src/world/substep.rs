@@ -14,10 +14,8 @@ use crate::{
         lanes::Lanes,
         spatial::Vec3,
     },
-    robot::{
-        controller::{filter_velocity, torque},
-        model::{DOFS, JOINTS, SUBSTEP_S},
-    },
+    model::{DOFS, JOINTS, SUBSTEP_S},
+    robot::controller::{filter_velocity, torque},
     table::{
         contact_finder::{self, Touch},
         contact_law::{MALLET, MALLETS, RIM},

@@ -2,8 +2,7 @@
 
 use crate::policy::strike;
 use faceoff_sim::{
-    Command, Episode, Game, GameSetup, Interpolation, PerturbationSettings, Plant,
-    robot::model::INITIAL_Q,
+    Command, Episode, Game, GameSetup, Interpolation, PerturbationSettings, Plant, model::INITIAL_Q,
 };
 use faceoff_types::{Factors, Seed, Task};
 

@@ -6,7 +6,7 @@ use faceoff_sim::{
         factor::Factor,
         lanes::Lanes,
     },
-    robot::model::{DOFS, INITIAL_Q, JOINTS},
+    model::{DOFS, INITIAL_Q, JOINTS},
 };
 use std::{
     cell::Cell,

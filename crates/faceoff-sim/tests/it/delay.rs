@@ -1,9 +1,8 @@
 //! The rehearsal's delays and table (RULES, factor `delay`).
 
 use faceoff_sim::{
-    Episode, Interpolation, PerturbationSettings, Plant, World,
-    perturbation::{rehearsal_table::RehearsalTable, stream::Stream},
-    robot::model::INITIAL_Q,
+    Episode, Interpolation, PerturbationSettings, Plant, World, model::INITIAL_Q,
+    perturbation::rehearsal_table::RehearsalTable, stream::Stream,
 };
 use faceoff_types::{Factor, Factors, Seed, Task};
 

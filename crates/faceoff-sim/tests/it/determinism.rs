@@ -1,9 +1,7 @@
 //! The same seed, the same bits: on every machine, in every build, after every restore.
 
 use crate::policy::strike;
-use faceoff_sim::{
-    Episode, Interpolation, PerturbationSettings, Plant, World, robot::model::INITIAL_Q,
-};
+use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant, World, model::INITIAL_Q};
 use faceoff_types::{Factors, Seed, Task};
 
 fn episode(task: Task, factors: Factors) -> Episode {

@@ -8,7 +8,7 @@ use faceoff_sim::{
     Command, Game, GameSetup, Interpolation, PerturbationSettings, Plant, RallyEnd, WINDOW_STEPS,
     World,
     game::referee::Referee,
-    robot::model::{EE_DESIRED_HEIGHT_M, INITIAL_Q},
+    model::{EE_DESIRED_HEIGHT_M, INITIAL_Q},
 };
 use faceoff_types::{Factors, Seed, Violations};
 use serde_json::Value;

@@ -1,6 +1,6 @@
 //! How often an agent that holds still succeeds, beside the reference's own statistics (REFERENCE).
 
-use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant, robot::model::INITIAL_Q};
+use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant, model::INITIAL_Q};
 use faceoff_types::{Factors, Seed, Task, Violations};
 
 /// Successes and episodes with a violation.

@@ -2,11 +2,11 @@
 
 use faceoff_sim::{
     Episode, Interpolation, PerturbationSettings, Plant,
+    model::INITIAL_Q,
     perturbation::{
-        disturbance::Disturbance, noise::ObservationNoise, stream::Stream,
-        tracking_loss::TrackingLoss,
+        disturbance::Disturbance, noise::ObservationNoise, tracking_loss::TrackingLoss,
     },
-    robot::model::INITIAL_Q,
+    stream::Stream,
     table::puck::Puck,
 };
 use faceoff_types::{Factor, Factors, Seed, Task};

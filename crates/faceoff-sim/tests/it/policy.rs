@@ -1,8 +1,8 @@
 //! A simple agent, so that golden hashes cover contacts.
 
-use faceoff_sim::robot::{
-    inverse_kinematics::inverse_kinematics,
+use faceoff_sim::{
     model::{EE_DESIRED_HEIGHT_M, JOINTS},
+    robot::inverse_kinematics::inverse_kinematics,
 };
 
 /// Control steps of one stroke.

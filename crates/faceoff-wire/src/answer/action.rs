@@ -1,3 +1,4 @@
+use super::marks;
 use serde::de::{DeserializeSeed, Deserializer, Error as _, SeqAccess, Visitor};
 use std::fmt;
 
@@ -8,9 +9,6 @@ pub(super) struct ActionSeed<'s> {
     pub shape: &'static [usize],
     pub out: &'s mut Vec<f64>,
 }
-
-/// serde carries only text in its errors; this one marks "well-formed so far, but another shape".
-pub(super) const SHAPE_MARK: &str = "faceoff: shape";
 
 impl<'de> DeserializeSeed<'de> for ActionSeed<'_> {
     type Value = ();
@@ -23,17 +21,17 @@ impl<'de> Visitor<'de> for ActionSeed<'_> {
     type Value = ();
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(SHAPE_MARK)
+        f.write_str(marks::SHAPE)
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<(), A::Error> {
         let Some((&expected, inner)) = self.shape.split_first() else {
-            return Err(A::Error::custom(SHAPE_MARK));
+            return Err(A::Error::custom(marks::SHAPE));
         };
         if inner.is_empty() {
             for _ in 0..expected {
                 let Some(Number(value)) = seq.next_element()? else {
-                    return Err(A::Error::custom(SHAPE_MARK));
+                    return Err(A::Error::custom(marks::SHAPE));
                 };
                 self.out.push(value);
             }
@@ -44,7 +42,7 @@ impl<'de> Visitor<'de> for ActionSeed<'_> {
                     out: self.out,
                 };
                 if seq.next_element_seed(seed)?.is_none() {
-                    return Err(A::Error::custom(SHAPE_MARK));
+                    return Err(A::Error::custom(marks::SHAPE));
                 }
             }
         }
@@ -52,7 +50,7 @@ impl<'de> Visitor<'de> for ActionSeed<'_> {
         // error of its own; asking once more names it as the shape.
         match seq.next_element::<serde::de::IgnoredAny>()? {
             None => Ok(()),
-            Some(_) => Err(A::Error::custom(SHAPE_MARK)),
+            Some(_) => Err(A::Error::custom(marks::SHAPE)),
         }
     }
 }
@@ -65,7 +63,7 @@ impl<'de> serde::Deserialize<'de> for Number {
         impl Visitor<'_> for NumberVisitor {
             type Value = Number;
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str(SHAPE_MARK)
+                f.write_str(marks::SHAPE)
             }
             fn visit_f64<E>(self, value: f64) -> Result<Number, E> {
                 Ok(Number(value))

@@ -1,25 +1,33 @@
 //! Says what was wrong with a line that the one-pass parser refused. Not on the normal path.
 
-use super::{action::SHAPE_MARK, fields::TWICE_MARK};
-use crate::InterpolationCode;
-use faceoff_types::AgentFaultKind;
+use super::marks;
+use crate::protocol::MAX_LINE_BYTES;
+use faceoff_types::{AgentFaultKind, Interpolation};
 use serde_json::Value;
+
+/// The fault of a line longer than the protocol allows.
+#[must_use]
+pub const fn too_long() -> AgentFaultKind {
+    AgentFaultKind::LineTooLong {
+        limit_bytes: MAX_LINE_BYTES as u64,
+    }
+}
 
 /// The fault behind a parser's error. `interpolation` is the agreed one where an action was due.
 pub(super) fn diagnose(
     text: &str,
     error: &serde_json::Error,
-    interpolation: Option<InterpolationCode>,
+    interpolation: Option<Interpolation>,
 ) -> AgentFaultKind {
     let message = error.to_string();
-    if let Some(rest) = message.strip_prefix(TWICE_MARK) {
+    if let Some(rest) = message.strip_prefix(marks::TWICE) {
         let key = rest.split(' ').next().unwrap_or_default();
         return AgentFaultKind::NotJson {
             detail: format!("the key {key:?} is given twice"),
         };
     }
     if let Some(code) = interpolation
-        && message.contains(SHAPE_MARK)
+        && message.contains(marks::SHAPE)
     {
         return wrong_shape(text, code);
     }
@@ -36,7 +44,7 @@ pub(super) fn diagnose(
     AgentFaultKind::NotJson { detail }
 }
 
-fn wrong_shape(text: &str, code: InterpolationCode) -> AgentFaultKind {
+fn wrong_shape(text: &str, code: Interpolation) -> AgentFaultKind {
     let got = match serde_json::from_str::<Value>(text) {
         Ok(value) => describe_action(&value["action"]),
         Err(error) if error.to_string().starts_with("number out of range") => {

@@ -1,6 +1,6 @@
-use super::{Scalar, action::ActionSeed, diagnosis};
-use crate::{InterpolationCode, MAX_LINE_BYTES};
-use faceoff_types::AgentFaultKind;
+use super::{action::ActionSeed, diagnosis, marks, scalar::Scalar};
+use crate::protocol::MAX_LINE_BYTES;
+use faceoff_types::{AgentFaultKind, Interpolation};
 use serde::{
     Deserializer as _,
     de::{Error as _, IgnoredAny, MapAccess, Visitor},
@@ -22,16 +22,13 @@ pub(super) struct Fields<'a> {
 }
 
 /// Where an expected action goes.
-pub(super) type ActionSink<'s> = Option<(InterpolationCode, &'s mut Vec<f64>)>;
-
-/// serde carries only text in its errors; this one marks a repeated key, which follows it.
-pub(super) const TWICE_MARK: &str = "faceoff: twice ";
+pub(super) type ActionSink<'s> = Option<(Interpolation, &'s mut Vec<f64>)>;
 
 impl<'a> Fields<'a> {
     /// Parses one line. Without a sink an `action` is skipped like any unknown field.
     pub fn parse(line: &'a [u8], sink: ActionSink<'_>) -> Result<Self, AgentFaultKind> {
         if line.len() > MAX_LINE_BYTES {
-            return Err(super::too_long());
+            return Err(diagnosis::too_long());
         }
         let text = std::str::from_utf8(line).map_err(|error| AgentFaultKind::NotJson {
             detail: format!("not UTF-8 after byte {}", error.valid_up_to()),
@@ -111,7 +108,7 @@ impl<'de> Visitor<'de> for FieldsVisitor<'_> {
                 Key::Version => &mut fields.version,
                 Key::Action => match &mut self.sink {
                     Some(_) if fields.has_action => {
-                        return Err(A::Error::custom(format_args!("{TWICE_MARK}action")));
+                        return Err(A::Error::custom(format_args!("{}action", marks::TWICE)));
                     }
                     Some((code, out)) => {
                         map.next_value_seed(ActionSeed {
@@ -133,7 +130,8 @@ impl<'de> Visitor<'de> for FieldsVisitor<'_> {
             };
             if field.replace(map.next_value()?).is_some() {
                 return Err(A::Error::custom(format_args!(
-                    "{TWICE_MARK}{}",
+                    "{}{}",
+                    marks::TWICE,
                     key.as_str()
                 )));
             }

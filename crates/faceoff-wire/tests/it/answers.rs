@@ -1,12 +1,8 @@
-use faceoff_types::AgentFaultKind;
+use faceoff_types::{AgentFaultKind, Interpolation};
 use faceoff_wire::{
-    InterpolationCode, MAX_LINE_BYTES,
+    MAX_LINE_BYTES,
     answer::{parse_act, parse_ready, parse_reset_ready},
 };
-
-fn cubic() -> InterpolationCode {
-    InterpolationCode::new(Some(3)).unwrap()
-}
 
 fn row(value: &str) -> String {
     format!("[{}]", [value; 7].join(","))
@@ -22,7 +18,7 @@ fn good() -> String {
 
 fn parse(line: &str) -> Result<Vec<f64>, AgentFaultKind> {
     let mut action = vec![9.0; 3];
-    parse_act(line.as_bytes(), 4, cubic(), &mut action).map(|()| action)
+    parse_act(line.as_bytes(), 4, Interpolation::Cubic, &mut action).map(|()| action)
 }
 
 #[track_caller]
@@ -88,10 +84,10 @@ fn every_shape_of_the_protocol_is_read() {
         (Some(-1), nest(2, &row("1"))),
         (None, nest(20, &nest(3, &row("1")))),
     ] {
-        let code = InterpolationCode::new(code).unwrap();
+        let code = Interpolation::from_code(code).unwrap();
         let mut action = Vec::new();
         parse_act(act("0", &text).as_bytes(), 0, code, &mut action).unwrap();
-        assert_eq!(action.len(), code.action_len(), "{code}");
+        assert_eq!(action.len(), code.len(), "{code}");
     }
 }
 
@@ -181,7 +177,8 @@ fn rubbish_is_not_json() {
     not_json("{\"type\":NaNsense}", "at character 9");
     not_json("loss: NaN", "at character 1");
     let mut action = Vec::new();
-    let fault = parse_act(b"{\"type\":\"\xff\"}", 0, cubic(), &mut action).unwrap_err();
+    let fault =
+        parse_act(b"{\"type\":\"\xff\"}", 0, Interpolation::Cubic, &mut action).unwrap_err();
     assert_eq!(
         fault,
         AgentFaultKind::NotJson {
@@ -247,7 +244,7 @@ fn ready_answers_hello() {
     let ready = |text: &str| parse_ready(text.as_bytes());
     let full = r#"{"type":"ready","protocol":1,"interpolation":3,"name":"x","version":"2"}"#;
     let parsed = ready(full).unwrap();
-    assert_eq!(parsed.interpolation, cubic());
+    assert_eq!(parsed.interpolation, Interpolation::Cubic);
     assert_eq!(
         (parsed.name.as_deref(), parsed.version.as_deref()),
         (Some("x"), Some("2"))

@@ -1,11 +1,12 @@
+use faceoff_types::Interpolation;
 use faceoff_wire::{
-    InterpolationCode, Message,
+    Message,
     answer::{parse_act, parse_ready, parse_reset_ready},
     quote_line,
 };
 use proptest::prelude::*;
 
-fn interpolation() -> impl Strategy<Value = InterpolationCode> {
+fn interpolation() -> impl Strategy<Value = Interpolation> {
     prop::sample::select(vec![
         Some(1),
         Some(2),
@@ -15,7 +16,7 @@ fn interpolation() -> impl Strategy<Value = InterpolationCode> {
         Some(-1),
         None,
     ])
-    .prop_map(|code| InterpolationCode::new(code).expect("a code of the protocol"))
+    .prop_map(|code| Interpolation::from_code(code).expect("a code of the protocol"))
 }
 
 fn finite() -> impl Strategy<Value = f64> {
@@ -43,7 +44,7 @@ proptest! {
         step in any::<u32>(),
         pool in prop::collection::vec(finite(), 420),
     ) {
-        let values = &pool[..code.action_len()];
+        let values = &pool[..code.len()];
         let mut action = Vec::new();
         parse_act(act_line(step, code.shape(), values).as_bytes(), step, code, &mut action).unwrap();
         prop_assert_eq!(
@@ -90,13 +91,13 @@ proptest! {
         len in 0..20usize,
         insert in "[\\[\\]{}\",:0-9eE.NaInfity\\\\ -]{0,8}",
     ) {
-        let mut line = act_line(5, code.shape(), &pool[..code.action_len()]);
+        let mut line = act_line(5, code.shape(), &pool[..code.len()]);
         let start = at.index(line.len());
         let end = (start + len).min(line.len());
         line.replace_range(start..end, &insert);
         let mut action = Vec::new();
         if parse_act(line.as_bytes(), 5, code, &mut action).is_ok() {
-            prop_assert_eq!(action.len(), code.action_len());
+            prop_assert_eq!(action.len(), code.len());
             prop_assert!(action.iter().all(|value| value.is_finite()));
         }
     }

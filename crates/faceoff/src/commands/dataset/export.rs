@@ -10,8 +10,7 @@ use arrow_array::{
 };
 use clap::Args;
 use faceoff_runner::dataset::{Dataset, EpisodeRecord, StepBatches};
-use faceoff_types::{Task, Tier};
-use faceoff_wire::InterpolationCode;
+use faceoff_types::{Interpolation, Task, Tier};
 use serde_json::{Map, Value, json};
 use std::{
     fs::{self, File},
@@ -170,7 +169,7 @@ fn shape(episode: &EpisodeRecord) -> anyhow::Result<&'static [usize]> {
                 .with_context(|| format!("interpolation {code:?}"))?,
         ),
     };
-    Ok(InterpolationCode::new(code)?.shape())
+    Ok(Interpolation::from_code(code)?.shape())
 }
 
 /// What was violated in which episode, in the words of 2023.

@@ -1,7 +1,6 @@
 //! The numbers of the KUKA LBR iiwa 14 with rod and mallet (MODEL, "Arm").
 
-/// Driven joints of an arm.
-pub const JOINTS: usize = 7;
+pub use faceoff_types::{JOINTS, SUBSTEPS};
 
 /// Degrees of freedom of the plant: the driven joints and the two hinges of the universal joint.
 pub const DOFS: usize = 9;
@@ -259,9 +258,6 @@ pub const GRAVITY_M_S2: f64 = 9.81;
 
 /// The length of a physics step, s.
 pub const SUBSTEP_S: f64 = 0.001;
-
-/// Physics steps of one control step.
-pub const SUBSTEPS: usize = 20;
 
 /// The length of a control step, s.
 pub const CONTROL_STEP_S: f64 = 0.02;

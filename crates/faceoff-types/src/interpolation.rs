@@ -1,0 +1,173 @@
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Driven joints of an arm: the innermost length of every action.
+pub const JOINTS: usize = 7;
+
+/// Physics steps of a control step: the outermost length of a whole-trajectory action.
+pub const SUBSTEPS: usize = 20;
+
+/// Numbers in the longest action, a whole trajectory.
+pub const MAX_ACTION_LEN: usize = SUBSTEPS * 3 * JOINTS;
+
+/// How an agent's actions become a trajectory (PROTOCOL). The protocol's code for it is 1, 2, 3, 4, 5,
+/// −1 or null. Polynomials start at the end of the previous commanded trajectory, at reset at the
+/// initial position with zero velocity and acceleration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(try_from = "Option<i64>", into = "Option<i64>")]
+pub enum Interpolation {
+    /// 1: position, linear; shape `[7]`.
+    Linear,
+    /// 2: position, quadratic; shape `[7]`.
+    Quadratic,
+    /// 3: position and velocity, cubic; shape `[2][7]`.
+    Cubic,
+    /// 4: position and velocity, quartic; shape `[2][7]`.
+    Quartic,
+    /// 5: position, velocity and acceleration, quintic; shape `[3][7]`.
+    Quintic,
+    /// −1: position and velocity, each linear; shape `[2][7]`.
+    LinearBoth,
+    /// null: position, velocity and acceleration at every millisecond; shape `[20][3][7]`.
+    Trajectory,
+}
+
+/// A number that is no interpolation of the protocol.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("unknown interpolation {0}: expected 1, 2, 3, 4, 5, -1 or null")]
+pub struct UnknownInterpolation(pub i64);
+
+impl Interpolation {
+    /// The interpolation of a code; `None` is the protocol's null.
+    ///
+    /// # Errors
+    /// The number is none of the protocol's.
+    pub const fn from_code(code: Option<i64>) -> Result<Self, UnknownInterpolation> {
+        Ok(match code {
+            Some(1) => Self::Linear,
+            Some(2) => Self::Quadratic,
+            Some(3) => Self::Cubic,
+            Some(4) => Self::Quartic,
+            Some(5) => Self::Quintic,
+            Some(-1) => Self::LinearBoth,
+            None => Self::Trajectory,
+            Some(unknown) => return Err(UnknownInterpolation(unknown)),
+        })
+    }
+
+    /// The code; `None` is the protocol's null.
+    #[must_use]
+    pub const fn code(self) -> Option<i64> {
+        match self {
+            Self::Linear => Some(1),
+            Self::Quadratic => Some(2),
+            Self::Cubic => Some(3),
+            Self::Quartic => Some(4),
+            Self::Quintic => Some(5),
+            Self::LinearBoth => Some(-1),
+            Self::Trajectory => None,
+        }
+    }
+
+    /// Lengths of an action's nested arrays, outermost first.
+    #[must_use]
+    pub const fn shape(self) -> &'static [usize] {
+        match self {
+            Self::Linear | Self::Quadratic => &[JOINTS],
+            Self::Cubic | Self::Quartic | Self::LinearBoth => &[2, JOINTS],
+            Self::Quintic => &[3, JOINTS],
+            Self::Trajectory => &[SUBSTEPS, 3, JOINTS],
+        }
+    }
+
+    /// Numbers in an action: the product of its shape.
+    #[must_use]
+    #[expect(clippy::len_without_is_empty, reason = "an action is never empty")]
+    pub const fn len(self) -> usize {
+        match self {
+            Self::Linear | Self::Quadratic => JOINTS,
+            Self::Cubic | Self::Quartic | Self::LinearBoth => 2 * JOINTS,
+            Self::Quintic => 3 * JOINTS,
+            Self::Trajectory => MAX_ACTION_LEN,
+        }
+    }
+
+    /// The action that commands a position, rad, at rest, in the first [`Interpolation::len`] places.
+    #[must_use]
+    pub fn held(self, position: &[f64; JOINTS]) -> [f64; MAX_ACTION_LEN] {
+        let mut action = [0.0; MAX_ACTION_LEN];
+        let every = match self {
+            Self::Trajectory => 3 * JOINTS,
+            _ => MAX_ACTION_LEN,
+        };
+        for point in action.chunks_mut(every) {
+            point[..JOINTS].copy_from_slice(position);
+        }
+        action
+    }
+}
+
+impl TryFrom<Option<i64>> for Interpolation {
+    type Error = UnknownInterpolation;
+    fn try_from(code: Option<i64>) -> Result<Self, Self::Error> {
+        Self::from_code(code)
+    }
+}
+
+impl From<Interpolation> for Option<i64> {
+    fn from(interpolation: Interpolation) -> Self {
+        interpolation.code()
+    }
+}
+
+impl fmt::Display for Interpolation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.code() {
+            Some(code) => code.fmt(f),
+            None => f.write_str("null"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_protocol_knows_seven_interpolations() {
+        let known: Vec<i64> = (-300..300)
+            .filter(|code| Interpolation::from_code(Some(*code)).is_ok())
+            .collect();
+        assert_eq!(known, [-1, 1, 2, 3, 4, 5]);
+        assert_eq!(
+            Interpolation::from_code(Some(i64::MAX)),
+            Err(UnknownInterpolation(i64::MAX))
+        );
+    }
+
+    #[test]
+    fn codes_shapes_and_lengths_are_those_of_the_protocol() {
+        for (code, len) in [
+            (Some(1), 7),
+            (Some(2), 7),
+            (Some(3), 14),
+            (Some(4), 14),
+            (Some(5), 21),
+            (Some(-1), 14),
+            (None, 420),
+        ] {
+            let interpolation = Interpolation::from_code(code).unwrap();
+            assert_eq!(interpolation.code(), code);
+            assert_eq!(interpolation.len(), len, "{interpolation}");
+            assert_eq!(interpolation.shape().iter().product::<usize>(), len);
+        }
+    }
+
+    #[test]
+    fn null_is_a_code_in_json() {
+        let null: Interpolation = serde_json::from_str("null").unwrap();
+        assert_eq!(null, Interpolation::Trajectory);
+        assert_eq!(serde_json::to_string(&null).unwrap(), "null");
+        assert!(serde_json::from_str::<Interpolation>("6").is_err());
+    }
+}

@@ -1,0 +1,7 @@
+//! serde carries only text in its errors; these words tell the parser's refusals from each other.
+
+/// Well-formed so far, but another shape than the agreed one.
+pub(super) const SHAPE: &str = "faceoff: shape";
+
+/// A repeated key, which follows.
+pub(super) const TWICE: &str = "faceoff: twice ";

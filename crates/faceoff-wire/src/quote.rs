@@ -1,0 +1,37 @@
+/// Characters of an offending line that are kept in a fault.
+const QUOTED_CHARS: usize = 400;
+
+/// An offending line as a fault shows it: lossy UTF-8, cut to 400 characters.
+#[must_use]
+pub fn quote_line(line: &[u8]) -> String {
+    // Four bytes hold any character, so that a long line is not decoded as a whole.
+    let head = &line[..line.len().min(4 * QUOTED_CHARS)];
+    let text = String::from_utf8_lossy(head);
+    let mut quoted: String = text.chars().take(QUOTED_CHARS).collect();
+    if quoted.len() < text.len() || head.len() < line.len() {
+        quoted.push('…');
+        if quoted.chars().count() > QUOTED_CHARS {
+            quoted = quoted.chars().take(QUOTED_CHARS - 1).chain(['…']).collect();
+        }
+    }
+    quoted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quoted_line_is_cut_to_400_characters_and_says_so() {
+        assert_eq!(quote_line(b"{}"), "{}");
+        assert_eq!(quote_line(&[b'a'; 400]), "a".repeat(400));
+        let cut = quote_line(&[b'a'; 401]);
+        assert_eq!(cut.chars().count(), 400);
+        assert!(cut.ends_with("a…"));
+        assert_eq!(
+            quote_line("é".repeat(50_000).as_bytes()).chars().count(),
+            400
+        );
+        assert_eq!(quote_line(&[0xff]), "\u{fffd}");
+    }
+}
