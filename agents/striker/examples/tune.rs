@@ -12,7 +12,7 @@ use std::time::Instant;
 
 use anyhow::{Context, bail};
 use faceoff_sim::{Episode, EpisodeState, Interpolation, PerturbationSettings, Plant, env_info};
-use faceoff_types::{Factor, Profile, Seed, Task};
+use faceoff_types::{Profile, Seed, Task};
 use striker::{Agent, BaseFrame, Env, RadiusInfo, RobotInfo, TableInfo};
 
 /// Sums over the episodes of a task.

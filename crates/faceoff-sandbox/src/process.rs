@@ -3,7 +3,7 @@ use crate::{
     cgroup::AgentCgroup,
     command_check::check_command,
     end::{End, Evidence},
-    line_pipe::{LinePipe, Written},
+    line_pipe::{LinePipe, Written, wait_for_any},
     output_holders,
     prepared::{Prepared, Started},
     process_tree::ProcessTree,
@@ -12,6 +12,7 @@ use crate::{
     sweep,
 };
 use faceoff_types::AgentFaultKind;
+use rustix::event::{PollFd, PollFlags};
 use std::{
     fs,
     sync::Once,
@@ -23,6 +24,27 @@ const FIRST_LOOK: Duration = Duration::from_millis(100);
 /// How long to wait for the exit status once the pipes are closed.
 const END_PATIENCE: Duration = Duration::from_millis(500);
 
+/// When to look again whether an agent that says nothing has closed its output.
+#[derive(Debug)]
+struct NextLook {
+    at: Instant,
+    pause: Duration,
+}
+
+impl NextLook {
+    fn first(now: Instant) -> Self {
+        Self {
+            at: now + FIRST_LOOK,
+            pause: FIRST_LOOK,
+        }
+    }
+
+    fn after_a_longer_pause(&mut self, now: Instant) {
+        self.pause *= 2;
+        self.at = now + self.pause;
+    }
+}
+
 /// A running agent. Dropping it kills and reaps the whole tree and removes its cgroup and scratch.
 #[derive(Debug)]
 pub struct AgentProcess {
@@ -30,6 +52,7 @@ pub struct AgentProcess {
     stderr: StderrTail,
     tree: ProcessTree,
     limits: Limits,
+    next_look: NextLook,
     end: Option<End>,
 }
 
@@ -81,6 +104,7 @@ impl AgentProcess {
             stderr,
             tree,
             limits: spec.limits,
+            next_look: NextLook::first(Instant::now()),
             end: None,
         })
     }
@@ -92,7 +116,10 @@ impl AgentProcess {
     /// [`WriteError::Closed`] and [`WriteError::TimedOut`] are the agent's doing, the rest is ours.
     pub fn write_line(&mut self, line: &[u8], deadline: Instant) -> Result<Instant, WriteError> {
         match self.lines.write(line, deadline) {
-            Ok(Written::At(at)) => Ok(at),
+            Ok(Written::At(at)) => {
+                self.next_look = NextLook::first(at);
+                Ok(at)
+            }
             Ok(Written::TimedOut) => Err(WriteError::TimedOut),
             Ok(Written::Closed) => {
                 self.check_platform()?;
@@ -102,7 +129,8 @@ impl AgentProcess {
         }
     }
 
-    /// Waits for the agent's next line, of at most `max_bytes` without its newline, until `deadline`.
+    /// Waits for the agent's next line, of at most `max_bytes` without its newline, until `deadline`;
+    /// one that has passed takes what is there already.
     ///
     /// # Errors
     /// When the pipe or the sandbox itself failed; never for what the agent does.
@@ -111,13 +139,8 @@ impl AgentProcess {
         max_bytes: usize,
         deadline: Instant,
     ) -> Result<ReadLine, SandboxError> {
-        let mut pause = FIRST_LOOK;
         let outcome = loop {
-            let until = if self.tree.is_sandboxed() {
-                deadline.min(Instant::now() + pause)
-            } else {
-                deadline
-            };
+            let until = self.until_next_look(deadline);
             let outcome = self
                 .lines
                 .read_line(max_bytes, until)
@@ -128,12 +151,43 @@ impl AgentProcess {
             if self.output_is_abandoned()? {
                 break ReadLine::Closed;
             }
-            pause *= 2;
+            self.next_look.after_a_longer_pause(Instant::now());
         };
         if matches!(outcome, ReadLine::Closed) {
             self.check_platform()?;
         }
         Ok(outcome)
+    }
+
+    /// Waits until one of the agents has something for [`Self::read_line`], be it a part of a line or
+    /// its end, or until `deadline`. May return early, when an agent's silence is to be looked into:
+    /// that, too, `read_line` does, with a deadline that has passed.
+    ///
+    /// # Errors
+    /// When the pipes cannot be waited for.
+    pub fn wait_for_any(agents: &[&Self], deadline: Instant) -> Result<(), SandboxError> {
+        if agents.iter().any(|agent| agent.lines.holds_line()) {
+            return Ok(());
+        }
+        let until = agents
+            .iter()
+            .fold(deadline, |until, agent| agent.until_next_look(until));
+        let mut outputs: Vec<PollFd<'_>> = agents
+            .iter()
+            .map(|agent| PollFd::from_borrowed_fd(agent.lines.output(), PollFlags::IN))
+            .collect();
+        wait_for_any(&mut outputs, until)
+            .map_err(|source| SandboxError::io("cannot wait for the agents' output", source))?;
+        Ok(())
+    }
+
+    /// Outside of a sandbox a closed output is seen at once.
+    fn until_next_look(&self, deadline: Instant) -> Instant {
+        if self.tree.is_sandboxed() {
+            deadline.min(self.next_look.at)
+        } else {
+            deadline
+        }
     }
 
     /// Is there unread output already (an answer before the question)?

@@ -213,7 +213,11 @@ mod tests {
             assert_eq!(serde_json::from_str::<AgentFault>(stored).unwrap(), fault);
             assert_eq!(fault.to_string(), shown);
         }
-        for wrong in [r#"{"task":"tournament"}"#, r#"{"task":"hit","side":1}"#, r#"{"task":"tournament","side":3}"#] {
+        for wrong in [
+            r#"{"task":"tournament"}"#,
+            r#"{"task":"hit","side":1}"#,
+            r#"{"task":"tournament","side":3}"#,
+        ] {
             assert!(serde_json::from_str::<Contest>(wrong).is_err(), "{wrong}");
         }
     }

@@ -1,7 +1,7 @@
 //! The scenario of `faceoff sim trace`, parsed once and checked field by field.
 
 use anyhow::{Context as _, Result, bail, ensure};
-use faceoff_sim::{Interpolation, JOINTS, MalletState, robot::model::INITIAL_Q};
+use faceoff_sim::{Interpolation, JOINTS, MalletState, model::INITIAL_Q};
 use faceoff_types::{Profile, Seed, Task};
 use serde::Deserialize;
 use serde_json::Value;

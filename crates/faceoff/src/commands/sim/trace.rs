@@ -3,8 +3,8 @@
 use super::scenario::Scenario;
 use anyhow::{Context as _, Result, ensure};
 use faceoff_sim::{
-    ConstraintValues, Interpolation, JOINTS, MalletState, PerturbationSettings,
-    Plant, SUBSTEPS, World,
+    ConstraintValues, Interpolation, JOINTS, MalletState, PerturbationSettings, Plant, SUBSTEPS,
+    World,
     episode::{opponent::Opponent, task},
     perturbation::table_factors::TableFactors,
 };
