@@ -112,6 +112,7 @@ impl Session {
     /// # Errors
     /// The agent's fault or the platform's.
     pub fn send_step(&mut self, step: u32, observation: &[f64]) -> Result<(), Trouble> {
+        debug_assert!(observation.iter().all(|value| value.is_finite()));
         self.send(Question::Step { step }, &Message::step(step, observation))
     }
 

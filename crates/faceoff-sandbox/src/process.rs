@@ -4,6 +4,7 @@ use crate::{
     command_check::check_command,
     end::{End, Evidence},
     line_pipe::{LinePipe, Written, wait_for_any},
+    next_look::NextLook,
     output_holders,
     prepared::{Prepared, Started},
     process_tree::ProcessTree,
@@ -19,31 +20,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// When to look for the first time whether a silent agent has closed its output; then ever more rarely.
-const FIRST_LOOK: Duration = Duration::from_millis(100);
 /// How long to wait for the exit status once the pipes are closed.
 const END_PATIENCE: Duration = Duration::from_millis(500);
-
-/// When to look again whether an agent that says nothing has closed its output.
-#[derive(Debug)]
-struct NextLook {
-    at: Instant,
-    pause: Duration,
-}
-
-impl NextLook {
-    fn first(now: Instant) -> Self {
-        Self {
-            at: now + FIRST_LOOK,
-            pause: FIRST_LOOK,
-        }
-    }
-
-    fn after_a_longer_pause(&mut self, now: Instant) {
-        self.pause *= 2;
-        self.at = now + self.pause;
-    }
-}
 
 /// A running agent. Dropping it kills and reaps the whole tree and removes its cgroup and scratch.
 #[derive(Debug)]

@@ -18,7 +18,10 @@ impl BundleError {
     /// `fs_err` do, has lost the number: read from the bare file.
     pub(super) fn reading(entry: &str) -> impl FnOnce(io::Error) -> Self + '_ {
         move |source| match source.raw_os_error() {
-            Some(_) => Self::Io(source),
+            Some(_) => Self::Io(io::Error::new(
+                source.kind(),
+                format!("reading the archive: {source}"),
+            )),
             None if entry.is_empty() => Self::Invalid(format!("the archive is damaged: {source}")),
             None => Self::Invalid(format!("the archive is damaged at {entry:?}: {source}")),
         }
