@@ -12,7 +12,7 @@ use std::time::Instant;
 
 use anyhow::{Context, bail};
 use faceoff_sim::{Episode, EpisodeState, Interpolation, PerturbationSettings, Plant, env_info};
-use faceoff_types::{Factor, Profile, Seed, Task};
+use faceoff_types::{Profile, Seed, Task};
 use striker::{Agent, BaseFrame, Env, RadiusInfo, RobotInfo, TableInfo};
 
 /// Sums over the episodes of a task.
@@ -62,11 +62,7 @@ fn main() -> anyhow::Result<()> {
         let mut tally = Tally::default();
         for season in first..first + seasons {
             let seed = Seed::from_number(season);
-            let plant = if profile.factors().contains(Factor::ModelMismatch) {
-                Plant::mismatched(&settings, seed.model_mismatch())
-            } else {
-                Plant::nominal()
-            };
+            let plant = Plant::under(profile.factors(), &settings, seed.model_mismatch());
             let mut agent = agent(task)?;
             for index in 0..episodes {
                 let mut episode = Episode::new(

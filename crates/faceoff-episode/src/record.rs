@@ -68,6 +68,21 @@ pub trait StepSink {
     fn end(&mut self, outcome: &EpisodeOutcome, host_noise_reruns: u32) -> Result<(), RecordError>;
 }
 
+impl<S: StepSink + ?Sized> StepSink for &mut S {
+    fn begin(&mut self, start: EpisodeStart<'_>) {
+        (**self).begin(start);
+    }
+    fn observe(&mut self, observation: &[f64]) {
+        (**self).observe(observation);
+    }
+    fn step(&mut self, row: &StepRow<'_>) {
+        (**self).step(row);
+    }
+    fn end(&mut self, outcome: &EpisodeOutcome, host_noise_reruns: u32) -> Result<(), RecordError> {
+        (**self).end(outcome, host_noise_reruns)
+    }
+}
+
 /// Records nothing.
 #[derive(Debug, Clone, Copy)]
 pub struct Nowhere;

@@ -13,12 +13,12 @@
 #![expect(clippy::print_stdout, reason = "a benchmark reports to the terminal")]
 
 use criterion::{BatchSize, Criterion};
+use faceoff_episode::Arena;
 use faceoff_runner::{
     AgentEnvironment, Observer, Session, ShardSpec, TimeLimits, bundle::Bundle, run_shard,
 };
 use faceoff_sandbox::{Isolation, Limits, Runtime};
-use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
-use faceoff_types::{EpisodeOutcome, Profile, Seed, Task};
+use faceoff_types::{EpisodeOutcome, Interpolation, Profile, Seed, Task};
 use faceoff_wire::{Manifest, Message};
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use std::{
@@ -138,15 +138,14 @@ fn round_trips(criterion: &mut Criterion) {
         ),
         ("protocol, no sandbox", environment(Isolation::None)),
     ] {
-        let mut session = Session::start(&agent.bundle, &env, Task::Hit)
+        let mut session = Session::start(&agent.bundle, &env, Task::Hit.into())
             .map_err(|(trouble, _)| trouble)
             .unwrap();
         session.reset(0).unwrap();
-        let mut action = Vec::new();
         let mut step = 0;
         group.bench_function(name, |bencher| {
             bencher.iter(|| {
-                session.step(step, &observation, &mut action).unwrap();
+                session.step(step, &observation).unwrap();
                 step += 1;
             });
         });
@@ -154,10 +153,7 @@ fn round_trips(criterion: &mut Criterion) {
         let mut charged: Vec<f64> = (0..5000)
             .map(|_| {
                 step += 1;
-                session
-                    .step(step, &observation, &mut action)
-                    .unwrap()
-                    .computation_time_s
+                session.step(step, &observation).unwrap().computation_time_s
             })
             .collect();
         charged.sort_by(f64::total_cmp);
@@ -188,11 +184,10 @@ fn medians(placement: &str, here: usize, there: usize) {
         given_up: Vec::new(),
     });
     env.agent_cpus = vec![there];
-    let mut session = Session::start(&agent.bundle, &env, Task::Hit)
+    let mut session = Session::start(&agent.bundle, &env, Task::Hit.into())
         .map_err(|(trouble, _)| trouble)
         .unwrap();
     session.reset(0).unwrap();
-    let mut action = Vec::new();
     let (mut bare_s, mut protocol_s) = (Vec::new(), Vec::new());
     for turn in 0..TURNS {
         for _ in 0..PER_TURN {
@@ -203,7 +198,7 @@ fn medians(placement: &str, here: usize, there: usize) {
         for index in 0..PER_TURN {
             let step = u32::try_from(turn * PER_TURN + index).unwrap();
             let started = Instant::now();
-            session.step(step, &observation, &mut action).unwrap();
+            session.step(step, &observation).unwrap();
             protocol_s.push(started.elapsed().as_secs_f64());
         }
     }
@@ -277,18 +272,8 @@ fn steps(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("control step");
     group.sample_size(20);
     let seed = Seed::from_number(1);
-    let settings = PerturbationSettings::default();
-    let plant = Plant::mismatched(&settings, seed.model_mismatch());
-    let world = || {
-        Episode::new(
-            Task::Prepare,
-            Interpolation::Cubic,
-            Profile::Evaluation.factors(),
-            &settings,
-            &plant,
-            seed.episode(Task::Prepare, 0),
-        )
-    };
+    let arena = Arena::new(Profile::Evaluation, seed, seed.model_mismatch());
+    let world = || arena.episode(Task::Prepare, 0, Interpolation::Cubic);
     group.bench_function("simulator alone", |bencher| {
         bencher.iter_batched(
             || {
@@ -325,7 +310,7 @@ fn steps(criterion: &mut Criterion) {
     let mut steps = 0;
     for _ in 0..3 {
         let started = cpu_time_s();
-        steps = play_bare(&agent, &env, &spec, &settings);
+        steps = play_bare(&agent, &env, &spec);
         bare_s = bare_s.min(cpu_time_s() - started);
         let started = cpu_time_s();
         run_shard(&spec, &agent.bundle, &env, out.path(), &mut Nobody).unwrap();
@@ -351,33 +336,18 @@ fn cpu_time_s() -> f64 {
 }
 
 /// What a shard does, without a recording. Returns the number of steps.
-fn play_bare(
-    agent: &InstantAgent,
-    env: &AgentEnvironment,
-    spec: &ShardSpec,
-    settings: &PerturbationSettings,
-) -> u32 {
-    let plant = Plant::mismatched(settings, spec.mismatch_seed);
-    let mut session = Session::start(&agent.bundle, env, spec.task)
+fn play_bare(agent: &InstantAgent, env: &AgentEnvironment, spec: &ShardSpec) -> u32 {
+    let arena = Arena::new(spec.profile, spec.seed, spec.mismatch_seed);
+    let mut session = Session::start(&agent.bundle, env, spec.task.into())
         .map_err(|(trouble, _)| trouble)
         .unwrap();
-    let mut action = Vec::new();
     let mut steps = 0;
     for episode in spec.episodes.clone() {
-        let mut world = Episode::new(
-            spec.task,
-            Interpolation::Cubic,
-            spec.profile.factors(),
-            settings,
-            &plant,
-            spec.seed.episode(spec.task, episode),
-        );
+        let mut world = arena.episode(spec.task, episode, Interpolation::Cubic);
         session.reset(episode).unwrap();
         loop {
-            session
-                .step(world.steps(), world.observation(), &mut action)
-                .unwrap();
-            if world.step(&action).end.is_some() {
+            session.step(world.steps(), world.observation()).unwrap();
+            if world.step(session.action()).end.is_some() {
                 break;
             }
         }

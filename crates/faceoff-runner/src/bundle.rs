@@ -1,83 +1,28 @@
 //! A team's bundle: an archive is unpacked without trusting a byte of it, a developer's folder is
 //! opened as it is.
 
-use faceoff_wire::{MANIFEST_MAX_BYTES, Manifest};
-use serde::{Deserialize, Serialize};
-use std::{
-    fs::File,
-    io::{self, BufReader, Read, Seek, SeekFrom},
-    path::{Path, PathBuf},
-};
-
+mod error;
 mod folder;
+mod limits;
 mod links;
+mod node;
 mod tar_archive;
 mod tree;
 mod zip_archive;
 
+pub use error::BundleError;
+pub use limits::BundleLimits;
+
+use faceoff_wire::{MANIFEST_MAX_BYTES, Manifest};
+use fs_err::File;
+use std::{
+    io::{self, BufReader, Read, Seek, SeekFrom},
+    path::{Path, PathBuf},
+};
 use tree::Tree;
 
 /// Name of the file that makes a folder a bundle.
 const MANIFEST_NAME: &str = "agent.toml";
-
-/// What a bundle may hold (PROTOCOL, "Bundle").
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct BundleLimits {
-    /// Largest archive, in bytes.
-    pub packed_bytes: u64,
-    /// Largest sum of its files, in bytes.
-    pub unpacked_bytes: u64,
-    /// Most files and links; folders are counted separately, against the same number.
-    pub files: u64,
-}
-
-impl Default for BundleLimits {
-    fn default() -> Self {
-        Self {
-            packed_bytes: 512 << 20,
-            unpacked_bytes: 2 << 30,
-            files: 50_000,
-        }
-    }
-}
-
-/// Why a bundle cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum BundleError {
-    /// The team's: the archive or its `agent.toml` is not as the protocol wants it. The text names
-    /// the entry and is shown to the team.
-    #[error("{0}")]
-    Invalid(String),
-    /// Ours: the disk did not do what it should.
-    #[error("{what}: {source}")]
-    Io {
-        /// What was attempted.
-        what: String,
-        /// Why it failed.
-        source: io::Error,
-    },
-}
-
-impl BundleError {
-    fn io(what: impl Into<String>) -> impl FnOnce(io::Error) -> Self {
-        let what = what.into();
-        move |source| Self::Io { what, source }
-    }
-
-    /// Reading an archive fails either because the disk does, and then the error carries the
-    /// system's number, or because the bytes make no sense.
-    fn reading(entry: &str) -> impl FnOnce(io::Error) -> Self + '_ {
-        move |source| match source.raw_os_error() {
-            Some(_) => Self::Io {
-                what: "reading the archive".to_owned(),
-                source,
-            },
-            None if entry.is_empty() => Self::Invalid(format!("the archive is damaged: {source}")),
-            None => Self::Invalid(format!("the archive is damaged at {entry:?}: {source}")),
-        }
-    }
-}
 
 /// An unpacked bundle.
 #[derive(Debug, Clone)]
@@ -101,11 +46,8 @@ pub struct Bundle {
 /// `..` paths, devices, set-id bits, duplicate names, a broken archive, a limit met, a missing or
 /// wrong `agent.toml`; [`BundleError::Io`] where reading or writing the disk fails.
 pub fn unpack(archive: &Path, into: &Path, limits: &BundleLimits) -> Result<Bundle, BundleError> {
-    let mut file = File::open(archive).map_err(BundleError::io("opening the archive"))?;
-    let packed = file
-        .metadata()
-        .map_err(BundleError::io("reading the archive's size"))?
-        .len();
+    let mut file = File::open(archive)?;
+    let packed = file.metadata()?.len();
     if packed > limits.packed_bytes {
         return Err(BundleError::Invalid(format!(
             "the archive has {packed} bytes; at most {} are allowed",
@@ -113,15 +55,11 @@ pub fn unpack(archive: &Path, into: &Path, limits: &BundleLimits) -> Result<Bund
         )));
     }
     let mut magic = Vec::with_capacity(4);
-    (&mut file)
-        .take(4)
-        .read_to_end(&mut magic)
-        .map_err(BundleError::io("reading the archive"))?;
-    file.seek(SeekFrom::Start(0))
-        .map_err(BundleError::io("reading the archive"))?;
+    (&mut file).take(4).read_to_end(&mut magic)?;
+    file.seek(SeekFrom::Start(0))?;
 
     let mut tree = Tree::new(into, limits)?;
-    let file = BufReader::with_capacity(64 << 10, file);
+    let file = BufReader::with_capacity(64 << 10, file.into_file());
     match magic.as_slice() {
         [0x1f, 0x8b, ..] => {
             tar_archive::unpack(flate2::bufread::MultiGzDecoder::new(file), &mut tree)?;
@@ -138,7 +76,7 @@ pub fn unpack(archive: &Path, into: &Path, limits: &BundleLimits) -> Result<Bund
             ));
         }
     }
-    let root = tree.bundle_root(MANIFEST_NAME)?;
+    let root = tree.bundle_root(MANIFEST_NAME).ok_or_else(no_manifest)?;
     tree.finish(&root)?;
     open_dir(&into.join(root))
 }
@@ -149,14 +87,11 @@ pub fn unpack(archive: &Path, into: &Path, limits: &BundleLimits) -> Result<Bund
 /// # Errors
 /// As [`unpack`].
 pub fn open(path: &Path, scratch: &Path, limits: &BundleLimits) -> Result<Bundle, BundleError> {
-    let metadata = path.metadata().map_err(|source| match source.kind() {
+    let metadata = fs_err::metadata(path).map_err(|error| match error.kind() {
         io::ErrorKind::NotFound => {
             BundleError::Invalid(format!("there is no bundle at {}", path.display()))
         }
-        _ => BundleError::Io {
-            what: format!("opening {}", path.display()),
-            source,
-        },
+        _ => error.into(),
     })?;
     if metadata.is_dir() {
         open_dir(path)
@@ -173,31 +108,19 @@ pub fn open(path: &Path, scratch: &Path, limits: &BundleLimits) -> Result<Bundle
 pub fn copy(folder: &Path, into: &Path, limits: &BundleLimits) -> Result<Bundle, BundleError> {
     let mut tree = Tree::new(into, limits)?;
     folder::copy(folder, &mut tree)?;
-    let root = tree.bundle_root(MANIFEST_NAME)?;
+    let root = tree.bundle_root(MANIFEST_NAME).ok_or_else(no_manifest)?;
     tree.finish(&root)?;
     open_dir(&into.join(root))
 }
 
 fn open_dir(path: &Path) -> Result<Bundle, BundleError> {
-    let dir = path
-        .canonicalize()
-        .map_err(BundleError::io(format!("opening {}", path.display())))?;
-    let file = match File::open(dir.join(MANIFEST_NAME)) {
-        Ok(file) => file,
-        Err(source) if source.kind() == io::ErrorKind::NotFound => {
-            return Err(no_manifest());
-        }
-        Err(source) => {
-            return Err(BundleError::Io {
-                what: format!("opening {MANIFEST_NAME}"),
-                source,
-            });
-        }
-    };
+    let dir = fs_err::canonicalize(path)?;
+    let file = File::open(dir.join(MANIFEST_NAME)).map_err(|error| match error.kind() {
+        io::ErrorKind::NotFound => no_manifest(),
+        _ => error.into(),
+    })?;
     let mut bytes = Vec::new();
-    file.take(MANIFEST_MAX_BYTES + 1)
-        .read_to_end(&mut bytes)
-        .map_err(BundleError::io(format!("reading {MANIFEST_NAME}")))?;
+    file.take(MANIFEST_MAX_BYTES + 1).read_to_end(&mut bytes)?;
     let text = String::from_utf8(bytes)
         .map_err(|_| BundleError::Invalid(format!("{MANIFEST_NAME}: not UTF-8")))?;
     let manifest =

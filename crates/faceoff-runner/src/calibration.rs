@@ -2,7 +2,7 @@
 //! agent's CPUs and answers at once, in messages as long as those of a step. It waits in a read and
 //! uses nothing while the agent plays.
 
-use crate::PlatformFault;
+use crate::fault::PlatformFault;
 use faceoff_types::RoundTrips;
 use faceoff_wire::Message;
 use rustix::thread::{CpuSet, sched_setaffinity};

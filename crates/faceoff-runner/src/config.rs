@@ -32,11 +32,14 @@ impl Default for TimeLimits {
 }
 
 impl TimeLimits {
+    /// No wait for an agent is longer.
+    pub(crate) const LONGEST: Duration = Duration::from_secs(3600);
+
     /// A limit as a duration; one that is no sensible number of seconds counts as an hour, so that
     /// a deadline exists whatever a configuration says.
     pub(crate) fn duration(limit_s: f64) -> Duration {
-        const HOUR: Duration = Duration::from_secs(3600);
-        Duration::try_from_secs_f64(limit_s).map_or(HOUR, |limit| limit.min(HOUR))
+        let given = Duration::try_from_secs_f64(limit_s);
+        given.map_or(Self::LONGEST, |limit| limit.min(Self::LONGEST))
     }
 }
 

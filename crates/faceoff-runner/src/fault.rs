@@ -1,5 +1,45 @@
+use faceoff_episode::{NotFinite, RecordError};
 use faceoff_sandbox::SandboxError;
+use faceoff_types::AgentFaultKind;
 use std::io;
+
+/// What ended a conversation.
+#[derive(Debug)]
+pub enum Trouble {
+    /// The agent broke the protocol or a limit.
+    Agent {
+        /// How.
+        fault: AgentFaultKind,
+        /// The offending line, cut, where there was one.
+        line: Option<String>,
+    },
+    /// The platform failed.
+    Platform(PlatformFault),
+}
+
+impl From<AgentFaultKind> for Trouble {
+    fn from(fault: AgentFaultKind) -> Self {
+        Self::Agent { fault, line: None }
+    }
+}
+
+impl From<PlatformFault> for Trouble {
+    fn from(fault: PlatformFault) -> Self {
+        Self::Platform(fault)
+    }
+}
+
+impl From<SandboxError> for Trouble {
+    fn from(error: SandboxError) -> Self {
+        Self::Platform(error.into())
+    }
+}
+
+impl From<NotFinite> for Trouble {
+    fn from(error: NotFinite) -> Self {
+        Self::Platform(error.into())
+    }
+}
 
 /// What failed on our side. The shard is to be run again; the agent is never blamed for it.
 #[derive(Debug, thiserror::Error)]
@@ -18,13 +58,16 @@ pub enum PlatformFault {
     /// A recording could not be made, or is not what was recorded.
     #[error("recording: {0}")]
     Recording(String),
+    /// The simulator's world stopped being finite.
+    #[error(transparent)]
+    Simulation(#[from] NotFinite),
     /// The observer asked to stop.
     #[error("cancelled")]
     Cancelled,
 }
 
-impl From<faceoff_episode::RecordError> for PlatformFault {
-    fn from(error: faceoff_episode::RecordError) -> Self {
+impl From<RecordError> for PlatformFault {
+    fn from(error: RecordError) -> Self {
         Self::Recording(error.to_string())
     }
 }

@@ -8,9 +8,9 @@ use faceoff_types::ComputationTime;
 /// Less than this share of the limit is “well below” it.
 const LITTLE: f64 = 0.5;
 
-/// The time an answer took, and what is known of it.
+/// The wait for an answer, and what is known of it.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Late {
+pub(crate) struct AnswerWait {
     /// Wall time, seconds.
     pub wall_s: f64,
     /// CPU time of the agent's process tree, seconds, if the host tells.
@@ -19,7 +19,7 @@ pub(crate) struct Late {
     pub stalled_s: f64,
 }
 
-impl Late {
+impl AnswerWait {
     /// Was it late at all? Cheap, so that evidence is looked for only then.
     pub fn is_late(wall_s: f64) -> bool {
         wall_s > COMPUTATION_TIME_LIMITS_S[0]
@@ -48,75 +48,37 @@ impl Late {
     }
 }
 
-/// Computation times of one episode, as they were and as they would have been.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Times {
-    measured: Sum,
-    without_noise: Sum,
-}
-
-#[derive(Debug, Clone, Copy, Default)]
-struct Sum {
-    sum_s: f64,
-    max_s: f64,
-    count: u32,
-}
-
-impl Times {
-    pub fn add(&mut self, wall_s: f64, without_noise_s: f64) {
-        self.measured.add(wall_s);
-        self.without_noise.add(without_noise_s);
-    }
-
-    /// As they count.
-    pub fn summary(&self) -> ComputationTime {
-        self.measured.summary()
-    }
-
-    /// Did the host's stalls cost the agent points?
-    pub fn host_cost_points(&self) -> bool {
-        computation_time_penalty(&self.measured.summary())
-            > computation_time_penalty(&self.without_noise.summary())
-    }
-}
-
-impl Sum {
-    fn add(&mut self, time_s: f64) {
-        self.sum_s += time_s;
-        self.max_s = self.max_s.max(time_s);
-        self.count += 1;
-    }
-
-    fn summary(self) -> ComputationTime {
-        let mean_s = if self.count == 0 {
-            0.0
-        } else {
-            self.sum_s / f64::from(self.count)
-        };
-        ComputationTime {
-            mean_s,
-            max_s: self.max_s,
-        }
-    }
+/// Did the host's stalls cost the agent points?
+pub(crate) fn host_cost_points(
+    measured: &ComputationTime,
+    without_noise: &ComputationTime,
+) -> bool {
+    computation_time_penalty(measured) > computation_time_penalty(without_noise)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use faceoff_episode::TimeSum;
 
     fn noise(wall_s: f64, cpu_s: Option<f64>, stalled_s: f64) -> bool {
-        let late = Late {
+        let late = AnswerWait {
             wall_s,
             cpu_s,
             stalled_s,
         };
-        let mut times = Times::default();
-        times.add(0.001, 0.001);
-        times.add(wall_s, late.without_noise_s());
-        for _ in 0..40 {
-            times.add(0.001, 0.001);
-        }
-        times.host_cost_points()
+        let among_fast_ones = |time_s| {
+            let mut times = TimeSum::default();
+            times.add(time_s);
+            for _ in 0..41 {
+                times.add(0.001);
+            }
+            times.summary()
+        };
+        host_cost_points(
+            &among_fast_ones(wall_s),
+            &among_fast_ones(late.without_noise_s()),
+        )
     }
 
     #[test]
@@ -141,7 +103,7 @@ mod tests {
     #[test]
     fn no_answer_is_noise_if_the_host_stalled_for_half_of_the_limit() {
         let none = |cpu_s, stalled_s| {
-            Late {
+            AnswerWait {
                 wall_s: 1.0,
                 cpu_s,
                 stalled_s,
@@ -152,20 +114,5 @@ mod tests {
         assert!(!none(Some(0.1), 0.4));
         assert!(!none(Some(0.5), 0.9));
         assert!(!none(None, 0.9));
-    }
-
-    #[test]
-    fn times_are_summed_up_as_they_were() {
-        let mut times = Times::default();
-        assert_eq!(times.summary(), ComputationTime::default());
-        times.add(0.03, 0.01);
-        times.add(0.01, 0.01);
-        assert_eq!(
-            times.summary(),
-            ComputationTime {
-                mean_s: 0.02,
-                max_s: 0.03
-            }
-        );
     }
 }

@@ -3,7 +3,7 @@
 //! virtual machine was held up, a process of higher priority took the CPU, or this service was
 //! stopped. An agent that sleeps or waits delays nobody, so that leaves no trace here.
 
-use crate::PlatformFault;
+use crate::fault::PlatformFault;
 use rustix::thread::{CpuSet, sched_setaffinity};
 use std::{
     collections::VecDeque,

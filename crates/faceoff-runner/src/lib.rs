@@ -16,6 +16,7 @@ mod calibration;
 mod config;
 mod cpu;
 pub mod dataset;
+mod exchange;
 mod fault;
 mod host_noise;
 mod host_watch;
@@ -28,14 +29,12 @@ mod shard;
 mod simulator;
 mod smoke;
 pub mod verify;
-
 mod wire_env;
 
 pub use assemble::{EvaluationMeta, assemble};
 pub use config::{AgentEnvironment, TimeLimits};
-pub use fault::PlatformFault;
+pub use fault::{PlatformFault, Trouble};
 pub use host_watch::HostWatch;
-pub use faceoff_episode::Answered;
-pub use session::{Session, Trouble};
+pub use session::Session;
 pub use shard::{Observer, ShardReport, ShardSpec, run_shard, run_shard_watched};
 pub use smoke::{SMOKE_STEPS, SmokeReport, smoke};

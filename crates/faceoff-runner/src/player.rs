@@ -1,15 +1,14 @@
 use crate::{
-    AgentEnvironment, HostWatch, PlatformFault, Session, Trouble,
     bundle::Bundle,
-    host_noise::{Late, Times},
+    config::AgentEnvironment,
+    fault::{PlatformFault, Trouble},
+    host_noise::{AnswerWait, host_cost_points},
+    host_watch::HostWatch,
     log::Log,
+    session::Session,
 };
-use faceoff_episode::{EpisodeStart, StepRow, StepSink};
-use faceoff_sim::{Episode, PerturbationSettings, Plant};
-use faceoff_types::{
-    AgentFault, AgentFaultKind, EpisodeEnd, EpisodeOutcome, Factor, Interpolation, Profile, Seed,
-    Task,
-};
+use faceoff_episode::{Arena, Course, Question, StepSink, TimeSum};
+use faceoff_types::{AgentFaultKind, EpisodeOutcome, Phase, Profile, Seed, Task};
 
 /// Plays episodes of one task with one agent, which is restarted after a fault. An episode that the
 /// host's stalls cost the agent is played again.
@@ -17,13 +16,10 @@ pub(crate) struct Player<'a> {
     bundle: &'a Bundle,
     env: &'a AgentEnvironment,
     task: Task,
-    profile: Profile,
-    seed: Seed,
-    settings: PerturbationSettings,
-    plant: Plant,
+    arena: Arena,
+    /// None before the first episode and after a fault.
     session: Option<Session>,
     log: Log,
-    action: Vec<f64>,
     watch: &'a dyn HostWatch,
     host_noise_reruns: u32,
 }
@@ -35,11 +31,15 @@ struct Try {
     spoilt_by_host: bool,
 }
 
-/// The agent's fault, before it is known where it counts.
-struct Fault {
+/// The agent's fault, the line that shows it, and what its process has left on standard error.
+struct StartUpFault {
     kind: AgentFaultKind,
     line: Option<String>,
+    stderr: String,
 }
+
+/// An episode under way, wherever it is recorded.
+type CourseTo<'a> = Course<&'a mut dyn StepSink>;
 
 impl<'a> Player<'a> {
     /// Prepares the plant; the agent is started by the first episode.
@@ -52,23 +52,13 @@ impl<'a> Player<'a> {
         mismatch_seed: Seed,
         watch: &'a dyn HostWatch,
     ) -> Self {
-        let settings = PerturbationSettings::default();
-        let plant = if profile.factors().contains(Factor::ModelMismatch) {
-            Plant::mismatched(&settings, mismatch_seed)
-        } else {
-            Plant::nominal()
-        };
         Self {
             bundle,
             env,
             task,
-            profile,
-            seed,
-            settings,
-            plant,
+            arena: Arena::new(profile, seed, mismatch_seed),
             session: None,
             log: Log::new(env.limits.stderr_tail_bytes),
-            action: Vec::new(),
             watch,
             host_noise_reruns: 0,
         }
@@ -121,56 +111,51 @@ impl<'a> Player<'a> {
         sink: &mut dyn StepSink,
         cancelled: &dyn Fn() -> bool,
     ) -> Result<Try, PlatformFault> {
-        let start_up = match self.session {
-            Some(_) => None,
+        let session = match self.session.take() {
+            Some(session) => Ok(session),
             None => self.start()?,
         };
-        // Without an agent the initial state is still of interest; it is the same for all.
-        let interpolation = self.session.as_ref().map(Session::interpolation);
-        let seed = self.seed.episode(self.task, episode);
-        let mut world = Episode::new(
-            self.task,
-            interpolation.unwrap_or(Interpolation::Cubic),
-            self.profile.factors(),
-            &self.settings,
-            &self.plant,
-            seed,
-        );
-        sink.begin(EpisodeStart {
+        let interpolation = session.as_ref().ok().map(Session::interpolation);
+        let mut course =
+            Course::begin(&self.arena, self.task, episode, interpolation, sink).at_most(max_steps);
+        let mut session = match session {
+            Ok(session) => session,
+            Err(StartUpFault { kind, line, stderr }) => {
+                let outcome = course.failed(Phase::StartUp, kind, line);
+                self.note(&stderr, &outcome);
+                return Ok(Try {
+                    outcome,
+                    spoilt_by_host: false,
+                });
+            }
+        };
+        let mut without_noise = TimeSum::default();
+        match self.converse(
+            &mut session,
             episode,
-            seed,
-            interpolation,
-            state: &world.state(),
-        });
-        if let Some(fault) = start_up {
-            let outcome = self.failed(&world, episode, None, None, fault, Times::default());
-            return Ok(Try {
-                outcome,
-                spoilt_by_host: false,
-            });
-        }
-
-        let mut times = Times::default();
-        match self.converse(episode, max_steps, &mut world, &mut times, sink, cancelled) {
-            Ok(end) => Ok(Try {
-                spoilt_by_host: times.host_cost_points(),
-                outcome: EpisodeOutcome {
-                    task: self.task,
-                    episode,
-                    steps: world.steps(),
-                    end,
-                    success: world.success(),
-                    violations: world.violations(),
-                    computation_time: times.summary(),
-                    fault: None,
-                },
-            }),
-            Err((_, Trouble::Platform(fault))) => Err(fault),
-            Err((step, Trouble::Agent { fault, line })) => {
-                let spoilt_by_host = step.is_some() && self.is_kept_from_answering(&fault);
-                let fault = Fault { kind: fault, line };
+            &mut course,
+            &mut without_noise,
+            cancelled,
+        ) {
+            Ok(outcome) => {
+                self.session = Some(session);
+                let (measured, without_noise) = (outcome.computation_time, without_noise.summary());
                 Ok(Try {
-                    outcome: self.failed(&world, episode, Some(episode), step, fault, times),
+                    outcome,
+                    spoilt_by_host: host_cost_points(&measured, &without_noise),
+                })
+            }
+            Err((_, Trouble::Platform(fault))) => {
+                self.session = Some(session);
+                Err(fault)
+            }
+            Err((phase, Trouble::Agent { fault, line })) => {
+                let spoilt_by_host =
+                    phase == Phase::Step && self.is_kept_from_answering(&session, &fault);
+                let outcome = course.failed(phase, fault, line);
+                self.note(&session.abort(), &outcome);
+                Ok(Try {
+                    outcome,
                     spoilt_by_host,
                 })
             }
@@ -178,22 +163,18 @@ impl<'a> Player<'a> {
     }
 
     /// Was it the host's stall that made a step's hard limit pass?
-    fn is_kept_from_answering(&mut self, fault: &AgentFaultKind) -> bool {
-        let AgentFaultKind::TimedOut { limit_s, .. } = fault else {
+    fn is_kept_from_answering(&self, session: &Session, fault: &AgentFaultKind) -> bool {
+        let (AgentFaultKind::TimedOut { limit_s, .. }, Some((asked, until))) =
+            (fault, session.waited())
+        else {
             return false;
         };
-        let Some(session) = &mut self.session else {
-            return false;
-        };
-        let Some((asked, until)) = session.waited() else {
-            return false;
-        };
-        let late = Late {
+        let wait = AnswerWait {
             wall_s: (until - asked).as_secs_f64(),
             cpu_s: session.cpu_time_since_answer_s(),
             stalled_s: self.watch.stalled_s(asked, until),
         };
-        late.no_answer_is_noise(*limit_s)
+        wait.no_answer_is_noise(*limit_s)
     }
 
     /// Says goodbye to the agent and returns the log of all its processes.
@@ -213,105 +194,68 @@ impl<'a> Player<'a> {
         self.log.into_text()
     }
 
-    fn start(&mut self) -> Result<Option<Fault>, PlatformFault> {
-        match Session::start(self.bundle, self.env, self.task) {
-            Ok(session) => {
-                self.session = Some(session);
-                Ok(None)
-            }
+    fn start(&self) -> Result<Result<Session, StartUpFault>, PlatformFault> {
+        match Session::start(self.bundle, self.env, self.task.into()) {
+            Ok(session) => Ok(Ok(session)),
             Err((Trouble::Platform(fault), _)) => Err(fault),
-            Err((Trouble::Agent { fault, line }, stderr)) => {
-                self.log.add(&stderr, None);
-                Ok(Some(Fault { kind: fault, line }))
+            Err((Trouble::Agent { fault: kind, line }, stderr)) => {
+                Ok(Err(StartUpFault { kind, line, stderr }))
             }
         }
     }
 
-    /// The conversation of one episode; trouble comes with the step at which it arose, none for
-    /// `reset`.
+    /// The conversation of one episode; trouble comes with what the agent was asked for.
     fn converse(
-        &mut self,
+        &self,
+        session: &mut Session,
         episode: u32,
-        max_steps: u32,
-        world: &mut Episode,
-        times: &mut Times,
-        sink: &mut dyn StepSink,
+        course: &mut CourseTo<'_>,
+        without_noise: &mut TimeSum,
         cancelled: &dyn Fn() -> bool,
-    ) -> Result<EpisodeEnd, (Option<u32>, Trouble)> {
-        let session = self.session.as_mut().expect("a session was started");
-        session.reset(episode).map_err(|trouble| (None, trouble))?;
-        let end = loop {
-            let step = world.steps();
-            let at_step = |trouble| (Some(step), trouble);
+    ) -> Result<EpisodeOutcome, (Phase, Trouble)> {
+        session
+            .reset(episode)
+            .map_err(|trouble| (Phase::Reset, trouble))?;
+        self.steps(session, course, without_noise, cancelled)
+            .and_then(|outcome| {
+                session.end(episode, outcome.steps)?;
+                Ok(outcome)
+            })
+            .map_err(|trouble| (Phase::Step, trouble))
+    }
+
+    fn steps(
+        &self,
+        session: &mut Session,
+        course: &mut CourseTo<'_>,
+        without_noise: &mut TimeSum,
+        cancelled: &dyn Fn() -> bool,
+    ) -> Result<EpisodeOutcome, Trouble> {
+        loop {
             if cancelled() {
-                return Err(at_step(Trouble::Platform(PlatformFault::Cancelled)));
+                return Err(PlatformFault::Cancelled.into());
             }
-            let answered = session
-                .step(step, world.observation(), &mut self.action)
-                .map_err(at_step)?;
+            let Question { step, observation } = course.question()?;
+            let answered = session.step(step, observation)?;
             let wall_s = answered.computation_time_s;
-            let without_noise_s = match session.waited() {
-                Some((asked, until)) if Late::is_late(wall_s) => Late {
+            without_noise.add(match session.waited() {
+                Some((asked, until)) if AnswerWait::is_late(wall_s) => AnswerWait {
                     wall_s,
                     cpu_s: answered.cpu_time_s,
                     stalled_s: self.watch.stalled_s(asked, until),
                 }
                 .without_noise_s(),
                 _ => wall_s,
-            };
-            times.add(wall_s, without_noise_s);
-            sink.observe(world.observation());
-            let outcome = world.step(&self.action);
-            sink.step(&StepRow {
-                step,
-                action: &self.action,
-                answered,
-                state: &world.state(),
-                constraints: outcome.constraints,
-                next_observation: world.observation(),
             });
-            if let Some(end) = outcome.end {
-                break end;
+            if let Some(outcome) = course.answer(session.action(), answered) {
+                return Ok(outcome);
             }
-            if world.steps() >= max_steps {
-                break EpisodeEnd::Horizon;
-            }
-        };
-        let steps = world.steps();
-        session
-            .end(episode, steps)
-            .map_err(|fault| (Some(steps), Trouble::Platform(fault)))?;
-        Ok(end)
+        }
     }
 
-    /// Ends the agent and makes its fault the episode's outcome.
-    fn failed(
-        &mut self,
-        world: &Episode,
-        episode: u32,
-        fault_episode: Option<u32>,
-        step: Option<u32>,
-        fault: Fault,
-        times: Times,
-    ) -> EpisodeOutcome {
-        let fault = AgentFault {
-            fault: fault.kind,
-            task: self.task,
-            episode: fault_episode,
-            step,
-            line: fault.line,
-        };
-        let stderr = self.session.take().map(Session::abort).unwrap_or_default();
-        self.log.add(&stderr, Some(&fault.to_string()));
-        EpisodeOutcome {
-            task: self.task,
-            episode,
-            steps: world.steps(),
-            end: EpisodeEnd::AgentFault,
-            success: false,
-            violations: world.violations(),
-            computation_time: times.summary(),
-            fault: Some(fault),
-        }
+    /// Notes what an agent has left, and the fault that ended it.
+    fn note(&mut self, stderr: &str, outcome: &EpisodeOutcome) {
+        let fault = outcome.fault.as_ref().map(ToString::to_string);
+        self.log.add(stderr, fault.as_deref());
     }
 }

@@ -1,58 +1,44 @@
-use crate::{AgentEnvironment, PlatformFault, TimeLimits, bundle::Bundle, wire_env::wire_env};
+use crate::{
+    bundle::Bundle,
+    config::{AgentEnvironment, TimeLimits},
+    exchange::{Answer, Exchange, Sent},
+    fault::{PlatformFault, Trouble},
+    wire_env::wire_env,
+};
 use faceoff_episode::Answered;
-use faceoff_sandbox::{AgentProcess, ReadLine, SpawnError, SpawnSpec, WriteError};
-use faceoff_types::{AgentFaultKind, Interpolation, Task};
-use faceoff_wire::{MAX_LINE_BYTES, Message, answer, quote_line};
+use faceoff_types::{AgentFaultKind, Contest, Interpolation, Phase};
+use faceoff_wire::{Message, answer};
 use std::time::{Duration, Instant};
-
-/// How long an agent that has closed its output gets to end, so that its exit status can be told.
-const DIAGNOSIS: Duration = Duration::from_secs(1);
-
-/// What ended a conversation.
-#[derive(Debug)]
-pub enum Trouble {
-    /// The agent broke the protocol or a limit.
-    Agent {
-        /// How.
-        fault: AgentFaultKind,
-        /// The offending line, cut, where there was one.
-        line: Option<String>,
-    },
-    /// The platform failed.
-    Platform(PlatformFault),
-}
-
-impl From<PlatformFault> for Trouble {
-    fn from(fault: PlatformFault) -> Self {
-        Self::Platform(fault)
-    }
-}
 
 /// One agent process and the conversation with it. Every wait has a deadline. Dropping it kills
 /// the process tree.
+///
+/// [`Self::reset`] and [`Self::step`] ask and wait. Who has two agents asks both with `send_…` and
+/// then, in turns, waits for any and looks at each with [`Self::poll`].
 #[derive(Debug)]
 pub struct Session {
-    process: AgentProcess,
+    exchange: Exchange,
     time: TimeLimits,
     interpolation: Interpolation,
-    /// The message being written; its memory is reused.
-    line: Vec<u8>,
+    asked: Option<Asked>,
+    /// The last action; its memory is reused.
+    action: Vec<f64>,
+    /// At the last answer.
     cpu_time_s: Option<f64>,
-    /// From the last question's last byte to its answer, or to the end of the wait for one.
     waited: Option<(Instant, Instant)>,
 }
 
-/// A question's wait: its name and limit, as a fault tells them.
+/// A question whose answer is due.
 #[derive(Debug, Clone, Copy)]
-struct Wait {
-    phase: &'static str,
-    limit_s: f64,
+struct Asked {
+    question: Question,
+    sent: Sent,
 }
 
-struct Answer {
-    bytes: Vec<u8>,
-    asked: Instant,
-    answered: Instant,
+#[derive(Debug, Clone, Copy)]
+enum Question {
+    Reset { episode: u32 },
+    Step { step: u32 },
 }
 
 impl Session {
@@ -63,69 +49,24 @@ impl Session {
     pub fn start(
         bundle: &Bundle,
         env: &AgentEnvironment,
-        task: Task,
+        contest: Contest,
     ) -> Result<Self, (Trouble, String)> {
-        let manifest = &bundle.manifest;
-        let Some(runtime) = env.runtimes.get(&manifest.runtime) else {
-            let offered: Vec<&str> = env.runtimes.keys().map(String::as_str).collect();
-            let detail = format!(
-                "the runtime {:?} of agent.toml is not offered here; offered: {}",
-                manifest.runtime,
-                offered.join(", ")
-            );
-            let fault = AgentFaultKind::CannotStart { detail };
-            return Err((Trouble::Agent { fault, line: None }, String::new()));
-        };
         let started = Instant::now();
-        let spec = SpawnSpec {
-            bundle_dir: bundle.dir.clone(),
-            command: manifest.command.clone(),
-            env: manifest.env.clone(),
-            runtime: runtime.clone(),
-            limits: env.limits.clone(),
-            isolation: env.isolation.clone(),
-            cpus: env.agent_cpus.clone(),
-        };
-        let process = AgentProcess::spawn(&spec).map_err(|error| {
-            let trouble = match error {
-                SpawnError::Agent(fault) => Trouble::Agent { fault, line: None },
-                SpawnError::Platform(error) => Trouble::Platform(error.into()),
-            };
-            (trouble, String::new())
-        })?;
-        let mut session = Self {
-            process,
-            time: env.time.clone(),
-            interpolation: Interpolation::Trajectory,
-            line: Vec::with_capacity(4096),
-            cpu_time_s: None,
-            waited: None,
-        };
-        match session.hello(started, manifest.interpolation, task) {
-            Ok(()) => Ok(session),
-            Err(trouble) => Err((trouble, session.abort())),
+        let mut exchange =
+            Exchange::start(bundle, env).map_err(|trouble| (trouble, String::new()))?;
+        let stated = bundle.manifest.interpolation;
+        match hello(&mut exchange, contest, stated, env.time.startup_s, started) {
+            Ok(interpolation) => Ok(Self {
+                exchange,
+                time: env.time.clone(),
+                interpolation,
+                asked: None,
+                action: Vec::new(),
+                cpu_time_s: None,
+                waited: None,
+            }),
+            Err(trouble) => Err((trouble, abort(exchange))),
         }
-    }
-
-    fn hello(&mut self, started: Instant, stated: Option<i64>, task: Task) -> Result<(), Trouble> {
-        let wait = Wait {
-            phase: "start-up",
-            limit_s: self.time.startup_s,
-        };
-        Message::hello(task, wire_env(task)).write_line(&mut self.line);
-        let answer = self.ask(wait, started)?;
-        let ready = answer::parse_ready(&answer.bytes).map_err(|fault| at_line(fault, &answer))?;
-        if let Some(stated) = stated
-            && ready.interpolation.code() != Some(stated)
-        {
-            let fault = AgentFaultKind::WrongMessage {
-                expected: format!("ready with interpolation {stated}, as agent.toml says"),
-                got: format!("ready with interpolation {}", ready.interpolation),
-            };
-            return Err(at_line(fault, &answer));
-        }
-        self.interpolation = ready.interpolation;
-        Ok(())
     }
 
     /// What the agent's actions mean.
@@ -134,58 +75,127 @@ impl Session {
         self.interpolation
     }
 
-    /// Announces an episode.
+    /// Announces an episode and waits until the agent is ready.
     ///
     /// # Errors
     /// The agent's fault or the platform's.
     pub fn reset(&mut self, episode: u32) -> Result<(), Trouble> {
-        let wait = Wait {
-            phase: "reset",
-            limit_s: self.time.reset_s,
-        };
-        Message::Reset { episode }.write_line(&mut self.line);
-        let answer = self.ask(wait, Instant::now())?;
-        answer::parse_reset_ready(&answer.bytes, episode)
-            .map_err(|fault| at_line(fault, &answer))?;
-        self.cpu_time_s = self.process.cpu_time_s();
-        Ok(())
+        self.send_reset(episode)?;
+        self.wait().map(drop)
     }
 
-    /// Asks for the action of a step, into `action` (row-major, of the agreed interpolation's
-    /// length).
+    /// Asks for the action of a step and waits for it.
     ///
     /// # Errors
     /// The agent's fault or the platform's.
-    pub fn step(
-        &mut self,
-        step: u32,
-        observation: &[f64],
-        action: &mut Vec<f64>,
-    ) -> Result<Answered, Trouble> {
-        if !observation.iter().all(|value| value.is_finite()) {
-            // JSON would say null, and the agent would be blamed for what it makes of it.
-            return Err(Trouble::Platform(PlatformFault::Recording(format!(
-                "the simulator's observation of step {step} is not finite"
-            ))));
-        }
-        let wait = Wait {
-            phase: "step",
-            limit_s: self.time.step_s,
+    pub fn step(&mut self, step: u32, observation: &[f64]) -> Result<Answered, Trouble> {
+        self.send_step(step, observation)?;
+        self.wait()
+    }
+
+    /// The last action: row-major, of the agreed interpolation's length.
+    #[must_use]
+    pub fn action(&self) -> &[f64] {
+        &self.action
+    }
+
+    /// Announces an episode.
+    ///
+    /// # Errors
+    /// The agent's fault or the platform's.
+    pub fn send_reset(&mut self, episode: u32) -> Result<(), Trouble> {
+        self.send(Question::Reset { episode }, &Message::Reset { episode })
+    }
+
+    /// Asks for the action of a step; the observation must be finite.
+    ///
+    /// # Errors
+    /// The agent's fault or the platform's.
+    pub fn send_step(&mut self, step: u32, observation: &[f64]) -> Result<(), Trouble> {
+        debug_assert!(observation.iter().all(|value| value.is_finite()));
+        self.send(Question::Step { step }, &Message::step(step, observation))
+    }
+
+    fn send(&mut self, question: Question, message: &Message<'_>) -> Result<(), Trouble> {
+        let (phase, limit_s) = match question {
+            Question::Reset { .. } => (Phase::Reset, self.time.reset_s),
+            Question::Step { .. } => (Phase::Step, self.time.step_s),
         };
-        Message::step(step, observation).write_line(&mut self.line);
-        let answer = self.ask(wait, Instant::now())?;
-        answer::parse_act(&answer.bytes, step, self.interpolation, action)
-            .map_err(|fault| at_line(fault, &answer))?;
-        let before = self.cpu_time_s;
-        self.cpu_time_s = self.process.cpu_time_s();
+        (self.asked, self.waited) = (None, None);
+        let sent = self
+            .exchange
+            .send(message, phase, limit_s, Instant::now())?;
+        self.asked = Some(Asked { question, sent });
+        Ok(())
+    }
+
+    /// Waits until one of the agents whose answer is due has written something or has met its limit,
+    /// or until `until`. [`Self::poll`] with a time that has passed tells what it was, if anything.
+    ///
+    /// # Errors
+    /// The platform's alone.
+    pub fn wait_for_any(sessions: &[&Self], until: Instant) -> Result<(), PlatformFault> {
+        let (mut due, mut until) = (Vec::with_capacity(sessions.len()), until);
+        for session in sessions {
+            if let Some(Asked { sent, .. }) = session.asked {
+                until = until.min(sent.deadline);
+                due.push(&session.exchange);
+            }
+        }
+        Exchange::wait_for_any(&due, until)
+    }
+
+    /// Waits for the answer that is due, at most until `until`, which may have passed, and takes it;
+    /// an action is then in [`Self::action`]. `None` while it has not come, and when none is due.
+    ///
+    /// # Errors
+    /// The agent's fault, which may be that its time is over, or the platform's.
+    pub fn poll(&mut self, until: Instant) -> Result<Option<Answered>, Trouble> {
+        let Some(Asked { question, sent }) = self.asked else {
+            return Ok(None);
+        };
+        let outcome = match self.exchange.poll(&sent, until) {
+            Ok(None) => return Ok(None),
+            Ok(Some(answer)) => {
+                self.waited = Some((sent.at, answer.at));
+                self.take(question, &sent, &answer).map(Some)
+            }
+            Err(trouble) => {
+                self.waited = Some((sent.at, Instant::now()));
+                Err(trouble)
+            }
+        };
+        self.asked = None;
+        outcome
+    }
+
+    /// Waits for the answer that is due as long as its limit allows.
+    fn wait(&mut self) -> Result<Answered, Trouble> {
+        loop {
+            if let Some(answered) = self.poll(Instant::now() + TimeLimits::LONGEST)? {
+                return Ok(answered);
+            }
+        }
+    }
+
+    fn take(
+        &mut self,
+        question: Question,
+        sent: &Sent,
+        answer: &Answer,
+    ) -> Result<Answered, Trouble> {
+        match question {
+            Question::Reset { episode } => answer::parse_reset_ready(&answer.bytes, episode),
+            Question::Step { step } => {
+                answer::parse_act(&answer.bytes, step, self.interpolation, &mut self.action)
+            }
+        }
+        .map_err(|fault| answer.shows(fault))?;
+        let cpu_time_s = self.cpu_time_since_answer_s();
+        self.cpu_time_s = self.exchange.cpu_time_s();
         Ok(Answered {
-            computation_time_s: answer
-                .answered
-                .saturating_duration_since(answer.asked)
-                .as_secs_f64(),
-            cpu_time_s: before
-                .zip(self.cpu_time_s)
-                .map(|(before, now)| (now - before).max(0.0)),
+            computation_time_s: answer.at.saturating_duration_since(sent.at).as_secs_f64(),
+            cpu_time_s,
         })
     }
 
@@ -197,9 +207,9 @@ impl Session {
 
     /// CPU time that the agent's process tree used since its last answer, in seconds, where the host
     /// tells.
-    pub(crate) fn cpu_time_since_answer_s(&mut self) -> Option<f64> {
+    pub(crate) fn cpu_time_since_answer_s(&self) -> Option<f64> {
         let before = self.cpu_time_s?;
-        Some((self.process.cpu_time_s()? - before).max(0.0))
+        Some((self.exchange.cpu_time_s()? - before).max(0.0))
     }
 
     /// Tells that an episode is over. An agent that no longer listens meets its fault at the next
@@ -208,8 +218,8 @@ impl Session {
     /// # Errors
     /// The platform's alone.
     pub fn end(&mut self, episode: u32, steps: u32) -> Result<(), PlatformFault> {
-        Message::End { episode, steps }.write_line(&mut self.line);
-        self.tell(TimeLimits::duration(self.time.step_s))
+        let end = Message::End { episode, steps };
+        self.exchange.tell(&end, self.time.step_s)
     }
 
     /// Says goodbye, waits for the exit, kills what is left, and returns the end of the agent's
@@ -218,117 +228,42 @@ impl Session {
     /// # Errors
     /// The platform's alone: how an agent exits is its own affair by now.
     pub fn finish(mut self) -> Result<String, PlatformFault> {
-        let grace = TimeLimits::duration(self.time.bye_s);
-        Message::Bye.write_line(&mut self.line);
-        self.tell(grace)?;
-        Ok(self.process.finish(grace)?.stderr_tail)
+        self.exchange.tell(&Message::Bye, self.time.bye_s)?;
+        self.exchange.finish(TimeLimits::duration(self.time.bye_s))
     }
 
     /// Kills the agent and returns the end of its standard error.
     pub fn abort(self) -> String {
-        match self.process.finish(Duration::ZERO) {
-            Ok(usage) => usage.stderr_tail,
-            Err(error) => {
-                tracing::error!(%error, "an agent's end could not be observed");
-                String::new()
-            }
-        }
-    }
-
-    /// Writes the line without expecting an answer.
-    fn tell(&mut self, limit: Duration) -> Result<(), PlatformFault> {
-        match self.process.write_line(&self.line, Instant::now() + limit) {
-            Ok(_) | Err(WriteError::Closed | WriteError::TimedOut) => Ok(()),
-            Err(WriteError::Platform(error)) => Err(error.into()),
-        }
-    }
-
-    /// Writes the line and waits for one line in return, both before `from` plus the limit.
-    fn ask(&mut self, wait: Wait, from: Instant) -> Result<Answer, Trouble> {
-        let deadline = from + TimeLimits::duration(wait.limit_s);
-        // During start-up anything counts as an answer: the agent runs before `hello` is written.
-        if wait.phase != "start-up" && self.process.has_pending_output().map_err(platform)? {
-            return Err(self.early(wait));
-        }
-        self.waited = None;
-        let asked = match self.process.write_line(&self.line, deadline) {
-            Ok(asked) => asked,
-            Err(WriteError::Closed) => return Err(self.closed()),
-            Err(WriteError::TimedOut) => return Err(timed_out(wait)),
-            Err(WriteError::Platform(error)) => return Err(platform(error)),
-        };
-        match self
-            .process
-            .read_line(MAX_LINE_BYTES, deadline)
-            .map_err(platform)?
-        {
-            ReadLine::Line { bytes, at } => {
-                self.waited = Some((asked, at));
-                Ok(Answer {
-                    bytes,
-                    asked,
-                    answered: at,
-                })
-            }
-            ReadLine::TooLong { head } => Err(too_long(&head)),
-            ReadLine::TimedOut => {
-                self.waited = Some((asked, Instant::now()));
-                Err(timed_out(wait))
-            }
-            ReadLine::Closed => Err(self.closed()),
-        }
-    }
-
-    /// The agent has written before it was asked, or has closed its output.
-    fn early(&mut self, wait: Wait) -> Trouble {
-        let fault = AgentFaultKind::WrongMessage {
-            expected: format!("no output before the next question ({})", wait.phase),
-            got: "a line that was not asked for".to_owned(),
-        };
-        match self.process.read_line(MAX_LINE_BYTES, Instant::now()) {
-            Ok(ReadLine::Line { bytes, .. }) => Trouble::Agent {
-                fault,
-                line: Some(quote_line(&bytes)),
-            },
-            Ok(ReadLine::TimedOut) => Trouble::Agent { fault, line: None },
-            Ok(ReadLine::TooLong { head }) => too_long(&head),
-            Ok(ReadLine::Closed) => self.closed(),
-            Err(error) => platform(error),
-        }
-    }
-
-    /// The agent's end of a pipe is closed: by exit, by a kill, or by itself.
-    fn closed(&mut self) -> Trouble {
-        let fault = self
-            .process
-            .diagnose_end(DIAGNOSIS)
-            .unwrap_or(AgentFaultKind::ClosedOutput);
-        Trouble::Agent { fault, line: None }
+        abort(self.exchange)
     }
 }
 
-fn platform(error: faceoff_sandbox::SandboxError) -> Trouble {
-    Trouble::Platform(error.into())
-}
-
-fn timed_out(wait: Wait) -> Trouble {
-    let fault = AgentFaultKind::TimedOut {
-        phase: wait.phase.to_owned(),
-        limit_s: wait.limit_s,
-    };
-    Trouble::Agent { fault, line: None }
-}
-
-fn too_long(head: &[u8]) -> Trouble {
-    Trouble::Agent {
-        fault: answer::too_long(),
-        line: Some(quote_line(head)),
+/// The agent's first answer; `stated` is the interpolation that `agent.toml` promises.
+fn hello(
+    exchange: &mut Exchange,
+    contest: Contest,
+    stated: Option<i64>,
+    limit_s: f64,
+    started: Instant,
+) -> Result<Interpolation, Trouble> {
+    let hello = Message::hello(contest, wire_env(contest));
+    let sent = exchange.send(&hello, Phase::StartUp, limit_s, started)?;
+    let answer = exchange.wait(&sent)?;
+    let ready = answer::parse_ready(&answer.bytes).map_err(|fault| answer.shows(fault))?;
+    match stated {
+        Some(stated) if ready.interpolation.code() != Some(stated) => {
+            Err(answer.shows(AgentFaultKind::WrongMessage {
+                expected: format!("ready with interpolation {stated}, as agent.toml says"),
+                got: format!("ready with interpolation {}", ready.interpolation),
+            }))
+        }
+        _ => Ok(ready.interpolation),
     }
 }
 
-fn at_line(fault: AgentFaultKind, answer: &Answer) -> Trouble {
-    Trouble::Agent {
-        fault,
-        line: Some(quote_line(&answer.bytes)),
-    }
+fn abort(exchange: Exchange) -> String {
+    exchange.finish(Duration::ZERO).unwrap_or_else(|error| {
+        tracing::error!(%error, "an agent's end could not be observed");
+        String::new()
+    })
 }

@@ -1,9 +1,10 @@
 use crate::{
-    AgentEnvironment, HostWatch, PlatformFault,
     bundle::Bundle,
     calibration::{self, CalibrationAgent},
+    config::AgentEnvironment,
     cpu::OffTheAgentsCpus,
-    host_watch::StallWatch,
+    fault::PlatformFault,
+    host_watch::{HostWatch, StallWatch},
     player::Player,
     recording::{Recorder, ShardFolder},
 };

@@ -1,6 +1,6 @@
 use crate::{
-    AgentEnvironment, PlatformFault, bundle::Bundle, host_watch::StallWatch, log::Log,
-    player::Player,
+    bundle::Bundle, config::AgentEnvironment, fault::PlatformFault, host_watch::StallWatch,
+    log::Log, player::Player,
 };
 use faceoff_episode::Nowhere;
 use faceoff_types::{AgentFault, Profile, Seed, Task};

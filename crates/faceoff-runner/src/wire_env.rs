@@ -1,12 +1,16 @@
-use faceoff_sim::EnvInfo;
-use faceoff_types::{RULESET, Task};
+use faceoff_sim::{EPISODE_STEPS, EnvInfo, GAME_STEPS, env_info, env_info_for};
+use faceoff_types::{Contest, RULESET, Task};
 use faceoff_wire::{
     Env,
     message::{DiscEnv, RobotEnv, TableEnv},
 };
 
 /// The simulator's constants under the protocol's names.
-pub(crate) fn wire_env(task: Task) -> Env {
+pub(crate) fn wire_env(contest: Contest) -> Env {
+    let (info, episode_steps) = match contest {
+        Contest::Task(task) => (env_info(task), EPISODE_STEPS),
+        Contest::Game { side } => (env_info_for(2, side.index()), GAME_STEPS),
+    };
     let EnvInfo {
         n_agents,
         table_length,
@@ -22,10 +26,10 @@ pub(crate) fn wire_env(task: Task) -> Env {
         joint_acc_limit,
         base_frame,
         dt,
-    } = faceoff_sim::env_info(task);
-    let opponent: &[usize] = match task {
-        Task::Hit => &Env::OPPONENT_EE_IDS,
-        Task::Defend | Task::Prepare => &[],
+    } = info;
+    let opponent: &[usize] = match contest {
+        Contest::Task(Task::Hit) | Contest::Game { .. } => &Env::OPPONENT_EE_IDS,
+        Contest::Task(Task::Defend | Task::Prepare) => &[],
     };
     Env {
         dt,
@@ -59,7 +63,7 @@ pub(crate) fn wire_env(task: Task) -> Env {
                 .map(|m| [0, 4, 8, 12].map(|row| [m[row], m[row + 1], m[row + 2], m[row + 3]]))
                 .collect(),
         },
-        episode_steps: faceoff_sim::EPISODE_STEPS,
+        episode_steps,
         ruleset: RULESET.to_owned(),
     }
 }
@@ -67,10 +71,13 @@ pub(crate) fn wire_env(task: Task) -> Env {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use faceoff_types::Side;
+    use faceoff_wire::Message;
+    use serde_json::json;
 
     #[test]
     fn hello_states_the_rules_constants() {
-        let env = serde_json::to_value(wire_env(Task::Hit)).unwrap();
+        let env = serde_json::to_value(wire_env(Task::Hit.into())).unwrap();
         assert_eq!(env["dt"], 0.02);
         assert_eq!(env["episode_steps"], 500);
         assert_eq!(env["table"]["length"], 1.948);
@@ -88,7 +95,26 @@ mod tests {
             serde_json::json!([1.0, 0.0, 0.0, -1.51])
         );
         for task in [Task::Defend, Task::Prepare] {
-            assert_eq!(wire_env(task).opponent_ee_ids, [] as [usize; 0]);
+            assert_eq!(wire_env(task.into()).opponent_ee_ids, [] as [usize; 0]);
+        }
+    }
+
+    #[test]
+    fn hello_of_a_game_states_the_side_and_its_own_frame_first() {
+        for (side, agent_id, own_x) in [(Side::First, 1, -1.51), (Side::Second, 2, 1.51)] {
+            let contest = Contest::Game { side };
+            let hello = Message::hello(contest, wire_env(contest));
+            let hello = serde_json::to_value(hello).unwrap();
+            assert_eq!(hello["task"], "tournament");
+            assert_eq!(hello["agent_id"], agent_id);
+            let env = &hello["env"];
+            assert_eq!(
+                (&env["n_agents"], &env["episode_steps"]),
+                (&json!(2), &json!(45_000))
+            );
+            assert_eq!(env["opponent_ee_ids"], json!([20, 21, 22]));
+            assert_eq!(env["robot"]["base_frame"][0][0][3], own_x);
+            assert_eq!(env["robot"]["base_frame"][1][0][3], -own_x);
         }
     }
 }

@@ -21,6 +21,7 @@ mod error;
 mod isolation;
 mod limits;
 mod line_pipe;
+mod next_look;
 mod output_holders;
 mod owner;
 mod prepared;

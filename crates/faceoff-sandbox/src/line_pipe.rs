@@ -118,7 +118,7 @@ impl LinePipe {
                 return Ok(ReadLine::Closed);
             }
             // A dribbling agent always has something to read: the deadline holds all the same.
-            if Instant::now() >= deadline && !self.buffer[self.searched..].contains(&b'\n') {
+            if Instant::now() >= deadline && !self.holds_line() {
                 return Ok(self.take_line(max_bytes).unwrap_or(ReadLine::TimedOut));
             }
         }
@@ -132,6 +132,11 @@ impl LinePipe {
     /// The descriptor's identity, for finding who else holds the pipe.
     pub(crate) fn output(&self) -> BorrowedFd<'_> {
         self.output.as_fd()
+    }
+
+    /// Has a whole line been read that has not been handed out?
+    pub(crate) fn holds_line(&self) -> bool {
+        self.buffer[self.searched..].contains(&b'\n')
     }
 
     fn take_line(&mut self, max_bytes: usize) -> Option<ReadLine> {
@@ -190,13 +195,18 @@ pub(crate) fn wait_for(
     flags: PollFlags,
     deadline: Instant,
 ) -> io::Result<bool> {
+    wait_for_any(&mut [PollFd::from_borrowed_fd(fd, flags)], deadline)
+}
+
+/// [`wait_for`] for several descriptors at once.
+pub(crate) fn wait_for_any(fds: &mut [PollFd<'_>], deadline: Instant) -> io::Result<bool> {
     loop {
         let left = deadline.saturating_duration_since(Instant::now());
         let timeout = Timespec {
             tv_sec: i64::try_from(left.as_secs()).unwrap_or(i64::MAX),
             tv_nsec: i64::from(left.subsec_nanos()),
         };
-        match poll(&mut [PollFd::from_borrowed_fd(fd, flags)], Some(&timeout)) {
+        match poll(fds, Some(&timeout)) {
             Ok(0) => return Ok(false),
             Ok(_) => return Ok(true),
             Err(Errno::INTR) => {}

@@ -4,7 +4,8 @@ use crate::{
     command_check::check_command,
     end::{End, Evidence},
     error::IoContext,
-    line_pipe::{LinePipe, Written},
+    line_pipe::{LinePipe, Written, wait_for_any},
+    next_look::NextLook,
     output_holders,
     prepared::{Prepared, Started},
     process_tree::ProcessTree,
@@ -13,14 +14,13 @@ use crate::{
     sweep,
 };
 use faceoff_types::AgentFaultKind;
+use rustix::event::{PollFd, PollFlags};
 use std::{
     fs,
     sync::Once,
     time::{Duration, Instant},
 };
 
-/// When to look for the first time whether a silent agent has closed its output; then ever more rarely.
-const FIRST_LOOK: Duration = Duration::from_millis(100);
 /// How long to wait for the exit status once the pipes are closed.
 const END_PATIENCE: Duration = Duration::from_millis(500);
 
@@ -31,6 +31,7 @@ pub struct AgentProcess {
     stderr: StderrTail,
     tree: ProcessTree,
     limits: Limits,
+    next_look: NextLook,
     end: Option<End>,
 }
 
@@ -80,6 +81,7 @@ impl AgentProcess {
             stderr,
             tree,
             limits: spec.limits,
+            next_look: NextLook::first(Instant::now()),
             end: None,
         })
     }
@@ -91,7 +93,10 @@ impl AgentProcess {
     /// [`WriteError::Closed`] and [`WriteError::TimedOut`] are the agent's doing, the rest is ours.
     pub fn write_line(&mut self, line: &[u8], deadline: Instant) -> Result<Instant, WriteError> {
         match self.lines.write(line, deadline) {
-            Ok(Written::At(at)) => Ok(at),
+            Ok(Written::At(at)) => {
+                self.next_look = NextLook::first(at);
+                Ok(at)
+            }
             Ok(Written::TimedOut) => Err(WriteError::TimedOut),
             Ok(Written::Closed) => {
                 self.check_platform()?;
@@ -101,7 +106,8 @@ impl AgentProcess {
         }
     }
 
-    /// Waits for the agent's next line, of at most `max_bytes` without its newline, until `deadline`.
+    /// Waits for the agent's next line, of at most `max_bytes` without its newline, until `deadline`;
+    /// one that has passed takes what is there already.
     ///
     /// # Errors
     /// When the pipe or the sandbox itself failed; never for what the agent does.
@@ -110,13 +116,8 @@ impl AgentProcess {
         max_bytes: usize,
         deadline: Instant,
     ) -> Result<ReadLine, SandboxError> {
-        let mut pause = FIRST_LOOK;
         let outcome = loop {
-            let until = if self.tree.is_sandboxed() {
-                deadline.min(Instant::now() + pause)
-            } else {
-                deadline
-            };
+            let until = self.until_next_look(deadline);
             let outcome = self
                 .lines
                 .read_line(max_bytes, until)
@@ -127,12 +128,43 @@ impl AgentProcess {
             if self.output_is_abandoned()? {
                 break ReadLine::Closed;
             }
-            pause *= 2;
+            self.next_look.after_a_longer_pause(Instant::now());
         };
         if matches!(outcome, ReadLine::Closed) {
             self.check_platform()?;
         }
         Ok(outcome)
+    }
+
+    /// Waits until one of the agents has something for [`Self::read_line`], be it a part of a line or
+    /// its end, or until `deadline`. May return early, when an agent's silence is to be looked into:
+    /// that, too, `read_line` does, with a deadline that has passed.
+    ///
+    /// # Errors
+    /// When the pipes cannot be waited for.
+    pub fn wait_for_any(agents: &[&Self], deadline: Instant) -> Result<(), SandboxError> {
+        if agents.iter().any(|agent| agent.lines.holds_line()) {
+            return Ok(());
+        }
+        let until = agents
+            .iter()
+            .fold(deadline, |until, agent| agent.until_next_look(until));
+        let mut outputs: Vec<PollFd<'_>> = agents
+            .iter()
+            .map(|agent| PollFd::from_borrowed_fd(agent.lines.output(), PollFlags::IN))
+            .collect();
+        wait_for_any(&mut outputs, until)
+            .map_err(|source| SandboxError::io("cannot wait for the agents' output", source))?;
+        Ok(())
+    }
+
+    /// Outside of a sandbox a closed output is seen at once.
+    fn until_next_look(&self, deadline: Instant) -> Instant {
+        if self.tree.is_sandboxed() {
+            deadline.min(self.next_look.at)
+        } else {
+            deadline
+        }
     }
 
     /// Is there unread output already (an answer before the question)?

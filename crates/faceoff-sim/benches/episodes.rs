@@ -18,11 +18,7 @@ fn held_arm(c: &mut Criterion) {
     let mut group = c.benchmark_group("control_step");
     group.throughput(Throughput::Elements(STEPS));
     for (name, factors) in [("ideal", Factors::NONE), ("evaluation", Factors::ALL)] {
-        let plant = if factors == Factors::NONE {
-            Plant::nominal()
-        } else {
-            Plant::mismatched(&settings, Seed::from_number(0))
-        };
+        let plant = Plant::under(factors, &settings, Seed::from_number(0));
         for task in Task::ALL {
             let episode = Episode::new(
                 task,

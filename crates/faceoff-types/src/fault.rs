@@ -1,4 +1,4 @@
-use crate::Task;
+use crate::Contest;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -35,8 +35,8 @@ pub enum AgentFaultKind {
     },
     /// No answer in time.
     TimedOut {
-        /// `start-up`, `reset` or `step`.
-        phase: String,
+        /// What was waited for.
+        phase: Phase,
         /// The limit in seconds.
         limit_s: f64,
     },
@@ -122,14 +122,37 @@ const fn signal_note(signal: i32) -> &'static str {
     }
 }
 
+/// What an agent is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Phase {
+    /// To start and to answer `hello`.
+    StartUp,
+    /// To get ready for an episode.
+    Reset,
+    /// To act.
+    Step,
+}
+
+impl fmt::Display for Phase {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::StartUp => "start-up",
+            Self::Reset => "reset",
+            Self::Step => "step",
+        })
+    }
+}
+
 /// One fault of an agent: what, where, and the offending line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AgentFault {
     /// What it did.
     #[serde(flatten)]
     pub fault: AgentFaultKind,
-    /// The task it was playing.
-    pub task: Task,
+    /// What it was playing.
+    #[serde(flatten)]
+    pub contest: Contest,
     /// The episode; `None` during start-up.
     pub episode: Option<u32>,
     /// The control step; `None` outside of an episode.
@@ -140,11 +163,11 @@ pub struct AgentFault {
 
 impl fmt::Display for AgentFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.task)?;
+        write!(f, "{}", self.contest)?;
         match (self.episode, self.step) {
             (Some(episode), Some(step)) => write!(f, ", episode {episode}, step {step}")?,
-            (Some(episode), None) => write!(f, ", episode {episode}, reset")?,
-            (None, _) => write!(f, ", start-up")?,
+            (Some(episode), None) => write!(f, ", episode {episode}, {}", Phase::Reset)?,
+            (None, _) => write!(f, ", {}", Phase::StartUp)?,
         }
         write!(f, ": {}", self.fault)?;
         if let Some(line) = &self.line {
@@ -157,6 +180,47 @@ impl fmt::Display for AgentFault {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Side, Task};
+
+    /// Databases and datasets hold these lines.
+    #[test]
+    fn stored_faults_stay_readable_and_a_games_fault_adds_its_side() {
+        let fault = AgentFault {
+            fault: AgentFaultKind::TimedOut {
+                phase: Phase::StartUp,
+                limit_s: 120.0,
+            },
+            contest: Task::Hit.into(),
+            episode: None,
+            step: None,
+            line: None,
+        };
+        let mut in_a_game = fault.clone();
+        in_a_game.contest = Contest::Game { side: Side::Second };
+        for (fault, stored, shown) in [
+            (
+                fault,
+                r#"{"kind":"timed_out","phase":"start-up","limit_s":120.0,"task":"hit","episode":null,"step":null,"line":null}"#,
+                "hit, start-up: no answer within the start-up limit of 120 s",
+            ),
+            (
+                in_a_game,
+                r#"{"kind":"timed_out","phase":"start-up","limit_s":120.0,"task":"tournament","side":2,"episode":null,"step":null,"line":null}"#,
+                "tournament, side 2, start-up: no answer within the start-up limit of 120 s",
+            ),
+        ] {
+            assert_eq!(serde_json::to_string(&fault).unwrap(), stored);
+            assert_eq!(serde_json::from_str::<AgentFault>(stored).unwrap(), fault);
+            assert_eq!(fault.to_string(), shown);
+        }
+        for wrong in [
+            r#"{"task":"tournament"}"#,
+            r#"{"task":"hit","side":1}"#,
+            r#"{"task":"tournament","side":3}"#,
+        ] {
+            assert!(serde_json::from_str::<Contest>(wrong).is_err(), "{wrong}");
+        }
+    }
 
     #[test]
     fn a_crash_in_the_sandbox_does_not_hide_that_it_may_have_been_an_abort() {

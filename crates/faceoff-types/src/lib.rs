@@ -6,6 +6,7 @@
 
 mod computation_time;
 mod constraint;
+mod contest;
 mod fault;
 mod ids;
 mod interpolation;
@@ -21,7 +22,8 @@ mod timing;
 
 pub use computation_time::ComputationTime;
 pub use constraint::{Constraint, Violations};
-pub use fault::{AgentFault, AgentFaultKind};
+pub use contest::{Contest, Side};
+pub use fault::{AgentFault, AgentFaultKind, Phase};
 pub use ids::{
     AblationId, AblationRunId, EvaluationId, ParseIdError, ShardId, SubmissionId, TeamId,
 };

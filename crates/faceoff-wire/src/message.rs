@@ -1,7 +1,7 @@
 //! What the evaluator says to an agent, one JSON object per line.
 
 use crate::protocol::PROTOCOL_VERSION;
-use faceoff_types::{JOINTS, Task};
+use faceoff_types::{Contest, JOINTS, Task};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
@@ -19,12 +19,13 @@ pub enum ProtocolTask {
     Tournament,
 }
 
-impl From<Task> for ProtocolTask {
-    fn from(task: Task) -> Self {
-        match task {
-            Task::Hit => Self::Hit,
-            Task::Defend => Self::Defend,
-            Task::Prepare => Self::Prepare,
+impl From<Contest> for ProtocolTask {
+    fn from(contest: Contest) -> Self {
+        match contest {
+            Contest::Task(Task::Hit) => Self::Hit,
+            Contest::Task(Task::Defend) => Self::Defend,
+            Contest::Task(Task::Prepare) => Self::Prepare,
+            Contest::Game { .. } => Self::Tournament,
         }
     }
 }
@@ -68,13 +69,13 @@ pub enum Message<'a> {
 }
 
 impl<'a> Message<'a> {
-    /// `hello` for the one agent of a qualifying task.
+    /// `hello` for the one agent of a qualifying task, or one of the two of a game.
     #[must_use]
-    pub fn hello(task: Task, env: Env) -> Self {
+    pub fn hello(contest: Contest, env: Env) -> Self {
         Self::Hello {
             protocol: PROTOCOL_VERSION,
-            task: task.into(),
-            agent_id: 1,
+            task: contest.into(),
+            agent_id: contest.agent_id(),
             env: Box::new(env),
         }
     }

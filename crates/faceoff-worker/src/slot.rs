@@ -139,6 +139,7 @@ fn outside(error: &anyhow::Error) -> &'static str {
         Some(PlatformFault::Sandbox(_)) => "the sandbox could not be set up",
         Some(PlatformFault::Io { .. }) => "a file could not be read or written",
         Some(PlatformFault::Recording(_)) => "the recording could not be made",
+        Some(PlatformFault::Simulation(_)) => "the simulator failed",
         Some(PlatformFault::Cancelled) | None => "the evaluator failed",
     }
 }

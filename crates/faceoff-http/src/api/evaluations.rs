@@ -177,8 +177,7 @@ pub struct FaultView {
     /// What it did, in words.
     pub message: String,
     /// In which task.
-    #[schema(value_type = String)]
-    pub task: Task,
+    pub task: String,
     /// In which episode; null during start-up.
     pub episode: Option<u32>,
     /// At which control step; null outside of an episode.
@@ -191,7 +190,7 @@ impl From<AgentFault> for FaultView {
     fn from(fault: AgentFault) -> Self {
         Self {
             message: fault.fault.to_string(),
-            task: fault.task,
+            task: fault.contest.to_string(),
             episode: fault.episode,
             step: fault.step,
             line: fault.line,

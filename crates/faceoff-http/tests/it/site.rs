@@ -377,7 +377,7 @@ pub fn text(value: &Value) -> String {
 pub fn outcome(task: Task, episode: u32, faulty: bool) -> EpisodeOutcome {
     let fault = faulty.then(|| AgentFault {
         fault: AgentFaultKind::NonFinite,
-        task,
+        contest: task.into(),
         episode: Some(episode),
         step: Some(3),
         line: Some("{\"type\":\"act\"}".into()),

@@ -1,14 +1,13 @@
-use super::{BundleError, tree::Tree};
+use super::{error::BundleError, tree::Tree};
+use fs_err::{self as fs, File};
 use std::{
-    fs::{self, File},
     os::unix::fs::{MetadataExt, PermissionsExt},
     path::Path,
 };
 
 /// Brings everything below `folder` into the tree, in order of the names.
 pub(super) fn copy(folder: &Path, tree: &mut Tree) -> Result<(), BundleError> {
-    let place = fs::metadata(tree.place_on_disk())
-        .map_err(BundleError::io(format!("reading {}", folder.display())))?;
+    let place = fs::metadata(tree.place_on_disk())?;
     copy_below(folder, "", (place.dev(), place.ino()), tree)
 }
 
@@ -21,19 +20,15 @@ fn copy_below(
     copy: (u64, u64),
     tree: &mut Tree,
 ) -> Result<(), BundleError> {
-    let reading = || BundleError::io(format!("reading {}", folder.display()));
-    let mut entries = fs::read_dir(folder)
-        .and_then(Iterator::collect::<Result<Vec<_>, _>>)
-        .map_err(reading())?;
+    let mut entries = fs::read_dir(folder)?.collect::<Result<Vec<_>, _>>()?;
     entries.sort_by_key(fs::DirEntry::file_name);
     for entry in entries {
         let path = entry.path();
-        let reading = || BundleError::io(format!("reading {}", path.display()));
         let name = entry.file_name().into_string().map_err(|name| {
             BundleError::Invalid(format!("the bundle has a name that is not UTF-8: {name:?}"))
         })?;
         let name = format!("{prefix}{name}");
-        let metadata = entry.metadata().map_err(reading())?;
+        let metadata = entry.metadata()?;
         let (kind, mode) = (metadata.file_type(), metadata.permissions().mode());
         if kind.is_dir() {
             if (metadata.dev(), metadata.ino()) == copy {
@@ -42,9 +37,9 @@ fn copy_below(
             tree.folder(&name, mode)?;
             copy_below(&path, &format!("{name}/"), copy, tree)?;
         } else if kind.is_file() {
-            tree.file(&name, mode, &mut File::open(&path).map_err(reading())?)?;
+            tree.file(&name, mode, &mut File::open(&path)?.into_file())?;
         } else if kind.is_symlink() {
-            let target = fs::read_link(&path).map_err(reading())?;
+            let target = fs::read_link(&path)?;
             let target = target.to_str().ok_or_else(|| {
                 BundleError::Invalid(format!(
                     "entry {name:?} is a link to a name that is not UTF-8"

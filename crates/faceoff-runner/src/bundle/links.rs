@@ -1,4 +1,4 @@
-use super::tree::Node;
+use super::node::Node;
 use std::collections::BTreeMap;
 
 /// As many links as Linux follows on one path.

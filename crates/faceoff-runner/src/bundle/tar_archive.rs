@@ -1,4 +1,4 @@
-use super::{BundleError, tree::Tree};
+use super::{error::BundleError, tree::Tree};
 use std::io::Read;
 use tar::{Archive, EntryType, Header, PaxExtensions};
 

@@ -1,24 +1,12 @@
-use super::{BundleError, BundleLimits, links, no_manifest};
+use super::{error::BundleError, limits::BundleLimits, links, node::Node};
+use fs_err::{self as fs, OpenOptions, os::unix::fs::symlink};
 use std::{
     collections::BTreeMap,
-    fs::{self, OpenOptions, Permissions},
+    fs::Permissions,
     io::{self, Read, Write},
-    os::unix::fs::{PermissionsExt, symlink},
+    os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
 };
-
-/// What an entry of the archive became.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Node {
-    /// A folder; `named` when the archive has an entry for it, not only for something inside.
-    Folder {
-        named: bool,
-    },
-    File,
-    Link {
-        target: String,
-    },
-}
 
 /// The folder that grows while an archive is read. What is in it is known from memory, never asked
 /// back from the disk, and symbolic links are made last: nothing can be written through one.
@@ -47,17 +35,11 @@ fn invalid(entry: &str, problem: impl std::fmt::Display) -> BundleError {
 impl Tree {
     /// An empty tree in the folder `into`.
     pub fn new(into: &Path, limits: &BundleLimits) -> Result<Self, BundleError> {
-        fs::create_dir_all(into)
-            .and_then(|()| fs::set_permissions(into, Permissions::from_mode(FOLDER_MODE)))
-            .map_err(BundleError::io(format!("creating {}", into.display())))?;
-        let mut inside =
-            fs::read_dir(into).map_err(BundleError::io(format!("reading {}", into.display())))?;
-        if inside.next().is_some() {
-            let source = io::Error::from(io::ErrorKind::DirectoryNotEmpty);
-            return Err(BundleError::Io {
-                what: format!("unpacking into {}", into.display()),
-                source,
-            });
+        fs::create_dir_all(into)?;
+        fs::set_permissions(into, Permissions::from_mode(FOLDER_MODE))?;
+        if fs::read_dir(into)?.next().is_some() {
+            let what = format!("unpacking into {}: it is not empty", into.display());
+            return Err(io::Error::new(io::ErrorKind::DirectoryNotEmpty, what).into());
         }
         Ok(Self {
             into: into.to_owned(),
@@ -168,9 +150,8 @@ impl Tree {
             )));
         }
         let place = self.into.join(path);
-        fs::create_dir(&place)
-            .and_then(|()| fs::set_permissions(&place, Permissions::from_mode(FOLDER_MODE)))
-            .map_err(BundleError::io(format!("creating the folder {path:?}")))?;
+        fs::create_dir(&place)?;
+        fs::set_permissions(&place, Permissions::from_mode(FOLDER_MODE))?;
         self.nodes.insert(path.to_owned(), Node::Folder { named });
         Ok(())
     }
@@ -195,14 +176,11 @@ impl Tree {
         Self::check_mode(entry, mode)?;
         let target = self.place(entry, Node::File)?;
         let file_mode = if mode & 0o111 == 0 { 0o644 } else { 0o755 };
-        let writing = || format!("writing {entry:?}");
         let mut file = OpenOptions::new()
             .write(true)
             .create_new(true)
-            .open(target)
-            .map_err(BundleError::io(writing()))?;
-        file.set_permissions(Permissions::from_mode(file_mode))
-            .map_err(BundleError::io(writing()))?;
+            .open(target)?;
+        file.set_permissions(Permissions::from_mode(file_mode))?;
         let mut buffer = vec![0; 64 << 10];
         loop {
             let read = match content.read(&mut buffer) {
@@ -218,8 +196,7 @@ impl Tree {
                     self.limits.unpacked_bytes
                 )));
             }
-            file.write_all(&buffer[..read])
-                .map_err(BundleError::io(writing()))?;
+            file.write_all(&buffer[..read])?;
         }
     }
 
@@ -249,8 +226,7 @@ impl Tree {
             ));
         }
         let place = self.place(entry, Node::File)?;
-        fs::hard_link(self.into.join(existing), place)
-            .map_err(BundleError::io(format!("linking {entry:?}")))
+        Ok(fs::hard_link(self.into.join(existing), place)?)
     }
 
     /// Anything that a bundle cannot hold.
@@ -262,18 +238,18 @@ impl Tree {
     }
 
     /// The folder that holds `manifest`: the root (an empty path) or the single top folder.
-    pub fn bundle_root(&self, manifest: &str) -> Result<String, BundleError> {
+    pub fn bundle_root(&self, manifest: &str) -> Option<String> {
         if self.nodes.contains_key(manifest) {
-            return Ok(String::new());
+            return Some(String::new());
         }
         let mut top = self.nodes.iter().filter(|(path, _)| !path.contains('/'));
         match (top.next(), top.next()) {
             (Some((folder, Node::Folder { .. })), None)
                 if self.nodes.contains_key(&format!("{folder}/{manifest}")) =>
             {
-                Ok(folder.clone())
+                Some(folder.clone())
             }
-            _ => Err(no_manifest()),
+            _ => None,
         }
     }
 
@@ -287,8 +263,7 @@ impl Tree {
         }
         for (path, node) in &self.nodes {
             if let Node::Link { target } = node {
-                symlink(target, self.into.join(path))
-                    .map_err(BundleError::io(format!("linking {path:?}")))?;
+                symlink(target, self.into.join(path))?;
             }
         }
         Ok(())

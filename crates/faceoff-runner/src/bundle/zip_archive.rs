@@ -1,4 +1,4 @@
-use super::{BundleError, tree::Tree};
+use super::{error::BundleError, tree::Tree};
 use std::{
     fs::File,
     io::{BufReader, Read},

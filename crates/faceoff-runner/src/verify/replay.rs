@@ -1,22 +1,16 @@
 use super::{Difference, compare, feed::Recorded};
 use crate::{
     dataset::Columns,
-    host_noise::Times,
-    recording::{
-        EPISODES_FILE, EpisodeRows, STEPS_FILE, StepRows, StepScan,
-        end_name, seconds,
-    },
+    recording::{EPISODES_FILE, EpisodeRows, STEPS_FILE, StepRows, StepScan, end_name, seconds},
 };
 use arrow_array::{
     Array, Float64Array, Int64Array, ListArray, RecordBatch,
     cast::AsArray,
     types::{Float64Type, Int64Type},
 };
-use faceoff_episode::{Answered, EpisodeStart, StepRow};
+use faceoff_episode::{Answered, EpisodeStart, StepRow, TimeSum};
 use faceoff_sim::{Episode, PerturbationSettings, Plant};
-use faceoff_types::{
-    AgentFault, EpisodeEnd, EpisodeOutcome, Factor, Interpolation, Profile, Seed,
-};
+use faceoff_types::{AgentFault, EpisodeEnd, EpisodeOutcome, Interpolation, Profile, Seed};
 use faceoff_wire::dataset::DatasetManifest;
 
 /// What it takes to simulate the episodes of an evaluation again.
@@ -42,7 +36,7 @@ struct Course<'a> {
     interpolation: Interpolation,
     steps: StepRows,
     episodes: EpisodeRows,
-    times: Times,
+    times: TimeSum,
     scan: StepScan,
     ended: Option<EpisodeEnd>,
 }
@@ -56,11 +50,8 @@ struct Given {
 impl Replay {
     pub fn new(manifest: &DatasetManifest) -> Self {
         let settings = PerturbationSettings::default();
-        let plant = if manifest.profile.factors().contains(Factor::ModelMismatch) {
-            Plant::mismatched(&settings, manifest.mismatch_seed)
-        } else {
-            Plant::nominal()
-        };
+        let factors = manifest.profile.factors();
+        let plant = Plant::under(factors, &settings, manifest.mismatch_seed);
         Self {
             profile: manifest.profile,
             seed: manifest.seed,
@@ -89,7 +80,7 @@ impl Replay {
             interpolation,
             steps: StepRows::new(recorded.task),
             episodes: EpisodeRows::new(),
-            times: Times::default(),
+            times: TimeSum::default(),
             scan: StepScan::default(),
             ended: None,
         };
@@ -144,8 +135,7 @@ impl Course<'_> {
         };
         self.steps.push(&row);
         self.episodes.step(&row);
-        let time_s = answered.computation_time_s;
-        self.times.add(time_s, time_s);
+        self.times.add(answered.computation_time_s);
         self.scan.add(
             self.recorded.episode,
             step,
@@ -220,7 +210,7 @@ impl Course<'_> {
                     (Some(recorded.episode), None),
                     (None, None),
                 ];
-                if fault.task != recorded.task
+                if fault.contest != recorded.task.into()
                     || !possible.contains(&during)
                     || (fault.step.is_none() && steps > 0)
                 {

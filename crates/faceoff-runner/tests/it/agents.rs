@@ -119,3 +119,17 @@ pub fn impatient() -> AgentEnvironment {
     env.time.step_s = 0.5;
     env
 }
+
+/// A developer's own agent, without the sandbox.
+pub fn unconfined() -> AgentEnvironment {
+    let mut env = sandboxed();
+    env.isolation = Isolation::None;
+    env.runtimes.insert(
+        "python3".into(),
+        Runtime {
+            read_only_paths: Vec::new(),
+            path: std::env::var("PATH").unwrap(),
+        },
+    );
+    env
+}

@@ -1,7 +1,7 @@
 //! Late answers, and whose fault they are: real agents, and a host that stalls or says that it does.
 
 use crate::{
-    agents::{Agent, impatient, sandboxed},
+    agents::{Agent, impatient, sandboxed, unconfined},
     recording::{floats, ints, read, seconds},
     shard::{Watcher, run, spec, timeless},
 };
@@ -9,7 +9,6 @@ use arrow_array::Array;
 use faceoff_runner::{
     AgentEnvironment, HostWatch, ShardReport, ShardSpec, run_shard, run_shard_watched,
 };
-use faceoff_sandbox::{Isolation, Runtime};
 use faceoff_types::{AgentFaultKind, Task};
 use std::{
     path::Path,
@@ -66,15 +65,8 @@ fn env(reruns: u32) -> AgentEnvironment {
 }
 
 fn developers() -> AgentEnvironment {
-    let mut env = env(2);
-    env.isolation = Isolation::None;
-    env.runtimes.insert(
-        "python3".into(),
-        Runtime {
-            read_only_paths: Vec::new(),
-            path: std::env::var("PATH").unwrap(),
-        },
-    );
+    let mut env = unconfined();
+    env.time.host_noise_reruns = 2;
     env
 }
 

@@ -10,4 +10,5 @@ mod host_noise;
 mod misbehaviour;
 mod recording;
 mod shard;
+mod two_agents;
 mod verify;

@@ -2,7 +2,7 @@
 
 use crate::agents::{Agent, impatient, sandboxed};
 use faceoff_runner::{AgentEnvironment, PlatformFault, SmokeReport, smoke};
-use faceoff_types::AgentFaultKind;
+use faceoff_types::{AgentFaultKind, Phase};
 
 fn verdict_in(agent: &Agent, env: &AgentEnvironment) -> (AgentFaultKind, SmokeReport) {
     let report = smoke(&agent.bundle, env, &|| false).expect("the platform works");
@@ -126,7 +126,7 @@ fn silence_times_out() {
     assert_eq!(
         kind,
         AgentFaultKind::TimedOut {
-            phase: "step".into(),
+            phase: Phase::Step,
             limit_s: 0.5
         }
     );
@@ -142,7 +142,7 @@ fn a_line_without_newline_times_out() {
     assert_eq!(
         kind,
         AgentFaultKind::TimedOut {
-            phase: "step".into(),
+            phase: Phase::Step,
             limit_s: 0.5
         }
     );

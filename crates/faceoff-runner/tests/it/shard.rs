@@ -140,8 +140,8 @@ fn a_fault_ends_its_episode_and_the_agent_is_restarted() {
         "{fault}"
     );
     assert_eq!(
-        (fault.task, fault.episode, fault.step),
-        (Task::Prepare, Some(1), Some(2))
+        (fault.contest, fault.episode, fault.step),
+        (Task::Prepare.into(), Some(1), Some(2))
     );
     assert_eq!(fault.line.as_deref(), Some("oops"));
     // The counter shows the new process, the note the reason.

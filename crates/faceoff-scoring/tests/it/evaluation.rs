@@ -41,7 +41,7 @@ fn an_agent_fault_is_a_failure_with_the_full_computation_time_points() {
     };
     faulty.fault = Some(AgentFault {
         fault: AgentFaultKind::NonFinite,
-        task: Task::Defend,
+        contest: Task::Defend.into(),
         episode: Some(0),
         step: Some(3),
         line: None,

@@ -5,6 +5,8 @@ pub mod env_info;
 pub mod opponent;
 pub mod task;
 
+pub use task::EPISODE_STEPS;
+
 use crate::{
     channel::{AgentChannel, Command, observation},
     model::JOINTS,
@@ -16,9 +18,6 @@ use crate::{
 use constraints::ConstraintValues;
 use faceoff_types::{EpisodeEnd, Factors, Interpolation, Seed, Task, Violations};
 use opponent::Opponent;
-
-/// Control steps of a qualifying episode.
-pub const EPISODE_STEPS: u32 = 500;
 
 /// One qualifying episode. Deterministic: no clock, no I/O. Clone saves and restores it exactly.
 #[derive(Debug, Clone)]
@@ -94,8 +93,7 @@ impl Episode {
 
         let constraints = self.constraints();
         constraints.mark(&mut self.violations);
-        let end = task::end(self.task, self.world.puck())
-            .or((self.steps >= EPISODE_STEPS).then_some(EpisodeEnd::Horizon));
+        let end = task::end(self.task, self.world.puck(), self.steps);
         StepOutcome { end, constraints }
     }
 

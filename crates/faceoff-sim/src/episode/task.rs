@@ -12,6 +12,9 @@ use crate::{
 use faceoff_types::{EpisodeEnd, Task};
 use std::f64::consts::FRAC_PI_2;
 
+/// Control steps of a qualifying episode.
+pub const EPISODE_STEPS: u32 = 500;
+
 /// Numbers of the tasks, table frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TaskRules {
@@ -128,9 +131,13 @@ pub fn initial_puck(task: Task, stream: &mut Stream) -> [f64; 6] {
     }
 }
 
-/// Why an episode ends in this true state, before its horizon.
+/// Why an episode ends in this true state, `steps` control steps after its start.
 #[must_use]
-pub fn end(task: Task, puck: &Puck) -> Option<EpisodeEnd> {
+pub fn end(task: Task, puck: &Puck, steps: u32) -> Option<EpisodeEnd> {
+    end_on_table(task, puck).or((steps >= EPISODE_STEPS).then_some(EpisodeEnd::Horizon))
+}
+
+fn end_on_table(task: Task, puck: &Puck) -> Option<EpisodeEnd> {
     let [x, y, _] = puck.pose;
     let vx = puck.velocity[0];
     let speed = puck.speed();

@@ -11,7 +11,7 @@ use crate::{
     },
     stream::Stream,
 };
-use faceoff_types::Seed;
+use faceoff_types::{Factor, Factors, Seed};
 
 /// Where the static error is looked at: end-effector positions over the table, m, base frame.
 const WORKSPACE_X_M: [f64; 4] = [0.65, 0.85, 1.05, 1.2];
@@ -25,6 +25,16 @@ const DRAWS: usize = 10_000;
 const SAG_ROUNDS: usize = 12;
 
 impl Plant {
+    /// The plant under these factors: nominal, or that of the season with this mismatch seed.
+    #[must_use]
+    pub fn under(factors: Factors, settings: &PerturbationSettings, mismatch_seed: Seed) -> Self {
+        if factors.contains(Factor::ModelMismatch) {
+            Self::mismatched(settings, mismatch_seed)
+        } else {
+            Self::nominal()
+        }
+    }
+
     /// Draws the plant of a season: factors on masses, gains, damping and friction, redrawn until
     /// the largest static end-effector error over the workspace lies in the settings' range. `seed`
     /// is the season's mismatch seed.

@@ -7,11 +7,7 @@ use faceoff_types::{Factors, Seed, Task};
 fn episode(task: Task, factors: Factors) -> Episode {
     let settings = PerturbationSettings::default();
     let root = Seed::from_number(1);
-    let plant = if factors == Factors::NONE {
-        Plant::nominal()
-    } else {
-        Plant::mismatched(&settings, root.model_mismatch())
-    };
+    let plant = Plant::under(factors, &settings, root.model_mismatch());
     Episode::new(
         task,
         Interpolation::Cubic,

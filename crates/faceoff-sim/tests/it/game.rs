@@ -18,11 +18,7 @@ fn setup(factors: Factors, seed: u64) -> GameSetup {
     GameSetup {
         interpolation: [Interpolation::Cubic; 2],
         factors,
-        plant: if factors == Factors::NONE {
-            Plant::nominal()
-        } else {
-            Plant::mismatched(&settings, seed.model_mismatch())
-        },
+        plant: Plant::under(factors, &settings, seed.model_mismatch()),
         settings,
         seed,
     }

@@ -47,12 +47,12 @@ async fn one_fault_more_ends_the_evaluation_without_a_score() {
     assert_eq!(finished_at, f.now);
     let places: Vec<_> = faults
         .iter()
-        .map(|fault| (fault.task, fault.episode))
+        .map(|fault| (fault.contest, fault.episode))
         .collect();
     assert_eq!(
         places,
         [&first_shard, &third_shard]
-            .map(|s| [0, 1].map(|i| (s.task, Some(s.first_episode + i))))
+            .map(|s| [0, 1].map(|i| (s.task.into(), Some(s.first_episode + i))))
             .concat()
     );
     assert!(

@@ -2,20 +2,23 @@
 #![expect(clippy::print_stdout, reason = "a command talks to the terminal")]
 
 mod ablation;
-mod board;
+mod files;
+mod pool;
+mod profile_run;
 mod table;
 
 use crate::config::Config;
-use anyhow::{Context, bail, ensure};
-use board::{Job, Verdict, play_all};
+use anyhow::{Context, ensure};
 use clap::Args;
 use faceoff_runner::{
-    AgentEnvironment, EvaluationMeta, ShardSpec, assemble,
+    AgentEnvironment,
     bundle::{self, Bundle, BundleError, BundleLimits},
 };
 use faceoff_sandbox::{Isolation, Runtime};
-use faceoff_types::{AgentFault, EpisodeOutcome, EvaluationResult, Profile, RULESET, Seed, Task};
+use faceoff_types::{Profile, Seed, Task};
 use faceoff_worker::CpuLayout;
+use files::{DATASET, RESULTS};
+use profile_run::EvalSetup;
 use rustix::thread::{CpuSet, sched_getaffinity};
 use std::{
     fs,
@@ -66,30 +69,6 @@ pub struct EvalCommand {
     config: Option<PathBuf>,
 }
 
-/// What an earlier run may have left in the folder.
-const RESULTS: &str = "results.json";
-const DATASET: &str = "dataset.zip";
-const LOG: &str = "agent.log";
-
-/// What all profiles are played with.
-#[derive(Debug)]
-struct Ground {
-    bundle: Bundle,
-    /// One per worker.
-    envs: Vec<AgentEnvironment>,
-    mismatch_seed: Seed,
-    max_faults: u32,
-    /// For recordings under way.
-    scratch: PathBuf,
-}
-
-/// What came of one profile.
-#[derive(Debug)]
-struct Played {
-    result: EvaluationResult,
-    outcomes: Vec<EpisodeOutcome>,
-}
-
 impl EvalCommand {
     /// Plays, scores, prints and writes.
     ///
@@ -106,7 +85,7 @@ impl EvalCommand {
         let config = Config::load(self.config.as_deref())?;
         fs::create_dir_all(&self.out)
             .with_context(|| format!("creating {}", self.out.display()))?;
-        remove_results(&self.out)?;
+        files::remove_earlier(&self.out)?;
         // Beside the results, not in /tmp: a recording may be larger than a memory file system. An
         // agent of another user must be able to pass through.
         let scratch = tempfile::Builder::new()
@@ -117,7 +96,10 @@ impl EvalCommand {
         let bundle = self.open(scratch.path(), &config.bundle)?;
         let envs = self.environments(&config, &bundle.manifest.runtime)?;
 
-        let ground = Ground {
+        let setup = EvalSetup {
+            tasks: self.tasks,
+            episodes: self.episodes,
+            seed: self.seed,
             mismatch_seed: self
                 .mismatch_seed
                 .unwrap_or_else(|| self.seed.model_mismatch()),
@@ -127,61 +109,17 @@ impl EvalCommand {
             envs,
         };
         if self.ablation {
-            return ablation::run(&self, &ground);
+            return ablation::run(&setup, &self.out);
         }
-        let played = self.play(&ground, self.profile, &self.out)?;
-        print!(
-            "{}",
-            table::of(&ground.bundle.manifest.name, &played.result)
-        );
+        let played = profile_run::play(&setup, self.profile, &self.out)?;
+        let agent = &setup.bundle.manifest.name;
+        print!("{}", table::of(agent, &played.result));
         println!(
             "\n{}\n{}",
             self.out.join(RESULTS).display(),
             self.out.join(DATASET).display()
         );
         Ok(())
-    }
-
-    /// Plays all episodes in one profile and leaves `results.json` and `dataset.zip` in `out`.
-    fn play(&self, ground: &Ground, profile: Profile, out: &Path) -> anyhow::Result<Played> {
-        fs::create_dir_all(out).with_context(|| format!("creating {}", out.display()))?;
-        remove_results(out)?;
-        let jobs = self.jobs(ground, profile);
-        let dirs: Vec<PathBuf> = jobs.iter().map(|job| job.out.clone()).collect();
-        let outcomes = match play_all(&ground.bundle, &ground.envs, jobs)? {
-            Verdict::Played { faults, outcomes } => {
-                print_faults(&faults);
-                outcomes
-            }
-            Verdict::Failed { faults, log } => {
-                let path = out.join(LOG);
-                fs::write(&path, &log).with_context(|| format!("writing {}", path.display()))?;
-                print_faults(&faults);
-                print_log_tail(&log);
-                let last = faults.last().map(ToString::to_string).unwrap_or_default();
-                bail!(
-                    "the agent failed: more than {} faults, so there is no score; the last one: \
-                     {last}; its log is in {}",
-                    ground.max_faults,
-                    path.display()
-                );
-            }
-        };
-        let meta = EvaluationMeta {
-            profile,
-            seed: self.seed,
-            mismatch_seed: ground.mismatch_seed,
-            agent: ground.bundle.manifest.name.clone(),
-            ruleset: RULESET.to_owned(),
-        };
-        let result =
-            assemble(&meta, &dirs, &out.join(DATASET)).context("joining the recordings")?;
-        // They are in the dataset now; a further profile needs the room.
-        for dir in &dirs {
-            fs::remove_dir_all(dir).with_context(|| format!("removing {}", dir.display()))?;
-        }
-        write_json(&out.join(RESULTS), &result)?;
-        Ok(Played { result, outcomes })
     }
 
     /// A folder is copied under the rules of an archive, so that it is refused here if the server
@@ -235,66 +173,5 @@ impl EvalCommand {
                 ..env.clone()
             })
             .collect())
-    }
-
-    /// One shard per task and worker, so that each agent is started as seldom as possible.
-    fn jobs(&self, ground: &Ground, profile: Profile) -> Vec<Job> {
-        let per_shard = self.episodes.div_ceil(u32::from(self.workers));
-        let mut jobs = Vec::new();
-        for task in &self.tasks {
-            for start in (0..self.episodes).step_by(per_shard as usize) {
-                let end = self.episodes.min(start + per_shard);
-                jobs.push(Job {
-                    out: ground.scratch.join(format!("{profile}-{task}-{start}")),
-                    spec: ShardSpec {
-                        task: *task,
-                        episodes: start..end,
-                        profile,
-                        seed: self.seed,
-                        mismatch_seed: ground.mismatch_seed,
-                        max_faults: ground.max_faults,
-                    },
-                });
-            }
-        }
-        jobs
-    }
-}
-
-/// Removes what an earlier run has left, so that it is not taken for this one's.
-fn remove_results(out: &Path) -> anyhow::Result<()> {
-    for name in [RESULTS, DATASET, LOG, ablation::FILE] {
-        remove(&out.join(name))?;
-    }
-    Ok(())
-}
-
-fn write_json(path: &Path, value: &impl serde::Serialize) -> anyhow::Result<()> {
-    let mut json = serde_json::to_string_pretty(value).context("writing the result")?;
-    json.push('\n');
-    fs::write(path, json).with_context(|| format!("writing {}", path.display()))
-}
-
-fn remove(path: &Path) -> anyhow::Result<()> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-            Err(error).with_context(|| format!("removing {}", path.display()))
-        }
-        _ => Ok(()),
-    }
-}
-
-fn print_faults(faults: &[AgentFault]) {
-    for fault in faults {
-        println!("fault: {fault}");
-    }
-}
-
-fn print_log_tail(log: &str) {
-    const LINES: usize = 20;
-    let lines: Vec<&str> = log.lines().collect();
-    println!("the end of the agent's log:");
-    for line in &lines[lines.len().saturating_sub(LINES)..] {
-        println!("  {line}");
     }
 }

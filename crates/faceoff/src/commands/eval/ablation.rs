@@ -1,14 +1,14 @@
 //! `faceoff eval --ablation`: the same episodes under each perturbation alone.
 
-use super::{EvalCommand, Ground, write_json};
+use super::{
+    files::{ABLATION, write_json},
+    profile_run::{EvalSetup, play},
+};
 use anyhow::Context;
 use faceoff_scoring::ProfileEffect;
 use faceoff_types::{Profile, RULESET, Seed, Task};
 use serde::Serialize;
-use std::{collections::BTreeMap, fmt::Write as _};
-
-/// The comparison's file.
-pub(super) const FILE: &str = "ablation.json";
+use std::{collections::BTreeMap, fmt::Write as _, path::Path};
 
 /// `ablation.json`.
 #[derive(Debug, Serialize)]
@@ -20,21 +20,20 @@ struct AblationFile {
 }
 
 /// Plays every profile, each into a folder of its name, and compares them.
-pub(super) fn run(command: &EvalCommand, ground: &Ground) -> anyhow::Result<()> {
+pub(super) fn run(setup: &EvalSetup, out: &Path) -> anyhow::Result<()> {
     let mut runs = BTreeMap::new();
     for profile in Profile::ABLATION {
-        let played = command
-            .play(ground, profile, &command.out.join(profile.as_str()))
+        let played = play(setup, profile, &out.join(profile.as_str()))
             .with_context(|| format!("profile {profile}"))?;
         runs.insert(profile, played.outcomes);
     }
     let tasks = faceoff_scoring::ablation(&runs).context("comparing the profiles")?;
-    let agent = ground.bundle.manifest.name.clone();
-    print!("{}", table(&agent, command.seed, &tasks));
-    let path = command.out.join(FILE);
+    let agent = setup.bundle.manifest.name.clone();
+    print!("{}", table(&agent, setup.seed, &tasks));
+    let path = out.join(ABLATION);
     let file = AblationFile {
         ruleset: RULESET,
-        seed: command.seed,
+        seed: setup.seed,
         agent,
         tasks,
     };

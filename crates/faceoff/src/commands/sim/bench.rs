@@ -2,11 +2,12 @@
 
 use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
+use faceoff_episode::Arena;
 use faceoff_sim::{
-    Command, Episode, Game, GameSetup, Interpolation, PerturbationSettings, Plant, SUBSTEPS,
+    Command, Game, GameSetup, Interpolation, PerturbationSettings, Plant, SUBSTEPS,
     model::INITIAL_Q,
 };
-use faceoff_types::{Factor, Profile, Seed, Task, WINDOW_STEPS};
+use faceoff_types::{Profile, Seed, Task, WINDOW_STEPS};
 use serde::Serialize;
 use std::{
     hint::black_box,
@@ -110,30 +111,14 @@ impl BenchArgs {
         Ok(())
     }
 
-    fn plant(&self, settings: &PerturbationSettings) -> Plant {
-        if self.profile.factors().contains(Factor::ModelMismatch) {
-            Plant::mismatched(settings, self.seed.model_mismatch())
-        } else {
-            Plant::nominal()
-        }
-    }
-
     fn play_episodes(&self, task: Task) -> (u64, Duration) {
-        let settings = PerturbationSettings::default();
-        let plant = self.plant(&settings);
+        let arena = Arena::new(self.profile, self.seed, self.seed.model_mismatch());
         let hold = HOLDS.held(&INITIAL_Q);
         let hold = &hold[..HOLDS.len()];
         let (mut steps, mut time) = (0, Duration::ZERO);
         for index in 0..self.episodes {
             let start = Instant::now();
-            let mut episode = Episode::new(
-                task,
-                HOLDS,
-                self.profile.factors(),
-                &settings,
-                &plant,
-                self.seed.episode(task, index),
-            );
+            let mut episode = arena.episode(task, index, HOLDS);
             while episode.step(black_box(hold)).end.is_none() {
                 black_box(episode.observation());
             }
@@ -144,11 +129,11 @@ impl BenchArgs {
     }
 
     fn play_game(&self) -> (u64, Duration) {
-        let settings = PerturbationSettings::default();
+        let (factors, settings) = (self.profile.factors(), PerturbationSettings::default());
         let setup = GameSetup {
             interpolation: [HOLDS; 2],
-            factors: self.profile.factors(),
-            plant: self.plant(&settings),
+            factors,
+            plant: Plant::under(factors, &settings, self.seed.model_mismatch()),
             settings,
             seed: self.seed,
         };

@@ -3,12 +3,12 @@
 use super::scenario::Scenario;
 use anyhow::{Context as _, Result, ensure};
 use faceoff_sim::{
-    ConstraintValues, EPISODE_STEPS, Interpolation, JOINTS, MalletState, PerturbationSettings,
-    Plant, SUBSTEPS, World,
+    ConstraintValues, Interpolation, JOINTS, MalletState, PerturbationSettings, Plant, SUBSTEPS,
+    World,
     episode::{opponent::Opponent, task},
     perturbation::table_factors::TableFactors,
 };
-use faceoff_types::{EpisodeEnd, Factor};
+use faceoff_types::EpisodeEnd;
 use serde::Serialize;
 use std::io::{IsTerminal as _, Write};
 
@@ -61,11 +61,7 @@ pub fn run() -> Result<()> {
 fn trace(scenario: &Scenario, out: &mut impl Write) -> Result<()> {
     let settings = PerturbationSettings::default();
     let factors = scenario.profile.factors();
-    let plant = if factors.contains(Factor::ModelMismatch) {
-        Plant::mismatched(&settings, scenario.seed.model_mismatch())
-    } else {
-        Plant::nominal()
-    };
+    let plant = Plant::under(factors, &settings, scenario.seed.model_mismatch());
     let mut world = World::new(&plant, &scenario.joints, scenario.puck);
     let mut table = TableFactors::new(factors, &settings, &scenario.seed, &mut world);
     let mut opponent = (scenario.task == Some(faceoff_types::Task::Hit)).then(Opponent::new);
@@ -97,10 +93,9 @@ fn trace(scenario: &Scenario, out: &mut impl Write) -> Result<()> {
         }
         if t_ms % SUBSTEPS as u64 == 0 {
             steps += 1;
-            end = scenario.task.and_then(|task| {
-                task::end(task, world.puck())
-                    .or((steps >= EPISODE_STEPS).then_some(EpisodeEnd::Horizon))
-            });
+            end = scenario
+                .task
+                .and_then(|task| task::end(task, world.puck(), steps));
             if end.is_some() {
                 break;
             }

@@ -36,8 +36,8 @@ pub(super) enum Verdict {
     },
 }
 
-/// What the workers share.
-struct Board {
+/// Threads that take shard after shard, and what they share.
+struct Pool {
     jobs: Mutex<VecDeque<Job>>,
     faults: Mutex<Vec<AgentFault>>,
     outcomes: Mutex<Vec<EpisodeOutcome>>,
@@ -63,7 +63,7 @@ pub(super) fn play_all(
         )
         .context("the progress bar's template")?,
     );
-    let board = Board {
+    let pool = Pool {
         jobs: Mutex::new(jobs.into()),
         faults: Mutex::default(),
         outcomes: Mutex::default(),
@@ -80,7 +80,7 @@ pub(super) fn play_all(
             .map(|(index, env)| {
                 thread::Builder::new()
                     .name(format!("worker-{index}"))
-                    .spawn_scoped(scope, || board.work(bundle, env))
+                    .spawn_scoped(scope, || pool.work(bundle, env))
             })
             .collect();
         workers
@@ -96,26 +96,26 @@ pub(super) fn play_all(
             })
             .collect()
     });
-    board.bar.finish_and_clear();
+    pool.bar.finish_and_clear();
     for result in results {
         match result {
             Ok(()) | Err(PlatformFault::Cancelled) => {}
             Err(fault) => return Err(fault).context("the evaluation failed, not by the agent"),
         }
     }
-    let mut faults = board
+    let mut faults = pool
         .faults
         .into_inner()
         .unwrap_or_else(PoisonError::into_inner);
-    faults.sort_by_key(|fault| (fault.task, fault.episode));
-    let log = board
+    faults.sort_by_key(|fault| (fault.contest, fault.episode));
+    let log = pool
         .logs
         .into_inner()
         .unwrap_or_else(PoisonError::into_inner);
     if faults.len() > max_faults as usize {
         Ok(Verdict::Failed { faults, log })
     } else {
-        let mut outcomes = board
+        let mut outcomes = pool
             .outcomes
             .into_inner()
             .unwrap_or_else(PoisonError::into_inner);
@@ -124,7 +124,7 @@ pub(super) fn play_all(
     }
 }
 
-impl Board {
+impl Pool {
     fn work(&self, bundle: &Bundle, env: &AgentEnvironment) -> Result<(), PlatformFault> {
         loop {
             let job = lock(&self.jobs).pop_front();
@@ -135,7 +135,7 @@ impl Board {
             let faults_so_far = self.fault_count.load(Ordering::Relaxed);
             spec.max_faults = self.max_faults.saturating_sub(faults_so_far);
             self.bar.set_message(spec.task.as_str());
-            if let Err(fault) = run_shard(&spec, bundle, env, &out, &mut Seat(self)) {
+            if let Err(fault) = run_shard(&spec, bundle, env, &out, &mut Worker(self)) {
                 self.stop.store(true, Ordering::Relaxed);
                 return Err(fault);
             }
@@ -143,10 +143,10 @@ impl Board {
     }
 }
 
-/// One worker's view of the board.
-struct Seat<'a>(&'a Board);
+/// One thread's part: it reports to the pool.
+struct Worker<'a>(&'a Pool);
 
-impl Observer for Seat<'_> {
+impl Observer for Worker<'_> {
     fn episode_done(&mut self, outcome: &EpisodeOutcome) {
         self.0.bar.inc(1);
         lock(&self.0.outcomes).push(outcome.clone());

@@ -1,0 +1,44 @@
+use faceoff_sim::{Episode, PerturbationSettings, Plant};
+use faceoff_types::{Factors, Interpolation, Profile, Seed, Task};
+
+/// What all episodes of an evaluation share: the perturbations, the season's plant and the seed that
+/// theirs derive from.
+#[derive(Debug, Clone)]
+pub struct Arena {
+    factors: Factors,
+    settings: PerturbationSettings,
+    plant: Plant,
+    seed: Seed,
+}
+
+impl Arena {
+    /// With the ruleset's magnitudes. Draws the plant, which takes milliseconds: make one, play many.
+    #[must_use]
+    pub fn new(profile: Profile, seed: Seed, mismatch_seed: Seed) -> Self {
+        let (factors, settings) = (profile.factors(), PerturbationSettings::default());
+        Self {
+            plant: Plant::under(factors, &settings, mismatch_seed),
+            factors,
+            settings,
+            seed,
+        }
+    }
+
+    /// An episode's own seed; `index` counts within the evaluation.
+    pub(crate) fn seed(&self, task: Task, index: u32) -> Seed {
+        self.seed.episode(task, index)
+    }
+
+    /// An episode at its start.
+    #[must_use]
+    pub fn episode(&self, task: Task, index: u32, interpolation: Interpolation) -> Episode {
+        Episode::new(
+            task,
+            interpolation,
+            self.factors,
+            &self.settings,
+            &self.plant,
+            self.seed(task, index),
+        )
+    }
+}

@@ -1,0 +1,133 @@
+use crate::Task;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// What an agent takes part in. As JSON `{"task":"hit"}` or `{"task":"tournament","side":2}`, to be
+/// flattened into what it is said of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "Fields", into = "Fields")]
+pub enum Contest {
+    /// Episodes of a qualifying task.
+    Task(Task),
+    /// A game against another agent.
+    Game {
+        /// Which of the two robots it moves.
+        side: Side,
+    },
+}
+
+impl Contest {
+    /// 1, or 2 for the second side of a game.
+    #[must_use]
+    pub const fn agent_id(self) -> u32 {
+        match self {
+            Self::Task(_) => 1,
+            Self::Game { side } => side.number(),
+        }
+    }
+}
+
+impl From<Task> for Contest {
+    fn from(task: Task) -> Self {
+        Self::Task(task)
+    }
+}
+
+impl fmt::Display for Contest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Task(task) => task.fmt(f),
+            Self::Game { side } => write!(f, "tournament, side {}", side.number()),
+        }
+    }
+}
+
+/// A side of a game. As JSON its number, 1 or 2.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "u32", into = "u32")]
+pub enum Side {
+    /// The simulator's first robot.
+    First,
+    /// The simulator's second robot.
+    Second,
+}
+
+impl Side {
+    /// As agents know it: 1 or 2.
+    #[must_use]
+    pub const fn number(self) -> u32 {
+        match self {
+            Self::First => 1,
+            Self::Second => 2,
+        }
+    }
+
+    /// As arrays of both sides have it: 0 or 1.
+    #[must_use]
+    pub const fn index(self) -> usize {
+        match self {
+            Self::First => 0,
+            Self::Second => 1,
+        }
+    }
+}
+
+impl From<Side> for u32 {
+    fn from(side: Side) -> Self {
+        side.number()
+    }
+}
+
+impl TryFrom<u32> for Side {
+    type Error = String;
+    fn try_from(number: u32) -> Result<Self, String> {
+        match number {
+            1 => Ok(Self::First),
+            2 => Ok(Self::Second),
+            other => Err(format!("a game has the sides 1 and 2, not {other}")),
+        }
+    }
+}
+
+/// A contest as JSON has it.
+#[derive(Serialize, Deserialize)]
+struct Fields {
+    task: Name,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    side: Option<Side>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Name {
+    Hit,
+    Defend,
+    Prepare,
+    Tournament,
+}
+
+impl From<Contest> for Fields {
+    fn from(contest: Contest) -> Self {
+        let (task, side) = match contest {
+            Contest::Task(Task::Hit) => (Name::Hit, None),
+            Contest::Task(Task::Defend) => (Name::Defend, None),
+            Contest::Task(Task::Prepare) => (Name::Prepare, None),
+            Contest::Game { side } => (Name::Tournament, Some(side)),
+        };
+        Self { task, side }
+    }
+}
+
+impl TryFrom<Fields> for Contest {
+    type Error = &'static str;
+    fn try_from(Fields { task, side }: Fields) -> Result<Self, Self::Error> {
+        match (task, side) {
+            (Name::Hit, None) => Ok(Self::Task(Task::Hit)),
+            (Name::Defend, None) => Ok(Self::Task(Task::Defend)),
+            (Name::Prepare, None) => Ok(Self::Task(Task::Prepare)),
+            (Name::Tournament, Some(side)) => Ok(Self::Game { side }),
+            (Name::Tournament, None) => Err("a tournament needs a side, 1 or 2"),
+            (_, Some(_)) => Err("only a tournament has sides"),
+        }
+    }
+}

@@ -1,0 +1,30 @@
+//! The files of `faceoff eval --out`.
+
+use anyhow::Context;
+use std::{fs, io::ErrorKind, path::Path};
+
+pub(super) const RESULTS: &str = "results.json";
+pub(super) const DATASET: &str = "dataset.zip";
+/// The agent's log, where there is no result.
+pub(super) const LOG: &str = "agent.log";
+/// The comparison of all profiles.
+pub(super) const ABLATION: &str = "ablation.json";
+
+/// Removes what an earlier run has left, so that it is not taken for this one's.
+pub(super) fn remove_earlier(out: &Path) -> anyhow::Result<()> {
+    for path in [RESULTS, DATASET, LOG, ABLATION].map(|name| out.join(name)) {
+        match fs::remove_file(&path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                return Err(error).with_context(|| format!("removing {}", path.display()));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn write_json(path: &Path, value: &impl serde::Serialize) -> anyhow::Result<()> {
+    let mut json = serde_json::to_string_pretty(value).context("writing the result")?;
+    json.push('\n');
+    fs::write(path, json).with_context(|| format!("writing {}", path.display()))
+}

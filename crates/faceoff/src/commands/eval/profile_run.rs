@@ -1,0 +1,116 @@
+//! All episodes in one profile: played, joined, scored.
+
+use super::{
+    files::{DATASET, LOG, RESULTS, remove_earlier, write_json},
+    pool::{Job, Verdict, play_all},
+};
+use anyhow::{Context, bail};
+use faceoff_runner::{AgentEnvironment, EvaluationMeta, ShardSpec, assemble, bundle::Bundle};
+use faceoff_types::{AgentFault, EpisodeOutcome, EvaluationResult, Profile, RULESET, Seed, Task};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+/// What every profile is played with.
+#[derive(Debug)]
+pub(super) struct EvalSetup {
+    pub bundle: Bundle,
+    /// One per worker.
+    pub envs: Vec<AgentEnvironment>,
+    pub tasks: Vec<Task>,
+    /// Of each task.
+    pub episodes: u32,
+    pub seed: Seed,
+    pub mismatch_seed: Seed,
+    pub max_faults: u32,
+    /// For recordings under way.
+    pub scratch: PathBuf,
+}
+
+/// What came of one profile.
+#[derive(Debug)]
+pub(super) struct Played {
+    pub result: EvaluationResult,
+    pub outcomes: Vec<EpisodeOutcome>,
+}
+
+/// Plays all episodes in one profile and leaves `results.json` and `dataset.zip` in `out`.
+pub(super) fn play(setup: &EvalSetup, profile: Profile, out: &Path) -> anyhow::Result<Played> {
+    fs::create_dir_all(out).with_context(|| format!("creating {}", out.display()))?;
+    remove_earlier(out)?;
+    let jobs = jobs(setup, profile);
+    let dirs: Vec<PathBuf> = jobs.iter().map(|job| job.out.clone()).collect();
+    let outcomes = match play_all(&setup.bundle, &setup.envs, jobs)? {
+        Verdict::Played { faults, outcomes } => {
+            print_faults(&faults);
+            outcomes
+        }
+        Verdict::Failed { faults, log } => {
+            let path = out.join(LOG);
+            fs::write(&path, &log).with_context(|| format!("writing {}", path.display()))?;
+            print_faults(&faults);
+            print_log_tail(&log);
+            let last = faults.last().map(ToString::to_string).unwrap_or_default();
+            bail!(
+                "the agent failed: more than {} faults, so there is no score; the last one: \
+                 {last}; its log is in {}",
+                setup.max_faults,
+                path.display()
+            );
+        }
+    };
+    let meta = EvaluationMeta {
+        profile,
+        seed: setup.seed,
+        mismatch_seed: setup.mismatch_seed,
+        agent: setup.bundle.manifest.name.clone(),
+        ruleset: RULESET.to_owned(),
+    };
+    let result = assemble(&meta, &dirs, &out.join(DATASET)).context("joining the recordings")?;
+    // They are in the dataset now; a further profile needs the room.
+    for dir in &dirs {
+        fs::remove_dir_all(dir).with_context(|| format!("removing {}", dir.display()))?;
+    }
+    write_json(&out.join(RESULTS), &result)?;
+    Ok(Played { result, outcomes })
+}
+
+/// One shard per task and worker, so that each agent is started as seldom as possible.
+fn jobs(setup: &EvalSetup, profile: Profile) -> Vec<Job> {
+    let workers = u32::try_from(setup.envs.len()).unwrap_or(u32::MAX);
+    let per_shard = setup.episodes.div_ceil(workers);
+    let mut jobs = Vec::new();
+    for task in &setup.tasks {
+        for start in (0..setup.episodes).step_by(per_shard as usize) {
+            let end = setup.episodes.min(start + per_shard);
+            jobs.push(Job {
+                out: setup.scratch.join(format!("{profile}-{task}-{start}")),
+                spec: ShardSpec {
+                    task: *task,
+                    episodes: start..end,
+                    profile,
+                    seed: setup.seed,
+                    mismatch_seed: setup.mismatch_seed,
+                    max_faults: setup.max_faults,
+                },
+            });
+        }
+    }
+    jobs
+}
+
+fn print_faults(faults: &[AgentFault]) {
+    for fault in faults {
+        println!("fault: {fault}");
+    }
+}
+
+fn print_log_tail(log: &str) {
+    const LINES: usize = 20;
+    let lines: Vec<&str> = log.lines().collect();
+    println!("the end of the agent's log:");
+    for line in &lines[lines.len().saturating_sub(LINES)..] {
+        println!("  {line}");
+    }
+}
