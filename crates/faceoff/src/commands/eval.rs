@@ -9,8 +9,9 @@ use crate::config::Config;
 use anyhow::{Context, bail, ensure};
 use board::{Job, Verdict, play_all};
 use clap::Args;
+use faceoff_dataset::{ARCHIVE_FILE, Assembled, EvaluationMeta, ShardSpec, assemble};
 use faceoff_runner::{
-    AgentEnvironment, EvaluationMeta, ShardSpec, assemble,
+    AgentEnvironment,
     bundle::{self, Bundle, BundleError, BundleLimits},
 };
 use faceoff_sandbox::{Isolation, Runtime};
@@ -68,7 +69,6 @@ pub struct EvalCommand {
 
 /// What an earlier run may have left in the folder.
 const RESULTS: &str = "results.json";
-const DATASET: &str = "dataset.zip";
 const LOG: &str = "agent.log";
 
 /// What all profiles are played with.
@@ -88,6 +88,7 @@ struct Ground {
 struct Played {
     result: EvaluationResult,
     outcomes: Vec<EpisodeOutcome>,
+    archive_blake3: String,
 }
 
 impl EvalCommand {
@@ -135,9 +136,10 @@ impl EvalCommand {
             table::of(&ground.bundle.manifest.name, &played.result)
         );
         println!(
-            "\n{}\n{}",
+            "\n{}\n{}, BLAKE3 {}",
             self.out.join(RESULTS).display(),
-            self.out.join(DATASET).display()
+            self.out.join(ARCHIVE_FILE).display(),
+            played.archive_blake3
         );
         Ok(())
     }
@@ -174,14 +176,18 @@ impl EvalCommand {
             agent: ground.bundle.manifest.name.clone(),
             ruleset: RULESET.to_owned(),
         };
-        let result =
-            assemble(&meta, &dirs, &out.join(DATASET)).context("joining the recordings")?;
+        let Assembled { result, archive } =
+            assemble(&meta, &dirs, &out.join(ARCHIVE_FILE)).context("joining the recordings")?;
         // They are in the dataset now; a further profile needs the room.
         for dir in &dirs {
             fs::remove_dir_all(dir).with_context(|| format!("removing {}", dir.display()))?;
         }
         write_json(&out.join(RESULTS), &result)?;
-        Ok(Played { result, outcomes })
+        Ok(Played {
+            result,
+            outcomes,
+            archive_blake3: archive.blake3,
+        })
     }
 
     /// A folder is copied under the rules of an archive, so that it is refused here if the server
@@ -263,7 +269,7 @@ impl EvalCommand {
 
 /// Removes what an earlier run has left, so that it is not taken for this one's.
 fn remove_results(out: &Path) -> anyhow::Result<()> {
-    for name in [RESULTS, DATASET, LOG, ablation::FILE] {
+    for name in [RESULTS, ARCHIVE_FILE, LOG, ablation::FILE] {
         remove(&out.join(name))?;
     }
     Ok(())
