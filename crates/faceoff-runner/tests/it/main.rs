@@ -10,4 +10,3 @@ mod host_noise;
 mod misbehaviour;
 mod recording;
 mod shard;
-mod verify;

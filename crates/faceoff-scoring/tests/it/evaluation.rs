@@ -74,7 +74,9 @@ fn a_task_adds_up_its_episodes_in_any_order() {
         max_s: 0.05,
     };
     let mut times = StepTimes::of(3);
-    [0.1, 0.2, 0.3].map(|time_s| times.add(time_s));
+    for time_s in [0.1, 0.2, 0.3] {
+        times.add(time_s);
+    }
     let result = score_task(&outcomes, &times);
     assert_eq!(
         (result.episodes, result.successes, result.success_rate),

@@ -1,0 +1,128 @@
+//! Datasets of real agents.
+
+use crate::{
+    agents::{Agent, sandboxed},
+    recording::{moving, read},
+    shard::{run, spec},
+};
+use faceoff_dataset::{
+    Dataset, EvaluationMeta, assemble,
+    verify::{Verified, verify},
+};
+use faceoff_types::{RULESET, Task};
+use std::{
+    fs::File,
+    num::NonZero,
+    path::{Path, PathBuf},
+};
+use zip::ZipArchive;
+
+/// Everything in the tables but the two columns of measured times and what follows from them.
+fn timeless_columns(dir: &Path, table: &str) -> Vec<(String, arrow_array::ArrayRef)> {
+    let batch = read(&dir.join(table));
+    let schema = batch.schema();
+    schema
+        .fields()
+        .iter()
+        .zip(batch.columns())
+        .map(|(field, column)| (field.name().clone(), column.clone()))
+        .filter(|(name, _)| {
+            !name.starts_with("computation_time")
+                && name != "cpu_time_ns"
+                && name != "times_blake3"
+                && name != "penalty_points"
+        })
+        .collect()
+}
+
+#[test]
+fn one_worker_and_three_record_the_same() {
+    let dir = tempfile::tempdir().unwrap();
+    let agent = moving();
+    let play = |name: &str, shards: &[(u32, u32)], workers: usize| {
+        let dirs: Vec<PathBuf> = shards
+            .iter()
+            .map(|(start, _)| dir.path().join(format!("{name}-{start}")))
+            .collect();
+        let next = std::sync::atomic::AtomicUsize::new(0);
+        std::thread::scope(|scope| {
+            for _ in 0..workers {
+                scope.spawn(|| {
+                    loop {
+                        let at = next.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+                        let Some((start, end)) = shards.get(at) else {
+                            break;
+                        };
+                        run(
+                            &spec(Task::Defend, *start..*end),
+                            &agent,
+                            &sandboxed(),
+                            &dirs[at],
+                        )
+                        .unwrap();
+                    }
+                });
+            }
+        });
+        let archive = dir.path().join(format!("{name}.zip"));
+        let mut result = assemble(&meta(), &dirs, &archive).unwrap().result;
+        let out = dir.path().join(name);
+        let mut zip = ZipArchive::new(File::open(&archive).unwrap()).unwrap();
+        zip.extract(&out).unwrap();
+        // What is measured may differ; nothing else may.
+        let task = result.tasks.get_mut(&Task::Defend).unwrap();
+        task.computation_time_s = Default::default();
+        task.violations.computation_time = 0;
+        (out, task.clone())
+    };
+    let (one, result_one) = play("one", &[(0, 6)], 1);
+    let (three, result_three) = play("three", &[(0, 1), (1, 4), (4, 5), (5, 6)], 3);
+    assert_eq!(result_one.successes, result_three.successes);
+    assert_eq!(result_one.violations, result_three.violations);
+    assert_eq!(result_one.steps, result_three.steps);
+    for table in ["steps.parquet", "episodes.parquet"] {
+        let (one, three) = (
+            timeless_columns(&one, table),
+            timeless_columns(&three, table),
+        );
+        assert!(one.len() > 30);
+        assert_eq!(one, three, "{table}");
+    }
+}
+
+fn meta() -> EvaluationMeta {
+    let spec = spec(Task::Defend, 0..1);
+    EvaluationMeta {
+        profile: spec.profile,
+        seed: spec.seed,
+        mismatch_seed: spec.mismatch_seed,
+        agent: "test".into(),
+        ruleset: RULESET.into(),
+    }
+}
+
+/// Plays one shard and simulates its recording again.
+fn verified(agent: &Agent, task: Task, episodes: u32) -> Verified {
+    let dir = tempfile::tempdir().unwrap();
+    let shard = dir.path().join("shard");
+    run(&spec(task, 0..episodes), agent, &sandboxed(), &shard).unwrap();
+    let archive = dir.path().join("dataset.zip");
+    assemble(&meta(), &[shard], &archive).unwrap();
+    let workers = NonZero::new(2).unwrap();
+    verify(&Dataset::open(&archive).unwrap(), workers, &|| ()).unwrap()
+}
+
+#[test]
+fn what_agents_play_verifies_faults_and_all() {
+    assert_eq!(verified(&moving(), Task::Hit, 2).episodes, 2);
+    let agent = Agent::with(
+        "now = 0\n\
+         def on_reset(episode):\n    global now; now = episode\n    \
+         if episode == 2: sys.exit(3)\n\
+         def on_step(step, answer):\n    \
+         return 'oops' if (now, step) == (1, 4) else json.dumps(answer)",
+    );
+    assert_eq!(verified(&agent, Task::Prepare, 4).episodes, 4);
+    let silent = Agent::script("import sys\nsys.exit('no model')");
+    assert_eq!(verified(&silent, Task::Hit, 2).steps, 0);
+}
