@@ -1,4 +1,4 @@
-use crate::{RecordingError, digest::HashingWriter, score::json_file};
+use crate::{digest::HashingWriter, error::RecordingError, score::json_file};
 use faceoff_wire::dataset::FileDigest;
 use fs_err::File;
 use serde::Serialize;

@@ -1,10 +1,10 @@
 //! Joins the shards of an evaluation to its dataset, and scores it.
 
 use crate::{
-    RecordingError,
     archive_writer::ArchiveWriter,
     dataset::Layout,
     digest,
+    error::RecordingError,
     files::{
         CALIBRATION_FILE, EPISODES_FILE, LOG_FILE, MANIFEST_FILE, RESULTS_FILE, STEPS_FILE,
         VIOLATIONS_FILE,

@@ -16,7 +16,8 @@ pub(crate) use episodes::Columns;
 pub(crate) use file_range::FileRange;
 
 use crate::{
-    DatasetError, digest,
+    digest,
+    error::DatasetError,
     files::{
         ARCHIVE_FILE, CALIBRATION_FILE, EPISODES_FILE, LOG_FILE, MANIFEST_FILE, RESULTS_FILE,
         STEPS_FILE, VIOLATIONS_FILE,

@@ -1,5 +1,5 @@
 use crate::{
-    RecordingError,
+    error::RecordingError,
     files::{EPISODES_FILE, STEPS_FILE},
     shard_folder::ShardFolder,
     table::{EpisodeRows, StepRows, TableWriter},

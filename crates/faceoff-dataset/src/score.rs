@@ -1,8 +1,8 @@
 //! What follows from the episodes of an evaluation: the score and where constraints were broken.
 
 use crate::{
-    DatasetError, RecordingError,
     dataset::{FileRange, Layout, StepTable},
+    error::{DatasetError, RecordingError},
     table::CONSTRAINTS,
     times::seconds,
 };

@@ -1,6 +1,8 @@
 use crate::{
-    RecordingError, ShardReport, ShardSpec, digest,
+    digest,
+    error::RecordingError,
     files::{EPISODES_FILE, LOG_FILE, STEPS_FILE},
+    shard::{ShardReport, ShardSpec},
     simulator::simulator_id,
     table::ShardTable,
 };

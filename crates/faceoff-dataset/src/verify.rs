@@ -17,8 +17,8 @@ pub use error::VerifyError;
 pub use season::{SeasonClaim, SeasonMismatch};
 
 use crate::{
-    DatasetError,
     dataset::Dataset,
+    error::DatasetError,
     files::{CALIBRATION_FILE, RESULTS_FILE, VIOLATIONS_FILE},
     score::{Scored, Tally, json_file, score},
     simulator::simulator_id,
@@ -60,7 +60,7 @@ pub fn verify(
 ) -> Result<Verified, VerifyError> {
     made_here(dataset)?;
     let mut feed = Feed::open(dataset)?;
-    let mut course = Course::new(dataset, feed.steps_of_tasks());
+    let mut totals = Totals::new(dataset, feed.steps_of_tasks());
     let replay = Replay::new(dataset.manifest());
     let pool = ThreadPoolBuilder::new()
         .num_threads(workers.get())
@@ -84,14 +84,14 @@ pub fn verify(
                 Err(_) => (simulate(), feed::Episodes::default()),
             };
             for (replayed, recorded) in replayed.into_iter().zip(&episodes.read) {
-                course.add(recorded, replayed?);
+                totals.add(recorded, replayed?);
             }
             episodes.then?;
             episodes = next;
         }
         episodes.then
     })?;
-    course.finish(dataset)
+    totals.finish(dataset)
 }
 
 /// Only the same rules and the same simulator can make the states again.
@@ -117,14 +117,14 @@ fn made_here(dataset: &Dataset) -> Result<(), DatasetError> {
 }
 
 /// What the episodes add up to, in order of play.
-struct Course {
+struct Totals {
     episodes: u32,
     steps: u64,
     host_noise_reruns: u32,
     played: BTreeMap<Task, Tally>,
 }
 
-impl Course {
+impl Totals {
     fn new(dataset: &Dataset, steps: BTreeMap<Task, u64>) -> Self {
         let tally = |task: &Task| {
             let steps = steps.get(task).copied().unwrap_or_default();

@@ -3,7 +3,7 @@
 //! are read all the same, only more of them.
 
 use super::steps::reader;
-use crate::{DatasetError, files::STEPS_FILE};
+use crate::{error::DatasetError, files::STEPS_FILE};
 use arrow_array::{
     BooleanArray, RecordBatch, RecordBatchReader, StringArray, UInt32Array, cast::AsArray,
 };

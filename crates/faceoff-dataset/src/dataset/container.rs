@@ -2,7 +2,7 @@ use super::{
     file_range::{FileRange, open},
     seal::{self, Seal},
 };
-use crate::{DatasetError, digest, files::MANIFEST_FILE};
+use crate::{digest, error::DatasetError, files::MANIFEST_FILE};
 use faceoff_wire::dataset::FileDigest;
 use std::{
     fs::File,

@@ -1,5 +1,5 @@
 use super::{file_range::FileRange, steps::has_columns};
-use crate::{DatasetError, files::EPISODES_FILE, table::EpisodeRows};
+use crate::{error::DatasetError, files::EPISODES_FILE, table::EpisodeRows};
 use arrow_array::{
     Array, BooleanArray, Float64Array, RecordBatch, StringArray, UInt32Array,
     cast::AsArray,

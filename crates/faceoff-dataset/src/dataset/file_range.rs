@@ -1,4 +1,4 @@
-use crate::DatasetError;
+use crate::error::DatasetError;
 use bytes::Bytes;
 use parquet::{
     errors::ParquetError,

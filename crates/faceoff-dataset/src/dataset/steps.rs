@@ -1,5 +1,5 @@
 use super::file_range::FileRange;
-use crate::{DatasetError, files::STEPS_FILE, table::StepRows};
+use crate::{error::DatasetError, files::STEPS_FILE, table::StepRows};
 use arrow_array::{RecordBatch, RecordBatchReader};
 use arrow_schema::{DataType, Schema};
 use faceoff_types::Task;

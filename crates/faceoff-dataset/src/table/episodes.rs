@@ -2,7 +2,7 @@ use super::{
     columns::FloatColumns,
     steps::{observation_columns, put_observation},
 };
-use crate::{RecordingError, digest::StepDigests};
+use crate::{digest::StepDigests, error::RecordingError};
 use arrow_array::{
     ArrayRef,
     builder::{ArrayBuilder, BooleanBuilder, StringBuilder, UInt32Builder},

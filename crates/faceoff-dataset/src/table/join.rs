@@ -1,5 +1,5 @@
 use super::writer::{TableWriter, schema_metadata};
-use crate::RecordingError;
+use crate::error::RecordingError;
 use fs_err::File;
 use parquet::{
     arrow::{ARROW_SCHEMA_META_KEY, arrow_reader::ParquetRecordBatchReaderBuilder},

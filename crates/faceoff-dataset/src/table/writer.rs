@@ -1,4 +1,4 @@
-use crate::RecordingError;
+use crate::error::RecordingError;
 use arrow_array::{Array, ArrayRef, RecordBatch};
 use arrow_schema::{DataType, Schema, SchemaRef};
 use faceoff_wire::dataset::DATASET_SCHEMA;

@@ -1,5 +1,5 @@
 use super::difference::Difference;
-use crate::DatasetError;
+use crate::error::DatasetError;
 
 /// Why a dataset is not verified.
 #[derive(Debug, thiserror::Error)]
