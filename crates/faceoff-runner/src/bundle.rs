@@ -13,6 +13,7 @@ mod zip_archive;
 pub use error::BundleError;
 pub use limits::BundleLimits;
 
+use faceoff_types::ArchiveFormat;
 use faceoff_wire::{MANIFEST_MAX_BYTES, Manifest};
 use fs_err::File;
 use std::{
@@ -54,22 +55,24 @@ pub fn unpack(archive: &Path, into: &Path, limits: &BundleLimits) -> Result<Bund
             limits.packed_bytes
         )));
     }
-    let mut magic = Vec::with_capacity(4);
-    (&mut file).take(4).read_to_end(&mut magic)?;
+    let mut head = Vec::with_capacity(ArchiveFormat::LONGEST_MAGIC);
+    (&mut file)
+        .take(ArchiveFormat::LONGEST_MAGIC as u64)
+        .read_to_end(&mut head)?;
     file.seek(SeekFrom::Start(0))?;
 
     let mut tree = Tree::new(into, limits)?;
     let file = BufReader::with_capacity(64 << 10, file.into_file());
-    match magic.as_slice() {
-        [0x1f, 0x8b, ..] => {
+    match ArchiveFormat::detect(&head) {
+        Some(ArchiveFormat::TarGz) => {
             tar_archive::unpack(flate2::bufread::MultiGzDecoder::new(file), &mut tree)?;
         }
-        [0x28, 0xb5, 0x2f, 0xfd] => {
+        Some(ArchiveFormat::TarZst) => {
             let decoder = zstd::Decoder::with_buffer(file).map_err(BundleError::reading(""))?;
             tar_archive::unpack(decoder, &mut tree)?;
         }
-        [b'P', b'K', 3 | 5, 4 | 6] => zip_archive::unpack(file, &mut tree)?,
-        _ => {
+        Some(ArchiveFormat::Zip) => zip_archive::unpack(file, &mut tree)?,
+        None => {
             return Err(BundleError::Invalid(
                 "the bundle is no archive that is accepted: expected .tar.gz, .tar.zst or .zip"
                     .to_owned(),

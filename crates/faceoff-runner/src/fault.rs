@@ -72,18 +72,22 @@ impl From<RecordError> for PlatformFault {
     }
 }
 
+impl From<faceoff_dataset::RecordingError> for PlatformFault {
+    fn from(error: faceoff_dataset::RecordingError) -> Self {
+        match error {
+            faceoff_dataset::RecordingError::Io(source) => Self::Io {
+                what: "recording".to_owned(),
+                source,
+            },
+            faceoff_dataset::RecordingError::Unusable(what) => Self::Recording(what),
+        }
+    }
+}
+
 impl PlatformFault {
     /// Turns an I/O error into a fault that says what was attempted.
     pub(crate) fn io(what: impl Into<String>) -> impl FnOnce(io::Error) -> Self {
         let what = what.into();
         move |source| Self::Io { what, source }
-    }
-
-    /// A fault of a recording, with what was attempted.
-    pub(crate) fn recording<E: std::fmt::Display>(
-        what: impl Into<String>,
-    ) -> impl FnOnce(E) -> Self {
-        let what = what.into();
-        move |error| Self::Recording(format!("{what}: {error}"))
     }
 }

@@ -6,41 +6,10 @@ use crate::{
     fault::PlatformFault,
     host_watch::{HostWatch, StallWatch},
     player::Player,
-    recording::{Recorder, ShardFolder},
 };
-use faceoff_types::{EpisodeOutcome, Profile, Seed, SlotTiming, Task};
-use serde::{Deserialize, Serialize};
-use std::{ops::Range, path::Path};
-
-/// What to simulate.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ShardSpec {
-    /// The task.
-    pub task: Task,
-    /// The episodes, by their index within the evaluation.
-    pub episodes: Range<u32>,
-    /// The perturbation profile.
-    pub profile: Profile,
-    /// The evaluation's seed.
-    pub seed: Seed,
-    /// The seed of the season's model mismatch.
-    pub mismatch_seed: Seed,
-    /// More faults than this end the shard early.
-    pub max_faults: u32,
-}
-
-/// What one shard yields, beside its recording.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ShardReport {
-    /// What happened in each episode, in order.
-    pub outcomes: Vec<EpisodeOutcome>,
-    /// The end of the agent's standard error, with its faults.
-    pub log: String,
-    /// More than the allowed faults: the remaining episodes were not played.
-    pub stopped_by_faults: bool,
-    /// How evenly the slot kept time meanwhile.
-    pub timing: SlotTiming,
-}
+use faceoff_dataset::{Recorder, ShardFolder, ShardReport, ShardSpec};
+use faceoff_types::{EpisodeOutcome, SlotTiming};
+use std::path::Path;
 
 /// Follows a shard as it runs, and can stop it.
 pub trait Observer {

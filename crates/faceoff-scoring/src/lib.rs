@@ -19,6 +19,7 @@ mod interval;
 mod paired;
 mod qualifying;
 mod rank_groups;
+mod step_times;
 mod successes;
 mod summary;
 mod task;
@@ -41,6 +42,7 @@ pub use qualifying::{
     InvalidTaskScore, QUALIFYING_EPISODES, QualifyingRow, QualifyingSheet, TaskRow, TaskScore,
 };
 pub use rank_groups::rank_groups;
+pub use step_times::StepTimes;
 pub use successes::Successes;
 pub use summary::{EpisodeSummary, TaskSummary};
 pub use task::score_task;

@@ -1,18 +1,23 @@
 use crate::{
     episode::{has_fault, time_or_fault_penalty},
-    episode_penalty, tier_of, wilson95,
+    episode_penalty,
+    step_times::StepTimes,
+    tier_of, wilson95,
 };
-use faceoff_types::{ComputationTimeSummary, EpisodeOutcome, TaskResult, ViolationCounts};
+use faceoff_types::{EpisodeOutcome, TaskResult, ViolationCounts};
 
 /// Scores one task from its episodes.
 ///
-/// `step_times_s` are the computation times of all answered steps in seconds, in any order; they are
-/// sorted in place, so that the result does not depend on how the episodes were cut into shards.
+/// `step_times` are the computation times of all answered steps in order of the episodes, so that the
+/// result does not depend on how they were cut into shards.
 ///
 /// An episode that ended by an agent fault is a failure and counts as a violation of the computation
 /// time.
+///
+/// # Panics
+/// If `step_times` holds more or fewer times than it was made for.
 #[must_use]
-pub fn score_task(outcomes: &[EpisodeOutcome], step_times_s: &mut [f64]) -> TaskResult {
+pub fn score_task(outcomes: &[EpisodeOutcome], step_times: &StepTimes) -> TaskResult {
     let episodes = count(outcomes, |_| true);
     let successes = count(outcomes, |outcome| outcome.success && !has_fault(outcome));
     // Points are multiples of one half: the sum is exact in any order.
@@ -39,43 +44,11 @@ pub fn score_task(outcomes: &[EpisodeOutcome], step_times_s: &mut [f64]) -> Task
             .iter()
             .map(|outcome| u64::from(outcome.steps))
             .sum(),
-        computation_time_s: summarise(step_times_s),
+        computation_time_s: step_times.summary(),
     }
 }
 
 fn count(outcomes: &[EpisodeOutcome], test: impl Fn(&EpisodeOutcome) -> bool) -> u32 {
     let count = outcomes.iter().filter(|outcome| test(outcome)).count();
     u32::try_from(count).expect("episodes are numbered with u32")
-}
-
-/// Mean, 99th percentile (nearest rank) and maximum; zeros when there was no step.
-fn summarise(times_s: &mut [f64]) -> ComputationTimeSummary {
-    times_s.sort_unstable_by(f64::total_cmp);
-    let Some(&max) = times_s.last() else {
-        return ComputationTimeSummary::default();
-    };
-    let rank = (times_s.len() * 99).div_ceil(100);
-    ComputationTimeSummary {
-        mean: times_s.iter().sum::<f64>() / times_s.len() as f64,
-        p99: times_s[rank - 1],
-        max,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_99th_percentile_is_the_nearest_rank() {
-        let mut hundred: Vec<f64> = (1..=100).rev().map(f64::from).collect();
-        let summary = summarise(&mut hundred);
-        assert_eq!(
-            (summary.mean, summary.p99, summary.max),
-            (50.5, 99.0, 100.0)
-        );
-        assert_eq!(summarise(&mut [0.5]).p99, 0.5);
-        assert_eq!(summarise(&mut [3.0, 1.0, 2.0]).p99, 3.0);
-        assert_eq!(summarise(&mut []), ComputationTimeSummary::default());
-    }
 }

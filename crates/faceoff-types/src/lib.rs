@@ -4,6 +4,7 @@
 //! This crate does no I/O, reads no clock and holds no policy: rules live in `faceoff-scoring`,
 //! physics in `faceoff-sim`.
 
+mod archive_format;
 mod computation_time;
 mod constraint;
 mod contest;
@@ -20,6 +21,7 @@ mod team_name;
 mod tier;
 mod timing;
 
+pub use archive_format::ArchiveFormat;
 pub use computation_time::ComputationTime;
 pub use constraint::{Constraint, Violations};
 pub use contest::{Contest, Side};

@@ -19,6 +19,21 @@ pub enum EpisodeEnd {
     AgentFault,
 }
 
+impl EpisodeEnd {
+    /// As in files and tables.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Horizon => "horizon",
+            Self::LeftTable => "left_table",
+            Self::CrossedMiddle => "crossed_middle",
+            Self::Stopped => "stopped",
+            Self::ReachedAxis => "reached_axis",
+            Self::AgentFault => "agent_fault",
+        }
+    }
+}
+
 /// What happened in one episode: all that scoring needs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EpisodeOutcome {

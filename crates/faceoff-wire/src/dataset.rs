@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Name and version of the layout described here. Another meaning of a column is another version.
-pub const DATASET_SCHEMA: &str = "faceoff-dataset/2";
+pub const DATASET_SCHEMA: &str = "faceoff-dataset/3";
 
 /// `manifest.json`: what the dataset is and what its files must hash to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -83,6 +83,6 @@ impl Evaluator for Runner {
         recordings: &[PathBuf],
         archive: &Path,
     ) -> Result<EvaluationResult, PlatformFault> {
-        faceoff_runner::assemble(meta, recordings, archive)
+        Ok(faceoff_runner::assemble(meta, recordings, archive)?.result)
     }
 }

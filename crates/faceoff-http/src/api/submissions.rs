@@ -3,7 +3,7 @@
 use super::{
     evaluations::{EvaluationView, with_name},
     schema::ProblemBody,
-    upload::{self, Format},
+    upload,
 };
 use crate::{
     App,
@@ -19,7 +19,7 @@ use axum::{
     response::{AppendHeaders, IntoResponse},
 };
 use faceoff_store::{BundleRef, StoreError, Submission, SubmissionState};
-use faceoff_types::{SubmissionId, TeamId};
+use faceoff_types::{ArchiveFormat, SubmissionId, TeamId};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
@@ -248,7 +248,7 @@ fn check_media_type(headers: &HeaderMap) -> Result<(), Problem> {
 }
 
 /// A harmless name that ends as the archive's format does, whatever was claimed.
-fn file_name(claimed: &str, format: Format) -> String {
+fn file_name(claimed: &str, format: ArchiveFormat) -> String {
     let last = claimed.rsplit(['/', '\\']).next().unwrap_or_default();
     let safe: String = last
         .chars()
@@ -353,14 +353,14 @@ mod tests {
 
     #[test]
     fn a_file_name_is_harmless_and_ends_as_its_format_does() {
-        let gz = |claimed| file_name(claimed, Format::TarGz);
+        let gz = |claimed| file_name(claimed, ArchiveFormat::TarGz);
         assert_eq!(gz("striker.tar.gz"), "striker.tar.gz");
         assert_eq!(gz("striker.tgz"), "striker.tgz");
         assert_eq!(gz("../../etc/passwd"), "passwd.tar.gz");
         assert_eq!(gz("C:\\agents\\a b.zip"), "ab.zip.tar.gz");
         assert_eq!(gz(""), "agent.tar.gz");
         assert_eq!(gz(".."), "agent.tar.gz");
-        assert_eq!(file_name("x", Format::Zip), "x.zip");
+        assert_eq!(file_name("x", ArchiveFormat::Zip), "x.zip");
         assert!(gz(&"a".repeat(500)).len() < 100);
     }
 }

@@ -6,6 +6,7 @@ use axum::{
     body::{Body, BodyDataStream},
     http::HeaderValue,
 };
+use faceoff_types::ArchiveFormat;
 use futures::StreamExt;
 use std::{path::Path, time::Duration};
 use tempfile::NamedTempFile;
@@ -15,52 +16,13 @@ use tokio::io::AsyncWriteExt;
 /// the answer instead of a broken connection.
 const DRAIN_BYTES: u64 = 64 * 1024 * 1024;
 
-/// An archive format, told by its first bytes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Format {
-    TarGz,
-    TarZst,
-    Zip,
-}
-
-impl Format {
-    const LONGEST_MAGIC: usize = 4;
-
-    fn detect(head: &[u8]) -> Option<Self> {
-        match head {
-            [0x1f, 0x8b, ..] => Some(Self::TarGz),
-            [0x28, 0xb5, 0x2f, 0xfd, ..] => Some(Self::TarZst),
-            [b'P', b'K', 3, 4, ..] => Some(Self::Zip),
-            _ => None,
-        }
-    }
-
-    /// Its usual ending, without the dot.
-    pub(crate) const fn extension(self) -> &'static str {
-        match self {
-            Self::TarGz => "tar.gz",
-            Self::TarZst => "tar.zst",
-            Self::Zip => "zip",
-        }
-    }
-
-    /// Endings that people give it.
-    pub(crate) const fn names(self) -> &'static [&'static str] {
-        match self {
-            Self::TarGz => &[".tar.gz", ".tgz"],
-            Self::TarZst => &[".tar.zst", ".tzst"],
-            Self::Zip => &[".zip"],
-        }
-    }
-}
-
 /// A bundle on disk; the file goes when this is dropped.
 #[derive(Debug)]
 pub(crate) struct Uploaded {
     pub(crate) file: NamedTempFile,
     pub(crate) bytes: u64,
     pub(crate) blake3: blake3::Hash,
-    pub(crate) format: Format,
+    pub(crate) format: ArchiveFormat,
 }
 
 /// Streams `body` into a file under `dir`.
@@ -89,7 +51,7 @@ pub(crate) async fn receive(
         .map_err(Problem::internal)?;
     let mut writer = tokio::fs::File::from_std(file.reopen().map_err(Problem::internal)?);
     let mut hasher = blake3::Hasher::new();
-    let mut head = Vec::with_capacity(Format::LONGEST_MAGIC);
+    let mut head = Vec::with_capacity(ArchiveFormat::LONGEST_MAGIC);
     let mut format = None;
     let mut bytes = 0;
     while let Some(chunk) = next(&mut stream, patience).await? {
@@ -99,10 +61,10 @@ pub(crate) async fn receive(
             return Err(too_large(max_bytes, None));
         }
         if format.is_none() {
-            let missing = Format::LONGEST_MAGIC - head.len();
+            let missing = ArchiveFormat::LONGEST_MAGIC - head.len();
             head.extend_from_slice(&chunk[..missing.min(chunk.len())]);
-            format = Format::detect(&head);
-            if format.is_none() && head.len() == Format::LONGEST_MAGIC {
+            format = ArchiveFormat::detect(&head);
+            if format.is_none() && head.len() == ArchiveFormat::LONGEST_MAGIC {
                 drain(&mut stream, announced.unwrap_or(DRAIN_BYTES), patience).await;
                 return Err(not_an_archive(&head));
             }
@@ -180,25 +142,4 @@ fn not_an_archive(head: &[u8]) -> Problem {
             hex::encode(head)
         ),
     )
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn formats_are_told_by_their_first_bytes() {
-        assert_eq!(Format::detect(&[0x1f, 0x8b, 8, 0]), Some(Format::TarGz));
-        assert_eq!(
-            Format::detect(&[0x28, 0xb5, 0x2f, 0xfd]),
-            Some(Format::TarZst)
-        );
-        assert_eq!(Format::detect(b"PK\x03\x04"), Some(Format::Zip));
-        assert_eq!(
-            Format::detect(b"PK\x05\x06"),
-            None,
-            "an empty zip holds no agent"
-        );
-        assert_eq!(Format::detect(b"<htm"), None);
-    }
 }

@@ -301,7 +301,10 @@ impl Site {
                             .filter(|o| o.task == task)
                             .cloned()
                             .collect();
-                        (task, faceoff_scoring::score_task(&of_task, &mut []))
+                        (
+                            task,
+                            faceoff_scoring::score_task(&of_task, &Default::default()),
+                        )
                     });
                     let secret = self.store.season().await.unwrap().secret;
                     let result = faceoff_scoring::score_evaluation(

@@ -11,4 +11,3 @@ mod misbehaviour;
 mod recording;
 mod shard;
 mod two_agents;
-mod verify;

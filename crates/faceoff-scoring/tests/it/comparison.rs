@@ -1,7 +1,7 @@
 use crate::support::episode;
 use faceoff_scoring::{
-    EpisodeSummary, NotPaired, PairedTally, PairingError, Played, overall_p_value, overall_score,
-    score_task,
+    EpisodeSummary, NotPaired, PairedTally, PairingError, Played, StepTimes, overall_p_value,
+    overall_score, score_task,
 };
 use faceoff_types::{EpisodeOutcome, Profile, RULESET, Seed, Task, Violations};
 use proptest::prelude::*;
@@ -221,7 +221,7 @@ proptest! {
         prop_assert_eq!(comparison.overall.p_value, overall_p_value(&tallies));
         let score = |all: &[EpisodeOutcome]| overall_score(Task::ALL.map(|task| {
             let of_task: Vec<_> = all.iter().filter(|o| o.task == task).cloned().collect();
-            (task, score_task(&of_task, &mut []).success_rate)
+            (task, score_task(&of_task, &StepTimes::default()).success_rate)
         }));
         prop_assert_eq!(comparison.overall.score_a, score(&of_a));
         prop_assert_eq!(comparison.overall.score_b, score(&of_b));

@@ -1,5 +1,5 @@
 use crate::support::{episode, task_result};
-use faceoff_scoring::{episode_penalty, score_evaluation, score_task};
+use faceoff_scoring::{StepTimes, episode_penalty, score_evaluation, score_task};
 use faceoff_types::{
     AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, Profile, RULESET, Seed, Task, Tier,
     Violations,
@@ -51,7 +51,7 @@ fn an_agent_fault_is_a_failure_with_the_full_computation_time_points() {
         5.0,
         "2 points once, not per cause"
     );
-    let result = score_task(&[faulty], &mut []);
+    let result = score_task(&[faulty], &StepTimes::default());
     assert_eq!(
         (result.successes, result.violations.computation_time),
         (0, 1)
@@ -73,8 +73,11 @@ fn a_task_adds_up_its_episodes_in_any_order() {
         mean_s: 0.001,
         max_s: 0.05,
     };
-    let mut times = vec![0.1, 0.2, 0.3];
-    let result = score_task(&outcomes, &mut times);
+    let mut times = StepTimes::of(3);
+    for time_s in [0.1, 0.2, 0.3] {
+        times.add(time_s);
+    }
+    let result = score_task(&outcomes, &times);
     assert_eq!(
         (result.episodes, result.successes, result.success_rate),
         (50, 20, 0.4)
@@ -93,8 +96,7 @@ fn a_task_adds_up_its_episodes_in_any_order() {
     assert_eq!(result.steps, 20 * 100 + 30 * 500);
 
     outcomes.reverse();
-    let mut times = vec![0.3, 0.1, 0.2];
-    assert_eq!(score_task(&outcomes, &mut times), result);
+    assert_eq!(score_task(&outcomes, &times), result);
 }
 
 #[test]

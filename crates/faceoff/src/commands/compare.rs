@@ -2,15 +2,15 @@
 //! difference is more than luck.
 #![expect(clippy::print_stdout, reason = "a command talks to the terminal")]
 
-mod dataset;
 mod table;
 
 use crate::client::Client;
 use anyhow::Context;
 use clap::Args;
-use dataset::Dataset;
-use faceoff_scoring::{Comparison, Played};
-use faceoff_types::{EvaluationId, Profile};
+use faceoff_dataset::Dataset;
+use faceoff_scoring::{Comparison, EpisodeSummary, Played};
+use faceoff_types::{EpisodeOutcome, EvaluationId, Profile};
+use faceoff_wire::dataset::DatasetManifest;
 use serde::Serialize;
 use std::path::Path;
 
@@ -114,17 +114,32 @@ impl CompareCommand {
     }
 }
 
-fn open(path: &str) -> anyhow::Result<Dataset> {
-    Dataset::open(Path::new(path)).with_context(|| format!("reading the evaluation {path}"))
+/// What a comparison needs of a dataset.
+struct Evaluation {
+    manifest: DatasetManifest,
+    summary: EpisodeSummary,
 }
 
-fn played(dataset: &Dataset) -> Played<'_> {
+fn open(path: &str) -> anyhow::Result<Evaluation> {
+    let read = || -> anyhow::Result<Evaluation> {
+        let dataset = Dataset::open_unread(Path::new(path))?;
+        let episodes = dataset.episodes()?.into_iter();
+        let outcomes: Vec<EpisodeOutcome> = episodes.map(|record| record.outcome).collect();
+        Ok(Evaluation {
+            manifest: dataset.manifest().clone(),
+            summary: EpisodeSummary::of(&outcomes)?,
+        })
+    };
+    read().with_context(|| format!("reading the evaluation {path}"))
+}
+
+fn played(Evaluation { manifest, summary }: &Evaluation) -> Played<'_> {
     Played {
-        ruleset: &dataset.manifest.ruleset,
-        profile: dataset.manifest.profile,
-        seed: dataset.manifest.seed,
-        mismatch_seed: dataset.manifest.mismatch_seed,
-        summary: &dataset.summary,
+        ruleset: &manifest.ruleset,
+        profile: manifest.profile,
+        seed: manifest.seed,
+        mismatch_seed: manifest.mismatch_seed,
+        summary,
     }
 }
 

@@ -26,7 +26,7 @@ enum Action {
 }
 
 impl DatasetCommand {
-    /// Reads the dataset, which is compared with its hashes first.
+    /// Reads what it needs of the dataset: files that are read as a whole are compared with their hashes.
     ///
     /// # Errors
     /// If it cannot be read, is damaged, or does not hold what was asked for.

@@ -10,6 +10,7 @@ mod table;
 use crate::config::Config;
 use anyhow::{Context, ensure};
 use clap::Args;
+use faceoff_dataset::ARCHIVE_FILE;
 use faceoff_runner::{
     AgentEnvironment,
     bundle::{self, Bundle, BundleError, BundleLimits},
@@ -17,7 +18,7 @@ use faceoff_runner::{
 use faceoff_sandbox::{Isolation, Runtime};
 use faceoff_types::{Profile, Seed, Task};
 use faceoff_worker::CpuLayout;
-use files::{DATASET, RESULTS};
+use files::RESULTS;
 use profile_run::EvalSetup;
 use rustix::thread::{CpuSet, sched_getaffinity};
 use std::{
@@ -115,9 +116,10 @@ impl EvalCommand {
         let agent = &setup.bundle.manifest.name;
         print!("{}", table::of(agent, &played.result));
         println!(
-            "\n{}\n{}",
+            "\n{}\n{}, BLAKE3 {}",
             self.out.join(RESULTS).display(),
-            self.out.join(DATASET).display()
+            self.out.join(ARCHIVE_FILE).display(),
+            played.archive_blake3
         );
         Ok(())
     }

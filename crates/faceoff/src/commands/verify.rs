@@ -5,10 +5,10 @@
     reason = "a command talks to the terminal"
 )]
 
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use clap::Args;
-use faceoff_runner::{
-    dataset::{Dataset, DatasetError},
+use faceoff_dataset::{
+    Dataset, DatasetError,
     verify::{Difference, SeasonClaim, SeasonMismatch, Verified, VerifyError, verify},
 };
 use faceoff_types::{EvaluationResult, Seed};
@@ -45,6 +45,9 @@ pub struct VerifyCommand {
     /// The commitment that was published before the season: also check that it is the secret's hash
     #[arg(long, value_name = "HEX", requires = "secret")]
     commitment: Option<String>,
+    /// The published hash of the archive: also check that it is this one's
+    #[arg(long, value_name = "HEX")]
+    blake3: Option<blake3::Hash>,
 }
 
 /// What is printed with `--json`.
@@ -69,6 +72,8 @@ struct Simulated {
     steps_per_s: f64,
     /// Were the seeds derived from the season's secret?
     season: bool,
+    /// The archive's hash; `null` for an unpacked folder.
+    blake3: Option<String>,
     result: EvaluationResult,
 }
 
@@ -149,6 +154,20 @@ impl VerifyCommand {
 
     fn verify(&self) -> Result<Simulated, Failure> {
         let dataset = Dataset::open(&self.dataset)?;
+        let archive = dataset.archive()?.map(|digest| digest.blake3);
+        match (&self.blake3, &archive) {
+            (Some(_), None) => {
+                return Err(Failure::Here(anyhow!(
+                    "--blake3 is the hash of an archive, this is an unpacked folder; name dataset.zip"
+                )));
+            }
+            (Some(expected), Some(found)) if expected.to_hex().as_str() != found => {
+                return Err(Failure::from(DatasetError::Altered(format!(
+                    "the archive's BLAKE3 is {found}, expected {expected}"
+                ))));
+            }
+            _ => {}
+        }
         let claim = self.secret.zip(self.day).map(|(secret, day)| SeasonClaim {
             secret,
             commitment: self.commitment.clone(),
@@ -170,6 +189,7 @@ impl VerifyCommand {
             seconds: time.as_secs_f64(),
             steps_per_s: verified.steps as f64 / time.as_secs_f64(),
             season: claim.is_some(),
+            blake3: archive,
             result: verified.result,
         })
     }
@@ -204,6 +224,7 @@ pub fn verified_line(path: &Path) -> anyhow::Result<String> {
         secret: None,
         day: None,
         commitment: None,
+        blake3: None,
     };
     let simulated = command.verify()?;
     Ok(describe(path, &simulated))
@@ -216,8 +237,12 @@ fn describe(path: &Path, simulated: &Simulated) -> String {
         seconds,
         steps_per_s,
         season,
+        blake3,
         result,
     } = simulated;
+    let hash = blake3
+        .as_ref()
+        .map_or_else(String::new, |hash| format!("; BLAKE3 {hash}"));
     let seeds = if *season {
         "; its seeds derive from the season's secret"
     } else {
@@ -226,7 +251,7 @@ fn describe(path: &Path, simulated: &Simulated) -> String {
     format!(
         "verified {}: {episodes} episodes, {steps} control steps, every state and score identical \
          (score {:.1} %, penalty points {:.1}){seeds}; {seconds:.1} s, {steps_per_s:.0} control \
-         steps/s",
+         steps/s{hash}",
         path.display(),
         result.score,
         result.penalty_points,

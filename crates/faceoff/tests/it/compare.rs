@@ -127,13 +127,13 @@ fn local_evaluations_are_compared_if_they_played_the_same_episodes() {
     fs::write(&episodes, bytes).unwrap();
     let refused = faceoff(&["compare", "unpacked", "b"], folder);
     assert!(
-        text(&refused.stderr).contains("its hash differs"),
+        text(&refused.stderr).contains("damaged or altered: episodes.parquet has"),
         "{}",
         text(&refused.stderr)
     );
     let missing = faceoff(&["compare", ".", "b"], folder);
     assert!(
-        text(&missing.stderr).contains("the folder has neither"),
+        text(&missing.stderr).contains("holds neither manifest.json nor dataset.zip"),
         "{}",
         text(&missing.stderr)
     );

@@ -358,3 +358,62 @@ fn workers_and_shards_change_nothing_but_times() {
     assert_eq!(runs[0], runs[1]);
     assert_eq!(runs[0], runs[2]);
 }
+
+#[test]
+fn the_archives_hash_is_told_and_compared() {
+    let archive = evaluated().join("dataset.zip");
+    let hash = blake3::hash(&fs::read(&archive).unwrap()).to_hex();
+    let path = archive.to_str().unwrap();
+    let line = stdout(&["verify", path, "--blake3", &hash]);
+    assert!(line.contains(&*hash), "{line}");
+    let other = faceoff(&["verify", path, "--blake3", &"00".repeat(32)]);
+    assert_eq!(other.status.code(), Some(1));
+    let words = text(&other.stderr);
+    assert!(
+        words.contains(&*hash) && words.contains("expected 0000"),
+        "{words}"
+    );
+
+    let dir = tempfile::tempdir().unwrap();
+    let file = fs::File::open(&archive).unwrap();
+    zip::ZipArchive::new(file)
+        .unwrap()
+        .extract(dir.path())
+        .unwrap();
+    let folder = faceoff(&["verify", dir.path().to_str().unwrap(), "--blake3", &hash]);
+    assert_eq!(folder.status.code(), Some(2));
+    let words = text(&folder.stderr);
+    assert!(words.contains("name dataset.zip"), "{words}");
+}
+
+#[test]
+fn a_dataset_of_the_layout_before_is_read() {
+    let archive =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fixtures/dataset-layout-2.zip");
+    let archive = archive.to_str().unwrap();
+    let line = stdout(&["verify", archive]);
+    assert!(line.contains("4 episodes, 548 control steps, every state and score identical"));
+    let list = stdout(&["dataset", "list", archive]);
+    assert_eq!(list.lines().count(), 5);
+    assert!(
+        list.contains("hit            1    185 left_table     yes           0"),
+        "{list}"
+    );
+    let slice = stdout(&[
+        "dataset",
+        "slice",
+        archive,
+        "--task",
+        "hit",
+        "--episode",
+        "1",
+    ]);
+    assert_eq!(slice.lines().count(), 186);
+    let comparison = stdout(&["compare", archive, archive]);
+    assert!(comparison.contains("A: striker") && comparison.contains("not told apart"));
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("export");
+    stdout(&["dataset", "export", archive, "--out", out.to_str().unwrap()]);
+    assert!(out.join("7dof-hit/dataset.pkl").exists());
+    assert!(out.join("7dof-defend/computation_time.npy").exists());
+}

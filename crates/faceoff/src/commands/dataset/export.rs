@@ -9,8 +9,8 @@ use arrow_array::{
     types::{Float64Type, Int64Type},
 };
 use clap::Args;
-use faceoff_runner::dataset::{Dataset, EpisodeRecord, StepBatches};
-use faceoff_types::{Interpolation, Task, Tier};
+use faceoff_dataset::{Dataset, EpisodeRecord, StepBatches};
+use faceoff_types::{EpisodeEnd, Interpolation, Task, Tier};
 use serde_json::{Map, Value, json};
 use std::{
     fs::{self, File},
@@ -48,7 +48,7 @@ impl ExportArgs {
                 .with_context(|| format!("making {}", dir.display()))?;
             let mine: Vec<&EpisodeRecord> = episodes
                 .iter()
-                .filter(|episode| episode.task == *task)
+                .filter(|episode| episode.outcome.task == *task)
                 .collect();
             Export::create(&dir, &mine)
                 .with_context(|| format!("writing to {}", dir.display()))?
@@ -80,7 +80,7 @@ impl Export {
     fn create(dir: &Path, episodes: &[&EpisodeRecord]) -> io::Result<Self> {
         let steps = episodes
             .iter()
-            .map(|episode| u64::from(episode.steps))
+            .map(|episode| u64::from(episode.outcome.steps))
             .sum();
         let constraints = CONSTRAINTS.map(|(name, column)| {
             NpyWriter::create(&dir.join(format!("{name}.npy")), &[steps, 1])
@@ -95,9 +95,10 @@ impl Export {
 
     fn write(mut self, episodes: &[&EpisodeRecord], steps: &mut StepBatches) -> anyhow::Result<()> {
         for episode in episodes {
-            let pieces = steps.take_rows(episode.steps as usize)?;
+            let of = &episode.outcome;
+            let pieces = steps.take_rows(of.steps as usize)?;
             self.episode(episode, &pieces)
-                .with_context(|| format!("{}, episode {}", episode.task, episode.episode))?;
+                .with_context(|| format!("{}, episode {}", of.task, of.episode))?;
         }
         self.transitions.finish()?;
         self.times.finish()?;
@@ -108,14 +109,19 @@ impl Export {
     }
 
     fn episode(&mut self, episode: &EpisodeRecord, pieces: &[RecordBatch]) -> anyhow::Result<()> {
+        let steps = episode.outcome.steps as usize;
+        let absorbs = !matches!(
+            episode.outcome.end,
+            EpisodeEnd::Horizon | EpisodeEnd::AgentFault
+        );
         let mut observations = Vec::new();
         for piece in pieces {
             observations.extend((0..piece.num_rows()).map(|row| observation(piece, row)));
         }
         ensure!(
-            observations.len() == episode.steps as usize,
+            observations.len() == steps,
             "{} control steps are missing",
-            episode.steps as usize - observations.len()
+            steps - observations.len()
         );
         observations.push(episode.last_observation.clone());
         let shape = shape(episode)?;
@@ -124,7 +130,7 @@ impl Export {
             let times = piece["computation_time_ns"].as_primitive::<Int64Type>();
             let actions = piece["action"].as_list::<i32>();
             for row in 0..piece.num_rows() {
-                let last = step + 1 == episode.steps as usize;
+                let last = step + 1 == steps;
                 let action = actions.value(row);
                 self.transitions.push(&Transition {
                     state: &observations[step],
@@ -133,7 +139,7 @@ impl Export {
                     // The challenge's evaluation gave none.
                     reward: 0.0,
                     next_state: &observations[step + 1],
-                    absorbing: last && !matches!(&*episode.end, "horizon" | "agent_fault"),
+                    absorbing: last && absorbs,
                     last,
                 })?;
                 self.times.push(times.value(row) as f64 / 1e9)?;
@@ -183,8 +189,8 @@ fn violations(episodes: &[&EpisodeRecord]) -> Value {
         "link_constr",
         "Computation Time",
     ];
-    for episode in episodes {
-        let (v, time) = (episode.violations, episode.computation_time);
+    for EpisodeRecord { outcome, .. } in episodes {
+        let (v, time) = (outcome.violations, outcome.computation_time);
         let slow = if time.max_s > 0.2 {
             Some("max computation_time > 0.2s")
         } else if time.mean_s > 0.02 {
@@ -211,7 +217,7 @@ fn violations(episodes: &[&EpisodeRecord]) -> Value {
             broken.push(slow.to_owned());
         }
         if !broken.is_empty() {
-            out.insert(format!("Episode {}", episode.episode), broken.into());
+            out.insert(format!("Episode {}", outcome.episode), broken.into());
         }
     }
     let mut summary: Map<String, Value> = names

@@ -1,5 +1,5 @@
 use clap::Args;
-use faceoff_runner::dataset::Dataset;
+use faceoff_dataset::Dataset;
 use std::{
     io::{BufWriter, Write, stdout},
     path::PathBuf,
@@ -17,7 +17,7 @@ pub struct ListArgs {
 
 impl ListArgs {
     pub fn run(self) -> anyhow::Result<()> {
-        let episodes = Dataset::open(&self.dataset)?.episodes()?;
+        let episodes = Dataset::open_unread(&self.dataset)?.episodes()?;
         let mut out = BufWriter::new(stdout().lock());
         if !self.json {
             writeln!(
@@ -26,20 +26,21 @@ impl ListArgs {
                 "task", "episode", "steps", "end", "success", "points"
             )?;
         }
-        for episode in episodes {
+        for record in episodes {
             if self.json {
-                serde_json::to_writer(&mut out, &episode)?;
+                serde_json::to_writer(&mut out, &record)?;
                 writeln!(out)?;
             } else {
+                let episode = &record.outcome;
                 writeln!(
                     out,
                     "{:<8} {:>7} {:>6} {:<14} {:<8} {:>6}",
                     episode.task,
                     episode.episode,
                     episode.steps,
-                    episode.end,
+                    episode.end.as_str(),
                     if episode.success { "yes" } else { "no" },
-                    episode.penalty_points,
+                    record.penalty_points,
                 )?;
             }
         }

@@ -1,4 +1,4 @@
-use anyhow::{Context, bail, ensure};
+use anyhow::Context;
 use arrow_array::{
     Array, RecordBatch,
     cast::AsArray,
@@ -6,7 +6,7 @@ use arrow_array::{
 };
 use arrow_schema::DataType;
 use clap::{Args, ValueEnum};
-use faceoff_runner::dataset::Dataset;
+use faceoff_dataset::Dataset;
 use faceoff_types::Task;
 use serde_json::{Map, Value};
 use std::{
@@ -69,21 +69,20 @@ impl FromStr for Steps {
 
 impl SliceArgs {
     pub fn run(self) -> anyhow::Result<()> {
-        let dataset = Dataset::open(&self.dataset)?;
-        let Self { task, episode, .. } = self;
-        let episodes = dataset.manifest().episodes.get(&task).copied();
-        match episodes {
-            None => bail!("the dataset holds no episode of {task}"),
-            Some(count) => ensure!(
-                episode < count,
-                "there is no episode {episode} of {task}: there are {count}, from 0"
-            ),
-        }
-        let table = dataset.steps()?;
-        let names = self.columns.clone().unwrap_or_else(|| table.columns());
-        let mut wanted = names.clone();
-        wanted.push("step".to_owned());
-        let batches = table.episode(task, episode, Some(&wanted))?;
+        let dataset = Dataset::open_unread(&self.dataset)?;
+        let wanted = self.columns.as_ref().map(|names| {
+            let step = "step".to_owned();
+            names.iter().cloned().chain([step]).collect::<Vec<_>>()
+        });
+        let rows = dataset.episode(self.task, self.episode, wanted.as_deref())?;
+        let names = self.columns.unwrap_or_else(|| {
+            let schema = rows.schema();
+            schema
+                .fields()
+                .iter()
+                .map(|field| field.name().clone())
+                .collect()
+        });
         let mut out: Box<dyn Write> = match &self.out {
             Some(path) => Box::new(BufWriter::new(
                 File::create(path).with_context(|| format!("creating {}", path.display()))?,
@@ -94,12 +93,10 @@ impl SliceArgs {
             writeln!(out, "{}", names.join(","))?;
         }
         let steps = self.steps.map_or(0..u32::MAX, |steps| steps.0);
-        for batch in &batches {
-            let numbers = batch["step"].as_primitive::<UInt32Type>();
-            for row in 0..batch.num_rows() {
-                if steps.contains(&numbers.value(row)) {
-                    write_row(&mut out, self.format, &names, batch, row)?;
-                }
+        let numbers = rows["step"].as_primitive::<UInt32Type>();
+        for row in 0..rows.num_rows() {
+            if steps.contains(&numbers.value(row)) {
+                write_row(&mut out, self.format, &names, &rows, row)?;
             }
         }
         Ok(out.flush()?)

@@ -1,10 +1,10 @@
 //! The files of `faceoff eval --out`.
 
 use anyhow::Context;
+use faceoff_dataset::ARCHIVE_FILE;
 use std::{fs, io::ErrorKind, path::Path};
 
 pub(super) const RESULTS: &str = "results.json";
-pub(super) const DATASET: &str = "dataset.zip";
 /// The agent's log, where there is no result.
 pub(super) const LOG: &str = "agent.log";
 /// The comparison of all profiles.
@@ -12,7 +12,7 @@ pub(super) const ABLATION: &str = "ablation.json";
 
 /// Removes what an earlier run has left, so that it is not taken for this one's.
 pub(super) fn remove_earlier(out: &Path) -> anyhow::Result<()> {
-    for path in [RESULTS, DATASET, LOG, ABLATION].map(|name| out.join(name)) {
+    for path in [RESULTS, ARCHIVE_FILE, LOG, ABLATION].map(|name| out.join(name)) {
         match fs::remove_file(&path) {
             Err(error) if error.kind() != ErrorKind::NotFound => {
                 return Err(error).with_context(|| format!("removing {}", path.display()));

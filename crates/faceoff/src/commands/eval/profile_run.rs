@@ -1,11 +1,12 @@
 //! All episodes in one profile: played, joined, scored.
 
 use super::{
-    files::{DATASET, LOG, RESULTS, remove_earlier, write_json},
+    files::{LOG, RESULTS, remove_earlier, write_json},
     pool::{Job, Verdict, play_all},
 };
 use anyhow::{Context, bail};
-use faceoff_runner::{AgentEnvironment, EvaluationMeta, ShardSpec, assemble, bundle::Bundle};
+use faceoff_dataset::{ARCHIVE_FILE, Assembled, EvaluationMeta, ShardSpec, assemble};
+use faceoff_runner::{AgentEnvironment, bundle::Bundle};
 use faceoff_types::{AgentFault, EpisodeOutcome, EvaluationResult, Profile, RULESET, Seed, Task};
 use std::{
     fs,
@@ -33,6 +34,7 @@ pub(super) struct EvalSetup {
 pub(super) struct Played {
     pub result: EvaluationResult,
     pub outcomes: Vec<EpisodeOutcome>,
+    pub archive_blake3: String,
 }
 
 /// Plays all episodes in one profile and leaves `results.json` and `dataset.zip` in `out`.
@@ -67,13 +69,18 @@ pub(super) fn play(setup: &EvalSetup, profile: Profile, out: &Path) -> anyhow::R
         agent: setup.bundle.manifest.name.clone(),
         ruleset: RULESET.to_owned(),
     };
-    let result = assemble(&meta, &dirs, &out.join(DATASET)).context("joining the recordings")?;
+    let Assembled { result, archive } =
+        assemble(&meta, &dirs, &out.join(ARCHIVE_FILE)).context("joining the recordings")?;
     // They are in the dataset now; a further profile needs the room.
     for dir in &dirs {
         fs::remove_dir_all(dir).with_context(|| format!("removing {}", dir.display()))?;
     }
     write_json(&out.join(RESULTS), &result)?;
-    Ok(Played { result, outcomes })
+    Ok(Played {
+        result,
+        outcomes,
+        archive_blake3: archive.blake3,
+    })
 }
 
 /// One shard per task and worker, so that each agent is started as seldom as possible.

@@ -1,0 +1,131 @@
+//! One episode out of an archive of some 300 MB, as a replay page would ask for it: the archive is
+//! opened anew each time, and nothing but the page cache is warm.
+#![expect(clippy::unwrap_used, reason = "a benchmark has nobody to tell")]
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use faceoff_dataset::{
+    Dataset, EvaluationMeta, Recorder, ShardFolder, ShardReport, ShardSpec, assemble,
+};
+use faceoff_episode::{Answered, EpisodeStart, StepRow, StepSink};
+use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
+use faceoff_types::{
+    ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, RULESET, Seed, Task, Violations,
+};
+use std::{hint::black_box, path::Path};
+
+const EPISODES: u32 = 1000;
+const EPISODES_PER_SHARD: u32 = 100;
+const STEPS: u32 = 230;
+
+/// A number that hardly repeats, as measured ones do.
+fn noise(number: f64) -> f64 {
+    (number * 1e3 + 0.37).sin()
+}
+
+fn record(spec: &ShardSpec, out: &Path) {
+    let folder = ShardFolder::create(out).unwrap();
+    let mut recorder = Recorder::create(&folder, spec.task).unwrap();
+    let (settings, plant) = (PerturbationSettings::default(), Plant::nominal());
+    let mut outcomes = Vec::new();
+    for episode in spec.episodes.clone() {
+        let seed = spec.seed.episode(spec.task, episode);
+        let (cubic, factors) = (Interpolation::Cubic, spec.profile.factors());
+        let world = Episode::new(spec.task, cubic, factors, &settings, &plant, seed);
+        let (mut state, mut observation) = (world.state(), world.observation().to_vec());
+        recorder.begin(EpisodeStart {
+            episode,
+            seed,
+            interpolation: Some(Interpolation::Cubic),
+            state: &state,
+        });
+        for step in 0..STEPS {
+            observation.iter_mut().for_each(|x| *x = noise(*x));
+            recorder.observe(&observation);
+            state.puck = state.puck.map(noise);
+            state.q = state.q.map(noise);
+            state.dq = state.dq.map(noise);
+            state.ee = state.ee.map(noise);
+            recorder.step(&StepRow {
+                step,
+                action: &[state.q, state.dq].concat(),
+                answered: Answered {
+                    computation_time_s: 1e-3,
+                    cpu_time_s: Some(5e-4),
+                },
+                state: &state,
+                constraints: Default::default(),
+                next_observation: &observation,
+            });
+        }
+        let outcome = EpisodeOutcome {
+            task: spec.task,
+            episode,
+            steps: STEPS,
+            end: EpisodeEnd::Horizon,
+            success: false,
+            violations: Violations::default(),
+            computation_time: ComputationTime::default(),
+            fault: None,
+        };
+        recorder.end(&outcome, 0).unwrap();
+        outcomes.push(outcome);
+    }
+    recorder.finish().unwrap();
+    let report = ShardReport {
+        outcomes,
+        log: String::new(),
+        stopped_by_faults: false,
+        timing: Default::default(),
+    };
+    folder.commit(spec, &report).unwrap();
+}
+
+fn slice(criterion: &mut Criterion) {
+    let dir = tempfile::tempdir().unwrap();
+    let seed = Seed::from_number(1);
+    let mut shards = Vec::new();
+    for task in Task::ALL {
+        for start in (0..EPISODES).step_by(EPISODES_PER_SHARD as usize) {
+            let spec = ShardSpec {
+                task,
+                episodes: start..start + EPISODES_PER_SHARD,
+                profile: Profile::Evaluation,
+                seed,
+                mismatch_seed: seed,
+                max_faults: 0,
+            };
+            let out = dir.path().join(format!("{task}-{start}"));
+            record(&spec, &out);
+            shards.push(out);
+        }
+    }
+    let meta = EvaluationMeta {
+        profile: Profile::Evaluation,
+        seed,
+        mismatch_seed: seed,
+        agent: "noise".to_owned(),
+        ruleset: RULESET.to_owned(),
+    };
+    let archive = dir.path().join("dataset.zip");
+    let megabytes = assemble(&meta, &shards, &archive).unwrap().archive.bytes / 1_000_000;
+    let read = |columns: Option<&[String]>| {
+        let dataset = Dataset::open_unread(&archive).unwrap();
+        dataset.episode(Task::Prepare, 777, columns).unwrap()
+    };
+    let mut group = criterion.benchmark_group(format!("an episode of {megabytes} MB"));
+    group.bench_function("all columns", |bencher| {
+        bencher.iter(|| black_box(read(None)));
+    });
+    let puck = ["puck_x", "puck_y"].map(str::to_owned);
+    group.bench_function("two columns", |bencher| {
+        bencher.iter(|| black_box(read(Some(&puck))));
+    });
+    group.finish();
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(20);
+    targets = slice
+}
+criterion_main!(benches);

@@ -1,0 +1,253 @@
+//! Joins the shards of an evaluation to its dataset, and scores it.
+
+use crate::{
+    archive_writer::ArchiveWriter,
+    dataset::Layout,
+    digest,
+    error::RecordingError,
+    files::{
+        CALIBRATION_FILE, EPISODES_FILE, LOG_FILE, MANIFEST_FILE, RESULTS_FILE, STEPS_FILE,
+        VIOLATIONS_FILE,
+    },
+    score::{Scored, Tally, score},
+    shard_folder::ShardRecording,
+    simulator::simulator_id,
+    table::{ShardTable, join},
+};
+use faceoff_types::{EvaluationResult, Profile, RULESET, Seed, Task};
+use faceoff_wire::dataset::{
+    CalibrationFile, DATASET_SCHEMA, DatasetManifest, FileDigest, ShardCalibration,
+};
+use fs_err as fs;
+use serde::{Deserialize, Serialize};
+use std::{
+    collections::BTreeMap,
+    io::Write,
+    path::{Path, PathBuf},
+};
+
+/// What the dataset of an evaluation says about itself.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EvaluationMeta {
+    /// The perturbations.
+    pub profile: Profile,
+    /// The episodes' seeds derive from it.
+    pub seed: Seed,
+    /// The season's, of the model mismatch.
+    pub mismatch_seed: Seed,
+    /// As the bundle's manifest names it.
+    pub agent: String,
+    /// Must be the one that this version scores.
+    pub ruleset: String,
+}
+
+/// An evaluation's dataset.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assembled {
+    /// The score, which is also the dataset's `results.json`.
+    pub result: EvaluationResult,
+    /// Size and hash of the archive: published, they vouch for every byte of it.
+    pub archive: FileDigest,
+}
+
+/// Joins the recordings of all shards of an evaluation, in any order, into one zip archive:
+/// `steps.parquet`, `episodes.parquet`, `violations.json`, `results.json`, `calibration.json`,
+/// `agent.log` and `manifest.json` with the hashes of the others.
+///
+/// Nothing is simulated again. The archive is written under a temporary name and renamed; the same
+/// shards give the same bytes. Memory grows with the episodes, not with their steps.
+///
+/// # Errors
+/// [`RecordingError::Unusable`] when a shard is damaged, incomplete, of another evaluation, ended
+/// by faults, or when episodes are missing or recorded twice; [`RecordingError::Io`].
+pub fn assemble(
+    meta: &EvaluationMeta,
+    shard_dirs: &[PathBuf],
+    archive: &Path,
+) -> Result<Assembled, RecordingError> {
+    let mut shards = shard_dirs
+        .iter()
+        .map(|dir| ShardRecording::open(dir))
+        .collect::<Result<Vec<_>, _>>()?;
+    shards.sort_by_key(|shard| (shard.spec.task, shard.spec.episodes.start));
+    let episodes = check(meta, &shards)?;
+    let calibration = calibration(&shards);
+    let scored = score(
+        meta.profile,
+        meta.seed,
+        Layout::Three,
+        played(&shards)?,
+        calibration.worst(),
+    );
+
+    let partial = archive.with_extension("zip.partial");
+    let written = write(meta, &shards, episodes, &scored, &calibration, &partial)
+        .and_then(|()| Ok(digest::of_file(&partial)?))
+        .and_then(|digest| {
+            fs::rename(&partial, archive)?;
+            Ok(digest)
+        });
+    match written {
+        Ok(archive) => Ok(Assembled {
+            result: scored.result,
+            archive,
+        }),
+        Err(error) => {
+            if let Err(error) = fs::remove_file(&partial) {
+                tracing::debug!(%error, "no unfinished dataset to remove");
+            }
+            Err(error)
+        }
+    }
+}
+
+fn write(
+    meta: &EvaluationMeta,
+    shards: &[ShardRecording],
+    episodes: BTreeMap<Task, u32>,
+    Scored { result, violations }: &Scored,
+    calibration: &CalibrationFile,
+    path: &Path,
+) -> Result<(), RecordingError> {
+    let scratch = match path.parent() {
+        Some(dir) if dir != Path::new("") => dir,
+        _ => Path::new("."),
+    };
+    let tables = |table: fn(&ShardRecording) -> &ShardTable| -> Vec<ShardTable> {
+        shards.iter().map(|shard| table(shard).clone()).collect()
+    };
+    let mut dataset = ArchiveWriter::create(path)?;
+    dataset.add(STEPS_FILE, |out| {
+        join(&tables(|shard| &shard.steps), scratch, out)
+    })?;
+    dataset.add(EPISODES_FILE, |out| {
+        join(&tables(|shard| &shard.episodes), scratch, out)
+    })?;
+    dataset.add_json(VIOLATIONS_FILE, violations)?;
+    dataset.add_json(RESULTS_FILE, result)?;
+    dataset.add_json(CALIBRATION_FILE, calibration)?;
+    dataset.add(LOG_FILE, |out| write_log(shards, out))?;
+    let manifest = DatasetManifest {
+        schema: DATASET_SCHEMA.to_owned(),
+        ruleset: meta.ruleset.clone(),
+        simulator: simulator_id().clone(),
+        profile: meta.profile,
+        seed: meta.seed,
+        mismatch_seed: meta.mismatch_seed,
+        agent: meta.agent.clone(),
+        episodes,
+        files: dataset.files().clone(),
+    };
+    dataset.add_json(MANIFEST_FILE, &manifest)?;
+    dataset.finish()
+}
+
+/// All shards belong to this evaluation and together hold each episode of each task once, from 0
+/// on. Returns the number of episodes per task.
+fn check(
+    meta: &EvaluationMeta,
+    shards: &[ShardRecording],
+) -> Result<BTreeMap<Task, u32>, RecordingError> {
+    let wrong = |what: String| Err(RecordingError::Unusable(what));
+    if meta.ruleset != RULESET {
+        return wrong(format!(
+            "the evaluation was played by {}, this version scores {RULESET}",
+            meta.ruleset
+        ));
+    }
+    let mut episodes = BTreeMap::new();
+    for ShardRecording { spec, report, .. } in shards {
+        let name = format!(
+            "{} {}..{}",
+            spec.task, spec.episodes.start, spec.episodes.end
+        );
+        if (spec.profile, spec.seed, spec.mismatch_seed)
+            != (meta.profile, meta.seed, meta.mismatch_seed)
+        {
+            return wrong(format!("shard {name} belongs to another evaluation"));
+        }
+        if report.stopped_by_faults {
+            return wrong(format!(
+                "shard {name} was ended by the agent's faults: there is no score"
+            ));
+        }
+        let next = episodes.entry(spec.task).or_insert(0);
+        if spec.episodes.start != *next {
+            return wrong(format!(
+                "shard {name} does not follow on episode {next}: episodes are missing or twice"
+            ));
+        }
+        let expected = spec.episodes.clone().map(|episode| (spec.task, episode));
+        if !expected.eq(report
+            .outcomes
+            .iter()
+            .map(|outcome| (outcome.task, outcome.episode)))
+        {
+            return wrong(format!("shard {name} does not report its episodes"));
+        }
+        *next = spec.episodes.end;
+    }
+    if episodes.is_empty() {
+        return wrong("an evaluation without shards".to_owned());
+    }
+    Ok(episodes)
+}
+
+/// What each slot measured of itself.
+fn calibration(shards: &[ShardRecording]) -> CalibrationFile {
+    CalibrationFile {
+        schema: DATASET_SCHEMA.to_owned(),
+        shards: shards
+            .iter()
+            .map(|ShardRecording { spec, report, .. }| ShardCalibration {
+                task: spec.task,
+                first_episode: spec.episodes.start,
+                end_episode: spec.episodes.end,
+                timing: report.timing,
+            })
+            .collect(),
+    }
+}
+
+/// Outcomes and steps of all shards, which come in order.
+fn played(shards: &[ShardRecording]) -> Result<BTreeMap<Task, Tally>, RecordingError> {
+    let mut steps: BTreeMap<Task, u64> = BTreeMap::new();
+    for ShardRecording { spec, report, .. } in shards {
+        let outcomes = report.outcomes.iter();
+        *steps.entry(spec.task).or_default() += outcomes
+            .map(|outcome| u64::from(outcome.steps))
+            .sum::<u64>();
+    }
+    let mut played: BTreeMap<Task, Tally> = steps
+        .iter()
+        .map(|(task, steps)| (*task, Tally::new(*steps, Layout::Three)))
+        .collect();
+    for shard in shards {
+        if let Some(tally) = played.get_mut(&shard.spec.task) {
+            for outcome in &shard.report.outcomes {
+                tally.add_episode(outcome.clone());
+            }
+            tally.add_table(shard.steps.path())?;
+        }
+    }
+    for (task, tally) in &played {
+        if tally.steps() != steps[task] {
+            return Err(RecordingError::Unusable(format!(
+                "{task}: {} steps are recorded, {} were played",
+                tally.steps(),
+                steps[task]
+            )));
+        }
+    }
+    Ok(played)
+}
+
+fn write_log(shards: &[ShardRecording], out: &mut dyn Write) -> Result<(), RecordingError> {
+    for ShardRecording { spec, report, .. } in shards {
+        let last = spec.episodes.end.saturating_sub(1);
+        let (task, first) = (spec.task, spec.episodes.start);
+        writeln!(out, "== {task}, episodes {first} to {last} ==")?;
+        out.write_all(report.log.as_bytes())?;
+    }
+    Ok(())
+}

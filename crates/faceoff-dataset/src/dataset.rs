@@ -1,0 +1,292 @@
+//! Reads a dataset: the archive, the unpacked folder, or the folder that `faceoff eval` writes.
+
+mod by_index;
+mod container;
+mod episodes;
+mod file_range;
+mod layout;
+mod seal;
+mod steps;
+
+pub use episodes::EpisodeRecord;
+pub use layout::Layout;
+pub use steps::{StepBatches, StepTable};
+
+pub(crate) use episodes::Columns;
+pub(crate) use file_range::FileRange;
+
+use crate::{
+    digest,
+    error::DatasetError,
+    files::{
+        ARCHIVE_FILE, CALIBRATION_FILE, EPISODES_FILE, LOG_FILE, MANIFEST_FILE, RESULTS_FILE,
+        STEPS_FILE, VIOLATIONS_FILE,
+    },
+};
+use arrow_array::RecordBatch;
+use container::Container;
+use faceoff_types::{EvaluationResult, Task};
+use faceoff_wire::dataset::{CalibrationFile, DatasetManifest, FileDigest};
+use fs_err as fs;
+use serde::Deserialize;
+use std::{
+    collections::BTreeSet,
+    io,
+    path::{Path, PathBuf},
+};
+
+/// Every file of a dataset but its manifest.
+const FILES: [&str; 6] = [
+    STEPS_FILE,
+    EPISODES_FILE,
+    VIOLATIONS_FILE,
+    RESULTS_FILE,
+    CALIBRATION_FILE,
+    LOG_FILE,
+];
+
+/// A dataset whose files are what its manifest says.
+#[derive(Debug)]
+pub struct Dataset {
+    path: PathBuf,
+    container: Container,
+    layout: Layout,
+    manifest: DatasetManifest,
+    checked: Checked,
+}
+
+/// When files are compared with their hashes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Checked {
+    AtOpening,
+    WhenRead,
+}
+
+/// What can be told of a manifest of any layout.
+#[derive(Deserialize)]
+struct Schema {
+    schema: String,
+}
+
+impl Dataset {
+    /// Opens `dataset.zip`, an unpacked folder, or a folder with a `dataset.zip`, and compares every
+    /// file with its hash, so that a damaged or truncated dataset is never half-read.
+    ///
+    /// # Errors
+    /// [`DatasetError`].
+    pub fn open(path: &Path) -> Result<Self, DatasetError> {
+        let mut dataset = Self::open_unread(path)?;
+        if dataset.layout == Layout::Two {
+            dataset.container.check_seal()?;
+        }
+        FILES.iter().try_for_each(|name| dataset.check(name))?;
+        dataset.checked = Checked::AtOpening;
+        Ok(dataset)
+    }
+
+    /// As [`Dataset::open`], but each file is compared with its hash when it is read: whoever needs a
+    /// few small files, or one episode, need not wait for hundreds of megabytes.
+    ///
+    /// # Errors
+    /// [`DatasetError`].
+    pub fn open_unread(path: &Path) -> Result<Self, DatasetError> {
+        let (path, container) = if !fs::metadata(path)?.is_dir() {
+            (path.to_owned(), Container::archive(path)?)
+        } else if path.join(MANIFEST_FILE).exists() {
+            (path.to_owned(), Container::Folder(path.to_owned()))
+        } else {
+            let archive = path.join(ARCHIVE_FILE);
+            if !archive.exists() {
+                return Err(DatasetError::Unreadable(format!(
+                    "{} holds neither {MANIFEST_FILE} nor {ARCHIVE_FILE}",
+                    path.display()
+                )));
+            }
+            let container = Container::archive(&archive)?;
+            same_results(&path.join(RESULTS_FILE), &container)?;
+            (archive, container)
+        };
+        let (layout, manifest) = manifest(&container)?;
+        let listed: BTreeSet<&str> = manifest.files.keys().map(String::as_str).collect();
+        if listed != BTreeSet::from(FILES) {
+            return Err(DatasetError::Altered(format!(
+                "{MANIFEST_FILE} lists {listed:?}, expected {FILES:?}"
+            )));
+        }
+        container.expect_only(&FILES)?;
+        Ok(Self {
+            path,
+            container,
+            layout,
+            manifest,
+            checked: Checked::WhenRead,
+        })
+    }
+
+    /// The archive or folder.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Which layout its files have.
+    #[must_use]
+    pub const fn layout(&self) -> Layout {
+        self.layout
+    }
+
+    /// What the dataset says about itself.
+    #[must_use]
+    pub const fn manifest(&self) -> &DatasetManifest {
+        &self.manifest
+    }
+
+    /// Size and hash of the archive, all of which is read; none of an unpacked folder.
+    ///
+    /// # Errors
+    /// [`DatasetError::Io`].
+    pub fn archive(&self) -> Result<Option<FileDigest>, DatasetError> {
+        match &self.container {
+            Container::Folder(_) => Ok(None),
+            Container::Archive { .. } => Ok(Some(digest::of_file(&self.path)?)),
+        }
+    }
+
+    /// The published score.
+    ///
+    /// # Errors
+    /// [`DatasetError::Unreadable`] if `results.json` is no score.
+    pub fn results(&self) -> Result<EvaluationResult, DatasetError> {
+        serde_json::from_slice(&self.bytes(RESULTS_FILE)?)
+            .map_err(DatasetError::unreadable(RESULTS_FILE))
+    }
+
+    /// What the slots measured of themselves.
+    ///
+    /// # Errors
+    /// [`DatasetError::Unreadable`] if `calibration.json` is nothing of the kind.
+    pub fn calibration(&self) -> Result<CalibrationFile, DatasetError> {
+        serde_json::from_slice(&self.bytes(CALIBRATION_FILE)?)
+            .map_err(DatasetError::unreadable(CALIBRATION_FILE))
+    }
+
+    /// The episodes, in order.
+    ///
+    /// # Errors
+    /// [`DatasetError::Unreadable`] if the table is not one of episodes, or not of as many as the
+    /// manifest says.
+    pub fn episodes(&self) -> Result<Vec<EpisodeRecord>, DatasetError> {
+        let records = episodes::records(&self.episode_batches()?)?;
+        for (task, expected) in &self.manifest.episodes {
+            let found = records.iter().filter(|record| record.outcome.task == *task);
+            let found = found.count();
+            if found != *expected as usize {
+                return Err(DatasetError::Unreadable(format!(
+                    "{MANIFEST_FILE} tells of {expected} episodes of {task}, {EPISODES_FILE} holds \
+                     {found}"
+                )));
+            }
+        }
+        Ok(records)
+    }
+
+    /// The table of episodes as it is.
+    pub(crate) fn episode_batches(&self) -> Result<Vec<RecordBatch>, DatasetError> {
+        episodes::batches(self.table(EPISODES_FILE)?)
+    }
+
+    /// The table of control steps.
+    ///
+    /// # Errors
+    /// [`DatasetError::Unreadable`] if the table is not one of control steps.
+    pub fn steps(&self) -> Result<StepTable, DatasetError> {
+        StepTable::open(self.table(STEPS_FILE)?)
+    }
+
+    /// The control steps of one episode, of all columns or of the named ones, in the file's order of
+    /// columns. Little more than these rows is read: the table as a whole is not compared with its hash,
+    /// unless [`Dataset::open`] did so.
+    ///
+    /// # Errors
+    /// [`DatasetError::Absent`] if there is no such episode or column, [`DatasetError::Unreadable`] if
+    /// the table is damaged.
+    pub fn episode(
+        &self,
+        task: Task,
+        episode: u32,
+        columns: Option<&[String]>,
+    ) -> Result<RecordBatch, DatasetError> {
+        match self.manifest.episodes.get(&task) {
+            None => {
+                return Err(DatasetError::Absent(format!(
+                    "the dataset holds no episode of {task}"
+                )));
+            }
+            Some(count) if episode >= *count => {
+                return Err(DatasetError::Absent(format!(
+                    "there is no episode {episode} of {task}: there are {count}, from 0"
+                )));
+            }
+            Some(_) => {}
+        }
+        by_index::episode(self.container.range(STEPS_FILE)?, task, episode, columns)
+    }
+
+    /// A small file's bytes.
+    pub(crate) fn bytes(&self, name: &str) -> Result<Vec<u8>, DatasetError> {
+        self.check_if_unread(name)?;
+        self.container.bytes(name)
+    }
+
+    fn table(&self, name: &str) -> Result<FileRange, DatasetError> {
+        self.check_if_unread(name)?;
+        self.container.range(name)
+    }
+
+    fn check_if_unread(&self, name: &str) -> Result<(), DatasetError> {
+        match self.checked {
+            Checked::AtOpening => Ok(()),
+            Checked::WhenRead => self.check(name),
+        }
+    }
+
+    fn check(&self, name: &str) -> Result<(), DatasetError> {
+        let (listed, found) = (&self.manifest.files[name], self.container.digest(name)?);
+        if found == *listed {
+            return Ok(());
+        }
+        Err(DatasetError::Altered(format!(
+            "{name} has {} bytes and BLAKE3 {}, {MANIFEST_FILE} says {} bytes and {}",
+            found.bytes, found.blake3, listed.bytes, listed.blake3
+        )))
+    }
+}
+
+fn manifest(container: &Container) -> Result<(Layout, DatasetManifest), DatasetError> {
+    let bytes = container.bytes(MANIFEST_FILE)?;
+    // The layout first: a manifest of another one may lack fields.
+    let Schema { schema } =
+        serde_json::from_slice(&bytes).map_err(DatasetError::unreadable(MANIFEST_FILE))?;
+    let Some(layout) = Layout::of(&schema) else {
+        return Err(DatasetError::Foreign(format!(
+            "the dataset's layout is {schema:?}, this version reads {}",
+            Layout::all()
+        )));
+    };
+    let manifest =
+        serde_json::from_slice(&bytes).map_err(DatasetError::unreadable(MANIFEST_FILE))?;
+    Ok((layout, manifest))
+}
+
+/// The score beside the archive, if there is one, is the one inside.
+fn same_results(path: &Path, container: &Container) -> Result<(), DatasetError> {
+    match fs::read(path) {
+        Ok(beside) if beside == container.bytes(RESULTS_FILE)? => Ok(()),
+        Ok(_) => Err(DatasetError::Altered(format!(
+            "{} is not the {RESULTS_FILE} inside of {ARCHIVE_FILE}",
+            path.display()
+        ))),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(error.into()),
+    }
+}

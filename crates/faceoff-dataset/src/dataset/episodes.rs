@@ -1,0 +1,135 @@
+use super::{file_range::FileRange, steps::has_columns};
+use crate::{error::DatasetError, files::EPISODES_FILE, table::EpisodeRows};
+use arrow_array::{
+    Array, BooleanArray, Float64Array, RecordBatch, StringArray, UInt32Array,
+    cast::AsArray,
+    types::{Float64Type, UInt32Type},
+};
+use faceoff_types::{ComputationTime, EpisodeOutcome, ParseTaskError, Violations};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use serde::Serialize;
+
+/// One row of `episodes.parquet`, without the states and hashes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EpisodeRecord {
+    /// What scoring knows of it.
+    #[serde(flatten)]
+    pub outcome: EpisodeOutcome,
+    /// The episode's own, 64 hexadecimal digits.
+    pub seed: String,
+    /// The agent's interpolation: `1` … `5`, `-1` or `null`; absent if it did not get as far as to
+    /// say.
+    pub interpolation: Option<String>,
+    /// Computation time included.
+    pub penalty_points: f64,
+    /// The observation after the last answered step: 23 numbers for `hit`, 20 otherwise, none if no
+    /// step was answered.
+    #[serde(skip)]
+    pub last_observation: Vec<f64>,
+}
+
+/// The table as it is, in batches, its columns checked.
+pub(super) fn batches(table: FileRange) -> Result<Vec<RecordBatch>, DatasetError> {
+    let builder = ParquetRecordBatchReaderBuilder::try_new(table)
+        .map_err(DatasetError::unreadable(EPISODES_FILE))?;
+    has_columns(EPISODES_FILE, builder.schema(), EpisodeRows::new().schema())?;
+    let reader = builder
+        .build()
+        .map_err(DatasetError::unreadable(EPISODES_FILE))?;
+    reader
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(DatasetError::unreadable(EPISODES_FILE))
+}
+
+pub(super) fn records(batches: &[RecordBatch]) -> Result<Vec<EpisodeRecord>, DatasetError> {
+    let mut records = Vec::new();
+    for batch in batches {
+        let columns = Columns(batch);
+        for row in 0..batch.num_rows() {
+            let read = columns.record(row);
+            records.push(read.map_err(DatasetError::unreadable(format!(
+                "{EPISODES_FILE}, row {}",
+                records.len()
+            )))?);
+        }
+    }
+    Ok(records)
+}
+
+/// A batch whose columns are known to be there.
+pub(crate) struct Columns<'a>(pub &'a RecordBatch);
+
+impl<'a> Columns<'a> {
+    fn column(&self, name: &str) -> &'a dyn Array {
+        self.0
+            .column_by_name(name)
+            .expect("the columns were checked when the table was read")
+    }
+
+    pub fn text(&self, name: &str, row: usize) -> Option<&'a str> {
+        let column: &StringArray = self.column(name).as_string();
+        column.is_valid(row).then(|| column.value(row))
+    }
+
+    pub fn int(&self, name: &str, row: usize) -> Option<u32> {
+        let column: &UInt32Array = self.column(name).as_primitive::<UInt32Type>();
+        column.is_valid(row).then(|| column.value(row))
+    }
+
+    fn float(&self, name: &str, row: usize) -> f64 {
+        let column: &Float64Array = self.column(name).as_primitive::<Float64Type>();
+        column.value(row)
+    }
+
+    fn flag(&self, name: &str, row: usize) -> bool {
+        let column: &BooleanArray = self.column(name).as_boolean();
+        column.is_valid(row) && column.value(row)
+    }
+
+    fn last_observation(&self, row: usize) -> Vec<f64> {
+        let schema = self.0.schema();
+        let columns = schema.fields().iter().map(|field| field.name());
+        columns
+            .filter(|name| name.starts_with("last_obs_") && self.column(name).is_valid(row))
+            .map(|name| self.float(name, row))
+            .collect()
+    }
+
+    fn record(&self, row: usize) -> Result<EpisodeRecord, String> {
+        let absent = |name: &str| format!("{name} is absent");
+        let text = |name| self.text(name, row).ok_or_else(|| absent(name));
+        let int = |name| self.int(name, row).ok_or_else(|| absent(name));
+        let (task, end) = (text("task")?, text("end")?);
+        let fault = self.text("fault", row).map(serde_json::from_str);
+        let outcome = EpisodeOutcome {
+            task: task
+                .parse()
+                .map_err(|error: ParseTaskError| error.to_string())?,
+            episode: int("episode")?,
+            steps: int("steps")?,
+            end: serde_json::from_value(end.into())
+                .map_err(|_| format!("the end {end:?} is unknown"))?,
+            success: self.flag("success", row),
+            violations: Violations {
+                ee: self.flag("violated_ee", row),
+                link: self.flag("violated_link", row),
+                joint_pos: self.flag("violated_joint_pos", row),
+                joint_vel: self.flag("violated_joint_vel", row),
+            },
+            computation_time: ComputationTime {
+                mean_s: self.float("computation_time_mean_s", row),
+                max_s: self.float("computation_time_max_s", row),
+            },
+            fault: fault
+                .transpose()
+                .map_err(|error| format!("fault: {error}"))?,
+        };
+        Ok(EpisodeRecord {
+            outcome,
+            seed: text("seed")?.to_owned(),
+            interpolation: self.text("interpolation", row).map(str::to_owned),
+            penalty_points: self.float("penalty_points", row),
+            last_observation: self.last_observation(row),
+        })
+    }
+}

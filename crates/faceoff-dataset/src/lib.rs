@@ -1,0 +1,28 @@
+//! Recordings of evaluations: the tables' schema, writing a shard as it is played, joining shards to a
+//! dataset and scoring them, reading a dataset as a whole or by episode, and verifying it.
+//!
+//! This crate starts no process and knows neither sandbox nor database. It reads no clock: measured
+//! times come from the caller or from the record.
+
+mod archive_writer;
+mod assemble;
+mod dataset;
+mod digest;
+mod error;
+mod files;
+mod recorder;
+mod score;
+mod shard;
+mod shard_folder;
+mod simulator;
+mod table;
+mod times;
+pub mod verify;
+
+pub use assemble::{Assembled, EvaluationMeta, assemble};
+pub use dataset::{Dataset, EpisodeRecord, Layout, StepBatches, StepTable};
+pub use error::{DatasetError, RecordingError};
+pub use files::ARCHIVE_FILE;
+pub use recorder::Recorder;
+pub use shard::{ShardReport, ShardSpec};
+pub use shard_folder::ShardFolder;

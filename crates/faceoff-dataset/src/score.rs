@@ -1,0 +1,204 @@
+//! What follows from the episodes of an evaluation: the score and where constraints were broken.
+
+use crate::{
+    dataset::{FileRange, Layout, StepTable},
+    error::{DatasetError, RecordingError},
+    table::CONSTRAINTS,
+    times::seconds,
+};
+use arrow_array::{
+    RecordBatch,
+    cast::AsArray,
+    types::{Float64Type, Int64Type, UInt32Type},
+};
+use faceoff_scoring::StepTimes;
+use faceoff_types::{
+    ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationResult, Profile, Seed, SlotTiming, Task,
+};
+use faceoff_wire::dataset::{ConstraintViolation, SlowEpisode, TaskViolations, ViolationsFile};
+use serde::Serialize;
+use std::{collections::BTreeMap, path::Path};
+
+/// What scoring needs of one answered step.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Measured {
+    pub time_s: f64,
+    /// Joint position, joint velocity, end effector, link height; violated when above 0.
+    pub constraints: [f64; 4],
+}
+
+/// Gathers what scoring needs of a task, in order of play.
+#[derive(Debug)]
+pub(crate) struct Tally {
+    outcomes: Vec<EpisodeOutcome>,
+    times: Times,
+    /// In the order of [`Measured::constraints`].
+    violations: [Vec<ConstraintViolation>; 4],
+}
+
+#[derive(Debug)]
+enum Times {
+    InOrderOfPlay(StepTimes),
+    /// For layout 2, whose mean was summed up from the shortest time on.
+    FromTheShortestOn(Vec<f64>),
+}
+
+impl Tally {
+    /// For a task whose episodes have so many steps in all.
+    pub fn new(steps: u64, layout: Layout) -> Self {
+        Self {
+            outcomes: Vec::new(),
+            times: match layout {
+                Layout::Two => Times::FromTheShortestOn(Vec::new()),
+                Layout::Three => Times::InOrderOfPlay(StepTimes::of(steps)),
+            },
+            violations: Default::default(),
+        }
+    }
+
+    pub fn add_episode(&mut self, outcome: EpisodeOutcome) {
+        self.outcomes.push(outcome);
+    }
+
+    pub fn add_step(&mut self, episode: u32, step: u32, measured: &Measured) {
+        match &mut self.times {
+            Times::InOrderOfPlay(times) => times.add(measured.time_s),
+            Times::FromTheShortestOn(times) => times.push(measured.time_s),
+        }
+        for (found, value) in self.violations.iter_mut().zip(measured.constraints) {
+            if value.is_nan() || value <= 0.0 {
+                continue;
+            }
+            match found.last_mut() {
+                Some(last) if last.episode == episode => {
+                    last.steps += 1;
+                    last.max = last.max.max(value);
+                }
+                _ => found.push(ConstraintViolation {
+                    episode,
+                    first_step: step,
+                    steps: 1,
+                    max: value,
+                }),
+            }
+        }
+    }
+
+    /// Adds the steps of a shard's table.
+    pub fn add_table(&mut self, path: &Path) -> Result<(), RecordingError> {
+        let names = ["episode", "step", "computation_time_ns"].into_iter();
+        let names: Vec<String> = names.chain(CONSTRAINTS).map(str::to_owned).collect();
+        let read = |error: DatasetError| match error {
+            DatasetError::Io(error) => RecordingError::Io(error),
+            other => RecordingError::unusable(path.display())(other),
+        };
+        let table = StepTable::open(FileRange::whole(path).map_err(read)?).map_err(read)?;
+        let mut batches = table.read(Some(&names)).map_err(read)?;
+        while let Some(batch) = batches.next_batch().map_err(read)? {
+            self.add_batch(&batch);
+        }
+        Ok(())
+    }
+
+    fn add_batch(&mut self, batch: &RecordBatch) {
+        let episodes = batch["episode"].as_primitive::<UInt32Type>();
+        let steps = batch["step"].as_primitive::<UInt32Type>();
+        let times = batch["computation_time_ns"].as_primitive::<Int64Type>();
+        let constraints = CONSTRAINTS.map(|name| batch[name].as_primitive::<Float64Type>());
+        for row in 0..batch.num_rows() {
+            let measured = Measured {
+                time_s: seconds(times.value(row)),
+                constraints: constraints.map(|column| column.value(row)),
+            };
+            self.add_step(episodes.value(row), steps.value(row), &measured);
+        }
+    }
+
+    /// Steps that were added.
+    pub fn steps(&self) -> u64 {
+        match &self.times {
+            Times::InOrderOfPlay(times) => times.count(),
+            Times::FromTheShortestOn(times) => times.len() as u64,
+        }
+    }
+}
+
+impl Times {
+    fn finish(self) -> StepTimes {
+        match self {
+            Self::InOrderOfPlay(times) => times,
+            Self::FromTheShortestOn(mut times) => {
+                times.sort_unstable_by(f64::total_cmp);
+                let mut summary = StepTimes::of(times.len() as u64);
+                times.into_iter().for_each(|time_s| summary.add(time_s));
+                summary
+            }
+        }
+    }
+}
+
+pub(crate) struct Scored {
+    pub result: EvaluationResult,
+    pub violations: ViolationsFile,
+}
+
+/// Scores an evaluation; `violations.json` names the layout.
+pub(crate) fn score(
+    profile: Profile,
+    seed: Seed,
+    layout: Layout,
+    played: BTreeMap<Task, Tally>,
+    timing: Option<SlotTiming>,
+) -> Scored {
+    let mut tasks = BTreeMap::new();
+    let mut violations = ViolationsFile {
+        schema: layout.schema().to_owned(),
+        tasks: BTreeMap::new(),
+    };
+    for (task, tally) in played {
+        let times = tally.times.finish();
+        tasks.insert(task, faceoff_scoring::score_task(&tally.outcomes, &times));
+        let [joint_pos, joint_vel, ee, link] = tally.violations;
+        let computation_time = tally.outcomes.iter().filter_map(slow_episode).collect();
+        violations.tasks.insert(
+            task,
+            TaskViolations {
+                ee,
+                link,
+                joint_pos,
+                joint_vel,
+                computation_time,
+            },
+        );
+    }
+    let mut result = faceoff_scoring::score_evaluation(profile, seed, tasks);
+    result.timing = timing;
+    Scored { result, violations }
+}
+
+/// A JSON file of a dataset, byte for byte.
+pub(crate) fn json_file<T: Serialize>(value: &T) -> serde_json::Result<Vec<u8>> {
+    let mut bytes = serde_json::to_vec_pretty(value)?;
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
+/// The episode as `violations.json` lists it, if it has penalty points for computation time.
+fn slow_episode(outcome: &EpisodeOutcome) -> Option<SlowEpisode> {
+    // The rule lives in the scoring crate: the points are what an instant agent would not have.
+    let instant = EpisodeOutcome {
+        computation_time: ComputationTime::default(),
+        end: EpisodeEnd::Horizon,
+        fault: None,
+        ..outcome.clone()
+    };
+    let points =
+        faceoff_scoring::episode_penalty(outcome) - faceoff_scoring::episode_penalty(&instant);
+    let ComputationTime { mean_s, max_s } = outcome.computation_time;
+    (points > 0.0).then_some(SlowEpisode {
+        episode: outcome.episode,
+        mean_s,
+        max_s,
+        points,
+    })
+}

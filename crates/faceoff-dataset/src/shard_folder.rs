@@ -1,0 +1,182 @@
+use crate::{
+    digest,
+    error::RecordingError,
+    files::{EPISODES_FILE, LOG_FILE, STEPS_FILE},
+    shard::{ShardReport, ShardSpec},
+    simulator::simulator_id,
+    table::ShardTable,
+};
+use faceoff_types::RULESET;
+use faceoff_wire::dataset::{FileDigest, SimulatorId};
+use fs_err::{self as fs, File};
+use serde::{Deserialize, Serialize};
+use std::{
+    collections::BTreeMap,
+    io::{ErrorKind, Write},
+    path::{Path, PathBuf},
+};
+
+const REPORT_FILE: &str = "report.json";
+/// Written last: a folder with this file is complete.
+const SHARD_FILE: &str = "shard.json";
+/// Name and version of a shard folder's layout; private to the platform.
+const SHARD_SCHEMA: &str = "faceoff-shard/3";
+/// The layout before, whose tables split integers by bytes and have no index of pages. An evaluation
+/// that was under way when the program was replaced has such shards.
+const OLD_SHARD_SCHEMA: &str = "faceoff-shard/2";
+
+/// The files that `shard.json` lists.
+const FILES: [&str; 4] = [STEPS_FILE, EPISODES_FILE, LOG_FILE, REPORT_FILE];
+
+/// `shard.json`.
+#[derive(Debug, Serialize, Deserialize)]
+struct ShardFile {
+    schema: String,
+    ruleset: String,
+    simulator: SimulatorId,
+    spec: ShardSpec,
+    files: BTreeMap<String, FileDigest>,
+}
+
+/// A folder in which a shard is being recorded.
+#[derive(Debug)]
+pub struct ShardFolder {
+    dir: PathBuf,
+}
+
+impl ShardFolder {
+    /// Creates the folder, or empties it of what an interrupted run has left.
+    ///
+    /// # Errors
+    /// [`RecordingError::Io`].
+    pub fn create(dir: &Path) -> Result<Self, RecordingError> {
+        fs::create_dir_all(dir)?;
+        let folder = Self {
+            dir: dir.to_owned(),
+        };
+        for name in [SHARD_FILE].into_iter().chain(FILES) {
+            for path in [dir.join(name), folder.partial(name)] {
+                match fs::remove_file(&path) {
+                    Err(error) if error.kind() != ErrorKind::NotFound => return Err(error.into()),
+                    _ => {}
+                }
+            }
+        }
+        Ok(folder)
+    }
+
+    /// Where a file is written before it is complete.
+    pub(crate) fn partial(&self, name: &str) -> PathBuf {
+        self.dir.join(format!("{name}.partial"))
+    }
+
+    /// Adds report and log to the tables, gives all files their names, and states their hashes.
+    ///
+    /// # Errors
+    /// [`RecordingError::Io`].
+    pub fn commit(&self, spec: &ShardSpec, report: &ShardReport) -> Result<(), RecordingError> {
+        self.write(LOG_FILE, report.log.as_bytes())?;
+        self.write(REPORT_FILE, &json(report)?)?;
+        let mut files = BTreeMap::new();
+        for name in FILES {
+            files.insert(name.to_owned(), digest::of_file(&self.partial(name))?);
+            self.rename(name)?;
+        }
+        let shard = ShardFile {
+            schema: SHARD_SCHEMA.to_owned(),
+            ruleset: RULESET.to_owned(),
+            simulator: simulator_id().clone(),
+            spec: spec.clone(),
+            files,
+        };
+        self.write(SHARD_FILE, &json(&shard)?)?;
+        self.rename(SHARD_FILE)
+    }
+
+    fn write(&self, name: &str, bytes: &[u8]) -> Result<(), RecordingError> {
+        let mut file = File::create(self.partial(name))?;
+        file.write_all(bytes)?;
+        Ok(file.sync_all()?)
+    }
+
+    fn rename(&self, name: &str) -> Result<(), RecordingError> {
+        Ok(fs::rename(self.partial(name), self.dir.join(name))?)
+    }
+}
+
+fn json<T: Serialize>(value: &T) -> Result<Vec<u8>, RecordingError> {
+    let mut bytes = serde_json::to_vec(value).map_err(RecordingError::unusable("writing JSON"))?;
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
+/// A complete shard folder whose files are what was recorded.
+#[derive(Debug)]
+pub(crate) struct ShardRecording {
+    pub spec: ShardSpec,
+    pub report: ShardReport,
+    pub steps: ShardTable,
+    pub episodes: ShardTable,
+}
+
+impl ShardRecording {
+    /// Opens a folder and checks every file's size and hash.
+    pub fn open(dir: &Path) -> Result<Self, RecordingError> {
+        let damaged = |what: String| {
+            RecordingError::Unusable(format!(
+                "{} is damaged or incomplete: {what}",
+                dir.display()
+            ))
+        };
+        let unread = |name: &'static str| {
+            move |error: &dyn std::fmt::Display| damaged(format!("{name}: {error}"))
+        };
+        let text = fs::read(dir.join(SHARD_FILE)).map_err(|e| unread(SHARD_FILE)(&e))?;
+        let shard: ShardFile = serde_json::from_slice(&text).map_err(|e| unread(SHARD_FILE)(&e))?;
+        let part = match &*shard.schema {
+            SHARD_SCHEMA => ShardTable::Ready,
+            OLD_SHARD_SCHEMA => ShardTable::Old,
+            other => {
+                return Err(damaged(format!(
+                    "its layout is {other}; this version joins {OLD_SHARD_SCHEMA} and {SHARD_SCHEMA}"
+                )));
+            }
+        };
+        if shard.ruleset != RULESET {
+            return Err(damaged(format!(
+                "it was played by {}, this version scores {RULESET}",
+                shard.ruleset
+            )));
+        }
+        if &shard.simulator != simulator_id() {
+            return Err(damaged(format!(
+                "it was played by another build of the simulator, {}",
+                shard.simulator.version
+            )));
+        }
+        for name in FILES {
+            let Some(expected) = shard.files.get(name) else {
+                return Err(damaged(format!("{SHARD_FILE} does not know {name}")));
+            };
+            let path = dir.join(name);
+            if !path.exists() {
+                return Err(damaged(format!("{name} is missing")));
+            }
+            let found = digest::of_file(&path)?;
+            if &found != expected {
+                return Err(damaged(format!(
+                    "{name} has {} bytes and hash {}, recorded were {} bytes and hash {}",
+                    found.bytes, found.blake3, expected.bytes, expected.blake3
+                )));
+            }
+        }
+        let text = fs::read(dir.join(REPORT_FILE))?;
+        let report = serde_json::from_slice(&text).map_err(|e| unread(REPORT_FILE)(&e))?;
+        Ok(Self {
+            spec: shard.spec,
+            report,
+            steps: part(dir.join(STEPS_FILE)),
+            episodes: part(dir.join(EPISODES_FILE)),
+        })
+    }
+}

@@ -1,0 +1,143 @@
+use super::writer::{TableWriter, schema_metadata};
+use crate::error::RecordingError;
+use fs_err::File;
+use parquet::{
+    arrow::{ARROW_SCHEMA_META_KEY, arrow_reader::ParquetRecordBatchReaderBuilder},
+    column::writer::ColumnCloseResult,
+    file::{
+        metadata::{PageIndexPolicy, ParquetMetaData, ParquetMetaDataReader},
+        properties::WriterProperties,
+        writer::SerializedFileWriter,
+    },
+};
+use std::{
+    fs,
+    io::Write,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+/// A table of a shard.
+#[derive(Debug, Clone)]
+pub(crate) enum ShardTable {
+    /// In today's layout: its bytes are taken as they are.
+    Ready(PathBuf),
+    /// In the layout before: written anew.
+    Old(PathBuf),
+}
+
+impl ShardTable {
+    /// Either can be read.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Ready(path) | Self::Old(path) => path,
+        }
+    }
+}
+
+/// Writes the row groups of several tables of one schema as one file. Old ones are written anew in a
+/// nameless file of the folder `scratch` first.
+pub(crate) fn join<W: Write + Send>(
+    tables: &[ShardTable],
+    scratch: &Path,
+    out: W,
+) -> Result<(), RecordingError> {
+    let mut writer: Option<SerializedFileWriter<W>> = None;
+    let mut out = Some(out);
+    for table in tables {
+        let path = table.path();
+        let file = match table {
+            ShardTable::Ready(path) => File::open(path)?.into_file(),
+            ShardTable::Old(path) => rewritten(path, scratch)?,
+        };
+        let joining = || RecordingError::unusable(format!("joining {}", path.display()));
+        let metadata = ParquetMetaDataReader::new()
+            .with_column_index_policy(PageIndexPolicy::Skip)
+            .with_offset_index_policy(PageIndexPolicy::Optional)
+            .parse_and_finish(&file)
+            .map_err(joining())?;
+        if let Some(out) = out.take() {
+            writer = Some(begin(&metadata, out).map_err(joining())?);
+        }
+        let Some(writer) = &mut writer else {
+            break;
+        };
+        if metadata.file_metadata().schema() != writer.schema_descr().root_schema() {
+            return Err(RecordingError::Unusable(format!(
+                "{} has other columns than the shards before it",
+                path.display()
+            )));
+        }
+        append(&metadata, &file, writer).map_err(joining())?;
+    }
+    match writer {
+        None => Err(RecordingError::Unusable("nothing to join".to_owned())),
+        Some(writer) => writer
+            .close()
+            .map(|_| ())
+            .map_err(RecordingError::unusable("joining the recordings")),
+    }
+}
+
+fn begin<W: Write + Send>(
+    first: &ParquetMetaData,
+    out: W,
+) -> parquet::errors::Result<SerializedFileWriter<W>> {
+    let metadata = first.file_metadata();
+    let arrow_schema = metadata
+        .key_value_metadata()
+        .into_iter()
+        .flatten()
+        .filter(|entry| entry.key == ARROW_SCHEMA_META_KEY)
+        .cloned();
+    let properties = WriterProperties::builder()
+        .set_key_value_metadata(Some(
+            [schema_metadata()]
+                .into_iter()
+                .chain(arrow_schema)
+                .collect(),
+        ))
+        .build();
+    let schema = metadata.schema_descr().root_schema_ptr();
+    SerializedFileWriter::new(out, schema, Arc::new(properties))
+}
+
+fn append<W: Write + Send>(
+    metadata: &ParquetMetaData,
+    file: &fs::File,
+    writer: &mut SerializedFileWriter<W>,
+) -> parquet::errors::Result<()> {
+    for (index, group) in metadata.row_groups().iter().enumerate() {
+        let pages = metadata.page_index_for_row_group(index);
+        let mut out = writer.next_row_group()?;
+        for (column_index, column) in group.columns().iter().enumerate() {
+            let close = ColumnCloseResult {
+                bytes_written: column.compressed_size().unsigned_abs(),
+                rows_written: group.num_rows().unsigned_abs(),
+                metadata: column.clone(),
+                bloom_filter: None,
+                column_index: None,
+                offset_index: pages.offset_index(column_index).cloned(),
+            };
+            out.append_column(file, close)?;
+        }
+        out.close()?;
+    }
+    Ok(())
+}
+
+/// The same rows as this version writes them.
+fn rewritten(path: &Path, scratch: &Path) -> Result<fs::File, RecordingError> {
+    let what = format!("reading {}", path.display());
+    let builder = ParquetRecordBatchReaderBuilder::try_new(File::open(path)?.into_file())
+        .map_err(RecordingError::unusable(&what))?;
+    let file = tempfile::tempfile_in(scratch)?;
+    let copy = File::from_parts(file.try_clone()?, path);
+    let mut writer = TableWriter::new(copy, builder.schema())?;
+    for batch in builder.build().map_err(RecordingError::unusable(&what))? {
+        let batch = batch.map_err(RecordingError::unusable(&what))?;
+        writer.write(batch.columns().to_vec())?;
+    }
+    writer.finish()?;
+    Ok(file)
+}

@@ -1,0 +1,188 @@
+//! Verifies a dataset: simulates every episode again from the published seed, the ruleset and the
+//! recorded actions, and compares every recorded number bit for bit; then scores again and compares
+//! the published score.
+//!
+//! Computation times, CPU times, faults, the slots' calibration and re-runs cannot be simulated.
+//! They are taken from the record, as they are; what follows from them is computed again.
+
+mod compare;
+mod difference;
+mod error;
+mod feed;
+mod replay;
+mod season;
+
+pub use difference::Difference;
+pub use error::VerifyError;
+pub use season::{SeasonClaim, SeasonMismatch};
+
+use crate::{
+    dataset::Dataset,
+    error::DatasetError,
+    files::{CALIBRATION_FILE, RESULTS_FILE, VIOLATIONS_FILE},
+    score::{Scored, Tally, json_file, score},
+    simulator::simulator_id,
+};
+use faceoff_types::{EvaluationResult, RULESET, Task};
+use feed::{Feed, Recorded};
+use rayon::{
+    ThreadPoolBuilder,
+    iter::{IntoParallelRefIterator, ParallelIterator},
+};
+use replay::{Replay, Replayed};
+use std::{collections::BTreeMap, num::NonZero};
+
+/// Episodes per thread that are read ahead.
+const READ_AHEAD: usize = 8;
+
+/// What was found to be identical.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Verified {
+    /// Episodes simulated again.
+    pub episodes: u32,
+    /// Control steps simulated again.
+    pub steps: u64,
+    /// The score, computed again.
+    pub result: EvaluationResult,
+}
+
+/// Simulates a dataset again on `workers` threads; `progress` is called after each episode. What is
+/// found does not depend on the number of threads. Memory grows with the episodes, not with their
+/// steps.
+///
+/// # Errors
+/// [`VerifyError::Differs`] with the first difference in order of task, episode and step; else why
+/// nothing could be compared.
+pub fn verify(
+    dataset: &Dataset,
+    workers: NonZero<usize>,
+    progress: &(dyn Fn() + Sync),
+) -> Result<Verified, VerifyError> {
+    made_here(dataset)?;
+    let mut feed = Feed::open(dataset)?;
+    let mut totals = Totals::new(dataset, feed.steps_of_tasks());
+    let replay = Replay::new(dataset.manifest());
+    let pool = ThreadPoolBuilder::new()
+        .num_threads(workers.get())
+        .thread_name(|index| format!("verify-{index}"))
+        .build()?;
+    let ahead = READ_AHEAD * workers.get();
+    pool.install(|| {
+        let mut episodes = feed.next_episodes(ahead);
+        while !episodes.read.is_empty() {
+            let simulate = || -> Vec<Result<Replayed, Difference>> {
+                let replayed = episodes.read.par_iter().map(|recorded| {
+                    let replayed = replay.episode(recorded);
+                    progress();
+                    replayed
+                });
+                replayed.collect()
+            };
+            let (replayed, next) = match episodes.then {
+                Ok(()) => rayon::join(simulate, || feed.next_episodes(ahead)),
+                // What was read before the trouble comes first.
+                Err(_) => (simulate(), feed::Episodes::default()),
+            };
+            for (replayed, recorded) in replayed.into_iter().zip(&episodes.read) {
+                totals.add(recorded, replayed?);
+            }
+            episodes.then?;
+            episodes = next;
+        }
+        episodes.then
+    })?;
+    totals.finish(dataset)
+}
+
+/// Only the same rules and the same simulator can make the states again.
+fn made_here(dataset: &Dataset) -> Result<(), DatasetError> {
+    let (manifest, here) = (dataset.manifest(), simulator_id());
+    if manifest.ruleset != RULESET {
+        return Err(DatasetError::Foreign(format!(
+            "the dataset was played by ruleset {:?}, this version knows {RULESET:?}",
+            manifest.ruleset
+        )));
+    }
+    if &manifest.simulator != here {
+        return Err(DatasetError::Foreign(format!(
+            "the dataset was simulated by version {} (fingerprint {}), this is version {} \
+             (fingerprint {}): verify it with the version that made it",
+            manifest.simulator.version,
+            manifest.simulator.fingerprint,
+            here.version,
+            here.fingerprint
+        )));
+    }
+    Ok(())
+}
+
+/// What the episodes add up to, in order of play.
+struct Totals {
+    episodes: u32,
+    steps: u64,
+    host_noise_reruns: u32,
+    played: BTreeMap<Task, Tally>,
+}
+
+impl Totals {
+    fn new(dataset: &Dataset, steps: BTreeMap<Task, u64>) -> Self {
+        let tally = |task: &Task| {
+            let steps = steps.get(task).copied().unwrap_or_default();
+            (*task, Tally::new(steps, dataset.layout()))
+        };
+        Self {
+            episodes: 0,
+            steps: 0,
+            host_noise_reruns: 0,
+            played: dataset.manifest().episodes.keys().map(tally).collect(),
+        }
+    }
+
+    fn add(&mut self, recorded: &Recorded, replayed: Replayed) {
+        self.episodes += 1;
+        self.steps += u64::from(replayed.outcome.steps);
+        self.host_noise_reruns += replayed.host_noise_reruns;
+        if let Some(tally) = self.played.get_mut(&recorded.task) {
+            for (step, measured) in (0..).zip(&replayed.steps) {
+                tally.add_step(recorded.episode, step, measured);
+            }
+            tally.add_episode(replayed.outcome);
+        }
+    }
+
+    /// Scores again.
+    fn finish(self, dataset: &Dataset) -> Result<Verified, VerifyError> {
+        let manifest = dataset.manifest();
+        let timing = dataset.calibration()?.worst();
+        let counted = timing.map_or(0, |timing| timing.host_noise_reruns);
+        if counted != self.host_noise_reruns {
+            return Err(Difference {
+                file: CALIBRATION_FILE.to_owned(),
+                task: None,
+                episode: None,
+                step: None,
+                field: "host_noise_reruns".to_owned(),
+                recorded: format!("{counted} in all"),
+                expected: format!("{}, as the episodes say", self.host_noise_reruns),
+            }
+            .into());
+        }
+        let (profile, seed) = (manifest.profile, manifest.seed);
+        let Scored { result, violations } =
+            score(profile, seed, dataset.layout(), self.played, timing);
+        for (name, expected) in [
+            (VIOLATIONS_FILE, json_file(&violations)),
+            (RESULTS_FILE, json_file(&result)),
+        ] {
+            let expected = expected.map_err(DatasetError::unreadable(name))?;
+            if let Some(difference) = compare::json(name, &dataset.bytes(name)?, &expected) {
+                return Err(difference.into());
+            }
+        }
+        Ok(Verified {
+            episodes: self.episodes,
+            steps: self.steps,
+            result,
+        })
+    }
+}

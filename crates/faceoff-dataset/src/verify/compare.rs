@@ -1,0 +1,155 @@
+//! Bit for bit: −0 is not 0, and a missing value is not any value.
+
+use super::difference::Difference;
+use arrow_array::{
+    Array, RecordBatch,
+    cast::AsArray,
+    types::{Float64Type, Int64Type, UInt32Type},
+};
+use arrow_schema::DataType;
+use serde_json::Value;
+
+/// A cell that differs.
+pub(super) struct Cell {
+    pub row: usize,
+    pub field: String,
+    pub recorded: String,
+    pub expected: String,
+}
+
+/// The first cell, by row and then by column, of `expected` that `recorded` does not hold. Columns go
+/// by their names; rows beyond those of `expected` are not looked at.
+pub(super) fn rows(recorded: &RecordBatch, expected: &RecordBatch) -> Option<Cell> {
+    let schema = expected.schema();
+    let mut first: Option<(usize, usize)> = None;
+    for (index, field) in schema.fields().iter().enumerate() {
+        let rows = first.map_or(expected.num_rows(), |(row, _)| row);
+        let column = recorded.column_by_name(field.name());
+        let differs = |row: &usize| {
+            column
+                .is_none_or(|column| !same(column.as_ref(), expected.column(index).as_ref(), *row))
+        };
+        if let Some(row) = (0..rows).find(differs) {
+            first = Some((row, index));
+        }
+    }
+    first.map(|(row, index)| {
+        let name = schema.field(index).name().clone();
+        Cell {
+            row,
+            recorded: recorded
+                .column_by_name(&name)
+                .map_or_else(|| "nothing".to_owned(), |column| text(column.as_ref(), row)),
+            expected: text(expected.column(index).as_ref(), row),
+            field: name,
+        }
+    })
+}
+
+fn same(a: &dyn Array, b: &dyn Array, row: usize) -> bool {
+    if row >= a.len() || a.is_null(row) != b.is_null(row) {
+        return false;
+    }
+    if a.is_null(row) {
+        return true;
+    }
+    match b.data_type() {
+        DataType::Float64 => float(a, row) == float(b, row),
+        DataType::Int64 => {
+            a.as_primitive::<Int64Type>().value(row) == b.as_primitive::<Int64Type>().value(row)
+        }
+        DataType::UInt32 => {
+            a.as_primitive::<UInt32Type>().value(row) == b.as_primitive::<UInt32Type>().value(row)
+        }
+        DataType::Boolean => a.as_boolean().value(row) == b.as_boolean().value(row),
+        DataType::Utf8 => a.as_string::<i32>().value(row) == b.as_string::<i32>().value(row),
+        DataType::List(_) => {
+            let (a, b) = (a.as_list::<i32>().value(row), b.as_list::<i32>().value(row));
+            a.len() == b.len() && (0..a.len()).all(|i| same(a.as_ref(), b.as_ref(), i))
+        }
+        other => unreachable!("no table has a column of {other}"),
+    }
+}
+
+fn float(array: &dyn Array, row: usize) -> u64 {
+    array.as_primitive::<Float64Type>().value(row).to_bits()
+}
+
+fn text(array: &dyn Array, row: usize) -> String {
+    if row >= array.len() || array.is_null(row) {
+        return "nothing".to_owned();
+    }
+    match array.data_type() {
+        DataType::Float64 => format!("{:?}", f64::from_bits(float(array, row))),
+        DataType::Int64 => array.as_primitive::<Int64Type>().value(row).to_string(),
+        DataType::UInt32 => array.as_primitive::<UInt32Type>().value(row).to_string(),
+        DataType::Boolean => array.as_boolean().value(row).to_string(),
+        DataType::Utf8 => format!("{:?}", array.as_string::<i32>().value(row)),
+        _ => "another list".to_owned(),
+    }
+}
+
+/// The first place in which a JSON file is not what it should be, byte for byte.
+pub(super) fn json(file: &str, recorded: &[u8], expected: &[u8]) -> Option<Difference> {
+    if recorded == expected {
+        return None;
+    }
+    let parse = serde_json::from_slice::<Value>;
+    let found = match (parse(recorded), parse(expected)) {
+        (Ok(recorded), Ok(expected)) => place(&recorded, &expected, String::new()),
+        _ => None,
+    };
+    let (field, recorded, expected) = found.unwrap_or_else(|| {
+        let at = recorded
+            .iter()
+            .zip(expected)
+            .position(|(a, b)| a != b)
+            .unwrap_or_else(|| recorded.len().min(expected.len()));
+        (
+            format!("byte {at}"),
+            format!("a file of {} bytes", recorded.len()),
+            format!("another one of {} bytes", expected.len()),
+        )
+    });
+    Some(Difference {
+        file: file.to_owned(),
+        task: None,
+        episode: None,
+        step: None,
+        field,
+        recorded,
+        expected,
+    })
+}
+
+fn place(recorded: &Value, expected: &Value, at: String) -> Option<(String, String, String)> {
+    match (recorded, expected) {
+        (Value::Object(a), Value::Object(b)) => {
+            let missing = a.keys().find(|key| !b.contains_key(*key));
+            b.keys().chain(missing).find_map(|key| {
+                let at = if at.is_empty() {
+                    key.clone()
+                } else {
+                    format!("{at}.{key}")
+                };
+                place(
+                    a.get(key).unwrap_or(&Value::Null),
+                    b.get(key).unwrap_or(&Value::Null),
+                    at,
+                )
+            })
+        }
+        (Value::Array(a), Value::Array(b)) => (0..a.len().max(b.len())).find_map(|i| {
+            place(
+                a.get(i).unwrap_or(&Value::Null),
+                b.get(i).unwrap_or(&Value::Null),
+                format!("{at}[{i}]"),
+            )
+        }),
+        // As text, so that −0 is not 0.
+        (a, b) => {
+            let (a, b) = (a.to_string(), b.to_string());
+            (a != b).then_some((at, a, b))
+        }
+    }
+}

@@ -1,0 +1,309 @@
+use crate::played::{Agent, Evaluation, holding, json, moving, play, spec, table, unzip};
+use arrow_array::{StringArray, cast::AsArray, types::Int64Type};
+use faceoff_dataset::RecordingError;
+use faceoff_scoring::StepTimes;
+use faceoff_types::{EpisodeOutcome, EvaluationResult, SlotTiming, Task};
+use faceoff_wire::dataset::{CalibrationFile, DATASET_SCHEMA, DatasetManifest, ViolationsFile};
+use std::{
+    collections::BTreeMap,
+    fs::{self, File},
+    io::Read,
+    time::Duration,
+};
+use zip::ZipArchive;
+
+/// Two tasks, one of them in three shards.
+fn two_tasks(agent: Agent) -> Evaluation {
+    let shards = [
+        (Task::Hit, 0..2),
+        (Task::Prepare, 0..1),
+        (Task::Prepare, 1..3),
+        (Task::Prepare, 3..4),
+    ];
+    Evaluation::play(Some(agent), &shards)
+}
+
+#[track_caller]
+fn refused(evaluation: &Evaluation, needle: &str) {
+    match evaluation.assemble("refused.zip") {
+        Err(RecordingError::Unusable(message)) => {
+            assert!(message.contains(needle), "{message:?} lacks {needle:?}");
+        }
+        other => panic!("{other:?}"),
+    }
+    let left = evaluation.dir.path().read_dir().unwrap();
+    let left = left.map(|entry| entry.unwrap().file_name());
+    assert_eq!(
+        left.filter(|name| name.to_string_lossy().contains(".zip"))
+            .count(),
+        0
+    );
+}
+
+#[test]
+fn the_dataset_is_whole_and_its_score_is_the_direct_one() {
+    let mut evaluation = two_tasks(moving);
+    let (one, archive) = evaluation.assemble("one.zip").unwrap();
+    let result = one.result.clone();
+
+    // The shards' order does not matter, and nothing depends on the time of day.
+    evaluation.shards.reverse();
+    let (again, second) = evaluation.assemble("two.zip").unwrap();
+    assert_eq!(one, again);
+    let bytes = fs::read(&archive).unwrap();
+    assert!(bytes == fs::read(second).unwrap(), "the same bytes");
+    assert_eq!(
+        (one.archive.bytes, one.archive.blake3),
+        (
+            bytes.len() as u64,
+            blake3::hash(&bytes).to_hex().to_string()
+        )
+    );
+
+    let dir = evaluation.dir.path().join("dataset");
+    let names = unzip(&archive, &dir);
+    assert_eq!(
+        names,
+        [
+            "steps.parquet",
+            "episodes.parquet",
+            "violations.json",
+            "results.json",
+            "calibration.json",
+            "agent.log",
+            "manifest.json"
+        ]
+    );
+    assert_eq!(json::<EvaluationResult>(&dir.join("results.json")), result);
+
+    // Scored directly from the reports and the recorded times.
+    let steps = table(&dir.join("steps.parquet"));
+    let mut tasks = BTreeMap::new();
+    for task in [Task::Hit, Task::Prepare] {
+        let outcomes: Vec<EpisodeOutcome> = evaluation
+            .reports
+            .iter()
+            .flat_map(|report| report.outcomes.iter().filter(|o| o.task == task).cloned())
+            .collect();
+        let of_task: &StringArray = steps["task"].as_string();
+        let nanoseconds = steps["computation_time_ns"].as_primitive::<Int64Type>();
+        let mut times = StepTimes::of(outcomes.iter().map(|o| u64::from(o.steps)).sum());
+        for row in (0..steps.num_rows()).filter(|row| of_task.value(*row) == task.as_str()) {
+            let time = Duration::from_nanos(nanoseconds.value(row).unsigned_abs());
+            times.add(time.as_secs_f64());
+        }
+        tasks.insert(task, faceoff_scoring::score_task(&outcomes, &times));
+    }
+    let meta = &evaluation.meta;
+    let direct = EvaluationResult {
+        timing: result.timing,
+        ..faceoff_scoring::score_evaluation(meta.profile, meta.seed, tasks)
+    };
+    assert_eq!(result, direct);
+
+    let manifest: DatasetManifest = json(&dir.join("manifest.json"));
+    assert_eq!(manifest.schema, DATASET_SCHEMA);
+    assert_eq!(
+        manifest.episodes,
+        BTreeMap::from([(Task::Hit, 2), (Task::Prepare, 4)])
+    );
+    assert_eq!(
+        (manifest.seed, manifest.mismatch_seed),
+        (meta.seed, meta.mismatch_seed)
+    );
+    assert_eq!(manifest.files.len(), 6);
+    for (name, digest) in &manifest.files {
+        let bytes = fs::read(dir.join(name)).unwrap();
+        assert_eq!(bytes.len() as u64, digest.bytes, "{name}");
+        assert_eq!(
+            blake3::hash(&bytes).to_hex().to_string(),
+            digest.blake3,
+            "{name}"
+        );
+    }
+    let calibration: CalibrationFile = json(&dir.join("calibration.json"));
+    let shards = &calibration.shards;
+    let ranges: Vec<_> = shards
+        .iter()
+        .map(|shard| (shard.task, shard.first_episode, shard.end_episode))
+        .collect();
+    assert_eq!(ranges[0], (Task::Hit, 0, 2));
+    let worst = shards
+        .iter()
+        .map(|shard| shard.timing)
+        .reduce(SlotTiming::worse);
+    assert_eq!(result.timing, worst);
+    assert!(worst.unwrap().before_s.p50 > 0.0);
+    let log = fs::read_to_string(dir.join("agent.log")).unwrap();
+    assert!(log.starts_with("== hit, episodes 0 to 1 ==\ngoodbye\n== prepare, episodes 0 to 0 =="));
+}
+
+#[test]
+fn violations_name_episode_and_step() {
+    // Joint 1 swings to its limit: position, velocity and end effector are violated.
+    let evaluation = two_tasks(|turn| {
+        let mut action = [turn.held, [0.0; 7]];
+        action[0][0] += 0.3 * f64::from(turn.step.unwrap_or(0));
+        action[1][0] = 15.0;
+        Some(action)
+    });
+    let (_, archive) = evaluation.assemble("one.zip").unwrap();
+    let dir = evaluation.dir.path().join("dataset");
+    unzip(&archive, &dir);
+    let file: ViolationsFile = json(&dir.join("violations.json"));
+    for (task, found) in &file.tasks {
+        let outcomes: Vec<&EpisodeOutcome> = evaluation
+            .reports
+            .iter()
+            .flat_map(|report| &report.outcomes)
+            .filter(|outcome| outcome.task == *task)
+            .collect();
+        let flagged = |flag: fn(&EpisodeOutcome) -> bool| -> Vec<u32> {
+            outcomes
+                .iter()
+                .filter(|o| flag(o))
+                .map(|o| o.episode)
+                .collect()
+        };
+        for (listed, flagged) in [
+            (&found.ee, flagged(|o| o.violations.ee)),
+            (&found.link, flagged(|o| o.violations.link)),
+            (&found.joint_pos, flagged(|o| o.violations.joint_pos)),
+            (&found.joint_vel, flagged(|o| o.violations.joint_vel)),
+        ] {
+            assert_eq!(
+                listed.iter().map(|v| v.episode).collect::<Vec<_>>(),
+                flagged,
+                "{task}"
+            );
+            assert!(listed.iter().all(|v| v.max > 0.0 && v.steps > 0));
+        }
+        assert_eq!(
+            found.joint_vel.len(),
+            outcomes.len(),
+            "the swing is too fast in every episode"
+        );
+        assert!(
+            found.joint_vel.iter().all(|v| v.first_step < 20),
+            "{:?}",
+            found.joint_vel
+        );
+    }
+}
+
+#[test]
+fn what_is_missing_twice_or_foreign_is_refused() {
+    let mut evaluation = two_tasks(holding);
+    let whole = evaluation.shards.clone();
+    evaluation.shards.remove(2);
+    refused(
+        &evaluation,
+        "shard prepare 3..4 does not follow on episode 1",
+    );
+    evaluation.shards = whole.clone();
+    evaluation.shards.push(whole[2].clone());
+    refused(&evaluation, "episodes are missing or twice");
+    evaluation.shards = whole[2..].to_vec();
+    refused(
+        &evaluation,
+        "shard prepare 1..3 does not follow on episode 0",
+    );
+    evaluation.shards = Vec::new();
+    refused(&evaluation, "an evaluation without shards");
+    evaluation.shards = whole;
+    evaluation.meta.seed = evaluation.meta.seed.model_mismatch();
+    refused(&evaluation, "belongs to another evaluation");
+    evaluation.meta.ruleset = "airhockey-1999".into();
+    refused(&evaluation, "played by airhockey-1999");
+}
+
+#[test]
+fn damaged_recordings_are_found() {
+    let evaluation = two_tasks(holding);
+    let shard = &evaluation.shards[1];
+    for name in [
+        "steps.parquet",
+        "episodes.parquet",
+        "report.json",
+        "agent.log",
+    ] {
+        let path = shard.join(name);
+        let good = fs::read(&path).unwrap();
+        let mut flipped = good.clone();
+        flipped[good.len() / 2] ^= 1;
+        fs::write(&path, &flipped).unwrap();
+        refused(&evaluation, &format!("damaged or incomplete: {name} has"));
+        fs::write(&path, &good[..good.len() - 1]).unwrap();
+        refused(&evaluation, &format!("damaged or incomplete: {name} has"));
+        fs::remove_file(&path).unwrap();
+        refused(&evaluation, &format!("{name} is missing"));
+        fs::write(&path, &good).unwrap();
+    }
+    let path = shard.join("shard.json");
+    let good = fs::read(&path).unwrap();
+    fs::write(&path, &good[..good.len() / 2]).unwrap();
+    refused(&evaluation, "damaged or incomplete: shard.json");
+    fs::remove_file(&path).unwrap();
+    refused(&evaluation, "damaged or incomplete: shard.json");
+    fs::write(&path, &good).unwrap();
+    evaluation.assemble("whole.zip").unwrap();
+    assert!(evaluation.dir.path().join("whole.zip").exists());
+}
+
+#[test]
+fn an_evaluation_stopped_by_faults_has_no_score() {
+    let evaluation = two_tasks(holding);
+    let quits: Agent = |turn| turn.step.is_none().then_some([turn.held, [0.0; 7]]);
+    play(
+        &spec(Task::Prepare, 0..4),
+        Some(quits),
+        &evaluation.shards[1],
+    );
+    refused(&evaluation, "there is no score");
+}
+
+#[test]
+fn the_archive_is_read_by_others() {
+    let evaluation = two_tasks(holding);
+    let (_, archive) = evaluation.assemble("one.zip").unwrap();
+    let mut text = String::new();
+    let mut zip = ZipArchive::new(File::open(archive).unwrap()).unwrap();
+    zip.by_name("results.json")
+        .unwrap()
+        .read_to_string(&mut text)
+        .unwrap();
+    let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let keys = |value: &serde_json::Value| -> Vec<String> {
+        let mut keys: Vec<String> = value.as_object().unwrap().keys().cloned().collect();
+        keys.sort();
+        keys
+    };
+    assert_eq!(
+        keys(&value),
+        [
+            "penalty_points",
+            "profile",
+            "ruleset",
+            "score",
+            "seed",
+            "tasks",
+            "tier",
+            "timing"
+        ]
+    );
+    assert_eq!(keys(&value["tasks"]), ["hit", "prepare"]);
+    assert_eq!(
+        keys(&value["tasks"]["hit"]),
+        [
+            "computation_time_s",
+            "episodes",
+            "penalty_points",
+            "steps",
+            "success_ci95",
+            "success_rate",
+            "successes",
+            "tier",
+            "violations"
+        ]
+    );
+}

@@ -1,0 +1,10 @@
+//! Datasets as others meet them: recorded by the library from agents that are functions, forged,
+//! damaged, and made by the version before.
+#![expect(clippy::unwrap_used, reason = "a helper's failure is its test's")]
+
+mod assemble;
+mod by_index;
+mod forgery;
+mod layout_2;
+mod played;
+mod verify;

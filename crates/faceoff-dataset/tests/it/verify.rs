@@ -1,0 +1,533 @@
+//! A sceptic's view: recordings forged in one place and made to look whole again.
+
+use crate::{
+    forgery::{Forgery, concat, flipped},
+    played::{Agent, Evaluation, moving, spec, table},
+};
+use arrow_array::{
+    Array, Float64Array, ListArray, RecordBatch, StringArray, UInt32Array,
+    builder::{Float64Builder, ListBuilder},
+    cast::AsArray,
+};
+use arrow_schema::DataType;
+use faceoff_dataset::{
+    Dataset, DatasetError, EpisodeRecord,
+    verify::{Difference, SeasonClaim, Verified, VerifyError, verify},
+};
+use faceoff_types::{EvaluationResult, RULESET, Seed, Task};
+use faceoff_wire::dataset::DatasetManifest;
+use std::{
+    fs,
+    num::NonZero,
+    path::Path,
+    sync::{
+        Arc, OnceLock,
+        atomic::{AtomicU32, Ordering},
+    },
+};
+
+/// One recording of two tasks for all tests that only read it.
+fn played() -> &'static Evaluation {
+    static PLAYED: OnceLock<Evaluation> = OnceLock::new();
+    PLAYED.get_or_init(|| {
+        let shards = [(Task::Hit, 0..1), (Task::Hit, 1..2), (Task::Defend, 0..2)];
+        Evaluation::play(Some(moving), &shards).assembled()
+    })
+}
+
+fn forgery() -> Forgery {
+    Forgery::of(&played().folder())
+}
+
+pub fn check(path: &Path, workers: usize) -> Result<Verified, VerifyError> {
+    verify(
+        &Dataset::open(path)?,
+        NonZero::new(workers).unwrap(),
+        &|| (),
+    )
+}
+
+#[track_caller]
+fn difference(path: &Path, workers: usize) -> Difference {
+    match check(path, workers) {
+        Err(VerifyError::Differs(difference)) => *difference,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn names(file: &str) -> Vec<String> {
+    let batch = table(&played().folder().join(file));
+    let schema = batch.schema();
+    schema
+        .fields()
+        .iter()
+        .map(|field| field.name().clone())
+        .collect()
+}
+
+#[test]
+fn a_recording_verifies_as_archive_as_folder_and_on_any_number_of_threads() {
+    let played = played();
+    let done = AtomicU32::new(0);
+    let dataset = Dataset::open(&played.archive()).unwrap();
+    let one = verify(&dataset, NonZero::<usize>::MIN, &|| {
+        done.fetch_add(1, Ordering::Relaxed);
+    })
+    .unwrap();
+    assert_eq!((one.episodes, done.into_inner()), (4, 4));
+    assert_eq!(one.result, dataset.results().unwrap());
+    assert_eq!(
+        one.steps,
+        one.result
+            .tasks
+            .values()
+            .map(|task| task.steps)
+            .sum::<u64>()
+    );
+    assert_eq!(check(&played.folder(), 8).unwrap(), one);
+    assert_eq!(
+        check(played.dir.path(), 3).unwrap(),
+        one,
+        "as `faceoff eval` leaves it"
+    );
+    // Rewritten by another program, the same numbers are the same dataset.
+    let rewritten = forgery();
+    rewritten.table("steps.parquet", |batch| batch);
+    assert_eq!(check(rewritten.reseal().dir.path(), 2).unwrap(), one);
+}
+
+#[test]
+fn a_worker_that_panics_does_not_leave_the_others_waiting() {
+    let dataset = Dataset::open(&played().archive()).unwrap();
+    let panic = std::panic::catch_unwind(|| {
+        verify(&dataset, NonZero::<usize>::MIN, &|| panic!("stop here")).unwrap()
+    })
+    .unwrap_err();
+    assert_eq!(panic.downcast_ref::<&str>(), Some(&"stop here"));
+}
+
+#[test]
+fn one_bit_of_any_column_of_a_step_is_found_where_it_is() {
+    let steps = table(&played().folder().join("steps.parquet"));
+    // Some step in the midst of `hit`, episode 1.
+    let tasks: &StringArray = steps["task"].as_string();
+    let episodes: &UInt32Array = steps["episode"].as_primitive();
+    let start = (0..steps.num_rows())
+        .find(|row| tasks.value(*row) == "hit" && episodes.value(*row) == 1)
+        .unwrap();
+    let row = start + 17;
+    for name in names("steps.parquet") {
+        let forgery = forgery();
+        forgery.table("steps.parquet", |batch| flipped(&batch, &name, row));
+        let found = difference(forgery.reseal().dir.path(), 2);
+        assert_eq!(
+            (found.task, found.episode),
+            (Some(Task::Hit), Some(1)),
+            "{name}: {found}"
+        );
+        match name.as_str() {
+            // The digest tells what moves nothing or follows from nothing.
+            "computation_time_ns" | "cpu_time_ns" => {
+                assert_eq!(found.step, None, "{found}");
+                let fields = ["computation_time_mean_s", "times_blake3"];
+                assert!(fields.contains(&found.field.as_str()), "{found}");
+            }
+            "action" => {
+                let digest = found.field == "actions_blake3" && found.step.is_none();
+                assert!(digest || found.step >= Some(17), "{found}");
+            }
+            _ => assert_eq!((found.step, &found.field), (Some(17), &name), "{found}"),
+        }
+    }
+}
+
+#[test]
+fn an_action_that_moves_the_arm_is_found_at_its_step() {
+    let forgery = forgery();
+    forgery.table("steps.parquet", |batch| {
+        let (index, _) = batch
+            .schema()
+            .column_with_name("action")
+            .map(|(i, f)| (i, f.clone()))
+            .unwrap();
+        let column: &ListArray = batch.column(index).as_list();
+        let DataType::List(item) = column.data_type() else {
+            panic!("actions are lists");
+        };
+        let mut out = ListBuilder::new(Float64Builder::new()).with_field(item.clone());
+        for i in 0..column.len() {
+            let values = column.value(i);
+            let values: &Float64Array = values.as_primitive();
+            for (k, value) in values.values().iter().enumerate() {
+                out.values()
+                    .append_value(value + if (i, k) == (5, 0) { 1e-9 } else { 0.0 });
+            }
+            out.append(true);
+        }
+        let mut columns = batch.columns().to_vec();
+        columns[index] = Arc::new(out.finish());
+        RecordBatch::try_new(batch.schema(), columns).unwrap()
+    });
+    let forgery = forgery.reseal();
+    let found = difference(forgery.dir.path(), 1);
+    assert_eq!(
+        (found.task, found.episode, found.step),
+        (Some(Task::Hit), Some(0), Some(5))
+    );
+    assert!(
+        found
+            .to_string()
+            .starts_with("steps.parquet, hit, episode 0, step 5, "),
+        "{found}"
+    );
+    assert_eq!(
+        found,
+        difference(forgery.dir.path(), 8),
+        "on any number of threads"
+    );
+}
+
+#[test]
+fn one_bit_of_any_column_of_an_episode_is_found() {
+    for name in names("episodes.parquet") {
+        // The opponent's columns are absent in `defend`: take `hit`.
+        let forgery = forgery();
+        forgery.table("episodes.parquet", |batch| flipped(&batch, &name, 1));
+        let found = difference(forgery.reseal().dir.path(), 2);
+        if name == "host_noise_reruns" {
+            // Nothing but the slots' own count tells that one was added.
+            assert_eq!((&found.field, &*found.file), (&name, "calibration.json"));
+            continue;
+        }
+        assert_eq!(
+            (found.task, found.episode),
+            (Some(Task::Hit), Some(1)),
+            "{name}: {found}"
+        );
+        match name.as_str() {
+            // Another interpolation cannot read the recorded actions; other steps are missing.
+            "interpolation" => assert_eq!(found.file, "steps.parquet", "{found}"),
+            "steps" => {}
+            _ => assert_eq!(
+                (&found.field, &*found.file),
+                (&name, "episodes.parquet"),
+                "{found}"
+            ),
+        }
+    }
+}
+
+#[test]
+fn forged_scores_are_found() {
+    for (name, from, to, field) in [
+        (
+            "results.json",
+            "\"successes\": ",
+            "\"successes\": 1",
+            "tasks.hit.successes",
+        ),
+        ("results.json", "\"score\": ", "\"score\": 1", "score"),
+        (
+            "results.json",
+            "\"tier\": \"",
+            "\"tier\": \"x",
+            "tasks.hit.tier",
+        ),
+        ("results.json", "{\n", "{ \n", "byte 1"),
+        (
+            "violations.json",
+            "\"joint_pos\": []",
+            "\"joint_pos\": [7]",
+            "tasks.hit.joint_pos[0]",
+        ),
+    ] {
+        let forgery = forgery();
+        forgery.text(name, from, to);
+        // Unsealed, the hash tells; sealed, the simulation does.
+        match Dataset::open(forgery.dir.path()) {
+            Err(DatasetError::Altered(what)) => assert!(what.starts_with(name), "{what}"),
+            other => panic!("{other:?}"),
+        }
+        let found = difference(forgery.reseal().dir.path(), 2);
+        assert_eq!(found.file, name);
+        assert_eq!(found.field, field, "{found}");
+    }
+}
+
+#[test]
+fn forged_seeds_and_profiles_give_other_episodes() {
+    let seed = spec(Task::Hit, 0..1).seed;
+    for (from, to) in [
+        (seed.to_string(), Seed::from_number(8).to_string()),
+        (seed.model_mismatch().to_string(), seed.to_string()),
+        (
+            "\"profile\": \"evaluation\"".into(),
+            "\"profile\": \"ideal\"".into(),
+        ),
+    ] {
+        let forgery = forgery();
+        forgery.text("manifest.json", &from, &to);
+        let found = difference(forgery.dir.path(), 2);
+        assert_eq!(
+            (found.task, found.episode, found.step),
+            (Some(Task::Hit), Some(0), Some(0)),
+            "{found}"
+        );
+    }
+}
+
+#[test]
+fn episodes_and_steps_that_are_missing_twice_or_too_many_are_found() {
+    let without = |table: &str, row: usize| {
+        let forgery = forgery();
+        forgery.table(table, |batch| {
+            let parts = [
+                batch.slice(0, row),
+                batch.slice(row + 1, batch.num_rows() - row - 1),
+            ];
+            concat(&parts)
+        });
+        difference(forgery.reseal().dir.path(), 2)
+    };
+    let twice = |table: &str, row: usize| {
+        let forgery = forgery();
+        forgery.table(table, |batch| {
+            concat(&[
+                batch.slice(0, row + 1),
+                batch.slice(row, batch.num_rows() - row),
+            ])
+        });
+        difference(forgery.reseal().dir.path(), 2)
+    };
+    let last = table(&played().folder().join("steps.parquet")).num_rows() - 1;
+    let place = |found: &Difference| (found.task, found.episode, found.step);
+    let (hit, defend) = (Some(Task::Hit), Some(Task::Defend));
+    assert_eq!(place(&without("steps.parquet", 3)), (hit, Some(0), Some(3)));
+    assert_eq!(place(&twice("steps.parquet", 3)), (hit, Some(0), Some(4)));
+    let found = without("steps.parquet", last);
+    assert_eq!((found.task, found.episode), (defend, Some(1)), "{found}");
+    let found = twice("steps.parquet", last);
+    assert_eq!(
+        (found.task, found.episode, &*found.field),
+        (defend, Some(1), "rows")
+    );
+    let found = without("episodes.parquet", 1);
+    assert_eq!(
+        (place(&found), &*found.field),
+        ((hit, Some(1), None), "task")
+    );
+    let found = twice("episodes.parquet", 0);
+    assert_eq!(
+        (place(&found), &*found.field),
+        ((hit, Some(1), None), "episode")
+    );
+    let found = without("episodes.parquet", 3);
+    assert_eq!(
+        (place(&found), &*found.recorded),
+        ((defend, Some(1), None), "nothing")
+    );
+    let found = twice("episodes.parquet", 3);
+    assert_eq!(
+        (place(&found), &*found.field),
+        ((defend, Some(1), None), "rows")
+    );
+}
+
+/// What a reader gets of a dataset.
+fn contents(dataset: &Dataset) -> (EvaluationResult, Vec<EpisodeRecord>, DatasetManifest) {
+    let episodes = dataset.episodes().unwrap();
+    (
+        dataset.results().unwrap(),
+        episodes,
+        dataset.manifest().clone(),
+    )
+}
+
+#[test]
+fn damage_to_an_archive_is_refused_or_touches_no_file() {
+    let good = fs::read(played().archive()).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("dataset.zip");
+    let whole = Dataset::open(&played().archive()).unwrap();
+    let hash = whole.archive().unwrap().unwrap().blake3;
+    let whole = contents(&whole);
+    // Every byte of the ends, where the framing is, and some of the rest.
+    let tail = good.len() - 2048;
+    let places = (0..128)
+        .chain((128..tail).step_by(tail / 200))
+        .chain(tail..good.len());
+    for at in places {
+        let mut bytes = good.clone();
+        bytes[at] ^= 1 << (at % 8);
+        fs::write(&path, &bytes).unwrap();
+        match Dataset::open(&path) {
+            Err(DatasetError::Altered(_) | DatasetError::Unreadable(_)) => {}
+            Err(other) => panic!("byte {at} flipped: {other:?}"),
+            Ok(dataset) => {
+                assert_eq!(contents(&dataset), whole, "byte {at} flipped");
+                assert_ne!(dataset.archive().unwrap().unwrap().blake3, hash);
+            }
+        }
+    }
+    for length in [0, 1, 100, good.len() / 2, good.len() - 100, good.len() - 1] {
+        fs::write(&path, &good[..length]).unwrap();
+        let refused = Dataset::open(&path);
+        assert!(
+            matches!(
+                refused,
+                Err(DatasetError::Altered(_) | DatasetError::Unreadable(_))
+            ),
+            "{length} bytes"
+        );
+    }
+}
+
+#[test]
+fn a_file_is_compared_with_its_hash_when_it_is_read() {
+    let forgery = forgery();
+    for name in [
+        "steps.parquet",
+        "episodes.parquet",
+        "results.json",
+        "calibration.json",
+    ] {
+        let good = fs::read(forgery.path(name)).unwrap();
+        let mut bytes = good.clone();
+        bytes[good.len() / 2] ^= 1;
+        fs::write(forgery.path(name), &bytes).unwrap();
+        let dataset = Dataset::open_unread(forgery.dir.path()).unwrap();
+        let read = [
+            ("steps.parquet", dataset.steps().map(|_| ())),
+            ("episodes.parquet", dataset.episodes().map(|_| ())),
+            ("results.json", dataset.results().map(|_| ())),
+            ("calibration.json", dataset.calibration().map(|_| ())),
+        ];
+        for (file, read) in read {
+            match read {
+                Err(DatasetError::Altered(what)) => {
+                    assert!(file == name && what.starts_with(name), "{what}");
+                }
+                other => assert!(other.is_ok() && file != name, "{file}: {other:?}"),
+            }
+        }
+        fs::write(forgery.path(name), &good).unwrap();
+    }
+}
+
+#[test]
+fn damaged_tables_are_refused_in_a_folder_too() {
+    for name in [
+        "steps.parquet",
+        "episodes.parquet",
+        "agent.log",
+        "results.json",
+    ] {
+        let forgery = forgery();
+        let good = fs::read(forgery.path(name)).unwrap();
+        for at in (0..good.len()).step_by(good.len().div_ceil(40)) {
+            let mut bytes = good.clone();
+            bytes[at] ^= 0x10;
+            fs::write(forgery.path(name), &bytes).unwrap();
+            match Dataset::open(forgery.dir.path()) {
+                Err(DatasetError::Altered(what)) => assert!(what.starts_with(name), "{what}"),
+                other => panic!("{name}, byte {at}: {other:?}"),
+            }
+        }
+        fs::remove_file(forgery.path(name)).unwrap();
+        assert!(
+            Dataset::open(forgery.dir.path()).is_err(),
+            "{name} is missing"
+        );
+    }
+    // Hashes that fit do not make a table readable.
+    let forgery = forgery();
+    let steps = fs::read(forgery.path("steps.parquet")).unwrap();
+    fs::write(forgery.path("steps.parquet"), &steps[..steps.len() / 2]).unwrap();
+    let result = check(forgery.reseal().dir.path(), 2);
+    assert!(
+        matches!(
+            result,
+            Err(VerifyError::Dataset(DatasetError::Unreadable(_)))
+        ),
+        "{result:?}"
+    );
+}
+
+#[test]
+fn other_layouts_rulesets_and_simulators_are_named() {
+    let fingerprint = Dataset::open(&played().archive())
+        .unwrap()
+        .manifest()
+        .simulator
+        .fingerprint
+        .clone();
+    for (from, to, words) in [
+        (
+            "faceoff-dataset/3",
+            "faceoff-dataset/1",
+            "layout is \"faceoff-dataset/1\"",
+        ),
+        (RULESET, "airhockey-1999", "ruleset \"airhockey-1999\""),
+        (
+            &*fingerprint,
+            "00",
+            "verify it with the version that made it",
+        ),
+    ] {
+        let forgery = forgery();
+        forgery.text("manifest.json", from, to);
+        match check(forgery.dir.path(), 1) {
+            Err(VerifyError::Dataset(DatasetError::Foreign(what))) => {
+                assert!(what.contains(words), "{what}");
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn agents_that_fault_verify_too() {
+    let agent: Agent = |turn| match (turn.episode, turn.step) {
+        (1, Some(4)) | (2, None) => None,
+        _ => Some([turn.held, [0.0; 7]]),
+    };
+    let faulty = Evaluation::play(Some(agent), &[(Task::Prepare, 0..4)]).assembled();
+    let verified = check(&faulty.archive(), 2).unwrap();
+    assert_eq!(verified.episodes, 4);
+    let violations = &verified.result.tasks[&Task::Prepare].violations;
+    assert_eq!(violations.computation_time, 2, "the two faults");
+    let silent = Evaluation::play(None, &[(Task::Hit, 0..2)]).assembled();
+    assert_eq!(check(&silent.archive(), 1).unwrap().steps, 0);
+}
+
+#[test]
+fn seeds_follow_from_the_revealed_secret() {
+    let day = "2026-11-21".parse().unwrap();
+    let secret = Seed::from_number(42);
+    let mut manifest = Dataset::open(&played().archive())
+        .unwrap()
+        .manifest()
+        .clone();
+    manifest.seed = secret.day(day);
+    manifest.mismatch_seed = secret.model_mismatch();
+    let claim = SeasonClaim {
+        secret,
+        commitment: Some(blake3::hash(secret.as_bytes()).to_hex().to_uppercase()),
+        day,
+    };
+    assert_eq!(claim.check(&manifest), Ok(()));
+    let what =
+        |claim: &SeasonClaim, manifest: &DatasetManifest| claim.check(manifest).unwrap_err().what;
+    let other_day = SeasonClaim {
+        day: "2026-11-22".parse().unwrap(),
+        ..claim.clone()
+    };
+    assert_eq!(what(&other_day, &manifest), "the evaluation's seed");
+    let broken = SeasonClaim {
+        commitment: Some("00".repeat(32)),
+        ..claim.clone()
+    };
+    assert_eq!(what(&broken, &manifest), "the commitment");
+    manifest.mismatch_seed = manifest.seed;
+    assert_eq!(what(&claim, &manifest), "the seed of the model mismatch");
+}

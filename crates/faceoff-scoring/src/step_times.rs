@@ -1,0 +1,127 @@
+use faceoff_types::ComputationTimeSummary;
+use std::{cmp::Reverse, collections::BinaryHeap};
+
+/// Computation times of a task's answered steps, in order of play: their sum, their maximum, and for
+/// the 99th percentile the largest hundredth of them. The rest is not kept.
+#[derive(Debug, Clone, Default)]
+pub struct StepTimes {
+    announced: u64,
+    count: u64,
+    sum_s: f64,
+    /// The largest times, the shortest on top; as bits, whose order is that of numbers that are not
+    /// negative.
+    largest: BinaryHeap<Reverse<u64>>,
+}
+
+impl StepTimes {
+    /// For so many steps: the percentile's rank must be known beforehand.
+    #[must_use]
+    pub fn of(steps: u64) -> Self {
+        Self {
+            announced: steps,
+            ..Self::default()
+        }
+    }
+
+    /// Adds a time in seconds, which is not negative.
+    pub fn add(&mut self, time_s: f64) {
+        self.count += 1;
+        self.sum_s += time_s;
+        let time = Reverse(time_s.to_bits());
+        if self.largest.len() < self.kept() {
+            self.largest.push(time);
+        } else if let Some(mut shortest) = self.largest.peek_mut()
+            && time < *shortest
+        {
+            *shortest = time;
+        }
+    }
+
+    /// Times that were added.
+    #[must_use]
+    pub const fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// Those from the percentile's nearest rank on.
+    fn kept(&self) -> usize {
+        let below = (self.announced * 99).div_ceil(100).saturating_sub(1);
+        usize::try_from(self.announced - below).unwrap_or(usize::MAX)
+    }
+
+    /// Mean, 99th percentile (nearest rank) and maximum; zeros when there was no step.
+    ///
+    /// # Panics
+    /// If more or fewer times were added than announced: the percentile would be another's.
+    pub(crate) fn summary(&self) -> ComputationTimeSummary {
+        assert_eq!(
+            self.count, self.announced,
+            "as many times are added as were announced"
+        );
+        let (Some(Reverse(p99)), Some(Reverse(max))) =
+            (self.largest.peek(), self.largest.iter().min())
+        else {
+            return ComputationTimeSummary::default();
+        };
+        ComputationTimeSummary {
+            mean: self.sum_s / self.count as f64,
+            p99: f64::from_bits(*p99),
+            max: f64::from_bits(*max),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn summary(times_s: &[f64]) -> ComputationTimeSummary {
+        let mut times = StepTimes::of(times_s.len() as u64);
+        times_s.iter().for_each(|time_s| times.add(*time_s));
+        times.summary()
+    }
+
+    #[test]
+    fn the_99th_percentile_is_the_nearest_rank() {
+        let hundred: Vec<f64> = (1..=100).rev().map(f64::from).collect();
+        let of_hundred = summary(&hundred);
+        assert_eq!(
+            (of_hundred.mean, of_hundred.p99, of_hundred.max),
+            (50.5, 99.0, 100.0)
+        );
+        assert_eq!(summary(&[0.5]).p99, 0.5);
+        assert_eq!(summary(&[3.0, 1.0, 2.0]).p99, 3.0);
+        assert_eq!(summary(&[]), ComputationTimeSummary::default());
+    }
+
+    #[test]
+    fn a_hundredth_of_the_times_is_kept() {
+        let mut times = StepTimes::of(1_000_000);
+        for index in 0..1_000_000u32 {
+            times.add(f64::from(index % 7919));
+            assert!(times.largest.len() <= 10_001);
+        }
+        assert!(times.largest.capacity() <= 2 * 10_001);
+        assert_eq!(times.summary().max, 7918.0);
+    }
+
+    proptest! {
+        #[test]
+        fn all_is_as_with_every_time_kept(
+            // Few values give ties, many none.
+            mut times_s in prop_oneof![
+                prop::collection::vec((0u8..5).prop_map(|n| f64::from(n) * 1e-3), 1..1500),
+                prop::collection::vec(0.0..1.0f64, 1..1500),
+            ]
+        ) {
+            let found = summary(&times_s);
+            let mean = times_s.iter().sum::<f64>() / times_s.len() as f64;
+            prop_assert_eq!(found.mean.to_bits(), mean.to_bits());
+            times_s.sort_unstable_by(f64::total_cmp);
+            let rank = (times_s.len() * 99).div_ceil(100);
+            prop_assert_eq!(found.p99, times_s[rank - 1]);
+            prop_assert_eq!(found.max, times_s[times_s.len() - 1]);
+        }
+    }
+}
