@@ -1,5 +1,5 @@
-use faceoff_sim::{EPISODE_STEPS, EnvInfo, GAME_STEPS, env_info, env_info_for};
-use faceoff_types::{Contest, RULESET, Task};
+use faceoff_sim::{EPISODE_STEPS, EnvInfo, env_info, env_info_for};
+use faceoff_types::{Contest, GAME_WINDOWS, RULESET, Task, WINDOW_STEPS};
 use faceoff_wire::{
     Env,
     message::{DiscEnv, RobotEnv, TableEnv},
@@ -9,7 +9,7 @@ use faceoff_wire::{
 pub(crate) fn wire_env(contest: Contest) -> Env {
     let (info, episode_steps) = match contest {
         Contest::Task(task) => (env_info(task), EPISODE_STEPS),
-        Contest::Game { side } => (env_info_for(2, side.index()), GAME_STEPS),
+        Contest::Game { side } => (env_info_for(2, side.index()), GAME_WINDOWS * WINDOW_STEPS),
     };
     let EnvInfo {
         n_agents,

@@ -5,7 +5,7 @@
 //! pipes), so each gets a number of its own from a range that distributions leave unused
 //! (0x7000_0000 to 0x7fff_ffff; systemd's list of user ids names it so).
 
-use crate::{Layer, SandboxError};
+use crate::{Layer, SandboxError, error::IoContext};
 use rustix::{fs, process, thread};
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -59,8 +59,7 @@ impl AgentUser {
 }
 
 fn read_map(path: &str) -> Result<String, SandboxError> {
-    std::fs::read_to_string(path)
-        .map_err(|source| SandboxError::io(format!("cannot read {path}"), source))
+    std::fs::read_to_string(path).context(format_args!("cannot read {path}"))
 }
 
 /// `map` is the text of a `uid_map`: first inside id, first outside id, count.

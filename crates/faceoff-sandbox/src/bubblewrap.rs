@@ -2,14 +2,15 @@
 
 use crate::{
     Layer, SandboxError, SpawnSpec,
+    error::IoContext,
+    private_mounts::PrivateMounts,
     seccomp::{self, Filters},
-    stage::Stage,
 };
-use rustix::fs::{MemfdFlags, SeekFrom, memfd_create, seek};
+use rustix::fs::{MemfdFlags, memfd_create};
 use std::{
     ffi::OsString,
     fs,
-    io::Write,
+    io::{self, Seek, Write},
     os::fd::{AsRawFd, OwnedFd},
     path::{Path, PathBuf},
     process::{Command, Stdio},
@@ -59,9 +60,7 @@ impl Bubblewrap {
                 .stdin(Stdio::null())
                 .output()
                 .map(|output| String::from_utf8_lossy(&output.stdout).into_owned())
-                .map_err(|source| {
-                    SandboxError::io(format!("cannot run {}", program.display()), source)
-                })
+                .context(format_args!("cannot run {}", program.display()))
         };
         let help = ask("--help")?;
         for option in [
@@ -90,19 +89,19 @@ impl Bubblewrap {
         }))
     }
 
-    /// The command line for `spec`, with what the child needs for it. `staged`: bubblewrap runs as a user
-    /// who may be unable to reach the files by name.
+    /// The command line for `spec`, with what the child needs for it. `private_mounts`: bubblewrap runs
+    /// as a user who may be unable to reach the files by name.
     pub(crate) fn command(
         &self,
         spec: &SpawnSpec,
         status: OwnedFd,
         filters: Option<&Filters>,
-        staged: bool,
+        private_mounts: bool,
     ) -> Result<Invocation, SandboxError> {
         let mut line = CommandLine {
             args: Vec::new(),
             inherit: Vec::new(),
-            stage: staged.then(Stage::default),
+            mounts: private_mounts.then(PrivateMounts::default),
         };
         line.args([
             "--unshare-user",
@@ -170,7 +169,7 @@ impl Bubblewrap {
         Ok(Invocation {
             command,
             inherit: line.inherit,
-            stage: line.stage,
+            mounts: line.mounts,
         })
     }
 }
@@ -180,7 +179,7 @@ impl Bubblewrap {
 pub(crate) struct Invocation {
     pub command: Command,
     pub inherit: Vec<OwnedFd>,
-    pub stage: Option<Stage>,
+    pub mounts: Option<PrivateMounts>,
 }
 
 /// The agent's variables; the bundle's own come last.
@@ -200,7 +199,7 @@ pub(crate) fn environment(spec: &SpawnSpec, home: &str) -> Vec<(String, String)>
 struct CommandLine {
     args: Vec<OsString>,
     inherit: Vec<OwnedFd>,
-    stage: Option<Stage>,
+    mounts: Option<PrivateMounts>,
 }
 
 impl CommandLine {
@@ -224,12 +223,6 @@ impl CommandLine {
 
     /// Shows `host` as `inside`: a link as the same link, all else as a read-only mount.
     fn read_only(&mut self, host: &Path, inside: &Path) -> Result<(), SandboxError> {
-        let failed = |source| {
-            SandboxError::io(
-                format!("cannot show {} to the agent", host.display()),
-                source,
-            )
-        };
         if host == inside
             && let Ok(target) = fs::read_link(host)
         {
@@ -237,9 +230,11 @@ impl CommandLine {
                 .extend(["--symlink".into(), target.into_os_string(), inside.into()]);
             return Ok(());
         }
-        let source = match &mut self.stage {
-            Some(stage) => stage.add(host)?,
-            None => fs::canonicalize(host).map_err(failed)?.into_os_string(),
+        let source = match &mut self.mounts {
+            Some(mounts) => mounts.add(host)?,
+            None => fs::canonicalize(host)
+                .context(format_args!("cannot show {} to the agent", host.display()))?
+                .into_os_string(),
         };
         self.args.extend(["--ro-bind".into(), source]);
         self.args.push(inside.into());
@@ -263,13 +258,13 @@ fn mount_order(paths: &[PathBuf]) -> Vec<PathBuf> {
 
 /// A file without a name, at its start.
 fn memory_file(content: &[u8]) -> Result<OwnedFd, SandboxError> {
-    let failed = |source| SandboxError::io("cannot make a file in memory", source);
-    let fd = memfd_create("faceoff", MemfdFlags::CLOEXEC).map_err(|error| failed(error.into()))?;
-    let mut file = fs::File::from(fd);
-    file.write_all(content).map_err(failed)?;
-    let fd = OwnedFd::from(file);
-    seek(&fd, SeekFrom::Start(0)).map_err(|error| failed(error.into()))?;
-    Ok(fd)
+    let make = || -> io::Result<OwnedFd> {
+        let mut file = fs::File::from(memfd_create("faceoff", MemfdFlags::CLOEXEC)?);
+        file.write_all(content)?;
+        file.rewind()?;
+        Ok(file.into())
+    };
+    make().context("cannot make a file in memory")
 }
 
 #[cfg(test)]

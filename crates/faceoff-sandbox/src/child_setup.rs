@@ -1,6 +1,6 @@
 //! What the child does between fork and exec.
 
-use crate::{Limits, agent_user::AgentUser, seccomp::Filters, stage::Stage};
+use crate::{Limits, agent_user::AgentUser, private_mounts::PrivateMounts, seccomp::Filters};
 use rustix::{
     fs::{Mode, OFlags, open},
     io::{Errno, FdFlags, fcntl_setfd, write},
@@ -22,7 +22,7 @@ pub(crate) struct ChildSetup {
     pub cpus: Option<CpuSet>,
     pub rlimits: Vec<(Resource, Rlimit)>,
     /// Files to show to that user, bound while the child is still root.
-    pub stage: Option<Stage>,
+    pub mounts: Option<PrivateMounts>,
     pub user: Option<AgentUser>,
     /// Descriptors that survive the exec.
     pub inherit: Vec<OwnedFd>,
@@ -38,7 +38,7 @@ enum Step {
     CloseDescriptors,
     EnterCgroup,
     SetCpus,
-    Stage,
+    MakeMounts,
     SetRlimits,
     BecomeUser,
     Inherit,
@@ -51,7 +51,7 @@ impl Step {
         Self::CloseDescriptors,
         Self::EnterCgroup,
         Self::SetCpus,
-        Self::Stage,
+        Self::MakeMounts,
         Self::SetRlimits,
         Self::BecomeUser,
         Self::Inherit,
@@ -66,7 +66,7 @@ impl Step {
             }
             Self::EnterCgroup => "cannot enter the agent's cgroup",
             Self::SetCpus => "cannot bind the agent to its CPUs",
-            Self::Stage => {
+            Self::MakeMounts => {
                 "cannot show files to the agent's user in a mount namespace (a root service needs \
                  CAP_SYS_ADMIN for it; without, run it as an ordinary user)"
             }
@@ -135,8 +135,8 @@ impl ChildSetup {
             );
             let _ = file.and_then(|file| write(&file, b"800"));
         }
-        if let Some(stage) = &mut self.stage {
-            stage.build().map_err(|error| (Step::Stage, error))?;
+        if let Some(mounts) = &mut self.mounts {
+            mounts.make().map_err(|error| (Step::MakeMounts, error))?;
         }
         for &(resource, limit) in &self.rlimits {
             process::setrlimit(resource, limit).map_err(|error| (Step::SetRlimits, error))?;

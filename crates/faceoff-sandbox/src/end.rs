@@ -1,6 +1,6 @@
 //! Why an agent ended, and whose doing it was.
 
-use crate::{Limits, cgroup::Trespass};
+use crate::{Limits, cgroup::LimitHit};
 use faceoff_types::AgentFaultKind;
 use std::{os::unix::process::ExitStatusExt, process::ExitStatus};
 
@@ -22,7 +22,7 @@ pub(crate) struct Evidence<'a> {
     pub status: ExitStatus,
     /// With bubblewrap: what it told about the agent, `None` if the agent never ran.
     pub sandboxed: Option<Option<i32>>,
-    pub trespass: Option<Trespass>,
+    pub limit_hit: Option<LimitHit>,
     pub stderr: &'a str,
     pub limits: &'a Limits,
 }
@@ -60,7 +60,7 @@ impl Evidence<'_> {
             });
         }
         // Out of memory the kernel may choose bubblewrap's own process in the agent's cgroup.
-        if let Some(Trespass::Memory { peak_bytes }) = self.trespass {
+        if let Some(LimitHit::Memory { peak_bytes }) = self.limit_hit {
             return self.of_memory(peak_bytes);
         }
         let said = self.stderr.trim();
@@ -80,9 +80,9 @@ impl Evidence<'_> {
         if self.sandboxed.is_some() && (129..=192).contains(&code) {
             return self.of_signal(code - 128);
         }
-        match &self.trespass {
-            Some(Trespass::Memory { peak_bytes }) if code != 0 => self.of_memory(*peak_bytes),
-            Some(Trespass::Pids { refused }) if code != 0 => {
+        match &self.limit_hit {
+            Some(LimitHit::Memory { peak_bytes }) if code != 0 => self.of_memory(*peak_bytes),
+            Some(LimitHit::Pids { refused }) if code != 0 => {
                 End::Agent(AgentFaultKind::LimitExceeded {
                     limit: "processes".into(),
                     allowed: self.limits.pids.to_string(),
@@ -94,8 +94,8 @@ impl Evidence<'_> {
     }
 
     fn of_signal(&self, signal: i32) -> End {
-        match &self.trespass {
-            Some(Trespass::Memory { peak_bytes }) => self.of_memory(*peak_bytes),
+        match &self.limit_hit {
+            Some(LimitHit::Memory { peak_bytes }) => self.of_memory(*peak_bytes),
             _ if signal == libc::SIGXFSZ => End::Agent(AgentFaultKind::LimitExceeded {
                 limit: "file size".into(),
                 allowed: format!("{} bytes", self.limits.file_size_bytes),
@@ -121,7 +121,7 @@ mod tests {
     fn end(
         sandboxed: Option<Option<i32>>,
         status: i32,
-        trespass: Option<Trespass>,
+        limit_hit: Option<LimitHit>,
         stderr: &str,
     ) -> End {
         let limits = Limits::default();
@@ -129,7 +129,7 @@ mod tests {
         Evidence {
             status,
             sandboxed,
-            trespass,
+            limit_hit,
             stderr,
             limits: &limits,
         }
@@ -181,7 +181,7 @@ mod tests {
     #[test]
     fn memory_is_named_only_when_the_agent_died_of_it() {
         let memory = || {
-            Some(Trespass::Memory {
+            Some(LimitHit::Memory {
                 peak_bytes: Some(7),
             })
         };

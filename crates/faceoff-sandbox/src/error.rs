@@ -1,6 +1,6 @@
 use crate::Layer;
 use faceoff_types::AgentFaultKind;
-use std::io;
+use std::{fmt, io};
 
 /// Our fault: the sandbox could not be set up or observed.
 #[derive(Debug, thiserror::Error)]
@@ -38,6 +38,17 @@ impl SandboxError {
             what: what.into(),
             source: io::Error::other(why.into()),
         }
+    }
+}
+
+/// Says of an I/O error what was being done: lower-case, without the reason.
+pub(crate) trait IoContext<T> {
+    fn context(self, what: impl fmt::Display) -> Result<T, SandboxError>;
+}
+
+impl<T, E: Into<io::Error>> IoContext<T> for Result<T, E> {
+    fn context(self, what: impl fmt::Display) -> Result<T, SandboxError> {
+        self.map_err(|source| SandboxError::io(what.to_string(), source))
     }
 }
 

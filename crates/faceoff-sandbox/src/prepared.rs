@@ -7,6 +7,7 @@ use crate::{
     bubblewrap::{Bubblewrap, environment},
     cgroup::AgentCgroup,
     child_setup::{ChildSetup, StepReport, rlimits},
+    error::IoContext,
     line_pipe::LinePipe,
     owner::Owner,
     process_tree::ProcessTree,
@@ -76,12 +77,11 @@ impl Prepared {
             ..ChildSetup::default()
         };
         if enforces(Layer::Namespaces) {
-            let failed = |source| SandboxError::io("cannot make a pipe", source);
-            let (status, writer) = StatusPipe::new().map_err(failed)?;
+            let (status, writer) = StatusPipe::new().context("cannot make a pipe")?;
             let invocation =
                 Bubblewrap::find()?.command(spec, writer, filters.as_ref(), user.is_some())?;
             setup.inherit = invocation.inherit;
-            setup.stage = invocation.stage;
+            setup.mounts = invocation.mounts;
             let command = invocation.command;
             return Ok(Self {
                 command,
@@ -141,24 +141,20 @@ impl Prepared {
             .stderr(Stdio::piped())
             .process_group(0);
         let sandboxed = status.is_some();
-        let report = setup
-            .install(&mut command)
-            .map_err(|source| SandboxError::io("cannot make a pipe", source))?;
+        let report = setup.install(&mut command).context("cannot make a pipe")?;
         let mut child = match spawner::spawn(command) {
             Ok(child) => child,
             Err(source) => return Err(start_failure(report, source, sandboxed, spec)),
         };
         let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
-        let failed = |source| SandboxError::io("cannot watch the agent", source);
-        let mut tree = ProcessTree::new(child, status, cgroup, scratch).map_err(failed)?;
+        const WATCH: &str = "cannot watch the agent";
+        let mut tree = ProcessTree::new(child, status, cgroup, scratch).context(WATCH)?;
         let (Some(stdin), Some(stdout), Some(stderr)) = pipes else {
-            return Err(
-                SandboxError::other("cannot watch the agent", "its pipes are missing").into(),
-            );
+            return Err(SandboxError::other(WATCH, "its pipes are missing").into());
         };
-        let lines = LinePipe::new(stdin.into(), stdout.into()).map_err(failed)?;
+        let lines = LinePipe::new(stdin.into(), stdout.into()).context(WATCH)?;
         let mut stderr =
-            StderrTail::drain(stderr.into(), spec.limits.stderr_tail_bytes).map_err(failed)?;
+            StderrTail::drain(stderr.into(), spec.limits.stderr_tail_bytes).context(WATCH)?;
         if let Some(status) = &mut tree.status {
             match status.wait_for_child(Instant::now() + SET_UP_PATIENCE)? {
                 Some(init) => tree.watch_init(init),
@@ -203,8 +199,7 @@ fn direct_command(spec: &SpawnSpec) -> Command {
 /// not look like a mistake of the bundle's.
 fn check_reachable(bundle_dir: &Path) -> Result<(), SandboxError> {
     for folder in bundle_dir.ancestors() {
-        let meta = fs::metadata(folder)
-            .map_err(|source| SandboxError::io("cannot look at the bundle", source))?;
+        let meta = fs::metadata(folder).context("cannot look at the bundle")?;
         if meta.permissions().mode() & 0o001 == 0 {
             return Err(SandboxError::Unavailable {
                 layer: Layer::Namespaces,
@@ -221,13 +216,13 @@ fn check_reachable(bundle_dir: &Path) -> Result<(), SandboxError> {
 }
 
 fn scratch_folder(user: Option<AgentUser>) -> Result<tempfile::TempDir, SandboxError> {
-    let failed = |source| SandboxError::io("cannot make a scratch folder", source);
+    const MAKE: &str = "cannot make a scratch folder";
     let folder = tempfile::Builder::new()
         .prefix(&Owner::this_process().name(SCRATCH_PREFIX))
         .tempdir()
-        .map_err(failed)?;
+        .context(MAKE)?;
     if let Some(user) = user {
-        std::os::unix::fs::chown(folder.path(), Some(user.id), Some(user.id)).map_err(failed)?;
+        std::os::unix::fs::chown(folder.path(), Some(user.id), Some(user.id)).context(MAKE)?;
     }
     Ok(folder)
 }

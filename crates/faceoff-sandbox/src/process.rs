@@ -3,6 +3,7 @@ use crate::{
     cgroup::AgentCgroup,
     command_check::check_command,
     end::{End, Evidence},
+    error::IoContext,
     line_pipe::{LinePipe, Written, wait_for_any},
     next_look::NextLook,
     output_holders,
@@ -61,12 +62,10 @@ impl AgentProcess {
                 sweep::sweep_stale();
             });
         }
-        let bundle_dir = fs::canonicalize(&spec.bundle_dir).map_err(|source| {
-            SandboxError::io(
-                format!("cannot find the bundle {}", spec.bundle_dir.display()),
-                source,
-            )
-        })?;
+        let bundle_dir = fs::canonicalize(&spec.bundle_dir).context(format_args!(
+            "cannot find the bundle {}",
+            spec.bundle_dir.display()
+        ))?;
         check_command(&bundle_dir, &spec.command, &spec.env).map_err(SpawnError::Agent)?;
         let spec = SpawnSpec {
             bundle_dir,
@@ -122,7 +121,7 @@ impl AgentProcess {
             let outcome = self
                 .lines
                 .read_line(max_bytes, until)
-                .map_err(|source| SandboxError::io("cannot read from the agent", source))?;
+                .context("cannot read from the agent")?;
             if !matches!(outcome, ReadLine::TimedOut) || until == deadline {
                 break outcome;
             }
@@ -154,8 +153,7 @@ impl AgentProcess {
             .iter()
             .map(|agent| PollFd::from_borrowed_fd(agent.lines.output(), PollFlags::IN))
             .collect();
-        wait_for_any(&mut outputs, until)
-            .map_err(|source| SandboxError::io("cannot wait for the agents' output", source))?;
+        wait_for_any(&mut outputs, until).context("cannot wait for the agents' output")?;
         Ok(())
     }
 
@@ -175,7 +173,7 @@ impl AgentProcess {
     pub fn has_pending_output(&mut self) -> Result<bool, SandboxError> {
         self.lines
             .has_pending_output()
-            .map_err(|source| SandboxError::io("cannot look at the agent's output", source))
+            .context("cannot look at the agent's output")
     }
 
     /// Why it ended, if it ends by itself within `wait`: exit, signal, or the limit that ended it.
@@ -247,8 +245,7 @@ impl AgentProcess {
             return Ok(false);
         }
         let pending = self.lines.has_pending_output();
-        Ok(!pending
-            .map_err(|source| SandboxError::io("cannot look at the agent's output", source))?)
+        Ok(!pending.context("cannot look at the agent's output")?)
     }
 
     /// After a closed pipe: was it the sandbox that failed?
@@ -272,7 +269,7 @@ impl AgentProcess {
             let evidence = Evidence {
                 status,
                 sandboxed: self.tree.status.as_mut().map(StatusPipe::exit_code),
-                trespass: self.tree.cgroup.as_ref().and_then(AgentCgroup::trespass),
+                limit_hit: self.tree.cgroup.as_ref().and_then(AgentCgroup::limit_hit),
                 stderr: &self.stderr.text(),
                 limits: &self.limits,
             };

@@ -1,4 +1,4 @@
-use crate::SandboxError;
+use crate::{SandboxError, error::IoContext};
 use serde::{Deserialize, Serialize};
 use std::{
     fs,
@@ -125,23 +125,23 @@ impl PythonLayout {
             print(sys.prefix)\n\
             print(sysconfig.get_path('stdlib'))\n\
             for p in dict.fromkeys(site.getsitepackages() + [sysconfig.get_path('platstdlib')]): print(p)";
-        let what = || format!("cannot ask {} for its layout", interpreter.display());
+        let what = format!("cannot ask {} for its layout", interpreter.display());
         let answer = Command::new(interpreter)
             .args(["-I", "-c", QUESTION])
             .env_clear()
             .stdin(Stdio::null())
             .stderr(Stdio::null())
             .output()
-            .map_err(|source| SandboxError::io(what(), source))?;
+            .context(&what)?;
         if !answer.status.success() {
-            return Err(SandboxError::other(what(), answer.status.to_string()));
+            return Err(SandboxError::other(what, answer.status.to_string()));
         }
         let text = String::from_utf8_lossy(&answer.stdout);
         let mut lines = text.lines().map(PathBuf::from);
         let mut next = || {
             lines
                 .next()
-                .ok_or_else(|| SandboxError::other(what(), "its answer is too short"))
+                .ok_or_else(|| SandboxError::other(&what, "its answer is too short"))
         };
         Ok(Self {
             executable: next()?,

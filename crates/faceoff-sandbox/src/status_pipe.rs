@@ -1,6 +1,6 @@
 //! What bubblewrap tells about its child: its pid when it exists, its exit code when it has ended.
 
-use crate::{SandboxError, line_pipe::wait_for};
+use crate::{SandboxError, error::IoContext, line_pipe::wait_for};
 use rustix::{
     event::PollFlags,
     io::{Errno, ioctl_fionbio, read},
@@ -52,16 +52,14 @@ impl StatusPipe {
             if self.closed {
                 return Ok(None);
             }
-            let ready = wait_for(self.pipe.as_fd(), PollFlags::IN, deadline)
-                .map_err(|source| SandboxError::io(WHAT, source))?;
+            let ready = wait_for(self.pipe.as_fd(), PollFlags::IN, deadline).context(WHAT)?;
             if !ready {
                 return Err(SandboxError::other(
                     WHAT,
                     "it did not set up the sandbox in time",
                 ));
             }
-            self.fill()
-                .map_err(|source| SandboxError::io(WHAT, source))?;
+            self.fill().context(WHAT)?;
         }
     }
 

@@ -27,21 +27,11 @@ pub struct Played<'a> {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum NotPaired {
     /// Other rules.
-    #[error("ruleset: the first evaluation was scored by {a}, the second by {b}")]
-    Ruleset {
-        /// Of the first.
-        a: String,
-        /// Of the second.
-        b: String,
-    },
+    #[error("ruleset: the first evaluation was scored by {0}, the second by {1}")]
+    Ruleset(String, String),
     /// Other perturbations.
-    #[error("profile: the first evaluation played {a}, the second {b}")]
-    Profile {
-        /// Of the first.
-        a: Profile,
-        /// Of the second.
-        b: Profile,
-    },
+    #[error("profile: the first evaluation played {0}, the second {1}")]
+    Profile(Profile, Profile),
     /// Other draws.
     #[error("seed: the two evaluations have different seeds (another day, season or --seed)")]
     Seed,
@@ -55,15 +45,8 @@ pub enum NotPaired {
     #[error("tasks: only one of the two evaluations played {0}")]
     Tasks(Task),
     /// Not equally many.
-    #[error("episodes: the first evaluation played {a} of {task}, the second {b}")]
-    Episodes {
-        /// The task.
-        task: Task,
-        /// Of the first.
-        a: u32,
-        /// Of the second.
-        b: u32,
-    },
+    #[error("episodes: the first evaluation played {1} of {0}, the second {2}")]
+    Episodes(Task, u32, u32),
 }
 
 impl NotPaired {
@@ -71,12 +54,12 @@ impl NotPaired {
     #[must_use]
     pub const fn field(&self) -> &'static str {
         match self {
-            Self::Ruleset { .. } => "ruleset",
-            Self::Profile { .. } => "profile",
+            Self::Ruleset(..) => "ruleset",
+            Self::Profile(..) => "profile",
             Self::Seed => "seed",
             Self::MismatchSeed => "mismatch_seed",
             Self::Tasks(_) => "tasks",
-            Self::Episodes { .. } => "episodes",
+            Self::Episodes(..) => "episodes",
         }
     }
 }
@@ -191,7 +174,7 @@ impl Played<'_> {
                 tallies.retain(|any, _| of_interest(any));
                 overall_p_value(&tallies) <= SIGNIFICANCE
             }
-            Err(NotPaired::Seed | NotPaired::Episodes { .. }) => {
+            Err(NotPaired::Seed | NotPaired::Episodes(..)) => {
                 let differences = self.summary.tasks.iter().filter_map(|(any, mine)| {
                     let theirs = other.summary.tasks.get(any)?;
                     let counts =
@@ -214,16 +197,13 @@ impl Played<'_> {
 
     fn tallies(&self, other: &Self) -> Result<BTreeMap<Task, PairedTally>, NotPaired> {
         if self.ruleset != other.ruleset {
-            return Err(NotPaired::Ruleset {
-                a: self.ruleset.to_owned(),
-                b: other.ruleset.to_owned(),
-            });
+            return Err(NotPaired::Ruleset(
+                self.ruleset.to_owned(),
+                other.ruleset.to_owned(),
+            ));
         }
         if self.profile != other.profile {
-            return Err(NotPaired::Profile {
-                a: self.profile,
-                b: other.profile,
-            });
+            return Err(NotPaired::Profile(self.profile, other.profile));
         }
         if self.mismatch_seed != other.mismatch_seed {
             return Err(NotPaired::MismatchSeed);
@@ -243,11 +223,7 @@ impl Played<'_> {
             .map(|((task, a), b)| {
                 let (a, b) = (&a.successes, &b.successes);
                 if a.episodes() != b.episodes() {
-                    return Err(NotPaired::Episodes {
-                        task: *task,
-                        a: a.episodes(),
-                        b: b.episodes(),
-                    });
+                    return Err(NotPaired::Episodes(*task, a.episodes(), b.episodes()));
                 }
                 let both = a.in_common(b);
                 let (only_a, only_b) = (a.count() - both, b.count() - both);

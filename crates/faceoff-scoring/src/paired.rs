@@ -23,29 +23,14 @@ pub struct PairedTally {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PairingError {
     /// An episode occurs twice in one list.
-    #[error("{task} episode {episode} occurs twice")]
-    Repeated {
-        /// The task.
-        task: Task,
-        /// The episode.
-        episode: u32,
-    },
+    #[error("{0} episode {1} occurs twice")]
+    Repeated(Task, u32),
     /// Episodes are numbered without gaps.
-    #[error("{task} episode {episode} is missing")]
-    Missing {
-        /// The task.
-        task: Task,
-        /// The episode.
-        episode: u32,
-    },
+    #[error("{0} episode {1} is missing")]
+    Missing(Task, u32),
     /// An episode that only one of the two played.
-    #[error("{task} episode {episode} was played by one of the two teams only")]
-    Unpaired {
-        /// The task.
-        task: Task,
-        /// The episode.
-        episode: u32,
-    },
+    #[error("{0} episode {1} was played by one of the two teams only")]
+    Unpaired(Task, u32),
 }
 
 impl PairedTally {
@@ -63,7 +48,7 @@ impl PairedTally {
         for ((task, episode), a_succeeded) in a {
             let b_succeeded = b
                 .remove(&(task, episode))
-                .ok_or(PairingError::Unpaired { task, episode })?;
+                .ok_or(PairingError::Unpaired(task, episode))?;
             *match (a_succeeded, b_succeeded) {
                 (true, true) => &mut tally.both,
                 (true, false) => &mut tally.only_a,
@@ -72,7 +57,7 @@ impl PairedTally {
             } += 1;
         }
         match b.into_keys().next() {
-            Some((task, episode)) => Err(PairingError::Unpaired { task, episode }),
+            Some((task, episode)) => Err(PairingError::Unpaired(task, episode)),
             None => Ok(tally),
         }
     }
@@ -98,7 +83,7 @@ fn by_episode(outcomes: &[EpisodeOutcome]) -> Result<BTreeMap<(Task, u32), bool>
         let (task, episode) = (outcome.task, outcome.episode);
         let succeeded = outcome.success && !has_fault(outcome);
         if episodes.insert((task, episode), succeeded).is_some() {
-            return Err(PairingError::Repeated { task, episode });
+            return Err(PairingError::Repeated(task, episode));
         }
     }
     Ok(episodes)

@@ -46,15 +46,13 @@ impl EpisodeSummary {
         for (task, episodes) in &mut by_task {
             episodes.sort_unstable_by_key(|outcome| outcome.episode);
             for (expected, outcome) in (0..).zip(episodes.iter()) {
-                let (task, episode) = (*task, expected);
                 match outcome.episode.cmp(&expected) {
                     std::cmp::Ordering::Equal => {}
                     std::cmp::Ordering::Greater => {
-                        return Err(PairingError::Missing { task, episode });
+                        return Err(PairingError::Missing(*task, expected));
                     }
                     std::cmp::Ordering::Less => {
-                        let episode = outcome.episode;
-                        return Err(PairingError::Repeated { task, episode });
+                        return Err(PairingError::Repeated(*task, outcome.episode));
                     }
                 }
             }

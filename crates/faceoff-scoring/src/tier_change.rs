@@ -29,11 +29,11 @@ impl TierChange {
     /// evaluation always gives the same numbers, whatever the machine, the time or the order of play.
     pub(crate) fn of(points: BTreeMap<Task, Vec<f64>>) -> Self {
         let mut key = blake3::Hasher::new_derive_key(STREAM);
-        let tasks: BTreeMap<Task, Played> = points
+        let tasks: BTreeMap<Task, TaskPoints> = points
             .into_iter()
             .filter(|(_, points)| !points.is_empty())
             .map(|(task, points)| {
-                let played = Played::new(&points);
+                let played = TaskPoints::new(&points);
                 key.update(task.as_str().as_bytes());
                 key.update(&u64::from(played.episodes).to_le_bytes());
                 key.update(&played.halves);
@@ -74,14 +74,14 @@ impl TierChange {
 }
 
 /// The episodes of a task.
-struct Played {
+struct TaskPoints {
     /// Half points of each episode, ascending.
     halves: Vec<u8>,
     episodes: u32,
     tier: Tier,
 }
 
-impl Played {
+impl TaskPoints {
     fn new(points: &[f64]) -> Self {
         let mut halves: Vec<u8> = points
             .iter()

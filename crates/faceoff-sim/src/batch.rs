@@ -5,8 +5,8 @@
 //! rayon's current pool, so that a caller chooses their number with `ThreadPool::install`.
 
 use crate::{
+    channel::observation::OBSERVATION_WITH_OPPONENT_LEN,
     episode::{Episode, StepOutcome},
-    link::observation::OBSERVATION_WITH_OPPONENT_LEN,
     perturbation::settings::PerturbationSettings,
     robot::plant::Plant,
 };
@@ -154,7 +154,7 @@ impl BatchSetup {
     }
 
     fn observation_len(&self) -> usize {
-        crate::link::observation::len(self.task)
+        crate::channel::observation::len(self.task)
     }
 }
 

@@ -16,10 +16,10 @@
 )]
 
 pub mod batch;
+pub mod channel;
 pub mod dynamics;
 pub mod episode;
 pub mod game;
-pub mod link;
 pub mod model;
 pub mod perturbation;
 pub mod robot;
@@ -28,15 +28,15 @@ pub mod table;
 pub mod world;
 
 pub use batch::{Batch, BatchOutcome, BatchSetup};
+pub use channel::Command;
 pub use episode::{
     EPISODE_STEPS, Episode, EpisodeState, StepOutcome,
     constraints::ConstraintValues,
     env_info::{EnvInfo, env_info, env_info_for},
 };
-pub use game::{GAME_STEPS, Game, GameSetup, GameStep, WINDOW_STEPS, referee::RallyEnd};
+pub use game::{Game, GameSetup, GameStep, referee::RallyEnd};
 // Actions and joint states are in terms of these.
 pub use faceoff_types::{Interpolation, JOINTS, SUBSTEPS};
-pub use link::Command;
 pub use perturbation::settings::PerturbationSettings;
 pub use robot::plant::Plant;
 pub use world::{MalletState, World};

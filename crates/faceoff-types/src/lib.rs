@@ -31,7 +31,7 @@ pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, Unknown
 pub use outcome::{EpisodeEnd, EpisodeOutcome};
 pub use profile::{Factor, Factors, ParseProfileError, Profile};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult, ViolationCounts};
-pub use ruleset::RULESET;
+pub use ruleset::{FOULS_PER_POINT, GAME_WINDOWS, RULESET, WINDOW_STEPS};
 pub use seed::{ParseSeedError, Seed};
 pub use task::{ParseTaskError, Task};
 pub use team_name::{InvalidTeamName, TeamName};

@@ -48,9 +48,9 @@ pub struct SimulatorId {
 /// Size and hash of a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FileDigest {
-    /// Its size.
+    /// Length in bytes.
     pub bytes: u64,
-    /// Its BLAKE3 hash, 64 hexadecimal digits.
+    /// 64 hexadecimal digits.
     pub blake3: String,
 }
 
@@ -81,7 +81,7 @@ pub struct TaskViolations {
 /// A constraint broken in one episode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ConstraintViolation {
-    /// The episode.
+    /// Index within the evaluation, from 0.
     pub episode: u32,
     /// The first control step at which it was broken.
     pub first_step: u32,
@@ -94,13 +94,13 @@ pub struct ConstraintViolation {
 /// An episode with penalty points for computation time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SlowEpisode {
-    /// The episode.
+    /// Index within the evaluation, from 0.
     pub episode: u32,
-    /// Mean computation time in seconds.
+    /// Over the answered steps, in seconds.
     pub mean_s: f64,
-    /// Maximum computation time in seconds.
+    /// The slowest answer, in seconds.
     pub max_s: f64,
-    /// The points.
+    /// What they cost: 0.5, 1 or 2.
     pub points: f64,
 }
 
@@ -127,7 +127,7 @@ impl CalibrationFile {
 pub struct ShardCalibration {
     /// The task.
     pub task: Task,
-    /// The first episode.
+    /// Index within the evaluation, from 0.
     pub first_episode: u32,
     /// One past the last episode.
     pub end_episode: u32,

@@ -119,13 +119,13 @@ pub struct Env {
     pub joint_vel_ids: Vec<usize>,
     /// Where the opponent's end effector is in an observation; empty without an opponent.
     pub opponent_ee_ids: Vec<usize>,
-    /// The table.
+    /// Playing surface and goal mouths.
     pub table: TableEnv,
-    /// The puck.
+    /// Mass and friction are not told.
     pub puck: DiscEnv,
-    /// The mallet.
+    /// The striking cylinder.
     pub mallet: DiscEnv,
-    /// The robot.
+    /// Always the nominal one, whatever the profile does to the plant.
     pub robot: RobotEnv,
     /// Control steps after which an episode ends at the latest.
     pub episode_steps: u32,
@@ -147,7 +147,7 @@ pub struct TableEnv {
 /// A round body on the table.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DiscEnv {
-    /// Its radius in metres.
+    /// In metres.
     pub radius: f64,
 }
 
@@ -172,7 +172,6 @@ pub struct RobotEnv {
     pub base_frame: Vec<[[f64; 4]; 4]>,
 }
 
-/// Index ranges of an observation, as `env` names them.
 impl Env {
     /// Indices of the puck's x, y, yaw.
     pub const PUCK_POS_IDS: [usize; 3] = [0, 1, 2];

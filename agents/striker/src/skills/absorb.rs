@@ -4,7 +4,7 @@
 //! with hardly any speed at all. A fast puck is met where the mallet can be in time with the least
 //! effort; a slow one is overtaken, around it if need be, and met as soon as possible.
 
-use super::{Order, Scene, around};
+use super::scene::{Order, Scene, around};
 use crate::arm::Posture;
 use crate::field::Vec2;
 use crate::motion::{Pace, Target};

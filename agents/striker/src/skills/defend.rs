@@ -4,7 +4,7 @@
 //! mallet keeps out of its way.
 
 use super::absorb::Absorb;
-use super::{Order, Scene};
+use super::scene::{Order, Scene};
 use crate::field::{Field, Vec2};
 use crate::motion::Pace;
 use crate::puck::{DRAG, Puck};

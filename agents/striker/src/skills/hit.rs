@@ -7,7 +7,8 @@
 
 mod plan;
 
-use super::{Order, Prepare, Scene, around, lean};
+use super::Prepare;
+use super::scene::{Order, Scene, around, lean};
 use crate::arm::Posture;
 use crate::field::Vec2;
 use crate::motion::{Pace, Target};

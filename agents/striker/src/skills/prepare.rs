@@ -8,7 +8,7 @@
 mod strike;
 
 use super::absorb::Absorb;
-use super::{Order, Scene, around};
+use super::scene::{Order, Scene, around};
 use crate::arm::Posture;
 use crate::field::Vec2;
 use crate::motion::{Pace, Target};

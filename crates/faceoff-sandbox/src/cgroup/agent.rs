@@ -2,18 +2,16 @@
 
 use super::{
     files,
-    hierarchy::{Home, Version},
+    hierarchy::{Hierarchies, Home, Version},
+    leaf::{leaf_name, remove_leaf},
 };
-use crate::{Isolation, Layer, Limits, SandboxError, affinity::cpu_list, owner::Owner};
-use rustix::process::{Pid, Signal, kill_process};
+use crate::{Isolation, Layer, Limits, SandboxError, affinity::cpu_list, error::IoContext};
+use rustix::process::Pid;
 use std::{
-    collections::BTreeMap,
     fs::{self, File},
     io,
     os::{fd::OwnedFd, unix::fs::FileExt},
     path::{Path, PathBuf},
-    sync::atomic::{AtomicU64, Ordering},
-    time::{Duration, Instant},
 };
 
 /// Over which the CPU quota is enforced: the longest that an agent over its quota is held up is this,
@@ -23,12 +21,10 @@ const CPU_PERIOD_US: u64 = 10_000;
 const PEAK_SLACK_BYTES: u64 = 1 << 20;
 /// bubblewrap's own process is in the agent's cgroup.
 const OUR_PROCESSES: u64 = 1;
-pub(super) const LEAF_PREFIX: &str = "agent-";
-static NEXT: AtomicU64 = AtomicU64::new(0);
 
 /// A limit that the tree ran into, as the kernel counted it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Trespass {
+pub(crate) enum LimitHit {
     /// The kernel killed for want of memory.
     Memory { peak_bytes: Option<u64> },
     /// Processes or threads were refused this often.
@@ -231,9 +227,7 @@ impl AgentCgroup {
                     .write(true)
                     .open(&path)
                     .map(OwnedFd::from)
-                    .map_err(|source| {
-                        SandboxError::io(format!("cannot open {}", path.display()), source)
-                    })
+                    .context(format_args!("cannot open {}", path.display()))
             })
             .collect()
     }
@@ -266,7 +260,7 @@ impl AgentCgroup {
 
     /// The limit that the tree ran into, memory first. A kill because the whole host ran out of memory
     /// is not the tree's doing: its own limit must have been hit as well.
-    pub(crate) fn trespass(&self) -> Option<Trespass> {
+    pub(crate) fn limit_hit(&self) -> Option<LimitHit> {
         if let Some((version, leaf)) = &self.memory {
             let killed_and_full = match version {
                 Version::V1 => {
@@ -284,13 +278,13 @@ impl AgentCgroup {
                 }
             };
             if killed_and_full {
-                return Some(Trespass::Memory {
+                return Some(LimitHit::Memory {
                     peak_bytes: self.peak_memory_bytes(),
                 });
             }
         }
         let refused = files::read_keyed(&self.pids.as_ref()?.join("pids.events"), "max")?;
-        (refused > 0).then_some(Trespass::Pids { refused })
+        (refused > 0).then_some(LimitHit::Pids { refused })
     }
 
     /// Every process in it, bubblewrap's own included.
@@ -315,73 +309,5 @@ impl AgentCgroup {
 impl Drop for AgentCgroup {
     fn drop(&mut self) {
         self.remove();
-    }
-}
-
-/// Kills the processes of `leaf`, waits for their end and removes it, and the folder above it with the
-/// last one. What cannot be removed is logged and left for the next start's sweep.
-pub(super) fn remove_leaf(leaf: &Path) {
-    /// The kernel lets go of a dead process's cgroup a moment after its parent has seen it end.
-    const PATIENCE: Duration = Duration::from_secs(5);
-    let deadline = Instant::now() + PATIENCE;
-    loop {
-        kill_all(leaf);
-        match fs::remove_dir(leaf) {
-            Ok(()) => break,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => break,
-            Err(error) if Instant::now() >= deadline => {
-                tracing::error!(cgroup = %leaf.display(), %error, "an agent's cgroup could not be removed");
-                return;
-            }
-            Err(_) => std::thread::sleep(Duration::from_millis(1)),
-        }
-    }
-    if let Some(folder) = leaf.parent() {
-        // Fails while other agents are in it, as it should.
-        let _ = fs::remove_dir(folder);
-    }
-}
-
-fn kill_all(leaf: &Path) {
-    if fs::write(leaf.join("cgroup.kill"), "1").is_ok() {
-        return;
-    }
-    for pid in files::processes(leaf).into_iter().filter_map(Pid::from_raw) {
-        let _ = kill_process(pid, Signal::KILL);
-    }
-}
-
-/// `agent-<pid>-<start time>-<namespace>-<number>`: whose it is can be told after that service has died.
-fn leaf_name() -> String {
-    let number = NEXT.fetch_add(1, Ordering::Relaxed);
-    format!("{}{number}", Owner::this_process().name(LEAF_PREFIX))
-}
-
-/// The host's hierarchies, read once per agent.
-pub(super) struct Hierarchies {
-    mountinfo: String,
-    own: String,
-    found: std::cell::RefCell<BTreeMap<String, Option<Home>>>,
-}
-
-impl Hierarchies {
-    pub(super) fn read() -> Result<Self, SandboxError> {
-        let read = |path: &str| {
-            fs::read_to_string(path)
-                .map_err(|source| SandboxError::io(format!("cannot read {path}"), source))
-        };
-        Ok(Self {
-            mountinfo: read("/proc/self/mountinfo")?,
-            own: read("/proc/self/cgroup")?,
-            found: std::cell::RefCell::default(),
-        })
-    }
-
-    pub(super) fn find(&self, controller: &str) -> Option<Home> {
-        let mut found = self.found.borrow_mut();
-        found
-            .entry(controller.to_owned())
-            .or_insert_with(|| Home::find(controller, &self.mountinfo, &self.own))
-            .clone()
     }
 }

@@ -1,6 +1,6 @@
 //! Small reads and writes of cgroup files.
 
-use crate::SandboxError;
+use crate::{SandboxError, error::IoContext};
 use std::{fs, io, path::Path};
 
 pub(super) fn read(path: &Path) -> io::Result<String> {
@@ -25,12 +25,7 @@ pub(super) fn read_keyed(path: &Path, key: &str) -> Option<u64> {
 }
 
 pub(super) fn write(path: &Path, value: &str) -> Result<(), SandboxError> {
-    fs::write(path, value).map_err(|source| {
-        SandboxError::io(
-            format!("cannot write {value:?} to {}", path.display()),
-            source,
-        )
-    })
+    fs::write(path, value).context(format_args!("cannot write {value:?} to {}", path.display()))
 }
 
 /// The processes directly in the cgroup `dir`.

@@ -1,7 +1,10 @@
 //! Where on this host each controller is, and where in it the service may make cgroups.
 
 use super::files;
+use crate::{SandboxError, error::IoContext};
 use std::{
+    cell::RefCell,
+    collections::BTreeMap,
     fs, io,
     path::{Path, PathBuf},
 };
@@ -130,6 +133,33 @@ impl Home {
             }
             result => result,
         }
+    }
+}
+
+/// The host's hierarchies, read once per agent.
+pub(super) struct Hierarchies {
+    mountinfo: String,
+    own: String,
+    found: RefCell<BTreeMap<String, Option<Home>>>,
+}
+
+impl Hierarchies {
+    pub(super) fn read() -> Result<Self, SandboxError> {
+        let read =
+            |path: &str| fs::read_to_string(path).context(format_args!("cannot read {path}"));
+        Ok(Self {
+            mountinfo: read("/proc/self/mountinfo")?,
+            own: read("/proc/self/cgroup")?,
+            found: RefCell::default(),
+        })
+    }
+
+    pub(super) fn find(&self, controller: &str) -> Option<Home> {
+        let mut found = self.found.borrow_mut();
+        found
+            .entry(controller.to_owned())
+            .or_insert_with(|| Home::find(controller, &self.mountinfo, &self.own))
+            .clone()
     }
 }
 

@@ -7,7 +7,8 @@
 mod agent;
 mod files;
 mod hierarchy;
+mod leaf;
 mod stale;
 
-pub(crate) use agent::{AgentCgroup, Trespass};
+pub(crate) use agent::{AgentCgroup, LimitHit};
 pub(crate) use stale::sweep;

@@ -1,8 +1,8 @@
 //! Cgroups that a killed service left behind.
 
 use super::{
-    agent::{Hierarchies, LEAF_PREFIX, remove_leaf},
-    hierarchy::FOLDER,
+    hierarchy::{FOLDER, Hierarchies},
+    leaf::{LEAF_PREFIX, remove_leaf},
 };
 use crate::owner::Owner;
 use std::{collections::BTreeSet, fs, path::PathBuf};

@@ -1,6 +1,6 @@
-use super::rules::{FOULS_PER_POINT, GAME_WINDOWS, Side, WINDOW_STEPS, final_score, winner};
+use super::rules::{Side, final_score, winner};
 use crate::episode::MAX_EPISODE_PENALTY;
-use faceoff_types::TeamName;
+use faceoff_types::{FOULS_PER_POINT, GAME_WINDOWS, TeamName, WINDOW_STEPS};
 use serde::{Deserialize, Serialize};
 
 /// A played game, one entry of `games.json`. Pairs are `[home, away]`.
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// `fouls` nor `score`, and a `score` that contradicts goals and fouls.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(try_from = "RawGame")]
-pub struct Game {
+pub struct PlayedGame {
     raw: RawGame,
     score: [u32; 2],
 }
@@ -52,7 +52,7 @@ pub struct ScoredGame {
     pub winner: Option<TeamName>,
 }
 
-impl Game {
+impl PlayedGame {
     /// The highest round number: a tournament has a few rounds, and standings list them all.
     pub const MAX_ROUND: u32 = 100;
     /// The longest game, in windows.
@@ -111,7 +111,7 @@ impl Game {
     }
 }
 
-impl TryFrom<RawGame> for Game {
+impl TryFrom<RawGame> for PlayedGame {
     type Error = InvalidGame;
 
     fn try_from(mut raw: RawGame) -> Result<Self, InvalidGame> {
@@ -134,10 +134,10 @@ impl TryFrom<RawGame> for Game {
 impl RawGame {
     /// The final score, or what is wrong with the entry.
     fn check(&self) -> Result<[u32; 2], String> {
-        if !(1..=Game::MAX_ROUND).contains(&self.round) {
+        if !(1..=PlayedGame::MAX_ROUND).contains(&self.round) {
             return Err(format!(
                 "round: expected 1 to {}, got {}",
-                Game::MAX_ROUND,
+                PlayedGame::MAX_ROUND,
                 self.round
             ));
         }
@@ -145,10 +145,10 @@ impl RawGame {
             return Err("a team cannot play itself".to_owned());
         }
         let windows = self.windows.unwrap_or(GAME_WINDOWS);
-        if !(1..=Game::MAX_WINDOWS).contains(&windows) {
+        if !(1..=PlayedGame::MAX_WINDOWS).contains(&windows) {
             return Err(format!(
                 "windows: expected 1 to {}, got {windows}",
-                Game::MAX_WINDOWS
+                PlayedGame::MAX_WINDOWS
             ));
         }
         // Nothing can happen more often than once per control step.

@@ -7,9 +7,6 @@ mod game;
 mod rules;
 mod standings;
 
-pub use game::{Game, InvalidGame, ScoredGame};
-pub use rules::{
-    FOULS_PER_POINT, GAME_WINDOWS, POINTS_DRAW, POINTS_LOSS, POINTS_WIN, Side, WINDOW_STEPS,
-    final_score, winner,
-};
+pub use game::{InvalidGame, PlayedGame, ScoredGame};
+pub use rules::{POINTS_DRAW, POINTS_LOSS, POINTS_WIN, Side, final_score, winner};
 pub use standings::{RepeatedPairing, Standing, Tournament, score_tournament};

@@ -1,13 +1,7 @@
 use crate::tier_of;
-use faceoff_types::Tier;
+use faceoff_types::{FOULS_PER_POINT, Tier};
 use std::cmp::Ordering;
 
-/// Control steps of a window, the tournament's equivalent of an episode (paper §2.2).
-pub const WINDOW_STEPS: u32 = 500;
-/// Windows of a game: 45,000 control steps, 15 minutes (paper §2.2).
-pub const GAME_WINDOWS: u32 = 90;
-/// Every so many fouls of a team give its opponent one point (reference implementation).
-pub const FOULS_PER_POINT: u32 = 3;
 /// Points of a won game.
 pub const POINTS_WIN: u32 = 3;
 /// Points of a drawn game.
@@ -55,6 +49,7 @@ pub fn winner(score: [u32; 2], penalty_points: [f64; 2], windows: u32) -> Option
 mod tests {
     use super::*;
     use Side::{Away, Home};
+    use faceoff_types::GAME_WINDOWS;
 
     #[test]
     fn every_third_foul_is_a_point_for_the_opponent() {

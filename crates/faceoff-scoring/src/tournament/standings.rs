@@ -1,5 +1,5 @@
 use super::{
-    game::{Game, ScoredGame},
+    game::{PlayedGame, ScoredGame},
     rules::{POINTS_DRAW, POINTS_LOSS, POINTS_WIN, Side},
 };
 use faceoff_types::TeamName;
@@ -61,8 +61,8 @@ pub struct RepeatedPairing {
 /// more than once in a round counts each time and is reported in
 /// [`Tournament::repeated_pairings`].
 #[must_use]
-pub fn score_tournament(games: &[Game]) -> Tournament {
-    let rounds = games.iter().map(Game::round).max().unwrap_or(0) as usize;
+pub fn score_tournament(games: &[PlayedGame]) -> Tournament {
+    let rounds = games.iter().map(PlayedGame::round).max().unwrap_or(0) as usize;
     let mut teams = BTreeMap::<&TeamName, Standing>::new();
     for game in games {
         let winner = game.winner();
@@ -86,7 +86,7 @@ pub fn score_tournament(games: &[Game]) -> Tournament {
         standing.rank = rank;
     }
     Tournament {
-        games: games.iter().map(Game::scored).collect(),
+        games: games.iter().map(PlayedGame::scored).collect(),
         standings,
         repeated_pairings: repeated_pairings(games),
     }
@@ -108,7 +108,7 @@ impl Standing {
         }
     }
 
-    fn add(&mut self, game: &Game, side: Side, winner: Option<Side>) {
+    fn add(&mut self, game: &PlayedGame, side: Side, winner: Option<Side>) {
         let (own, other) = match side {
             Side::Home => (0, 1),
             Side::Away => (1, 0),
@@ -131,7 +131,7 @@ impl Standing {
     }
 }
 
-fn repeated_pairings(games: &[Game]) -> Vec<RepeatedPairing> {
+fn repeated_pairings(games: &[PlayedGame]) -> Vec<RepeatedPairing> {
     let mut meetings = BTreeMap::<(u32, [&TeamName; 2]), u32>::new();
     for game in games {
         let mut teams = game.teams();

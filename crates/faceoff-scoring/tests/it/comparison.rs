@@ -160,18 +160,12 @@ fn a_summary_needs_every_episode_once() {
     let first = outcomes.remove(2); // prepare 0
     assert_eq!(
         EpisodeSummary::of(&outcomes),
-        Err(PairingError::Missing {
-            task: Task::Prepare,
-            episode: 0
-        })
+        Err(PairingError::Missing(Task::Prepare, 0))
     );
     outcomes.extend([first.clone(), first]);
     assert_eq!(
         EpisodeSummary::of(&outcomes),
-        Err(PairingError::Repeated {
-            task: Task::Prepare,
-            episode: 0
-        })
+        Err(PairingError::Repeated(Task::Prepare, 0))
     );
     assert_eq!(summary(&[]).tier_change, 0.0);
 }

@@ -43,19 +43,13 @@ fn an_episode_lost_to_a_fault_is_no_success() {
 #[test]
 fn what_cannot_be_paired_is_refused() {
     let (short, long) = (outcomes(&[true; 3]), outcomes(&[true; 4]));
-    let unpaired = Err(PairingError::Unpaired {
-        task: Task::Hit,
-        episode: 3,
-    });
+    let unpaired = Err(PairingError::Unpaired(Task::Hit, 3));
     assert_eq!(PairedTally::of(&short, &long), unpaired);
     assert_eq!(PairedTally::of(&long, &short), unpaired);
     let twice = [short[1].clone(), short[1].clone()];
     assert_eq!(
         PairedTally::of(&short, &twice),
-        Err(PairingError::Repeated {
-            task: Task::Hit,
-            episode: 1
-        })
+        Err(PairingError::Repeated(Task::Hit, 1))
     );
     assert_eq!(PairedTally::of(&[], &[]).unwrap().p_value(), 1.0);
 }

@@ -1,5 +1,5 @@
 use crate::support::{read, rows};
-use faceoff_scoring::tournament::{Game, score_tournament};
+use faceoff_scoring::tournament::{PlayedGame, score_tournament};
 use serde_json::{Value, json};
 
 const GOLDEN: &str = include_str!(concat!(
@@ -11,7 +11,7 @@ fn golden() -> Value {
     serde_json::from_str(GOLDEN).unwrap()
 }
 
-fn games(golden: &Value) -> Vec<Game> {
+fn games(golden: &Value) -> Vec<PlayedGame> {
     let mut games = golden["games"].clone();
     for game in games.as_array_mut().unwrap() {
         game.as_object_mut().unwrap().remove("winner");

@@ -1,7 +1,7 @@
 use crate::support::{read, team};
 use faceoff_scoring::{
     QualifyingSheet,
-    tournament::{Game, score_tournament},
+    tournament::{PlayedGame, score_tournament},
 };
 use serde_json::{Value, json};
 
@@ -101,7 +101,7 @@ fn teams_and_tasks_occur_once_and_are_known() {
 #[test]
 fn an_empty_sheet_is_an_empty_board() {
     assert_eq!(read::<QualifyingSheet>("{}").unwrap().board(), []);
-    let nothing = score_tournament(&read::<Vec<Game>>("[]").unwrap());
+    let nothing = score_tournament(&read::<Vec<PlayedGame>>("[]").unwrap());
     assert_eq!(
         serde_json::to_value(&nothing).unwrap(),
         json!({"games": [], "standings": []})
@@ -155,7 +155,7 @@ fn game(changes: Value) -> String {
 
 #[test]
 fn the_score_follows_from_the_fouls() {
-    let scored = score_tournament(&read::<Vec<Game>>(&game(json!({}))).unwrap());
+    let scored = score_tournament(&read::<Vec<PlayedGame>>(&game(json!({}))).unwrap());
     assert_eq!(
         serde_json::to_value(&scored.games[0]).unwrap(),
         json!({
@@ -168,9 +168,9 @@ fn the_score_follows_from_the_fouls() {
         "goals, not points for fouls"
     );
     // Both may be given if they agree.
-    read::<Vec<Game>>(&game(json!({"score": [5, 3]}))).unwrap();
+    read::<Vec<PlayedGame>>(&game(json!({"score": [5, 3]}))).unwrap();
     // A shorter game has lower bounds: 100.5 over 60 windows is non-deployable.
-    let short = read::<Vec<Game>>(&game(json!({"windows": 60, "goals": [0, 9]}))).unwrap();
+    let short = read::<Vec<PlayedGame>>(&game(json!({"windows": 60, "goals": [0, 9]}))).unwrap();
     assert_eq!(
         score_tournament(&short).games[0].winner,
         Some(team("Alpha"))
@@ -220,7 +220,7 @@ fn games_that_cannot_have_been_are_refused() {
         ),
         (json!({"goals": null}), ["[0]", "missing field `goals`"]),
     ] {
-        let error = read::<Vec<Game>>(&game(changes)).unwrap_err();
+        let error = read::<Vec<PlayedGame>>(&game(changes)).unwrap_err();
         for word in words {
             assert!(error.contains(word), "{word:?} is not in: {error}");
         }
@@ -228,7 +228,7 @@ fn games_that_cannot_have_been_are_refused() {
 }
 
 fn standings(games: Value) -> Vec<String> {
-    let games: Vec<Game> = read(&games.to_string()).unwrap();
+    let games: Vec<PlayedGame> = read(&games.to_string()).unwrap();
     score_tournament(&games)
         .standings
         .iter()
@@ -273,7 +273,7 @@ fn a_pairing_that_occurs_twice_counts_twice_and_is_reported() {
         json!({"round": round, "home": home, "away": away, "goals": [1, 0], "fouls": [0, 0],
                "penalty_points": [0, 0]})
     };
-    let games: Vec<Game> =
+    let games: Vec<PlayedGame> =
         read(&json!([game(1, "A", "B"), game(1, "B", "A"), game(2, "A", "B")]).to_string())
             .unwrap();
     let tournament = score_tournament(&games);

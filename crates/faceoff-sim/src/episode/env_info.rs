@@ -2,7 +2,10 @@
 
 use crate::{
     model::{CONTROL_STEP_S, EE_DESIRED_HEIGHT_M, JOINTS, LINKS, TOOL},
-    table::geometry::{PUCK, TABLE},
+    table::{
+        frames::side,
+        geometry::{PUCK, TABLE},
+    },
 };
 use faceoff_types::Task;
 
@@ -55,7 +58,7 @@ pub fn env_info_for(robots: u32, own: usize) -> EnvInfo {
         [false, true].map(|upper| std::array::from_fn(|i| if upper { limit(i) } else { -limit(i) }))
     };
     let base_frame = |robot: usize| {
-        let side = if robot == 0 { 1.0 } else { -1.0 };
+        let side = side(robot);
         let (x, z) = (-side * TABLE.base_x_m, TABLE.base_z_m);
         [
             side, 0.0, 0.0, x, 0.0, side, 0.0, 0.0, 0.0, 0.0, 1.0, z, 0.0, 0.0, 0.0, 1.0,

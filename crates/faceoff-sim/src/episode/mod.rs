@@ -8,7 +8,7 @@ pub mod task;
 pub use task::EPISODE_STEPS;
 
 use crate::{
-    link::{Command, Link, observation},
+    channel::{AgentChannel, Command, observation},
     model::JOINTS,
     perturbation::{settings::PerturbationSettings, table_factors::TableFactors},
     robot::plant::Plant,
@@ -25,7 +25,7 @@ pub struct Episode {
     task: Task,
     world: World,
     opponent: Option<Opponent>,
-    link: Link,
+    channel: AgentChannel,
     table: TableFactors,
     steps: u32,
     violations: Violations,
@@ -64,7 +64,7 @@ impl Episode {
         let table = TableFactors::new(factors, settings, &seed, &mut world);
         Self {
             task,
-            link: Link::new(0, interpolation, factors, settings, &seed, &world),
+            channel: AgentChannel::new(0, interpolation, factors, settings, &seed, &world),
             world,
             opponent,
             table,
@@ -76,28 +76,19 @@ impl Episode {
     /// The observation that the agent gets: 23 numbers for `hit`, 20 otherwise (PROTOCOL).
     #[must_use]
     pub fn observation(&self) -> &[f64] {
-        &self.link.observation()[..observation::len(self.task)]
+        &self.channel.observation()[..observation::len(self.task)]
     }
 
     /// One control step. `action` is row-major, of length [`Interpolation::len`], finite. Must not
     /// be called after an end.
     pub fn step(&mut self, action: &[f64]) -> StepOutcome {
-        self.advance(Command::Act(action))
-    }
-
-    /// One control step in which no action came in time.
-    pub fn step_late(&mut self) -> StepOutcome {
-        self.advance(Command::Late)
-    }
-
-    fn advance(&mut self, command: Command<'_>) -> StepOutcome {
-        self.link.command(&mut self.world, command);
+        self.channel.command(&mut self.world, Command::Act(action));
         if let Some(opponent) = &mut self.opponent {
             self.world
                 .command(1, Interpolation::LinearBoth, &opponent.action());
         }
         let lost = self.table.control_step(&mut self.world);
-        self.link.look(&self.world, lost);
+        self.channel.look(&self.world, lost);
         self.steps += 1;
 
         let constraints = self.constraints();

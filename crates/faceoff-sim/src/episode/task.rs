@@ -20,7 +20,7 @@ pub const EPISODE_STEPS: u32 = 500;
 pub struct TaskRules {
     /// Range of x at the start of `hit`, m.
     pub hit_x_m: [f64; 2],
-    /// Largest speed at the start of `hit`, m/s.
+    /// Range of the speed at the start of `hit`, m/s.
     pub hit_speed_m_s: [f64; 2],
     /// Largest angle of the first velocity of `hit`, rad.
     pub hit_angle_rad: f64,
@@ -55,7 +55,7 @@ pub struct TaskRules {
 }
 
 /// The ruleset's numbers.
-pub const RULES: TaskRules = TaskRules {
+pub const TASK_RULES: TaskRules = TaskRules {
     hit_x_m: [-0.7, -0.2],
     hit_speed_m_s: [0.0, 0.5],
     hit_angle_rad: FRAC_PI_2 + 0.1,
@@ -93,23 +93,23 @@ pub fn initial_puck(task: Task, stream: &mut Stream) -> [f64; 6] {
     };
     match task {
         Task::Hit => moving(
-            between(RULES.hit_x_m, u[0]),
+            between(TASK_RULES.hit_x_m, u[0]),
             around(PLAYABLE_Y_M, u[1]),
-            between(RULES.hit_speed_m_s, u[2]),
-            around(RULES.hit_angle_rad, u[3]),
-            around(RULES.hit_yaw_rate_rad_s, u[4]),
+            between(TASK_RULES.hit_speed_m_s, u[2]),
+            around(TASK_RULES.hit_angle_rad, u[3]),
+            around(TASK_RULES.hit_yaw_rate_rad_s, u[4]),
         ),
         Task::Defend => moving(
-            between(RULES.defend_x_m, u[0]),
-            around(RULES.defend_y_m, u[1]),
-            between(RULES.defend_speed_m_s, u[2]),
-            around(RULES.defend_angle_rad, u[3]),
-            around(RULES.defend_yaw_rate_rad_s, u[4]),
+            between(TASK_RULES.defend_x_m, u[0]),
+            around(TASK_RULES.defend_y_m, u[1]),
+            between(TASK_RULES.defend_speed_m_s, u[2]),
+            around(TASK_RULES.defend_angle_rad, u[3]),
+            around(TASK_RULES.defend_yaw_rate_rad_s, u[4]),
         ),
         Task::Prepare => {
-            let side = (RULES.prepare_side_x_m, [PLAYABLE_Y_M, STRIP_Y_M]);
+            let side = (TASK_RULES.prepare_side_x_m, [PLAYABLE_Y_M, STRIP_Y_M]);
             let corner = (
-                RULES.prepare_corner_x_m,
+                TASK_RULES.prepare_corner_x_m,
                 [TABLE.goal_width_m / 2.0, STRIP_Y_M],
             );
             let area = |(x, y): ([f64; 2], [f64; 2])| (x[1] - x[0]) * (y[1] - y[0]);
@@ -144,16 +144,16 @@ fn end_on_table(task: Task, puck: &Puck) -> Option<EpisodeEnd> {
     // Written so that a state that is not a number ends the episode too.
     let on_table = x.abs() <= TABLE.half_length_m()
         && y.abs() <= TABLE.half_width_m()
-        && speed <= RULES.lost_speed_m_s;
+        && speed <= TASK_RULES.lost_speed_m_s;
     if !on_table {
         return Some(EpisodeEnd::LeftTable);
     }
     match task {
         Task::Hit if x > 0.0 && vx < 0.0 => Some(EpisodeEnd::CrossedMiddle),
         Task::Defend if x > 0.0 && vx > 0.0 => Some(EpisodeEnd::CrossedMiddle),
-        Task::Defend if speed < RULES.defend_stopped_m_s => Some(EpisodeEnd::Stopped),
+        Task::Defend if speed < TASK_RULES.defend_stopped_m_s => Some(EpisodeEnd::Stopped),
         Task::Prepare if x > 0.0 => Some(EpisodeEnd::CrossedMiddle),
-        Task::Prepare if y.abs() < RULES.prepare_axis_m => Some(EpisodeEnd::ReachedAxis),
+        Task::Prepare if y.abs() < TASK_RULES.prepare_axis_m => Some(EpisodeEnd::ReachedAxis),
         _ => None,
     }
 }
@@ -162,14 +162,14 @@ fn end_on_table(task: Task, puck: &Puck) -> Option<EpisodeEnd> {
 #[must_use]
 pub fn success(task: Task, puck: &Puck) -> bool {
     let [x, y, _] = puck.pose;
-    let in_place = RULES.success_x_m[0] < x
-        && x <= RULES.success_x_m[1]
-        && puck.velocity[0] < RULES.success_vx_m_s;
+    let in_place = TASK_RULES.success_x_m[0] < x
+        && x <= TASK_RULES.success_x_m[1]
+        && puck.velocity[0] < TASK_RULES.success_vx_m_s;
     match task {
         Task::Hit => {
             x > TABLE.half_length_m()
                 && y.abs() < TABLE.goal_width_m / 2.0
-                && puck.speed() >= RULES.hit_min_goal_speed_m_s
+                && puck.speed() >= TASK_RULES.hit_min_goal_speed_m_s
         }
         Task::Defend => in_place,
         Task::Prepare => in_place && y.abs() < PLAYABLE_Y_M,

@@ -3,21 +3,15 @@
 pub mod referee;
 
 use crate::{
+    channel::{AgentChannel, Command, observation::OBSERVATION_WITH_OPPONENT_LEN},
     episode::{constraints::ConstraintValues, task::PLAYABLE_Y_M},
-    link::{Command, Link, observation::OBSERVATION_WITH_OPPONENT_LEN},
     perturbation::{settings::PerturbationSettings, table_factors::TableFactors},
     robot::plant::Plant,
     stream::Stream,
     world::World,
 };
-use faceoff_types::{Factors, Interpolation, Seed, Violations};
-use referee::{RULES, RallyEnd, Referee};
-
-/// Control steps of a game: 15 minutes.
-pub const GAME_STEPS: u32 = 45_000;
-
-/// Control steps of a window: the same violation counts once in each.
-pub const WINDOW_STEPS: u32 = 500;
+use faceoff_types::{Factors, Interpolation, Seed, Violations, WINDOW_STEPS};
+use referee::{GAME_RULES, RallyEnd, Referee};
 
 /// What a game is played with.
 #[derive(Debug, Clone)]
@@ -51,7 +45,7 @@ pub struct Game {
 struct Rally {
     number: u32,
     world: World,
-    links: [Link; 2],
+    channels: [AgentChannel; 2],
     table: TableFactors,
 }
 
@@ -84,24 +78,24 @@ impl Game {
     /// What a robot's agent is told: 23 numbers in its own base frame.
     #[must_use]
     pub fn observation(&self, robot: usize) -> &[f64; OBSERVATION_WITH_OPPONENT_LEN] {
-        self.rally.links[robot].observation()
+        self.rally.channels[robot].observation()
     }
 
-    /// One control step of both robots. Whether the game is over, [`GAME_STEPS`] say, is the caller's
-    /// to decide.
+    /// One control step of both robots. When the game is over is the caller's to
+    /// decide.
     pub fn step(&mut self, commands: [Command<'_>; 2]) -> GameStep {
         let Rally {
             world,
-            links,
+            channels,
             table,
             number,
         } = &mut self.rally;
-        for (link, command) in links.iter_mut().zip(commands) {
-            link.command(world, command);
+        for (channel, command) in channels.iter_mut().zip(commands) {
+            channel.command(world, command);
         }
         let lost = table.control_step(world);
-        for link in links {
-            link.look(world, lost);
+        for channel in channels {
+            channel.look(world, lost);
         }
         self.steps += 1;
 
@@ -155,15 +149,15 @@ impl Rally {
     fn new(setup: &GameSetup, number: u32, serves: usize) -> Self {
         let seed = setup.seed.rally(number);
         let mut stream = Stream::new(&seed, "initial_state");
-        let [near, far] = RULES.start_x_m;
+        let [near, far] = GAME_RULES.start_x_m;
         let x = stream.uniform(near, far);
         let y = stream.uniform(-PLAYABLE_Y_M, PLAYABLE_Y_M);
         let x = if serves == 0 { -x } else { x };
         let mut world = World::with_robots(&setup.plant, 2, [x, y, 0.0, 0.0, 0.0, 0.0]);
         let table = TableFactors::new(setup.factors, &setup.settings, &seed, &mut world);
-        let links = [0, 1].map(|robot| {
+        let channels = [0, 1].map(|robot| {
             let interpolation = setup.interpolation[robot];
-            Link::new(
+            AgentChannel::new(
                 robot,
                 interpolation,
                 setup.factors,
@@ -175,7 +169,7 @@ impl Rally {
         Self {
             number,
             world,
-            links,
+            channels,
             table,
         }
     }

@@ -4,6 +4,7 @@ use crate::{
     model::CONTROL_STEP_S,
     table::{geometry::TABLE, puck::Puck},
 };
+use faceoff_types::FOULS_PER_POINT;
 
 /// Numbers of the game's rules, table frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,24 +17,21 @@ pub struct GameRules {
     pub middle_x_m: f64,
     /// A puck in the middle is stuck below this |vx|, m/s.
     pub stuck_vx_m_s: f64,
-    /// Fouls that give the opponent a point.
-    pub fouls_per_point: u32,
     /// A faster puck is taken as gone, m/s.
     pub lost_speed_m_s: f64,
 }
 
 /// The ruleset's numbers.
-pub const RULES: GameRules = GameRules {
+pub const GAME_RULES: GameRules = GameRules {
     start_x_m: [0.2, 0.7],
     foul_after_s: 15.0,
     middle_x_m: 0.15,
     stuck_vx_m_s: 0.025,
-    fouls_per_point: 3,
     lost_speed_m_s: 100.0,
 };
 
 /// Control steps after which a puck on one side is a foul.
-const FOUL_STEPS: u32 = (RULES.foul_after_s / CONTROL_STEP_S + 0.5) as u32;
+const FOUL_STEPS: u32 = (GAME_RULES.foul_after_s / CONTROL_STEP_S + 0.5) as u32;
 
 /// Why a rally ended. Robots are 0 and 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,7 +81,7 @@ impl Referee {
     /// Goals and the points for the opponent's fouls.
     #[must_use]
     pub fn score(&self) -> [u32; 2] {
-        [0, 1].map(|robot| self.goals[robot] + self.fouls[1 - robot] / RULES.fouls_per_point)
+        [0, 1].map(|robot| self.goals[robot] + self.fouls[1 - robot] / FOULS_PER_POINT)
     }
 
     /// Judges the true puck after a control step. An end sets who serves next and resets the clock.
@@ -112,20 +110,20 @@ impl Referee {
             _ => 0,
         };
         self.watched = Some((seen, steps));
-        let in_middle = x.abs() < RULES.middle_x_m;
+        let in_middle = x.abs() < GAME_RULES.middle_x_m;
         if steps > FOUL_STEPS && !in_middle {
             return Some(RallyEnd::Foul { by: seen });
         }
         if x.abs() > TABLE.half_length_m() && y.abs() <= TABLE.goal_width_m / 2.0 {
             return Some(RallyEnd::Goal { by: 1 - seen });
         }
-        if in_middle && puck.velocity[0].abs() < RULES.stuck_vx_m_s {
+        if in_middle && puck.velocity[0].abs() < GAME_RULES.stuck_vx_m_s {
             return Some(RallyEnd::Stuck);
         }
         // Written so that a state that is not a number ends the rally too.
         let on_table = x.abs() <= TABLE.half_length_m()
             && y.abs() <= TABLE.half_width_m()
-            && puck.speed() <= RULES.lost_speed_m_s;
+            && puck.speed() <= GAME_RULES.lost_speed_m_s;
         (!on_table).then_some(RallyEnd::LeftTable)
     }
 }

@@ -17,9 +17,9 @@ pub struct Limiter {
     commanded: [f64; JOINTS],
 }
 
-/// A limited command: position, rad, and velocity, rad/s.
+/// A setpoint within the limits: position, rad, and velocity, rad/s.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Command {
+pub struct LimitedSetpoint {
     position: [f64; JOINTS],
     velocity: [f64; JOINTS],
 }
@@ -32,8 +32,8 @@ impl Limiter {
 
     /// Limits the desired motion of one substep.
     #[inline(always)]
-    pub fn limit(&mut self, desired: &Setpoint) -> Command {
-        let mut command = Command {
+    pub fn limit(&mut self, desired: &Setpoint) -> LimitedSetpoint {
+        let mut command = LimitedSetpoint {
             position: [0.0; JOINTS],
             velocity: [0.0; JOINTS],
         };
@@ -59,7 +59,7 @@ impl Limiter {
 #[inline(always)]
 pub fn torque(
     plant: &Plant,
-    command: &Command,
+    command: &LimitedSetpoint,
     q: &[f64],
     dq_filtered: &[f64; JOINTS],
     feed_forward: &[f64; JOINTS],

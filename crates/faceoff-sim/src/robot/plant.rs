@@ -3,7 +3,7 @@
 use crate::{
     dynamics::{
         arm::{Bodies, Kinematics, mass_matrix},
-        factor::Factor,
+        ldlt::Ldlt,
     },
     model::{DOFS, JOINTS, LINKS},
 };
@@ -50,7 +50,7 @@ impl Plant {
     ) -> Self {
         let kinematics = Kinematics::new(&[0.0; DOFS]);
         let bodies = Bodies::new(&kinematics).plant(&mass_scale);
-        let factor = Factor::new(&mass_matrix(&kinematics, &bodies));
+        let factor = Ldlt::new(&mass_matrix(&kinematics, &bodies));
         let inverse_inertia = std::array::from_fn(|i| {
             let mut unit = [0.0; DOFS];
             unit[i] = 1.0;

@@ -15,7 +15,7 @@ const DIRECTIONS_TRIED: usize = 16;
 const BISECTIONS: usize = 54;
 
 /// One contact's force: normal, horizontal tangent, upright tangent.
-type Force = [f64; DIRECTIONS];
+type ContactForce = [f64; DIRECTIONS];
 
 /// Minimises ½ f·matrix·f − target·f where each contact's tangential force stays within friction times
 /// its normal force; rows are normal, horizontal and upright tangent of each contact. This is the reference's notion of
@@ -65,7 +65,11 @@ pub fn solve_cone<const N: usize>(
 }
 
 /// As [`solve_cone`], for one contact.
-fn solve_one_cone(matrix: &[Force; DIRECTIONS], target: &Force, mu: f64) -> Force {
+fn solve_one_cone(
+    matrix: &[ContactForce; DIRECTIONS],
+    target: &ContactForce,
+    mu: f64,
+) -> ContactForce {
     let stuck = eliminate(matrix, target, DIRECTIONS);
     if norm([stuck[1], stuck[2]]) <= mu * stuck[0] {
         return stuck;
@@ -77,20 +81,20 @@ fn solve_one_cone(matrix: &[Force; DIRECTIONS], target: &Force, mu: f64) -> Forc
     // The force lies on the edge of the cone. Along a given edge it is a matter of one unknown; the edge
     // sought is the best of all, found roughly first and then between its neighbours.
     let edge = |u: [f64; 2]| [1.0, mu * u[0], mu * u[1]];
-    let response = |edge: &Force| matrix.map(|row| dot(&row, edge));
+    let response = |edge: &ContactForce| matrix.map(|row| dot(&row, edge));
     let gain = |u: [f64; 2]| {
         let edge = edge(u);
         let push = dot(&edge, target).max(0.0);
         push * push / dot(&edge, &response(&edge))
     };
-    let along = |u: [f64; 2]| -> Force {
+    let along = |u: [f64; 2]| -> ContactForce {
         let edge = edge(u);
         let size = (dot(&edge, target) / dot(&edge, &response(&edge))).max(0.0);
         edge.map(|e| size * e)
     };
     let gain_across = |u: [f64; 2]| {
         let force = along(u);
-        let left: Force = std::array::from_fn(|d| target[d] - dot(&matrix[d], &force));
+        let left: ContactForce = std::array::from_fn(|d| target[d] - dot(&matrix[d], &force));
         left[2] * u[0] - left[1] * u[1]
     };
     let mut best = unit(pull);
@@ -121,11 +125,11 @@ fn turned([x, y]: [f64; 2], sign: f64) -> [f64; 2] {
     [COS * x - sin * y, sin * x + COS * y]
 }
 
-fn dot(a: &Force, b: &Force) -> f64 {
+fn dot(a: &ContactForce, b: &ContactForce) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-fn block<const N: usize>(row: &[f64; N], contact: usize) -> Force {
+fn block<const N: usize>(row: &[f64; N], contact: usize) -> ContactForce {
     std::array::from_fn(|d| row[DIRECTIONS * contact + d])
 }
 
@@ -205,7 +209,7 @@ mod tests {
         let mut kinds = [0; 3];
         for (c, &mu) in friction.iter().enumerate() {
             let [f, a, b] = block(&force, c);
-            let left: Force = std::array::from_fn(|d| {
+            let left: ContactForce = std::array::from_fn(|d| {
                 let row = matrix[DIRECTIONS * c + d];
                 let response: f64 = row.iter().zip(&force).map(|(m, f)| m * f).sum();
                 target[DIRECTIONS * c + d] - response

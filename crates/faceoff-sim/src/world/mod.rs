@@ -9,21 +9,16 @@ mod substep;
 
 use crate::{
     dynamics::arm::Kinematics,
-    model::{DOFS, INITIAL_Q, JOINTS, SUBSTEPS},
+    model::{DOFS, INITIAL_Q, JOINTS},
     robot::plant::Plant,
     table::{
         contact_finder,
-        contact_law::{MALLET, RIM},
-        geometry::TABLE,
-        mallet_cylinder::MalletCylinder,
+        frames::{side, table_from_robot},
         puck::{Damping, Puck},
     },
 };
-pub use arm::Arm;
-use contacts::{Contacts, MalletMotion, Pair};
+use arm::Arm;
 use faceoff_types::Interpolation;
-use solver::add;
-use wide::f64x2;
 
 /// A mallet's striking cylinder: centre x, y, z (m) and velocity vx, vy (m/s), table frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -102,11 +97,6 @@ impl World {
         &self.puck
     }
 
-    /// Puts the puck somewhere else.
-    pub fn set_puck(&mut self, puck: [f64; 6]) {
-        self.puck = Puck::from_state(puck);
-    }
-
     /// Positions of a robot's driven joints, rad.
     #[must_use]
     pub fn joints(&self, robot: usize) -> [f64; JOINTS] {
@@ -173,29 +163,6 @@ impl World {
         }
     }
 
-    /// Advances by a control step, 20 substeps. `air` is called before each of them.
-    pub fn control_step(&mut self, mut air: impl FnMut(&Puck) -> [f64; 2]) {
-        for _ in 0..SUBSTEPS {
-            self.air_n = air(&self.puck);
-            self.substep();
-        }
-    }
-
-    /// Advances by one substep, 1 ms. After 20 of them a new action is due; without one the last
-    /// trajectory would be repeated, so [`World::command`] or [`World::hold`] first.
-    pub fn substep(&mut self) {
-        if self.imposed.is_some() {
-            self.substep_imposed();
-        } else {
-            match self.arms.len() {
-                0 => self.advance_puck_alone(),
-                1 => self.substep_lanes::<f64>(),
-                _ => self.substep_lanes::<f64x2>(),
-            }
-        }
-        self.substep = (self.substep + 1) % SUBSTEPS;
-    }
-
     /// Commands a robot's last commanded position again, at rest, for the coming control step.
     pub fn hold(&mut self, robot: usize, interpolation: Interpolation) {
         self.arms[robot].hold(interpolation);
@@ -211,92 +178,6 @@ impl World {
     pub fn set_puck_damping(&mut self, per_s: f64) {
         self.puck_damping = Damping::per_s(per_s);
     }
-
-    fn advance_puck_alone(&mut self) {
-        let mut contacts = Contacts::none();
-        self.add_rims(&mut contacts);
-        let force = (!contacts.is_empty()).then(|| {
-            contacts.solve_puck(&self.puck.free_acceleration(&self.puck_damping, self.air_n))
-        });
-        self.advance_puck(force);
-    }
-
-    fn substep_imposed(&mut self) {
-        let mut contacts = Contacts::none();
-        self.add_rims(&mut contacts);
-        if let Some(mallet) = self.imposed {
-            let cylinder = MalletCylinder::upright(mallet.position);
-            let puck = [self.puck.pose[0], self.puck.pose[1]];
-            if let Some(touch) = contact_finder::mallet_and_puck(&cylinder, puck) {
-                let motion = MalletMotion {
-                    jacobian: None,
-                    velocity: [mallet.velocity[0], mallet.velocity[1], 0.0],
-                };
-                contacts.add(
-                    touch,
-                    &MALLET,
-                    Pair::Mallet {
-                        robot: 0,
-                        mallet: &motion,
-                        puck: &self.puck.velocity,
-                    },
-                );
-            }
-        }
-        let force = (!contacts.is_empty()).then(|| {
-            contacts.solve_puck(&self.puck.free_acceleration(&self.puck_damping, self.air_n))
-        });
-        self.advance_puck(force);
-    }
-
-    fn add_rims(&self, contacts: &mut Contacts) {
-        contact_finder::rims([self.puck.pose[0], self.puck.pose[1]], |touch| {
-            contacts.add(
-                touch,
-                &RIM,
-                Pair::Rim {
-                    puck: &self.puck.velocity,
-                },
-            );
-        });
-    }
-
-    fn advance_puck(&mut self, contact: Option<[f64; 3]>) {
-        let mut force = [self.air_n[0], self.air_n[1], 0.0];
-        if let Some(contact) = contact {
-            for i in 0..3 {
-                force[i] += contact[i];
-            }
-        }
-        self.puck.advance(&self.puck_damping, force);
-    }
-}
-
-/// A robot's side of the table: its base frame is turned by π for robot 2.
-#[inline(always)]
-fn side(robot: usize) -> f64 {
-    if robot == 0 { 1.0 } else { -1.0 }
-}
-
-/// A point of a robot's base frame in the table frame, m.
-#[inline(always)]
-fn table_from_robot(robot: usize, p: [f64; 3]) -> [f64; 3] {
-    let side = side(robot);
-    [
-        side * (p[0] - TABLE.base_x_m),
-        side * p[1],
-        p[2] + TABLE.base_z_m,
-    ]
-}
-
-/// A point of the table frame in a robot's base frame, m.
-fn robot_from_table(robot: usize, p: [f64; 3]) -> [f64; 3] {
-    let side = side(robot);
-    [
-        side * p[0] + TABLE.base_x_m,
-        side * p[1],
-        p[2] - TABLE.base_z_m,
-    ]
 }
 
 fn head(q: &[f64; DOFS]) -> [f64; JOINTS] {

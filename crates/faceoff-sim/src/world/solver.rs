@@ -9,7 +9,7 @@ use super::{
     contacts::{ContactForces, Contacts},
 };
 use crate::{
-    dynamics::{factor::Factor, lanes::Lanes},
+    dynamics::{lanes::Lanes, ldlt::Ldlt},
     model::DOFS,
 };
 
@@ -59,7 +59,7 @@ fn newton_step<T: Lanes>(arms: &[Arm], mass: &Mass<T>, load: &[[f64; DOFS]; 2]) 
         matrix[i][i] += T::from_fn(|a| diagonal[a][i]);
     }
     let rhs: [T; DOFS] = std::array::from_fn(|i| T::from_fn(|a| rhs[a][i]));
-    Factor::new(&matrix).solve(&rhs)
+    Ldlt::new(&matrix).solve(&rhs)
 }
 
 /// Newton's method with line search from accelerations whose sets of bounds are set.
@@ -120,14 +120,14 @@ pub fn accelerations_in_contact<T: Lanes>(
         arms: [[0.0; DOFS]; 2],
     };
     for _ in 0..CONTACT_ROUNDS {
-        let factors: [Factor<f64>; 2] = std::array::from_fn(|a| {
+        let factors: [Ldlt<f64>; 2] = std::array::from_fn(|a| {
             let arm = &arms[a.min(T::COUNT - 1)];
             let mut matrix = masses[a];
             let (stiffness, torque) = arm.constraints.assemble();
             for i in 0..DOFS {
                 matrix[i][i] += stiffness[i];
             }
-            let factor = Factor::new(&matrix);
+            let factor = Ldlt::new(&matrix);
             let mut rhs = load[a];
             add(&mut rhs, &torque);
             acceleration[a] = factor.solve(&rhs);

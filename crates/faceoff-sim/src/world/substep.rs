@@ -1,32 +1,55 @@
 //! One millisecond of arms and puck.
 
 use super::{
-    World, add,
+    World,
     contacts::{Contacts, MalletMotion, Pair},
-    robot_from_table, side,
-    solver::{accelerations_in_contact, joint_accelerations},
-    table_from_robot,
+    solver::{accelerations_in_contact, add, joint_accelerations},
 };
 use crate::{
     dynamics::{
         arm::{Bodies, Kinematics, controller_torques, damped, mass_matrix, plant_bias},
-        factor::Factor,
         lanes::Lanes,
+        ldlt::Ldlt,
         spatial::Vec3,
     },
-    model::{DOFS, JOINTS, SUBSTEP_S},
+    model::{DOFS, JOINTS, SUBSTEP_S, SUBSTEPS},
     robot::controller::{filter_velocity, torque},
     table::{
         contact_finder::{self, Touch},
         contact_law::{MALLET, MALLETS, RIM},
+        frames::{robot_from_table, side, table_from_robot},
         mallet_cylinder::MalletCylinder,
         puck::Puck,
     },
 };
+use wide::f64x2;
 
 impl World {
+    /// Advances by a control step, 20 substeps. `air` is called before each of them.
+    pub fn control_step(&mut self, mut air: impl FnMut(&Puck) -> [f64; 2]) {
+        for _ in 0..SUBSTEPS {
+            self.air_n = air(&self.puck);
+            self.substep();
+        }
+    }
+
+    /// Advances by one substep, 1 ms. After 20 of them a new action is due; without one the last
+    /// trajectory would be repeated, so [`World::command`] or [`World::hold`] first.
+    pub fn substep(&mut self) {
+        if self.imposed.is_some() {
+            self.substep_imposed();
+        } else {
+            match self.arms.len() {
+                0 => self.advance_puck_alone(),
+                1 => self.substep_lanes::<f64>(),
+                _ => self.substep_lanes::<f64x2>(),
+            }
+        }
+        self.substep = (self.substep + 1) % SUBSTEPS;
+    }
+
     /// One substep of all arms, `T::COUNT` of them, and the puck.
-    pub(super) fn substep_lanes<T: Lanes>(&mut self) {
+    fn substep_lanes<T: Lanes>(&mut self) {
         let arms = &mut self.arms;
         let plant = &self.plant;
         let q: [T; DOFS] = std::array::from_fn(|i| T::from_fn(|a| arms[a].q[i]));
@@ -96,7 +119,7 @@ impl World {
 
         // Semi-implicit Euler, joint damping implicit.
         let load: [T; DOFS] = std::array::from_fn(|i| T::from_fn(|a| load[a][i]));
-        let acceleration = Factor::new(&damped(&mass, &plant.damping)).solve(&load);
+        let acceleration = Ldlt::new(&damped(&mass, &plant.damping)).solve(&load);
         for (a, arm) in arms.iter_mut().enumerate() {
             for i in 0..DOFS {
                 arm.dq[i] += SUBSTEP_S * acceleration[i].lane(a);
@@ -105,6 +128,65 @@ impl World {
             filter_velocity(&mut arm.dq_filtered, &arm.dq);
         }
         self.advance_puck(puck_force);
+    }
+
+    fn advance_puck_alone(&mut self) {
+        let mut contacts = Contacts::none();
+        self.add_rims(&mut contacts);
+        let force = (!contacts.is_empty()).then(|| {
+            contacts.solve_puck(&self.puck.free_acceleration(&self.puck_damping, self.air_n))
+        });
+        self.advance_puck(force);
+    }
+
+    fn substep_imposed(&mut self) {
+        let mut contacts = Contacts::none();
+        self.add_rims(&mut contacts);
+        if let Some(mallet) = self.imposed {
+            let cylinder = MalletCylinder::upright(mallet.position);
+            let puck = [self.puck.pose[0], self.puck.pose[1]];
+            if let Some(touch) = contact_finder::mallet_and_puck(&cylinder, puck) {
+                let motion = MalletMotion {
+                    jacobian: None,
+                    velocity: [mallet.velocity[0], mallet.velocity[1], 0.0],
+                };
+                contacts.add(
+                    touch,
+                    &MALLET,
+                    Pair::Mallet {
+                        robot: 0,
+                        mallet: &motion,
+                        puck: &self.puck.velocity,
+                    },
+                );
+            }
+        }
+        let force = (!contacts.is_empty()).then(|| {
+            contacts.solve_puck(&self.puck.free_acceleration(&self.puck_damping, self.air_n))
+        });
+        self.advance_puck(force);
+    }
+
+    fn add_rims(&self, contacts: &mut Contacts) {
+        contact_finder::rims([self.puck.pose[0], self.puck.pose[1]], |touch| {
+            contacts.add(
+                touch,
+                &RIM,
+                Pair::Rim {
+                    puck: &self.puck.velocity,
+                },
+            );
+        });
+    }
+
+    fn advance_puck(&mut self, contact: Option<[f64; 3]>) {
+        let mut force = [self.air_n[0], self.air_n[1], 0.0];
+        if let Some(contact) = contact {
+            for i in 0..3 {
+                force[i] += contact[i];
+            }
+        }
+        self.puck.advance(&self.puck_damping, force);
     }
 }
 

@@ -3,8 +3,8 @@
 use faceoff_sim::{
     dynamics::{
         arm::{Bodies, Kinematics, controller_torques, damped, mass_matrix, plant_bias},
-        factor::Factor,
         lanes::Lanes,
+        ldlt::Ldlt,
     },
     model::{DOFS, INITIAL_Q, JOINTS},
 };
@@ -138,10 +138,10 @@ fn a_substep_is_as_much_arithmetic_as_documented() {
         mass_matrix(&kinematics, &bodies)
     });
     counted("dry friction: a Newton step", &mut total, || {
-        Factor::new(&mass).solve(&zero)
+        Ldlt::new(&mass).solve(&zero)
     });
     counted("integration: implicit damping", &mut total, || {
-        Factor::new(&damped(&mass, &[0.1; JOINTS])).solve(&zero)
+        Ldlt::new(&damped(&mass, &[0.1; JOINTS])).solve(&zero)
     });
     println!("{total:5} in all");
     assert_eq!(total, DOCUMENTED);

@@ -5,12 +5,11 @@ use crate::{
     reference::{array, max_difference, recording},
 };
 use faceoff_sim::{
-    Command, Game, GameSetup, Interpolation, PerturbationSettings, Plant, RallyEnd, WINDOW_STEPS,
-    World,
+    Command, Game, GameSetup, Interpolation, PerturbationSettings, Plant, RallyEnd, World,
     game::referee::Referee,
     model::{EE_DESIRED_HEIGHT_M, INITIAL_Q},
 };
-use faceoff_types::{Factors, Seed, Violations};
+use faceoff_types::{Factors, Seed, Violations, WINDOW_STEPS};
 use serde_json::Value;
 
 fn setup(factors: Factors, seed: u64) -> GameSetup {
@@ -186,8 +185,9 @@ fn both_robots_see_the_same_picture() {
             world.command(1 - k, Interpolation::Cubic, &actions[1]);
             world.control_step(|_| [0.0; 2]);
         }
-        let seen = [(0, 0), (1, 1)]
-            .map(|(world, robot)| faceoff_sim::link::observation::observe(&worlds[world], robot));
+        let seen = [(0, 0), (1, 1)].map(|(world, robot)| {
+            faceoff_sim::channel::observation::observe(&worlds[world], robot)
+        });
         assert!(
             max_difference(&seen[0], &seen[1]) <= 1e-9,
             "step {step}: {seen:?}"

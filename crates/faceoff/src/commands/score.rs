@@ -4,7 +4,7 @@ use anyhow::{Context as _, bail, ensure};
 use clap::{Args, Subcommand};
 use faceoff_scoring::{
     QualifyingSheet,
-    tournament::{Game, score_tournament},
+    tournament::{PlayedGame, score_tournament},
 };
 use serde::de::DeserializeOwned;
 use std::io::{IsTerminal as _, Read, Write};
@@ -87,7 +87,7 @@ impl Stage {
                 }
             }
             Self::Tournament => {
-                let games: Vec<Game> = parse(&input, self.file())?;
+                let games: Vec<PlayedGame> = parse(&input, self.file())?;
                 let tournament = score_tournament(&games);
                 for repeated in &tournament.repeated_pairings {
                     let [a, b] = &repeated.teams;

@@ -6,7 +6,8 @@ use crate::field::{Field, Vec2};
 use crate::motion::{Pace, Target};
 use crate::opponent::Opponent;
 use crate::puck::{DRAG, MALLET_RESTITUTION, Puck};
-use crate::skills::{Scene, around, lean, normal_cdf, strike_towards};
+use crate::skills::aim::{normal_cdf, strike_towards};
+use crate::skills::scene::{Scene, around, lean};
 
 /// Duration of the run-up, seconds.
 const RUN_UP: f64 = 0.32;

@@ -4,10 +4,10 @@ use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
 use faceoff_episode::Arena;
 use faceoff_sim::{
-    Command, Game, GameSetup, Interpolation, PerturbationSettings, Plant, SUBSTEPS, WINDOW_STEPS,
+    Command, Game, GameSetup, Interpolation, PerturbationSettings, Plant, SUBSTEPS,
     model::INITIAL_Q,
 };
-use faceoff_types::{Profile, Seed, Task};
+use faceoff_types::{Profile, Seed, Task, WINDOW_STEPS};
 use serde::Serialize;
 use std::{
     hint::black_box,

@@ -26,7 +26,7 @@ struct Raw {
     robots: Option<u32>,
     puck: Vec<f64>,
     joints: Option<Vec<Vec<f64>>>,
-    interpolation: Option<Vec<Option<i64>>>,
+    interpolation: Option<Vec<Interpolation>>,
     actions: Option<Vec<Vec<Value>>>,
     mallet: Option<Vec<Vec<f64>>>,
     duration_ms: u64,
@@ -161,21 +161,14 @@ fn joints(given: Vec<Vec<f64>>, robots: usize) -> Result<Vec<[f64; JOINTS]>> {
     Ok(joints)
 }
 
-fn interpolations(given: &[Option<i64>], robots: usize) -> Result<Vec<Interpolation>> {
+fn interpolations(given: &[Interpolation], robots: usize) -> Result<Vec<Interpolation>> {
     ensure!(
         given.len() <= robots,
         "interpolation: expected at most {robots} robots with actions, got {}",
         given.len()
     );
     let mut all = vec![Interpolation::Cubic; robots];
-    for (robot, code) in given.iter().enumerate() {
-        all[robot] = Interpolation::from_code(*code).with_context(|| {
-            format!(
-                "interpolation[{robot}]: expected 1, 2, 3, 4, 5, -1 or null, got {}",
-                code.map_or("null".to_owned(), |code| code.to_string())
-            )
-        })?;
-    }
+    all[..given.len()].copy_from_slice(given);
     Ok(all)
 }
 
@@ -320,7 +313,7 @@ mod tests {
             ),
             (
                 format!(r#"{{{puck}, "interpolation": [6]}}"#),
-                "interpolation[0]: expected 1, 2, 3",
+                "interpolation[0]: unknown interpolation 6: expected 1, 2, 3",
             ),
             (
                 format!(r#"{{{puck}, "actions": [[[[1, 2]]]]}}"#),

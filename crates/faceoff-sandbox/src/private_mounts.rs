@@ -4,7 +4,7 @@
 //! looks its sources up by name. So the child, while it is still root, binds them below `/tmp` of a
 //! mount namespace of its own, where nobody else sees them and whose end is theirs.
 
-use crate::SandboxError;
+use crate::{SandboxError, error::IoContext};
 use rustix::{
     fs::{CWD, Mode, OFlags, mkdir, open},
     io::Errno,
@@ -24,9 +24,9 @@ use std::{
 /// Any folder that every host has; the namespace's own, so nothing of the host's is hidden from anybody.
 const FOLDER: &CStr = c"/tmp";
 
-/// The sources of one agent.
+/// What one agent's bubblewrap is to find.
 #[derive(Debug, Default)]
-pub(crate) struct Stage {
+pub(crate) struct PrivateMounts {
     sources: Vec<Source>,
 }
 
@@ -39,30 +39,28 @@ struct Source {
     tree: Option<OwnedFd>,
 }
 
-impl Stage {
+impl PrivateMounts {
     /// Adds `path` and returns the name under which bubblewrap will find it.
     pub(crate) fn add(&mut self, path: &Path) -> Result<OsString, SandboxError> {
-        let failed = |source| {
-            SandboxError::io(
-                format!("cannot show {} to the agent", path.display()),
-                source,
-            )
-        };
-        let path = fs::canonicalize(path).map_err(failed)?;
+        let failure = format!("cannot show {} to the agent", path.display());
+        let path = fs::canonicalize(path).context(&failure)?;
         let place = format!("/tmp/{}", self.sources.len());
-        let text =
-            |bytes: &[u8]| CString::new(bytes).map_err(|error| failed(io::Error::other(error)));
+        let text = |bytes: &[u8]| {
+            CString::new(bytes)
+                .map_err(io::Error::other)
+                .context(&failure)
+        };
         self.sources.push(Source {
             path: text(path.as_os_str().as_bytes())?,
             place: text(place.as_bytes())?,
-            is_folder: fs::metadata(&path).map_err(failed)?.is_dir(),
+            is_folder: fs::metadata(&path).context(&failure)?.is_dir(),
             tree: None,
         });
         Ok(place.into())
     }
 
-    /// Builds it. Called between fork and exec, as root: system calls only.
-    pub(crate) fn build(&mut self) -> Result<(), Errno> {
+    /// Makes the mounts. Called between fork and exec, as root: system calls only.
+    pub(crate) fn make(&mut self) -> Result<(), Errno> {
         #[expect(
             unsafe_code,
             reason = "rustix marks all unsharing unsafe for the sake of shared descriptors"

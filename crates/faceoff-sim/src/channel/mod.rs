@@ -1,6 +1,7 @@
 //! What lies between an agent and its robot: the observation one way, commands the other, both subject
 //! to the perturbations.
 
+mod command;
 mod latency;
 pub mod observation;
 
@@ -9,23 +10,14 @@ use crate::{
     stream::Stream,
     world::World,
 };
+pub use command::Command;
 use faceoff_types::{Factor, Factors, Interpolation, Seed};
 use latency::Latency;
 use observation::{OBSERVATION_WITH_OPPONENT_LEN, observe, wrap};
 
-/// What an agent does in a control step.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Command<'a> {
-    /// An action: row-major, of length [`Interpolation::len`], finite.
-    Act(&'a [f64]),
-    /// No answer came in time. The previous position is commanded again, with zero velocity; under
-    /// [`Factor::Delay`] the last trajectory runs on at constant velocity for 80 ms, then stops.
-    Late,
-}
-
-/// The link of one agent and its robot, for one episode or rally.
+/// The channel of one agent and its robot, for one episode or rally.
 #[derive(Debug, Clone)]
-pub struct Link {
+pub struct AgentChannel {
     robot: usize,
     interpolation: Interpolation,
     noise: Option<ObservationNoise>,
@@ -33,8 +25,8 @@ pub struct Link {
     observation: [f64; OBSERVATION_WITH_OPPONENT_LEN],
 }
 
-impl Link {
-    /// The link of a robot (0 or 1) in a world at its start. Draws come from streams of their own,
+impl AgentChannel {
+    /// The channel of a robot (0 or 1) in a world at its start. Draws come from streams of their own,
     /// derived from `seed` by the factor's name; robot 2's are other ones than robot 1's.
     #[must_use]
     pub fn new(
@@ -51,7 +43,7 @@ impl Link {
                 _ => Stream::new(seed, &format!("{factor}, robot {}", robot + 1)),
             })
         };
-        let mut link = Self {
+        let mut channel = Self {
             robot,
             interpolation,
             noise: stream(Factor::ObservationNoise)
@@ -60,8 +52,8 @@ impl Link {
                 .map(|stream| Latency::new(&settings.delay, interpolation, stream)),
             observation: [0.0; OBSERVATION_WITH_OPPONENT_LEN],
         };
-        link.look(world, false);
-        link
+        channel.look(world, false);
+        channel
     }
 
     /// What the agent was told last, with the opponent's end effector at the end; zero without one.

@@ -1,6 +1,6 @@
 //! Late observations and late actions (RULES, factor `delay`).
 
-use super::Command;
+use super::command::Command;
 use crate::{perturbation::settings::DelaySettings, stream::Stream, world::World};
 use faceoff_types::Interpolation;
 

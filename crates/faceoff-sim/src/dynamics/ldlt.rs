@@ -5,12 +5,12 @@ use crate::model::DOFS;
 
 /// `L D Lᵀ` of a symmetric positive definite matrix.
 #[derive(Debug, Clone, Copy)]
-pub struct Factor<T> {
+pub struct Ldlt<T> {
     /// Strictly lower triangle: L (unit diagonal). The diagonal holds 1 / D.
     l: [[T; DOFS]; DOFS],
 }
 
-impl<T: Lanes> Factor<T> {
+impl<T: Lanes> Ldlt<T> {
     /// Factorises a matrix given by its lower triangle.
     #[inline(always)]
     pub fn new(matrix: &[[T; DOFS]; DOFS]) -> Self {

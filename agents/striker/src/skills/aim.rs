@@ -1,0 +1,31 @@
+//! Aiming a strike.
+
+use crate::field::Vec2;
+use crate::puck::Puck;
+
+/// The normal (mallet to puck) along which a mallet of speed `speed` sends the puck towards
+/// `direction`, and the puck just after.
+pub fn strike_towards(puck: &Puck, direction: Vec2, speed: f64, contact: f64) -> (Vec2, Puck) {
+    let wanted = direction.y.atan2(direction.x);
+    let mut angle = wanted;
+    let mut struck = *puck;
+    for _ in 0..6 {
+        let normal = Vec2::new(angle.cos(), angle.sin());
+        struck = *puck;
+        struck.strike(puck.pos - contact * normal, speed * normal);
+        let miss = wrap(wanted - struck.vel.y.atan2(struck.vel.x));
+        angle += 0.8 * miss.clamp(-0.4, 0.4);
+    }
+    (Vec2::new(angle.cos(), angle.sin()), struck)
+}
+
+/// An angle in (−π, π].
+fn wrap(angle: f64) -> f64 {
+    let turn = std::f64::consts::TAU;
+    angle - turn * ((angle + std::f64::consts::PI) / turn).floor()
+}
+
+/// Standard normal distribution function (logistic approximation, error below 0.01).
+pub fn normal_cdf(x: f64) -> f64 {
+    1.0 / (1.0 + (-1.702 * x).exp())
+}
