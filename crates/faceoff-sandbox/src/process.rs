@@ -153,8 +153,7 @@ impl AgentProcess {
             .iter()
             .map(|agent| PollFd::from_borrowed_fd(agent.lines.output(), PollFlags::IN))
             .collect();
-        wait_for_any(&mut outputs, until)
-            .map_err(|source| SandboxError::io("cannot wait for the agents' output", source))?;
+        wait_for_any(&mut outputs, until).context("cannot wait for the agents' output")?;
         Ok(())
     }
 
