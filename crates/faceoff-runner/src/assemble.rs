@@ -17,7 +17,8 @@ use faceoff_wire::dataset::{
     CalibrationFile, DATASET_SCHEMA, DatasetManifest, FileDigest, ShardCalibration, SlowEpisode,
     TaskViolations, ViolationsFile,
 };
-use serde::{Deserialize, Serialize};
+use faceoff_wire::work::EvaluationMeta;
+use serde::Serialize;
 use std::{
     collections::BTreeMap,
     fs::{self, File},
@@ -25,21 +26,6 @@ use std::{
     path::{Path, PathBuf},
 };
 use zip::{CompressionMethod, DateTime, ZipWriter, write::SimpleFileOptions};
-
-/// What the dataset of an evaluation says about itself.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct EvaluationMeta {
-    /// The perturbation profile.
-    pub profile: Profile,
-    /// The evaluation's seed.
-    pub seed: Seed,
-    /// The seed of the season's model mismatch.
-    pub mismatch_seed: Seed,
-    /// The agent's name.
-    pub agent: String,
-    /// The ruleset's name.
-    pub ruleset: String,
-}
 
 /// Joins the recordings of all shards of an evaluation, in any order, into one zip archive:
 /// `steps.parquet`, `episodes.parquet`, `violations.json`, `results.json`, `calibration.json`,

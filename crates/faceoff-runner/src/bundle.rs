@@ -1,8 +1,8 @@
 //! A team's bundle: an archive is unpacked without trusting a byte of it, a developer's folder is
 //! opened as it is.
 
+pub use faceoff_types::BundleLimits;
 use faceoff_wire::{MANIFEST_MAX_BYTES, Manifest};
-use serde::{Deserialize, Serialize};
 use std::{
     fs::File,
     io::{self, BufReader, Read, Seek, SeekFrom},
@@ -19,28 +19,6 @@ use tree::Tree;
 
 /// Name of the file that makes a folder a bundle.
 const MANIFEST_NAME: &str = "agent.toml";
-
-/// What a bundle may hold (PROTOCOL, "Bundle").
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct BundleLimits {
-    /// Largest archive, in bytes.
-    pub packed_bytes: u64,
-    /// Largest sum of its files, in bytes.
-    pub unpacked_bytes: u64,
-    /// Most files and links; folders are counted separately, against the same number.
-    pub files: u64,
-}
-
-impl Default for BundleLimits {
-    fn default() -> Self {
-        Self {
-            packed_bytes: 512 << 20,
-            unpacked_bytes: 2 << 30,
-            files: 50_000,
-        }
-    }
-}
 
 /// Why a bundle cannot be used.
 #[derive(Debug, thiserror::Error)]

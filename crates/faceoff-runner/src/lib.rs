@@ -31,11 +31,13 @@ pub mod verify;
 
 mod wire_env;
 
-pub use assemble::{EvaluationMeta, assemble};
-pub use config::{AgentEnvironment, TimeLimits};
+pub use assemble::assemble;
+pub use config::AgentEnvironment;
+pub use faceoff_episode::Answered;
+pub use faceoff_types::TimeLimits;
+pub use faceoff_wire::work::{EvaluationMeta, ShardSpec};
 pub use fault::PlatformFault;
 pub use host_watch::HostWatch;
-pub use faceoff_episode::Answered;
 pub use session::{Session, Trouble};
-pub use shard::{Observer, ShardReport, ShardSpec, run_shard, run_shard_watched};
+pub use shard::{Observer, ShardReport, run_shard, run_shard_watched};
 pub use smoke::{SMOKE_STEPS, SmokeReport, smoke};

@@ -7,26 +7,10 @@ use crate::{
     player::Player,
     recording::{Recorder, ShardFolder},
 };
-use faceoff_types::{EpisodeOutcome, Profile, Seed, SlotTiming, Task};
+use faceoff_types::{EpisodeOutcome, SlotTiming};
+use faceoff_wire::work::ShardSpec;
 use serde::{Deserialize, Serialize};
-use std::{ops::Range, path::Path};
-
-/// What to simulate.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ShardSpec {
-    /// The task.
-    pub task: Task,
-    /// The episodes, by their index within the evaluation.
-    pub episodes: Range<u32>,
-    /// The perturbation profile.
-    pub profile: Profile,
-    /// The evaluation's seed.
-    pub seed: Seed,
-    /// The seed of the season's model mismatch.
-    pub mismatch_seed: Seed,
-    /// More faults than this end the shard early.
-    pub max_faults: u32,
-}
+use std::path::Path;
 
 /// What one shard yields, beside its recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

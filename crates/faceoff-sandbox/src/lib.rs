@@ -19,7 +19,6 @@ mod cpu_clock;
 mod end;
 mod error;
 mod isolation;
-mod limits;
 mod line_pipe;
 mod output_holders;
 mod owner;
@@ -37,8 +36,8 @@ mod stderr_tail;
 mod sweep;
 
 pub use error::{SandboxError, SpawnError, WriteError};
+pub use faceoff_types::ResourceLimits as Limits;
 pub use isolation::{Isolation, Layer};
-pub use limits::Limits;
 pub use line_pipe::ReadLine;
 pub use plan::SpawnSpec;
 pub use probe::{HostFeature, probe_host};

@@ -4,31 +4,39 @@
 //! This crate does no I/O, reads no clock and holds no policy: rules live in `faceoff-scoring`,
 //! physics in `faceoff-sim`.
 
+mod bundle_ref;
+mod clock;
 mod computation_time;
 mod constraint;
 mod fault;
 mod ids;
+mod limits;
 mod outcome;
 mod profile;
 mod result;
 mod ruleset;
 mod seed;
+mod smoke_outcome;
 mod task;
 mod team_name;
 mod tier;
 mod timing;
 
+pub use bundle_ref::BundleRef;
+pub use clock::Clock;
 pub use computation_time::ComputationTime;
 pub use constraint::{Constraint, Violations};
 pub use fault::{AgentFault, AgentFaultKind};
 pub use ids::{
     AblationId, AblationRunId, EvaluationId, ParseIdError, ShardId, SubmissionId, TeamId,
 };
+pub use limits::{AgentLimits, BundleLimits, ResourceLimits, TimeLimits};
 pub use outcome::{EpisodeEnd, EpisodeOutcome};
 pub use profile::{Factor, Factors, ParseProfileError, Profile};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult, ViolationCounts};
 pub use ruleset::RULESET;
 pub use seed::{ParseSeedError, Seed};
+pub use smoke_outcome::SmokeOutcome;
 pub use task::{ParseTaskError, Task};
 pub use team_name::{InvalidTeamName, TeamName};
 pub use tier::Tier;

@@ -1,9 +1,10 @@
 //! The scripted evaluator and a server around it.
 
 use crate::{
-    clock::Clock,
     evaluator::Evaluator,
-    service::{Pace, WorkerConfig, run_with},
+    local::LocalServer,
+    server::WorkServer,
+    service::{Intervals, WorkerConfig, run_with},
 };
 use faceoff_runner::{
     AgentEnvironment, EvaluationMeta, Observer, PlatformFault, ShardReport, ShardSpec, SmokeReport,
@@ -177,7 +178,7 @@ impl Server {
 
     pub(super) fn clock(&self) -> Clock {
         let ahead_s = Arc::clone(&self.ahead_s);
-        Clock::of(move || {
+        Clock::new(move || {
             Timestamp::now() + SignedDuration::from_secs(ahead_s.load(Ordering::SeqCst))
         })
     }
@@ -244,6 +245,16 @@ impl Server {
     }
 
     pub(super) fn work(&self, slots: usize, evaluator: &Arc<Scripted>) -> Running {
+        self.work_through(slots, evaluator, |server| Arc::new(server))
+    }
+
+    /// With something between the slots and their server.
+    pub(super) fn work_through(
+        &self,
+        slots: usize,
+        evaluator: &Arc<Scripted>,
+        between: impl FnOnce(LocalServer) -> Arc<dyn WorkServer>,
+    ) -> Running {
         let config = WorkerConfig {
             slots,
             lease_s: LEASE_S,
@@ -267,20 +278,20 @@ impl Server {
                 files: 1,
             },
         };
-        let pace = Pace {
-            clock: self.clock(),
-            poll: Duration::from_millis(20),
-            tidy_every: Duration::from_millis(20),
-            ..Pace::default()
+        let intervals = Intervals {
+            idle_poll: Duration::from_millis(20),
+            tidy: Duration::from_millis(20),
+            ..Intervals::default()
         };
+        let server = config.local_server(self.store.clone(), self.clock());
         let shutdown = CancellationToken::new();
-        let evaluator = Arc::clone(evaluator) as Arc<dyn Evaluator>;
         let task = tokio::spawn(run_with(
-            self.store.clone(),
+            server.clone(),
+            between(server),
+            Arc::clone(evaluator) as Arc<dyn Evaluator>,
             config,
+            intervals,
             shutdown.clone(),
-            evaluator,
-            pace,
         ));
         Running { shutdown, task }
     }
