@@ -14,7 +14,6 @@ mod assemble;
 pub mod bundle;
 mod calibration;
 mod config;
-mod cpu;
 pub mod dataset;
 mod fault;
 mod host_noise;

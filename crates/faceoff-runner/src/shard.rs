@@ -2,11 +2,11 @@ use crate::{
     AgentEnvironment, HostWatch, PlatformFault,
     bundle::Bundle,
     calibration::{self, CalibrationAgent},
-    cpu::OffTheAgentsCpus,
     host_watch::StallWatch,
     player::Player,
     recording::{Recorder, ShardFolder},
 };
+use faceoff_sandbox::affinity::PinnedElsewhere;
 use faceoff_types::{EpisodeOutcome, SlotTiming};
 use faceoff_wire::work::ShardSpec;
 use serde::{Deserialize, Serialize};
@@ -50,7 +50,7 @@ pub fn run_shard(
     out: &Path,
     observer: &mut dyn Observer,
 ) -> Result<ShardReport, PlatformFault> {
-    let _pinned = OffTheAgentsCpus::pin(&env.agent_cpus);
+    let _pinned = PinnedElsewhere::than(&env.agent_cpus);
     let watch = StallWatch::start(&env.agent_cpus)?;
     run_shard_watched(spec, bundle, env, out, observer, &watch)
 }
@@ -67,7 +67,7 @@ pub fn run_shard_watched(
     observer: &mut dyn Observer,
     watch: &dyn HostWatch,
 ) -> Result<ShardReport, PlatformFault> {
-    let _pinned = OffTheAgentsCpus::pin(&env.agent_cpus);
+    let _pinned = PinnedElsewhere::than(&env.agent_cpus);
     let mut calibration = Calibration::start(&env.agent_cpus)?;
     let folder = ShardFolder::create(out)?;
     let mut recorder = Recorder::create(&folder, spec.task)?;

@@ -9,7 +9,7 @@
 //! never turns a failure of the host into a fault of the agent or the other way round
 //! ([`SandboxError`] and [`faceoff_types::AgentFaultKind`] are different types on purpose).
 
-mod affinity;
+pub mod affinity;
 mod agent_user;
 mod bubblewrap;
 mod cgroup;

@@ -2,6 +2,7 @@
 
 use crate::{
     bundle_cache::{BundleCache, Unpacked, blake3_of},
+    cpus::SlotCpus,
     evaluator::Evaluator,
     lease::Progress,
     server::WorkServer,
@@ -33,7 +34,7 @@ pub(crate) struct Executor {
 pub(crate) struct AgentHost {
     pub(crate) isolation: Isolation,
     pub(crate) runtimes: BTreeMap<String, Runtime>,
-    pub(crate) cpus: Vec<usize>,
+    pub(crate) cpus: SlotCpus,
 }
 
 impl AgentHost {
@@ -43,7 +44,7 @@ impl AgentHost {
             time: limits.time.clone(),
             isolation: self.isolation.clone(),
             runtimes: self.runtimes.clone(),
-            agent_cpus: self.cpus.clone(),
+            agent_cpus: self.cpus.of_agent(0).to_vec(),
         }
     }
 }

@@ -53,6 +53,7 @@ impl LocalServer {
             expires_at: claim.lease_until,
             duration_s: self.lease_s,
         };
+        let secret = self.store.season().await?.secret;
         let assignment = match work {
             Work::Smoke { submission, .. } => Assignment::Smoke {
                 submission: submission.id,
@@ -63,44 +64,37 @@ impl LocalServer {
                 evaluation,
                 shard,
                 bundle,
-            } => {
-                let secret = self.store.season().await?.secret;
-                Assignment::Play {
-                    run: evaluation.id.as_uuid(),
-                    agent: self.agent(bundle),
-                    spec: ShardSpec {
-                        task: shard.task,
-                        episodes: shard.first_episode..shard.end_episode,
-                        profile: evaluation.plan.profile,
-                        seed: secret.day(evaluation.day),
-                        mismatch_seed: secret.model_mismatch(),
-                        max_faults: evaluation.plan.max_faults,
-                    },
-                    recording: Some(claim.recording_key(evaluation.id)),
-                }
-            }
-            Work::Ablation { run, bundle, .. } => {
-                let secret = self.store.season().await?.secret;
-                Assignment::Play {
-                    run: run.ablation.as_uuid(),
-                    agent: self.agent(bundle),
-                    spec: ShardSpec {
-                        task: run.task,
-                        episodes: 0..run.episodes,
-                        profile: run.profile,
-                        seed: secret.ablation(),
-                        mismatch_seed: secret.model_mismatch(),
-                        max_faults: run.max_faults,
-                    },
-                    recording: None,
-                }
-            }
+            } => Assignment::Play {
+                run: evaluation.id.as_uuid(),
+                agent: self.agent(bundle),
+                spec: ShardSpec {
+                    task: shard.task,
+                    episodes: shard.first_episode..shard.end_episode,
+                    profile: evaluation.plan.profile,
+                    seed: secret.day(evaluation.day),
+                    mismatch_seed: secret.model_mismatch(),
+                    max_faults: evaluation.plan.max_faults,
+                },
+                recording: Some(claim.recording_key(evaluation.id)),
+            },
+            Work::Ablation { run, bundle, .. } => Assignment::Play {
+                run: run.ablation.as_uuid(),
+                agent: self.agent(bundle),
+                spec: ShardSpec {
+                    task: run.task,
+                    episodes: 0..run.episodes,
+                    profile: run.profile,
+                    seed: secret.ablation(),
+                    mismatch_seed: secret.model_mismatch(),
+                    max_faults: run.max_faults,
+                },
+                recording: None,
+            },
             Work::Finalise {
                 claim,
                 evaluation,
                 agent_name,
             } => {
-                let secret = self.store.season().await?.secret;
                 let shards = self.store.shards(evaluation.id).await?;
                 let recordings = shards.into_iter().map(|shard| shard.recording);
                 Assignment::Finalise {
@@ -135,9 +129,10 @@ impl LocalServer {
         let recording = played.recording.clone();
         let committed = self.store.commit_shard(claim, played, self.clock.now());
         let holding = holding(committed.await?);
-        if holding == Holding::Lost {
-            let removed = self.store.artifacts().delete_folder(&recording).await;
-            removed.context("removing the recording of a lost lease")?;
+        if holding == Holding::Lost
+            && let Err(error) = self.store.artifacts().delete_folder(&recording).await
+        {
+            tracing::warn!(recording, %error, "the recording of a lost lease is left");
         }
         Ok(holding)
     }

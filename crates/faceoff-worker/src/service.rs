@@ -129,14 +129,14 @@ pub(crate) async fn run_with(
                 host: AgentHost {
                     isolation: config.agent.isolation.clone(),
                     runtimes: config.agent.runtimes.clone(),
-                    cpus: cpus.agent,
+                    cpus,
                 },
                 bundles: BundleCache::new(&folder),
                 folder,
             },
             shutdown: stop.clone(),
         };
-        let end = start(index, cpus.simulator, slot)?;
+        let end = start(index, slot)?;
         slots.spawn(async move { end.await.map_err(|_| index) });
     }
     let tidying = tokio::spawn(tidy(server, intervals.tidy, shutdown.clone()));
@@ -146,16 +146,16 @@ pub(crate) async fn run_with(
     ended
 }
 
-/// The CPUs of every slot.
+/// The CPUs of every slot. A task is played by one agent.
 fn layout(config: &WorkerConfig) -> Vec<SlotCpus> {
     if !config.agent.agent_cpus.is_empty() {
         let cpus = SlotCpus {
             simulator: Vec::new(),
-            agent: config.agent.agent_cpus.clone(),
+            agents: vec![config.agent.agent_cpus.clone()],
         };
         return vec![cpus; config.slots];
     }
-    let layout = CpuLayout::divide(&cpus::allowed(), config.slots);
+    let layout = CpuLayout::divide(&cpus::allowed(), config.slots, 1);
     if layout.shared {
         tracing::warn!(
             slots = config.slots,
@@ -166,16 +166,12 @@ fn layout(config: &WorkerConfig) -> Vec<SlotCpus> {
 }
 
 /// Starts a slot's thread; the receiver hears of its end, or of its panic by the sender's drop.
-fn start(
-    index: usize,
-    simulator_cpus: Vec<usize>,
-    slot: Slot,
-) -> anyhow::Result<oneshot::Receiver<()>> {
+fn start(index: usize, slot: Slot) -> anyhow::Result<oneshot::Receiver<()>> {
     let (ended, end) = oneshot::channel();
     thread::Builder::new()
         .name(format!("faceoff-slot-{index}"))
         .spawn(move || {
-            cpus::pin_this_thread(&simulator_cpus);
+            cpus::pin_simulator(&slot.executor.host.cpus.simulator);
             slot.run();
             // nobody listens any more after the grace
             let _ = ended.send(());

@@ -3,3 +3,4 @@
 
 mod answers;
 mod robustness;
+mod work;

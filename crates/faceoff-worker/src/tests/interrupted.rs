@@ -1,8 +1,12 @@
 //! Shutdowns, lost leases, cancelled evaluations and successors.
 
-use super::fixture::*;
+use super::{
+    between::{Between, Moment},
+    fixture::*,
+};
 use faceoff_runner::PlatformFault;
 use faceoff_store::*;
+use faceoff_types::Task;
 use std::sync::{Arc, Mutex, atomic::Ordering};
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -31,6 +35,39 @@ async fn a_shutdown_gives_the_unit_back_and_the_next_worker_finishes() {
     ));
     assert_eq!(healthy.played.lock().unwrap().len(), 6);
     running.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_shutdown_does_not_stop_a_slot_before_its_unit_was_given_back() {
+    let server = Server::new().await;
+    server.evaluation().await;
+    let (begun, mut begins) = tokio::sync::mpsc::unbounded_channel();
+    let (left, leaves) = std::sync::mpsc::channel();
+    let hanging = Scripted::new(move |_, observer| {
+        begun.send(()).unwrap();
+        while !observer.cancelled() {
+            std::thread::yield_now();
+        }
+        left.send(()).unwrap();
+        Err(PlatformFault::Cancelled)
+    });
+    let leaves = Mutex::new(leaves);
+    let running = server.work_through(1, &hanging, |local| {
+        Between::new(local, move |moment| {
+            // the slot has nothing left to do but to end
+            if let Moment::GivingBack = moment {
+                leaves.lock().unwrap().recv()?;
+            }
+            Ok(())
+        })
+    });
+    begins.recv().await.unwrap();
+    running.stop().await;
+    let work = server.store.claim("next", LEASE_S, server.now()).await;
+    let Some(Work::Shard { shard, .. }) = work.unwrap() else {
+        panic!("the slot has left its shard to its lease")
+    };
+    assert_eq!((shard.task, shard.first_episode), (Task::Hit, 0));
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
