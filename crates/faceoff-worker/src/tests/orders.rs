@@ -6,7 +6,6 @@ use super::{
 };
 use crate::server::{Claimed, Holding, WorkServer as _};
 use faceoff_store::*;
-use faceoff_types::*;
 use faceoff_wire::work::{Assignment, WorkOrder, WorkReport};
 
 async fn next(server: &Server) -> Option<WorkOrder> {
