@@ -7,7 +7,13 @@ use super::{
 use faceoff_runner::PlatformFault;
 use faceoff_store::*;
 use faceoff_types::Task;
-use std::sync::{Arc, Mutex, atomic::Ordering};
+use std::{
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::Duration,
+};
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_shutdown_gives_the_unit_back_and_the_next_worker_finishes() {
@@ -42,27 +48,33 @@ async fn a_shutdown_does_not_stop_a_slot_before_its_unit_was_given_back() {
     let server = Server::new().await;
     server.evaluation().await;
     let (begun, mut begins) = tokio::sync::mpsc::unbounded_channel();
-    let (left, leaves) = std::sync::mpsc::channel();
+    let (stopped, stops) = std::sync::mpsc::channel();
     let hanging = Scripted::new(move |_, observer| {
         begun.send(()).unwrap();
         while !observer.cancelled() {
             std::thread::yield_now();
         }
-        left.send(()).unwrap();
         Err(PlatformFault::Cancelled)
     });
-    let leaves = Mutex::new(leaves);
+    let (early, stops) = (Arc::new(AtomicBool::new(false)), Mutex::new(stops));
     let running = server.work_through(1, &hanging, |local| {
+        let early = Arc::clone(&early);
         Between::new(local, move |moment| {
-            // the slot has nothing left to do but to end
             if let Moment::GivingBack = moment {
-                leaves.lock().unwrap().recv()?;
+                // Time for a worker that does not wait to end; one that waits is not in a hurry.
+                let ended = stops
+                    .lock()
+                    .unwrap()
+                    .recv_timeout(Duration::from_millis(200));
+                early.store(ended.is_ok(), Ordering::SeqCst);
             }
             Ok(())
         })
     });
     begins.recv().await.unwrap();
     running.stop().await;
+    let _ = stopped.send(());
+    assert!(!early.load(Ordering::SeqCst));
     let work = server.store.claim("next", LEASE_S, server.now()).await;
     let Some(Work::Shard { shard, .. }) = work.unwrap() else {
         panic!("the slot has left its shard to its lease")
