@@ -3,14 +3,13 @@
 #![expect(clippy::unwrap_used, reason = "a benchmark has nobody to tell")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use faceoff_dataset::{
-    Dataset, EvaluationMeta, Recorder, ShardFolder, ShardReport, ShardSpec, assemble,
-};
+use faceoff_dataset::{Dataset, Recorder, ShardFolder, ShardReport, assemble};
 use faceoff_episode::{Answered, EpisodeStart, StepRow, StepSink};
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
 use faceoff_types::{
     ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, RULESET, Seed, Task, Violations,
 };
+use faceoff_wire::work::{EvaluationMeta, ShardSpec};
 use std::{hint::black_box, path::Path};
 
 const EPISODES: u32 = 1000;

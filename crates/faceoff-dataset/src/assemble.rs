@@ -14,32 +14,17 @@ use crate::{
     simulator::simulator_id,
     table::{ShardTable, join},
 };
-use faceoff_types::{EvaluationResult, Profile, RULESET, Seed, Task};
-use faceoff_wire::dataset::{
-    CalibrationFile, DATASET_SCHEMA, DatasetManifest, FileDigest, ShardCalibration,
+use faceoff_types::{EvaluationResult, RULESET, Task};
+use faceoff_wire::{
+    dataset::{CalibrationFile, DATASET_SCHEMA, DatasetManifest, FileDigest, ShardCalibration},
+    work::EvaluationMeta,
 };
 use fs_err as fs;
-use serde::{Deserialize, Serialize};
 use std::{
     collections::BTreeMap,
     io::Write,
     path::{Path, PathBuf},
 };
-
-/// What the dataset of an evaluation says about itself.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct EvaluationMeta {
-    /// The perturbations.
-    pub profile: Profile,
-    /// The episodes' seeds derive from it.
-    pub seed: Seed,
-    /// The season's, of the model mismatch.
-    pub mismatch_seed: Seed,
-    /// As the bundle's manifest names it.
-    pub agent: String,
-    /// Must be the one that this version scores.
-    pub ruleset: String,
-}
 
 /// An evaluation's dataset.
 #[derive(Debug, Clone, PartialEq)]

@@ -19,10 +19,10 @@ mod table;
 mod times;
 pub mod verify;
 
-pub use assemble::{Assembled, EvaluationMeta, assemble};
+pub use assemble::{Assembled, assemble};
 pub use dataset::{Dataset, EpisodeRecord, Layout, StepBatches, StepTable};
 pub use error::{DatasetError, RecordingError};
 pub use files::ARCHIVE_FILE;
 pub use recorder::Recorder;
-pub use shard::{ShardReport, ShardSpec};
+pub use shard::ShardReport;
 pub use shard_folder::ShardFolder;

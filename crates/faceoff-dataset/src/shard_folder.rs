@@ -2,12 +2,15 @@ use crate::{
     digest,
     error::RecordingError,
     files::{EPISODES_FILE, LOG_FILE, STEPS_FILE},
-    shard::{ShardReport, ShardSpec},
+    shard::ShardReport,
     simulator::simulator_id,
     table::ShardTable,
 };
 use faceoff_types::RULESET;
-use faceoff_wire::dataset::{FileDigest, SimulatorId};
+use faceoff_wire::{
+    dataset::{FileDigest, SimulatorId},
+    work::ShardSpec,
+};
 use fs_err::{self as fs, File};
 use serde::{Deserialize, Serialize};
 use std::{

@@ -16,35 +16,10 @@ pub mod token;
 
 pub use axum::Router;
 use faceoff_store::{EvaluationPlan, Store};
-use jiff::{Timestamp, civil, tz::TimeZone};
-use std::{fmt, io, path::PathBuf, sync::Arc, time::Duration};
+use faceoff_types::Clock;
+use jiff::civil;
+use std::{io, path::PathBuf, sync::Arc, time::Duration};
 use tokio::{net::TcpListener, sync::Semaphore};
-
-/// Where the time comes from.
-#[derive(Clone)]
-pub struct Clock(Arc<dyn Fn() -> Timestamp + Send + Sync>);
-
-impl Clock {
-    /// A clock that asks `now`.
-    pub fn new(now: impl Fn() -> Timestamp + Send + Sync + 'static) -> Self {
-        Self(Arc::new(now))
-    }
-
-    fn now(&self) -> Timestamp {
-        (self.0)()
-    }
-
-    /// The current UTC day.
-    fn today(&self) -> civil::Date {
-        self.now().to_zoned(TimeZone::UTC).date()
-    }
-}
-
-impl fmt::Debug for Clock {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("Clock(..)")
-    }
-}
 
 /// How much the web side takes on at a time, and how long it waits.
 #[derive(Debug, Clone, Copy)]

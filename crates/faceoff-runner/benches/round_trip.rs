@@ -17,10 +17,9 @@ use faceoff_episode::Arena;
 use faceoff_runner::{
     AgentEnvironment, Observer, Session, ShardSpec, TimeLimits, bundle::Bundle, run_shard,
 };
-use faceoff_sandbox::{Isolation, Limits, Runtime};
+use faceoff_sandbox::{Isolation, Limits, Runtime, affinity};
 use faceoff_types::{EpisodeOutcome, Interpolation, Profile, Seed, Task};
 use faceoff_wire::{Manifest, Message};
-use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use std::{
     collections::BTreeMap,
     fs,
@@ -54,15 +53,12 @@ fn main() {
                 .measurement_time(Duration::from_secs(5))
                 .warm_up_time(Duration::from_secs(1));
             round_trips(&mut criterion);
-            let all = sched_getaffinity(None).unwrap();
-            let cpus: Vec<usize> = (0..CpuSet::MAX_CPU)
-                .filter(|cpu| all.is_set(*cpu))
-                .collect();
+            let cpus = affinity::allowed().unwrap();
             medians("one CPU", cpus[0], cpus[0]);
             if let [here, there, ..] = cpus[..] {
                 medians("a CPU each", here, there);
             }
-            sched_setaffinity(None, &all).unwrap();
+            affinity::pin_current_thread(&cpus).unwrap();
             steps(&mut criterion);
             criterion.final_summary();
         }
@@ -216,9 +212,7 @@ fn medians(placement: &str, here: usize, there: usize) {
 
 /// Pins this thread and the children that it starts from now on.
 fn pin(cpu: usize) {
-    let mut cpus = CpuSet::new();
-    cpus.set(cpu);
-    sched_setaffinity(None, &cpus).unwrap();
+    affinity::pin_current_thread(&[cpu]).unwrap();
 }
 
 /// A child that reads as many bytes as the question has and writes as many as the answer.

@@ -3,7 +3,6 @@
 
 mod error;
 mod folder;
-mod limits;
 mod links;
 mod node;
 mod tar_archive;
@@ -11,7 +10,7 @@ mod tree;
 mod zip_archive;
 
 pub use error::BundleError;
-pub use limits::BundleLimits;
+pub use faceoff_types::BundleLimits;
 
 use faceoff_types::ArchiveFormat;
 use faceoff_wire::{MANIFEST_MAX_BYTES, Manifest};

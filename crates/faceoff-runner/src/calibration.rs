@@ -3,9 +3,9 @@
 //! uses nothing while the agent plays.
 
 use crate::fault::PlatformFault;
+use faceoff_sandbox::affinity::pin_current_thread;
 use faceoff_types::RoundTrips;
 use faceoff_wire::Message;
-use rustix::thread::{CpuSet, sched_setaffinity};
 use std::{
     io::{self, PipeReader, PipeWriter, Read as _, Write as _},
     thread::{self, JoinHandle},
@@ -91,14 +91,8 @@ impl Drop for CalibrationAgent {
 
 /// Answers until the question's pipe is closed.
 fn answer(cpus: &[usize], length: usize, mut questions: PipeReader, mut answers: PipeWriter) {
-    if !cpus.is_empty() {
-        let mut set = CpuSet::new();
-        for cpu in cpus.iter().filter(|cpu| **cpu < CpuSet::MAX_CPU) {
-            set.set(*cpu);
-        }
-        if let Err(error) = sched_setaffinity(None, &set) {
-            tracing::warn!(%error, "the calibration agent cannot be pinned to the agent's CPUs");
-        }
+    if let Err(error) = pin_current_thread(cpus) {
+        tracing::warn!(%error, "the calibration agent cannot be pinned to the agent's CPUs");
     }
     let mut question = vec![0; length];
     let answer = [b'0'; ANSWER_BYTES];

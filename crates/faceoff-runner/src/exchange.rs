@@ -3,11 +3,11 @@
 
 use crate::{
     bundle::Bundle,
-    config::{AgentEnvironment, TimeLimits},
+    config::AgentEnvironment,
     fault::{PlatformFault, Trouble},
 };
 use faceoff_sandbox::{AgentProcess, ReadLine, SpawnError, SpawnSpec, WriteError};
-use faceoff_types::{AgentFaultKind, Phase};
+use faceoff_types::{AgentFaultKind, Phase, TimeLimits};
 use faceoff_wire::{MAX_LINE_BYTES, Message, answer, quote_line};
 use std::time::{Duration, Instant};
 

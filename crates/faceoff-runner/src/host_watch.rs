@@ -4,7 +4,7 @@
 //! stopped. An agent that sleeps or waits delays nobody, so that leaves no trace here.
 
 use crate::fault::PlatformFault;
-use rustix::thread::{CpuSet, sched_setaffinity};
+use faceoff_sandbox::affinity::pin_current_thread;
 use std::{
     collections::VecDeque,
     sync::{
@@ -184,12 +184,7 @@ fn covered(mut spans: Vec<(Instant, Instant)>, from: Instant, to: Instant) -> Du
 
 /// Best effort: an unpinned watcher sees only stalls of the whole machine, and blames the host less.
 fn pin(cpu: usize) {
-    if cpu >= CpuSet::MAX_CPU {
-        return;
-    }
-    let mut cpus = CpuSet::new();
-    cpus.set(cpu);
-    if let Err(error) = sched_setaffinity(None, &cpus) {
+    if let Err(error) = pin_current_thread(&[cpu]) {
         tracing::warn!(%error, cpu, "the thread that watches a CPU cannot be pinned to it");
     }
 }

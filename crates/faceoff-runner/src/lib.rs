@@ -12,7 +12,6 @@
 pub mod bundle;
 mod calibration;
 mod config;
-mod cpu;
 mod exchange;
 mod fault;
 mod host_noise;
@@ -24,8 +23,10 @@ mod shard;
 mod smoke;
 mod wire_env;
 
-pub use config::{AgentEnvironment, TimeLimits};
-pub use faceoff_dataset::{Assembled, EvaluationMeta, ShardReport, ShardSpec, assemble};
+pub use config::AgentEnvironment;
+pub use faceoff_dataset::{Assembled, ShardReport, assemble};
+pub use faceoff_types::TimeLimits;
+pub use faceoff_wire::work::{EvaluationMeta, ShardSpec};
 pub use fault::{PlatformFault, Trouble};
 pub use host_watch::HostWatch;
 pub use session::Session;

@@ -1,12 +1,12 @@
 use crate::{
     bundle::Bundle,
-    config::{AgentEnvironment, TimeLimits},
+    config::AgentEnvironment,
     exchange::{Answer, Exchange, Sent},
     fault::{PlatformFault, Trouble},
     wire_env::wire_env,
 };
 use faceoff_episode::Answered;
-use faceoff_types::{AgentFaultKind, Contest, Interpolation, Phase};
+use faceoff_types::{AgentFaultKind, Contest, Interpolation, Phase, TimeLimits};
 use faceoff_wire::{Message, answer};
 use std::time::{Duration, Instant};
 

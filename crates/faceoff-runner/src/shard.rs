@@ -2,13 +2,14 @@ use crate::{
     bundle::Bundle,
     calibration::{self, CalibrationAgent},
     config::AgentEnvironment,
-    cpu::OffTheAgentsCpus,
     fault::PlatformFault,
     host_watch::{HostWatch, StallWatch},
     player::Player,
 };
-use faceoff_dataset::{Recorder, ShardFolder, ShardReport, ShardSpec};
+use faceoff_dataset::{Recorder, ShardFolder, ShardReport};
+use faceoff_sandbox::affinity::PinnedElsewhere;
 use faceoff_types::{EpisodeOutcome, SlotTiming};
+use faceoff_wire::work::ShardSpec;
 use std::path::Path;
 
 /// Follows a shard as it runs, and can stop it.
@@ -36,7 +37,7 @@ pub fn run_shard(
     out: &Path,
     observer: &mut dyn Observer,
 ) -> Result<ShardReport, PlatformFault> {
-    let _pinned = OffTheAgentsCpus::pin(&env.agent_cpus);
+    let _pinned = PinnedElsewhere::than(&env.agent_cpus);
     let watch = StallWatch::start(&env.agent_cpus)?;
     run_shard_watched(spec, bundle, env, out, observer, &watch)
 }
@@ -53,7 +54,7 @@ pub fn run_shard_watched(
     observer: &mut dyn Observer,
     watch: &dyn HostWatch,
 ) -> Result<ShardReport, PlatformFault> {
-    let _pinned = OffTheAgentsCpus::pin(&env.agent_cpus);
+    let _pinned = PinnedElsewhere::than(&env.agent_cpus);
     let mut calibration = Calibration::start(&env.agent_cpus)?;
     let folder = ShardFolder::create(out)?;
     let mut recorder = Recorder::create(&folder, spec.task)?;

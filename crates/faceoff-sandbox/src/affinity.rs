@@ -1,14 +1,97 @@
-//! CPU sets.
+//! Which CPUs a thread may run on. It changes how evenly time is kept, never what is computed.
 
-use rustix::thread::CpuSet;
+use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
+use std::io;
 
-/// The set of these CPU numbers; numbers beyond what the kernel interface holds are left out.
+/// The CPUs that the calling thread may use: a container, a service manager or a pinning may have
+/// taken some away.
+///
+/// # Errors
+/// When the kernel does not tell.
+pub fn allowed() -> io::Result<Vec<usize>> {
+    let set = sched_getaffinity(None)?;
+    Ok((0..CpuSet::MAX_CPU)
+        .filter(|cpu| set.is_set(*cpu))
+        .collect())
+}
+
+/// Keeps the calling thread, and the threads that it starts from now on, on these CPUs; with none
+/// given it stays where it is.
+///
+/// # Errors
+/// When none of them is there for this process.
+pub fn pin_current_thread(cpus: &[usize]) -> io::Result<()> {
+    if !cpus.is_empty() {
+        sched_setaffinity(None, &cpu_set(cpus))?;
+    }
+    Ok(())
+}
+
+/// Keeps the calling thread off some CPUs for as long as this lives, which is not to be sent to
+/// another thread: a simulator and its agent do not share one.
+#[derive(Debug)]
+pub struct PinnedElsewhere {
+    before: Option<CpuSet>,
+    /// It must be dropped where it was made.
+    _this_thread: std::marker::PhantomData<*const ()>,
+}
+
+impl PinnedElsewhere {
+    /// Does nothing where no other CPU is left, or the host does not allow it: pinning makes times
+    /// fairer, and nothing wrong.
+    #[must_use]
+    pub fn than(cpus: &[usize]) -> Self {
+        Self {
+            before: leave(cpus),
+            _this_thread: std::marker::PhantomData,
+        }
+    }
+}
+
+impl Drop for PinnedElsewhere {
+    fn drop(&mut self) {
+        if let Some(before) = &self.before
+            && let Err(error) = sched_setaffinity(None, before)
+        {
+            tracing::warn!(%error, "a thread cannot be unpinned");
+        }
+    }
+}
+
+/// What the thread was allowed before it left these CPUs, if it did.
+fn leave(cpus: &[usize]) -> Option<CpuSet> {
+    if cpus.is_empty() {
+        return None;
+    }
+    let before = sched_getaffinity(None).ok()?;
+    let mut rest = before;
+    for cpu in within_the_interface(cpus) {
+        rest.unset(cpu);
+    }
+    if rest.count() == 0 {
+        return None;
+    }
+    match sched_setaffinity(None, &rest) {
+        Ok(()) => Some(before),
+        Err(error) => {
+            tracing::warn!(%error, ?cpus, "a thread cannot be kept off the agent's CPUs");
+            None
+        }
+    }
+}
+
+/// The set of these CPU numbers.
 pub(crate) fn cpu_set(cpus: &[usize]) -> CpuSet {
     let mut set = CpuSet::new();
-    for &cpu in cpus.iter().filter(|&&cpu| cpu < CpuSet::MAX_CPU) {
+    for cpu in within_the_interface(cpus) {
         set.set(cpu);
     }
     set
+}
+
+/// Numbers beyond what the kernel's interface holds name no CPU.
+fn within_the_interface(cpus: &[usize]) -> impl Iterator<Item = usize> {
+    cpus.iter().copied().filter(|&cpu| cpu < CpuSet::MAX_CPU)
 }
 
 /// `0-1,4` for the cpuset controller.
@@ -21,4 +104,27 @@ pub(crate) fn cpu_list(cpus: &[usize]) -> String {
         .map(usize::to_string)
         .collect::<Vec<_>>()
         .join(",")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thread_leaves_and_returns() {
+        let all = allowed().unwrap();
+        let (first, rest) = all.split_first().unwrap();
+        {
+            let _elsewhere = PinnedElsewhere::than(&[*first]);
+            let left = allowed().unwrap();
+            // where there is but one CPU, it stays
+            assert_eq!(left, if rest.is_empty() { &all[..] } else { rest });
+        }
+        assert_eq!(allowed().unwrap(), all);
+        pin_current_thread(&[*first, usize::MAX]).unwrap();
+        assert_eq!(allowed().unwrap(), [*first]);
+        pin_current_thread(&[]).unwrap();
+        assert_eq!(allowed().unwrap(), [*first]);
+        assert!(pin_current_thread(&[usize::MAX]).is_err());
+    }
 }

@@ -9,7 +9,7 @@
 //! never turns a failure of the host into a fault of the agent or the other way round
 //! ([`SandboxError`] and [`faceoff_types::AgentFaultKind`] are different types on purpose).
 
-mod affinity;
+pub mod affinity;
 mod agent_user;
 mod bubblewrap;
 mod cgroup;
@@ -19,7 +19,6 @@ mod cpu_clock;
 mod end;
 mod error;
 mod isolation;
-mod limits;
 mod line_pipe;
 mod next_look;
 mod output_holders;
@@ -38,8 +37,8 @@ mod stderr_tail;
 mod sweep;
 
 pub use error::{SandboxError, SpawnError, WriteError};
+pub use faceoff_types::ResourceLimits as Limits;
 pub use isolation::{Isolation, Layer};
-pub use limits::Limits;
 pub use line_pipe::ReadLine;
 pub use probe::{HostFeature, probe_host};
 pub use process::{AgentProcess, Usage};

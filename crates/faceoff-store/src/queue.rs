@@ -1,9 +1,8 @@
 use crate::{
-    AblationRun, BundleRef, Claim, Evaluation, Event, Shard, Store, StoreError, Submission,
-    ablations, column::Instant, evaluation_ends, evaluations, leases, shards, smoke_runs,
-    submissions,
+    AblationRun, Claim, Evaluation, Event, Shard, Store, StoreError, Submission, ablations,
+    column::Instant, evaluation_ends, evaluations, leases, shards, smoke_runs, submissions,
 };
-use faceoff_types::{AblationRunId, EvaluationId, ShardId, SubmissionId};
+use faceoff_types::{AblationRunId, BundleRef, EvaluationId, ShardId, SubmissionId};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 use uuid::Uuid;

@@ -2,31 +2,10 @@ use crate::{
     Claim, Event, Store, StoreError,
     leases::{self, Hold},
 };
-use faceoff_types::SubmissionId;
+use faceoff_types::{SmokeOutcome, SubmissionId};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 use uuid::Uuid;
-
-/// What a smoke run found.
-#[derive(Debug, Clone, PartialEq)]
-pub enum SmokeOutcome {
-    /// The agent starts, answers and keeps time.
-    Valid {
-        /// The name in its manifest.
-        agent_name: String,
-        /// Tail of its standard error.
-        log: String,
-    },
-    /// The team's fault.
-    Invalid {
-        /// The name in its manifest, if that could be read.
-        agent_name: Option<String>,
-        /// What is wrong and where.
-        reason: String,
-        /// Tail of its standard error.
-        log: String,
-    },
-}
 
 /// Ends a submission's validation by our fault.
 pub(crate) async fn give_up(

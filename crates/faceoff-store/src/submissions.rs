@@ -1,22 +1,9 @@
 use crate::{Event, Store, StoreError, column::Instant, season};
-use faceoff_types::{SubmissionId, TeamId};
+use faceoff_types::{BundleRef, SubmissionId, TeamId};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use sqlx::{SqliteConnection, types::Text};
 use uuid::Uuid;
-
-/// Where an uploaded bundle is kept and what it must be.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BundleRef {
-    /// Artifact key.
-    pub key: String,
-    /// Size of the archive.
-    pub bytes: u64,
-    /// BLAKE3 of the archive, 64 hexadecimal digits.
-    pub blake3: String,
-    /// Original file name, for its format.
-    pub file_name: String,
-}
 
 /// One uploaded agent.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,23 +5,29 @@
 //! physics in `faceoff-sim`.
 
 mod archive_format;
+mod bundle_ref;
+mod clock;
 mod computation_time;
 mod constraint;
 mod contest;
 mod fault;
 mod ids;
 mod interpolation;
+mod limits;
 mod outcome;
 mod profile;
 mod result;
 mod ruleset;
 mod seed;
+mod smoke_outcome;
 mod task;
 mod team_name;
 mod tier;
 mod timing;
 
 pub use archive_format::ArchiveFormat;
+pub use bundle_ref::BundleRef;
+pub use clock::Clock;
 pub use computation_time::ComputationTime;
 pub use constraint::{Constraint, Violations};
 pub use contest::{Contest, Side};
@@ -30,11 +36,13 @@ pub use ids::{
     AblationId, AblationRunId, EvaluationId, ParseIdError, ShardId, SubmissionId, TeamId,
 };
 pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, UnknownInterpolation};
+pub use limits::{AgentLimits, BundleLimits, ResourceLimits, TimeLimits};
 pub use outcome::{EpisodeEnd, EpisodeOutcome};
 pub use profile::{Factor, Factors, ParseProfileError, Profile};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult, ViolationCounts};
 pub use ruleset::{FOULS_PER_POINT, GAME_WINDOWS, RULESET, WINDOW_STEPS};
 pub use seed::{ParseSeedError, Seed};
+pub use smoke_outcome::SmokeOutcome;
 pub use task::{ParseTaskError, Task};
 pub use team_name::{InvalidTeamName, TeamName};
 pub use tier::Tier;

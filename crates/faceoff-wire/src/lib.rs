@@ -1,5 +1,5 @@
-//! What Faceoff promises to outsiders: the agent protocol, the bundle's `agent.toml` and the files
-//! of a dataset.
+//! What Faceoff promises to outsiders: the agent protocol, the bundle's `agent.toml`, the files of a
+//! dataset and the work orders of slots, which may be on other machines.
 //!
 //! Everything here is versioned, size-capped and free of I/O: bytes come in and go out as slices,
 //! and the crate neither reads a clock nor knows a process. What an agent says is parsed once, into
@@ -9,7 +9,8 @@
 //! * [`message`]: what the evaluator says (`hello`, `reset`, `step`, `end`, `bye`);
 //! * [`answer`]: what the agent answers (`ready`, `act`);
 //! * [`Manifest`][]: `agent.toml`;
-//! * [`dataset`]: `manifest.json` and `violations.json` of a recorded evaluation.
+//! * [`dataset`]: `manifest.json` and `violations.json` of a recorded evaluation;
+//! * [`work`]: what a worker slot is told to do and reports back.
 
 pub mod answer;
 pub mod dataset;
@@ -17,6 +18,7 @@ mod manifest;
 pub mod message;
 mod protocol;
 mod quote;
+pub mod work;
 
 pub use manifest::{MANIFEST_MAX_BYTES, Manifest, ManifestError};
 pub use message::{Env, Message, ProtocolTask};

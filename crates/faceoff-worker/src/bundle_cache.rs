@@ -1,16 +1,16 @@
-use crate::evaluator::Evaluator;
-use faceoff_runner::bundle::{Bundle, BundleError, BundleLimits};
-use faceoff_store::{BundleRef, Store};
-use std::{fs, path::PathBuf};
-use tokio::runtime::Handle;
+use crate::{evaluator::Evaluator, server::WorkServer};
+use anyhow::Context as _;
+use faceoff_runner::bundle::{Bundle, BundleError};
+use faceoff_wire::work::AgentOrder;
+use fs_err as fs;
+use std::path::{Path, PathBuf};
 
-/// Why a bundle cannot be had.
+/// What a team's archive turned out to be.
 #[derive(Debug)]
-pub(crate) enum FetchError {
-    /// The archive is the team's fault; the text says what is wrong.
+pub(crate) enum Unpacked {
+    Bundle(Bundle),
+    /// No bundle, by the team's fault; the text says what is wrong.
     Invalid(String),
-    /// Ours.
-    Platform(String),
 }
 
 /// The bundle that a slot used last, unpacked: a slot plays many shards of one agent in a row.
@@ -22,7 +22,7 @@ pub(crate) struct BundleCache {
 }
 
 impl BundleCache {
-    pub(crate) fn new(slot_folder: &std::path::Path) -> Self {
+    pub(crate) fn new(slot_folder: &Path) -> Self {
         Self {
             folder: slot_folder.join("bundle"),
             held: None,
@@ -30,63 +30,61 @@ impl BundleCache {
     }
 
     /// The unpacked bundle, fetched if it is not the one held. Its bytes are the ones that were
-    /// uploaded: the hash is checked on every fetch, and agents see the folder read-only.
+    /// uploaded: the hash is checked on every fetch, and agents see the folder read-only. An error is
+    /// ours.
     pub(crate) fn get(
         &mut self,
-        bundle: &BundleRef,
+        agent: &AgentOrder,
         evaluator: &dyn Evaluator,
-        limits: &BundleLimits,
-        store: &Store,
-        handle: &Handle,
-    ) -> Result<Bundle, FetchError> {
+        server: &dyn WorkServer,
+    ) -> anyhow::Result<Unpacked> {
         if let Some((hash, held)) = &self.held
-            && *hash == bundle.blake3
+            && *hash == agent.bundle.blake3
         {
-            return Ok(held.clone());
+            return Ok(Unpacked::Bundle(held.clone()));
         }
         self.held = None;
-        let unpacked = self.fetch(bundle, evaluator, limits, store, handle)?;
-        self.held = Some((bundle.blake3.clone(), unpacked.clone()));
+        let unpacked = self.fetch(agent, evaluator, server)?;
+        if let Unpacked::Bundle(bundle) = &unpacked {
+            self.held = Some((agent.bundle.blake3.clone(), bundle.clone()));
+        }
         Ok(unpacked)
     }
 
     fn fetch(
         &self,
-        bundle: &BundleRef,
+        agent: &AgentOrder,
         evaluator: &dyn Evaluator,
-        limits: &BundleLimits,
-        store: &Store,
-        handle: &Handle,
-    ) -> Result<Bundle, FetchError> {
-        let ours = |what: &str, error: &dyn std::fmt::Display| {
-            FetchError::Platform(format!("{what}: {error}"))
-        };
+        server: &dyn WorkServer,
+    ) -> anyhow::Result<Unpacked> {
         if self.folder.exists() {
-            fs::remove_dir_all(&self.folder).map_err(|e| ours("removing the last bundle", &e))?;
+            fs::remove_dir_all(&self.folder)?;
         }
         let unpacked = self.folder.join("unpacked");
-        fs::create_dir_all(&unpacked).map_err(|e| ours("making room for a bundle", &e))?;
+        fs::create_dir_all(&unpacked)?;
         let archive = self.folder.join("archive");
-        handle
-            .block_on(store.artifacts().get_to_file(&bundle.key, &archive))
-            .map_err(|e| ours("fetching the bundle", &e))?;
-        let mut hasher = blake3::Hasher::new();
-        fs::File::open(&archive)
-            .and_then(|file| hasher.update_reader(file).map(|_| ()))
-            .map_err(|e| ours("reading the bundle", &e))?;
-        if hasher.finalize().to_string() != bundle.blake3 {
-            return Err(FetchError::Platform(
-                "the stored bundle is not the uploaded one".into(),
-            ));
-        }
-        let result = match evaluator.unpack(&archive, &unpacked, limits) {
+        server
+            .fetch_bundle(&agent.bundle, &archive)
+            .context("fetching the bundle")?;
+        anyhow::ensure!(
+            blake3_of(&archive)? == agent.bundle.blake3,
+            "the stored bundle is not the uploaded one"
+        );
+        let bundle = match evaluator.unpack(&archive, &unpacked, &agent.limits.bundle) {
             Ok(bundle) => bundle,
-            Err(BundleError::Invalid(reason)) => return Err(FetchError::Invalid(reason)),
+            Err(BundleError::Invalid(reason)) => return Ok(Unpacked::Invalid(reason)),
             Err(error @ BundleError::Io { .. }) => {
-                return Err(ours("unpacking the bundle", &error));
+                return Err(error).context("unpacking the bundle");
             }
         };
-        fs::remove_file(&archive).map_err(|e| ours("removing the unpacked archive", &e))?;
-        Ok(result)
+        fs::remove_file(&archive)?;
+        Ok(Unpacked::Bundle(bundle))
     }
+}
+
+/// BLAKE3 of a file, 64 hexadecimal digits.
+pub(crate) fn blake3_of(file: &Path) -> anyhow::Result<String> {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_reader(fs::File::open(file)?)?;
+    Ok(hasher.finalize().to_string())
 }

@@ -1,58 +1,59 @@
-use crate::clock::Clock;
-use faceoff_store::{Claim, Store};
+use crate::server::{GivenBack, Holding, WorkServer};
 use faceoff_types::EpisodeOutcome;
+use faceoff_wire::work::Lease;
 use std::{
+    io,
     sync::{
         Arc,
         atomic::{AtomicU32, Ordering},
     },
-    time::Duration,
+    thread::{self, JoinHandle},
+    time::{Duration, Instant},
 };
-use tokio::{runtime::Handle, task::JoinHandle, time::MissedTickBehavior};
 use tokio_util::sync::CancellationToken;
 
 /// How often progress is looked at, so that a progress bar moves.
 const PROGRESS_TICK: Duration = Duration::from_secs(1);
 
-/// Keeps a unit's lease while a slot works on it: a task renews it, stores the progress, notices when
+/// Keeps a unit's lease while a slot works on it: a thread renews it, tells the progress, notices when
 /// it is lost, and at a shutdown gives it back at once, whatever the slot is in the middle of.
-/// Dropping it ends the renewal.
+/// Dropping it waits for what the thread is telling the server, so that a slot never ends before its
+/// unit was given back.
 #[derive(Debug)]
 pub(crate) struct LeaseKeeper {
     progress: Progress,
-    renewal: JoinHandle<()>,
+    over: CancellationToken,
+    /// `None` only while it is being dropped.
+    thread: Option<JoinHandle<()>>,
 }
 
-/// What passes between the slot's thread and the renewal.
-#[derive(Debug, Clone)]
+/// What passes between the slot's thread and the keeper's.
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Progress {
     episodes_done: Arc<AtomicU32>,
     stop: CancellationToken,
 }
 
 impl LeaseKeeper {
-    /// Keeps `claim`, which was leased for `lease_s` seconds.
+    /// Fails when the host has no thread left.
     pub(crate) fn keep(
-        handle: &Handle,
-        store: Store,
-        claim: Claim,
-        lease_s: u32,
-        clock: Clock,
-        shutdown: CancellationToken,
-    ) -> Self {
-        let progress = Progress {
-            episodes_done: Arc::default(),
-            stop: CancellationToken::new(),
-        };
-        let renewal = handle.spawn(renew(
-            store,
-            claim,
-            lease_s,
-            progress.clone(),
-            clock,
-            shutdown,
-        ));
-        Self { progress, renewal }
+        server: Arc<dyn WorkServer>,
+        lease: Lease,
+        shutdown: &CancellationToken,
+    ) -> io::Result<Self> {
+        let progress = Progress::default();
+        let over = shutdown.child_token();
+        let thread = thread::Builder::new()
+            .name("faceoff-lease".to_owned())
+            .spawn({
+                let (progress, over, shutdown) = (progress.clone(), over.clone(), shutdown.clone());
+                move || keep(&*server, &lease, &progress, &over, &shutdown)
+            })?;
+        Ok(Self {
+            progress,
+            over,
+            thread: Some(thread),
+        })
     }
 
     /// For the slot's thread.
@@ -63,7 +64,12 @@ impl LeaseKeeper {
 
 impl Drop for LeaseKeeper {
     fn drop(&mut self) {
-        self.renewal.abort();
+        self.over.cancel();
+        if let Some(thread) = self.thread.take()
+            && thread.join().is_err()
+        {
+            tracing::error!("the thread that keeps a lease panicked; the lease will end");
+        }
     }
 }
 
@@ -84,47 +90,47 @@ impl faceoff_runner::Observer for Progress {
     }
 }
 
-async fn renew(
-    store: Store,
-    claim: Claim,
-    lease_s: u32,
-    progress: Progress,
-    clock: Clock,
-    shutdown: CancellationToken,
+/// Ends with the unit (`over`), with its lease or with the shutdown, which ends `over`, too.
+fn keep(
+    server: &dyn WorkServer,
+    lease: &Lease,
+    progress: &Progress,
+    over: &CancellationToken,
+    shutdown: &CancellationToken,
 ) {
     // three tries before the lease ends
-    let due_every = Duration::from_secs(lease_s.into()) / 3;
-    let mut ticks = tokio::time::interval(due_every.min(PROGRESS_TICK));
-    ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let due_every = Duration::from_secs(lease.duration_s.into()) / 3;
     let mut told = 0;
-    let mut renewed_at = tokio::time::Instant::now();
+    let mut renewed_at = Instant::now();
     loop {
-        tokio::select! {
-            biased;
-            () = shutdown.cancelled() => {
-                progress.stop.cancel();
-                if let Err(error) = store.release(&claim, clock.now()).await {
-                    tracing::warn!(unit = %claim.unit, %error, "the unit could not be given back; its lease will end");
-                }
-                return;
+        server.wait(over, due_every.min(PROGRESS_TICK), None);
+        if shutdown.is_cancelled() {
+            progress.stop.cancel();
+            if let Err(error) = server.give_back(lease, GivenBack::Shutdown) {
+                tracing::warn!(unit = %lease.unit, cause = format!("{error:#}"), "the unit could not be given back; its lease will end");
             }
-            _ = ticks.tick() => {}
+            return;
+        }
+        if over.is_cancelled() {
+            return;
         }
         let done = progress.episodes_done.load(Ordering::Relaxed);
         if done == told && renewed_at.elapsed() < due_every {
             continue;
         }
-        match store.heartbeat(&claim, done, lease_s, clock.now()).await {
-            Ok(true) => {
+        match server.renew(lease, done) {
+            Ok(Holding::Held) => {
                 told = done;
-                renewed_at = tokio::time::Instant::now();
+                renewed_at = Instant::now();
             }
-            Ok(false) => {
+            Ok(Holding::Lost) => {
                 progress.stop.cancel();
                 return;
             }
             // The next tick tries again. Should the lease end meanwhile, the commit finds out.
-            Err(error) => tracing::warn!(unit = %claim.unit, %error, "the lease was not renewed"),
+            Err(error) => {
+                tracing::warn!(unit = %lease.unit, cause = format!("{error:#}"), "the lease was not renewed");
+            }
         }
     }
 }

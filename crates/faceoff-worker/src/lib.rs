@@ -1,5 +1,6 @@
-//! The part of the server that works: slots lease units from the store, run agents through
-//! `faceoff-runner`, and commit what came of it; and the daily schedule.
+//! The part of the server that works: slots lease units of work, run agents through `faceoff-runner`,
+//! and commit what came of it; and the daily schedule. A slot gets a work order (`faceoff-wire`) from
+//! a server that it knows as a trait; that of its own process sits on the store.
 //!
 //! A slot is a named operating-system thread: physics and the agent's pipes block, and must not share
 //! a thread with the service's async tasks. A unit is leased for seconds and renewed while it runs,
@@ -10,17 +11,18 @@
 //! lose: everything is in the store.
 
 mod bundle_cache;
-mod clock;
 mod cpus;
 mod evaluator;
+mod executor;
 mod lease;
+mod local;
 mod schedule;
 mod scratch;
+mod server;
 mod service;
 mod slot;
 #[cfg(test)]
 mod tests;
-mod units;
 
 pub use cpus::{CpuLayout, SlotCpus};
 pub use schedule::{DailyPlan, run_schedule};

@@ -1,6 +1,6 @@
-use crate::clock::Clock;
 use anyhow::Context as _;
 use faceoff_store::{Evaluation, EvaluationPlan, Store};
+use faceoff_types::Clock;
 use jiff::{Timestamp, civil::Time, tz::TimeZone};
 use std::{num::NonZeroU32, time::Duration};
 use tokio_util::sync::CancellationToken;
@@ -25,10 +25,10 @@ pub struct DailyPlan {
 /// database is tried again every minute.
 pub async fn run_schedule(
     store: Store,
+    clock: Clock,
     daily: DailyPlan,
     shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
-    let clock = Clock::system();
     loop {
         let now = clock.now();
         let wait = match until_next(now, daily.at)

@@ -1,6 +1,7 @@
 use anyhow::Context as _;
+use fs_err::{self as fs, File};
 use std::{
-    fs::{self, File, TryLockError},
+    fs::TryLockError,
     io::{Read as _, Seek as _, SeekFrom, Write as _},
     path::{Path, PathBuf},
 };
@@ -18,15 +19,14 @@ pub(crate) struct Scratch {
 impl Scratch {
     /// Takes the folder, creating it if need be, and removes what an earlier process left.
     pub(crate) fn take(folder: &Path) -> anyhow::Result<Self> {
-        fs::create_dir_all(folder)
-            .with_context(|| format!("cannot create the scratch folder {}", folder.display()))?;
-        let mut lock = File::options()
+        fs::create_dir_all(folder).context("making the scratch folder")?;
+        let mut lock = fs::OpenOptions::new()
             .read(true)
             .write(true)
             .create(true)
             .truncate(false)
             .open(folder.join("lock"))
-            .with_context(|| format!("cannot write to the scratch folder {}", folder.display()))?;
+            .context("taking the scratch folder")?;
         match lock.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => anyhow::bail!(
@@ -34,9 +34,8 @@ impl Scratch {
                 folder.display()
             ),
             Err(TryLockError::Error(error)) => {
-                return Err(error).with_context(|| {
-                    format!("cannot lock the scratch folder {}", folder.display())
-                });
+                return Err(error)
+                    .with_context(|| format!("locking the scratch folder {}", folder.display()));
             }
         }
         for entry in fs::read_dir(folder)? {
@@ -46,8 +45,7 @@ impl Scratch {
                 .to_str()
                 .is_some_and(|name| name.starts_with("slot-"));
             if ours {
-                fs::remove_dir_all(entry.path())
-                    .with_context(|| format!("cannot remove {}", entry.path().display()))?;
+                fs::remove_dir_all(entry.path())?;
             }
         }
         let worker = worker_name(&mut lock).context("cannot keep the worker's name")?;
@@ -67,7 +65,7 @@ impl Scratch {
     /// The empty folder of one slot.
     pub(crate) fn slot(&self, index: usize) -> anyhow::Result<PathBuf> {
         let folder = self.folder.join(format!("slot-{index}"));
-        fs::create_dir(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
+        fs::create_dir(&folder)?;
         Ok(folder)
     }
 }

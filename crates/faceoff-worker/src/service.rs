@@ -1,41 +1,38 @@
 use crate::{
     bundle_cache::BundleCache,
-    clock::Clock,
     cpus::{self, CpuLayout, SlotCpus},
     evaluator::{Evaluator, Runner},
+    executor::{AgentHost, Executor},
+    local::LocalServer,
     scratch::Scratch,
+    server::WorkServer,
     slot::Slot,
-    units::Tools,
 };
 use anyhow::Context as _;
 use faceoff_runner::{AgentEnvironment, bundle::BundleLimits};
 use faceoff_store::Store;
-use jiff::SignedDuration;
+use faceoff_types::{AgentLimits, Clock};
 use std::{path::PathBuf, sync::Arc, thread, time::Duration};
 use tokio::{runtime::Handle, sync::oneshot, task::JoinSet};
 use tokio_util::sync::CancellationToken;
 
-/// No artifact is under way longer than this.
-const LONGEST_WRITE: SignedDuration = SignedDuration::from_hours(1);
-
-/// What time means here; tests are quicker.
-pub(crate) struct Pace {
-    pub(crate) clock: Clock,
-    /// See [`Slot::poll`].
-    pub(crate) poll: Duration,
+/// How often things are done that nothing calls for; tests are quicker.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Intervals {
+    /// See [`Slot::idle_poll`].
+    pub(crate) idle_poll: Duration,
     /// How often the recordings of evaluations that are over are removed.
-    pub(crate) tidy_every: Duration,
+    pub(crate) tidy: Duration,
     /// How long slots may take to leave what they are in the middle of (a step of an agent, an
     /// upload) once their units were given back.
     pub(crate) shutdown_grace: Duration,
 }
 
-impl Default for Pace {
+impl Default for Intervals {
     fn default() -> Self {
         Self {
-            clock: Clock::system(),
-            poll: Duration::from_secs(2),
-            tidy_every: Duration::from_secs(300),
+            idle_poll: Duration::from_secs(2),
+            tidy: Duration::from_secs(300),
             shutdown_grace: Duration::from_secs(20),
         }
     }
@@ -62,77 +59,103 @@ pub struct WorkerConfig {
 /// middle of an answer may take that long. Fails if the scratch folder cannot be had or a slot dies.
 pub async fn run(
     store: Store,
+    clock: Clock,
     config: WorkerConfig,
     shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
-    run_with(store, config, shutdown, Arc::new(Runner), Pace::default()).await
+    let server = config.local_server(store, clock);
+    let slots_server = Arc::new(server.clone());
+    let evaluator = Arc::new(Runner);
+    run_with(
+        server,
+        slots_server,
+        evaluator,
+        config,
+        Intervals::default(),
+        shutdown,
+    )
+    .await
 }
 
+impl WorkerConfig {
+    /// Hands out work as configured here.
+    pub(crate) fn local_server(&self, store: Store, clock: Clock) -> LocalServer {
+        LocalServer {
+            store,
+            runtime: Handle::current(),
+            clock,
+            lease_s: self.lease_s,
+            limits: AgentLimits {
+                bundle: self.bundle_limits,
+                resources: self.agent.limits.clone(),
+                time: self.agent.time.clone(),
+            },
+        }
+    }
+}
+
+/// `slots_server` is what the slots see of `server`.
 pub(crate) async fn run_with(
-    store: Store,
-    config: WorkerConfig,
-    shutdown: CancellationToken,
+    server: LocalServer,
+    slots_server: Arc<dyn WorkServer>,
     evaluator: Arc<dyn Evaluator>,
-    pace: Pace,
+    config: WorkerConfig,
+    intervals: Intervals,
+    shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
     anyhow::ensure!(config.slots > 0, "a worker needs at least one slot");
     anyhow::ensure!(config.lease_s > 0, "a lease lasts at least one second");
     let folder = config.scratch_dir.clone();
     let scratch = tokio::task::spawn_blocking(move || Scratch::take(&folder)).await??;
 
-    // A killed predecessor's units need not wait for their leases to run out.
-    let ended = store
-        .end_leases_of(scratch.worker(), pace.clock.now())
-        .await?;
+    let ended = server.end_leases_of(scratch.worker()).await?;
     if ended > 0 {
         tracing::info!(units = ended, "taken over from this worker's last life");
     }
 
-    let layout = layout(&config);
     let stop = shutdown.child_token();
     // However this function ends, its threads do, too.
     let _stop = stop.clone().drop_guard();
     let mut slots = JoinSet::new();
-    for (index, cpus) in layout.into_iter().enumerate() {
+    for (index, cpus) in layout(&config).into_iter().enumerate() {
         let folder = scratch.slot(index)?;
-        let mut agent = config.agent.clone();
-        agent.agent_cpus = cpus.agent;
         let slot = Slot {
             name: format!("{}/slot-{index}", scratch.worker()),
-            lease_s: config.lease_s,
-            poll: pace.poll,
-            tools: Tools {
-                store: store.clone(),
-                handle: Handle::current(),
-                clock: pace.clock.clone(),
+            idle_poll: intervals.idle_poll,
+            server: Arc::clone(&slots_server),
+            executor: Executor {
+                server: Arc::clone(&slots_server),
                 evaluator: Arc::clone(&evaluator),
-                agent,
-                bundle_limits: config.bundle_limits,
+                host: AgentHost {
+                    isolation: config.agent.isolation.clone(),
+                    runtimes: config.agent.runtimes.clone(),
+                    cpus,
+                },
                 bundles: BundleCache::new(&folder),
                 folder,
             },
             shutdown: stop.clone(),
         };
-        let end = start(index, cpus.simulator, slot)?;
+        let end = start(index, slot)?;
         slots.spawn(async move { end.await.map_err(|_| index) });
     }
-    let tidying = tokio::spawn(tidy(store, pace.clock, pace.tidy_every, shutdown.clone()));
+    let tidying = tokio::spawn(tidy(server, intervals.tidy, shutdown.clone()));
 
-    let ended = wait_for(slots, pace.shutdown_grace, &stop).await;
+    let ended = wait_for(slots, intervals.shutdown_grace, &stop).await;
     tidying.abort();
     ended
 }
 
-/// The CPUs of every slot.
+/// The CPUs of every slot. A task is played by one agent.
 fn layout(config: &WorkerConfig) -> Vec<SlotCpus> {
     if !config.agent.agent_cpus.is_empty() {
         let cpus = SlotCpus {
             simulator: Vec::new(),
-            agent: config.agent.agent_cpus.clone(),
+            agents: vec![config.agent.agent_cpus.clone()],
         };
         return vec![cpus; config.slots];
     }
-    let layout = CpuLayout::divide(&cpus::allowed(), config.slots);
+    let layout = CpuLayout::divide(&cpus::allowed(), config.slots, 1);
     if layout.shared {
         tracing::warn!(
             slots = config.slots,
@@ -143,16 +166,12 @@ fn layout(config: &WorkerConfig) -> Vec<SlotCpus> {
 }
 
 /// Starts a slot's thread; the receiver hears of its end, or of its panic by the sender's drop.
-fn start(
-    index: usize,
-    simulator_cpus: Vec<usize>,
-    slot: Slot,
-) -> anyhow::Result<oneshot::Receiver<()>> {
+fn start(index: usize, slot: Slot) -> anyhow::Result<oneshot::Receiver<()>> {
     let (ended, end) = oneshot::channel();
     thread::Builder::new()
         .name(format!("faceoff-slot-{index}"))
         .spawn(move || {
-            cpus::pin_this_thread(&simulator_cpus);
+            cpus::pin_simulator(&slot.executor.host.cpus.simulator);
             slot.run();
             // nobody listens any more after the grace
             let _ = ended.send(());
@@ -195,20 +214,10 @@ async fn wait_for(
     }
 }
 
-/// Removes, now and then, recordings that are no longer needed and what kills left half written.
-async fn tidy(store: Store, clock: Clock, every: Duration, shutdown: CancellationToken) {
+/// Clears away, now and then, what nobody needs.
+async fn tidy(server: LocalServer, every: Duration, shutdown: CancellationToken) {
     loop {
-        let now = clock.now();
-        if let Err(error) = store.remove_old_recordings(now).await {
-            tracing::warn!(%error, "old recordings could not be removed");
-        }
-        if let Err(error) = store
-            .artifacts()
-            .remove_abandoned(now - LONGEST_WRITE)
-            .await
-        {
-            tracing::warn!(%error, "half-written artifacts could not be removed");
-        }
+        server.tidy().await;
         tokio::select! {
             () = shutdown.cancelled() => return,
             () = tokio::time::sleep(every) => {}

@@ -1,134 +1,94 @@
 use crate::{
+    executor::Executor,
     lease::LeaseKeeper,
-    units::{End, Ended, Tools},
+    server::{Claimed, GivenBack, Holding, WorkServer},
 };
 use faceoff_runner::PlatformFault;
-use faceoff_store::Work;
-use std::{panic::AssertUnwindSafe, time::Duration};
+use faceoff_wire::work::WorkOrder;
+use std::{panic::AssertUnwindSafe, sync::Arc, time::Duration};
 use tokio_util::sync::CancellationToken;
 
 /// One slot: claims units and works them off, one at a time, on its own thread.
 pub(crate) struct Slot {
     pub(crate) name: String,
-    pub(crate) lease_s: u32,
     /// How long to wait, idle, before looking for units that became claimable by the passing of time:
     /// an expired lease, the end of a back-off, work added by another process.
-    pub(crate) poll: Duration,
-    pub(crate) tools: Tools,
+    pub(crate) idle_poll: Duration,
+    pub(crate) server: Arc<dyn WorkServer>,
+    pub(crate) executor: Executor,
     pub(crate) shutdown: CancellationToken,
 }
 
 impl Slot {
     /// Works until the shutdown.
     pub(crate) fn run(mut self) {
-        let mut signal = self.tools.store.work_signal();
         while !self.shutdown.is_cancelled() {
-            // Seen before the claim, so that what is queued right after it wakes the wait.
-            signal.borrow_and_update();
-            let claimed = self.tools.handle.block_on(self.tools.store.claim(
-                &self.name,
-                self.lease_s,
-                self.tools.clock.now(),
-            ));
-            match claimed {
-                Ok(Some(work)) => self.work_on(&work),
-                Ok(None) => self.wait_for(Some(&mut signal)),
-                Err(error) => {
-                    tracing::error!(%error, "cannot claim work; trying again");
-                    self.wait_for(None);
+            let queue = match self.server.claim(&self.name) {
+                Ok(Claimed::Order(order)) => {
+                    self.work_on(&order);
+                    continue;
                 }
-            }
+                Ok(Claimed::Nothing { queue }) => Some(queue),
+                Err(error) => {
+                    tracing::error!(
+                        cause = format!("{error:#}"),
+                        "cannot claim work; trying again"
+                    );
+                    None
+                }
+            };
+            self.server.wait(&self.shutdown, self.idle_poll, queue);
         }
     }
 
-    fn wait_for(&self, signal: Option<&mut tokio::sync::watch::Receiver<u64>>) {
-        self.tools.handle.block_on(async {
-            let added = async {
-                match signal {
-                    Some(signal) => drop(signal.changed().await),
-                    None => std::future::pending().await,
-                }
-            };
-            tokio::select! {
-                () = self.shutdown.cancelled() => {}
-                () = added => {}
-                () = tokio::time::sleep(self.poll) => {}
-            }
-        });
-    }
-
-    fn work_on(&mut self, work: &Work) {
-        let claim = work.claim();
-        let keeper = LeaseKeeper::keep(
-            &self.tools.handle,
-            self.tools.store.clone(),
-            claim.clone(),
-            self.lease_s,
-            self.tools.clock.clone(),
-            self.shutdown.clone(),
-        );
-        tracing::info!(unit = %claim.unit, work = %Description(work), "begun");
+    fn work_on(&mut self, order: &WorkOrder) {
+        let (unit, work) = (order.lease.unit, &order.assignment);
+        tracing::info!(%unit, %work, "begun");
         // A defect of ours in the middle of an episode must not end the slot, nor the evaluation.
-        let ended = std::panic::catch_unwind(AssertUnwindSafe(|| self.perform(work, &keeper)))
+        let ended = std::panic::catch_unwind(AssertUnwindSafe(|| self.perform(order)))
             .unwrap_or_else(|panic| {
                 Err(anyhow::anyhow!("the evaluator failed: {}", words(&*panic)))
             });
         match ended {
-            Ok(End::Committed) => {
-                tracing::info!(unit = %claim.unit, work = %Description(work), "committed");
-            }
-            Ok(End::Stopped) => {
-                tracing::info!(unit = %claim.unit, work = %Description(work), "no longer this slot's");
-            }
-            Err(error) => self.give_back(work, &keeper, &error),
+            Ok(Holding::Held) => tracing::info!(%unit, %work, "committed"),
+            Ok(Holding::Lost) => tracing::info!(%unit, %work, "no longer this slot's"),
+            Err(error) => self.give_back(order, &error),
         }
     }
 
-    fn perform(&mut self, work: &Work, keeper: &LeaseKeeper) -> Ended {
-        match work {
-            Work::Smoke { claim, submission } => {
-                self.tools.smoke(claim, submission, &keeper.progress())
+    /// From order to commit. An error is a fault of ours.
+    fn perform(&mut self, order: &WorkOrder) -> anyhow::Result<Holding> {
+        let keeper = LeaseKeeper::keep(
+            Arc::clone(&self.server),
+            order.lease.clone(),
+            &self.shutdown,
+        )?;
+        let progress = keeper.progress();
+        let committed = self
+            .executor
+            .report(&order.assignment, &progress)
+            .and_then(|report| self.server.commit(&order.lease, report));
+        match committed {
+            // no fault: the unit was given back, or is another's
+            Err(error) if progress.stopped() => {
+                tracing::info!(unit = %order.lease.unit, cause = format!("{error:#}"), "stopped");
+                Ok(Holding::Lost)
             }
-            Work::Shard {
-                claim,
-                evaluation,
-                shard,
-                bundle,
-            } => self
-                .tools
-                .shard(claim, evaluation, shard, bundle, keeper.progress()),
-            Work::Finalise {
-                claim,
-                evaluation,
-                agent_name,
-            } => self.tools.finalise(claim, evaluation, agent_name),
-            Work::Ablation { claim, run, bundle } => {
-                self.tools.ablation(claim, run, bundle, keeper.progress())
-            }
+            committed => committed,
         }
     }
 
-    /// Our fault. A unit whose lease was lost or given back stays as it is.
-    fn give_back(&self, work: &Work, keeper: &LeaseKeeper, error: &anyhow::Error) {
-        let claim = work.claim();
-        if keeper.progress().stopped() {
-            tracing::info!(unit = %claim.unit, work = %Description(work), cause = format!("{error:#}"), "stopped");
-            return;
-        }
-        tracing::error!(unit = %claim.unit, work = %Description(work), cause = format!("{error:#}"), "platform fault");
+    /// Our fault.
+    fn give_back(&self, order: &WorkOrder, error: &anyhow::Error) {
+        let unit = order.lease.unit;
+        tracing::error!(%unit, work = %order.assignment, cause = format!("{error:#}"), "platform fault");
         // The cause names folders of this host; a team is told enough to ask about it.
-        let reason = format!(
-            "{} (in the server's log: unit {})",
-            outside(error),
-            claim.unit
-        );
-        let released = self.tools.handle.block_on(self.tools.store.release_failed(
-            claim,
-            &reason,
-            self.tools.clock.now(),
-        ));
-        if let Err(error) = released {
-            tracing::error!(unit = %claim.unit, %error, "the unit could not be given back; its lease will end");
+        let reason = format!("{} (in the server's log: unit {unit})", outside(error));
+        let given_back = self
+            .server
+            .give_back(&order.lease, GivenBack::PlatformFault(&reason));
+        if let Err(error) = given_back {
+            tracing::error!(%unit, cause = format!("{error:#}"), "the unit could not be given back; its lease will end");
         }
     }
 }
@@ -151,37 +111,4 @@ fn words(panic: &(dyn std::any::Any + Send)) -> &str {
         .copied()
         .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
         .unwrap_or("no reason given")
-}
-
-/// A unit in a log line.
-struct Description<'a>(&'a Work);
-
-impl std::fmt::Display for Description<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self.0 {
-            Work::Smoke { submission, .. } => {
-                write!(f, "smoke run of submission {}", submission.id)
-            }
-            Work::Shard {
-                evaluation, shard, ..
-            } => write!(
-                f,
-                "{} episodes {} to {} of evaluation {}",
-                shard.task,
-                shard.first_episode,
-                shard.end_episode - 1,
-                evaluation.id
-            ),
-            Work::Finalise { evaluation, .. } => {
-                write!(f, "finalisation of evaluation {}", evaluation.id)
-            }
-            Work::Ablation { run, .. } => {
-                write!(
-                    f,
-                    "{} with {} of ablation {}",
-                    run.task, run.profile, run.ablation
-                )
-            }
-        }
-    }
 }

@@ -1,6 +1,8 @@
 //! Slots on a real store, with an evaluator that plays what a test tells it to: faults of ours and
 //! moments of time that a healthy runner does not offer. The real runner is in `tests/it`.
 
+mod between;
 mod fixture;
 mod interrupted;
+mod orders;
 mod slots;

@@ -5,8 +5,9 @@ use crate::{
     verify::check,
 };
 use arrow_array::RecordBatch;
-use faceoff_dataset::{Dataset, DatasetError, Layout, ShardSpec};
+use faceoff_dataset::{Dataset, DatasetError, Layout};
 use faceoff_types::Task;
+use faceoff_wire::work::ShardSpec;
 use parquet::{
     basic::Encoding,
     file::reader::{FileReader, SerializedFileReader},

@@ -1,16 +1,14 @@
 //! Evaluations played by functions: no process, no clock, the same numbers everywhere.
 
 use arrow_array::RecordBatch;
-use faceoff_dataset::{
-    Assembled, EvaluationMeta, Recorder, RecordingError, ShardFolder, ShardReport, ShardSpec,
-    assemble,
-};
+use faceoff_dataset::{Assembled, Recorder, RecordingError, ShardFolder, ShardReport, assemble};
 use faceoff_episode::{Answered, EpisodeStart, StepRow, StepSink};
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
 use faceoff_types::{
     AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, RULESET,
     RoundTrips, Seed, SlotTiming, Task,
 };
+use faceoff_wire::work::{EvaluationMeta, ShardSpec};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use std::{
     fs::{self, File},

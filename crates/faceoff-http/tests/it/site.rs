@@ -1,7 +1,7 @@
 //! A running site: axum on a loopback port, SQLite in a temporary folder, a clock that tests turn,
 //! and the steps that a worker would take.
 
-use faceoff_http::{Clock, HttpConfig, HttpLimits, router, token::hash_token};
+use faceoff_http::{HttpConfig, HttpLimits, router, token::hash_token};
 use faceoff_store::*;
 use faceoff_types::*;
 use jiff::{SignedDuration, Timestamp};

@@ -1,4 +1,5 @@
-use super::{error::BundleError, limits::BundleLimits, links, node::Node};
+use super::{error::BundleError, links, node::Node};
+use faceoff_types::BundleLimits;
 use fs_err::{self as fs, OpenOptions, os::unix::fs::symlink};
 use std::{
     collections::BTreeMap,

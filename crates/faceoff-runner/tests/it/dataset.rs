@@ -6,10 +6,11 @@ use crate::{
     shard::{run, spec},
 };
 use faceoff_dataset::{
-    Dataset, EvaluationMeta, assemble,
+    Dataset, assemble,
     verify::{Verified, verify},
 };
 use faceoff_types::{RULESET, Task};
+use faceoff_wire::work::EvaluationMeta;
 use std::{
     fs::File,
     num::NonZero,

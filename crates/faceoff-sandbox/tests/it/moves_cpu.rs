@@ -1,15 +1,11 @@
 use crate::harness::{Subject, expect_echo, expect_line, has};
-use faceoff_sandbox::Layer;
+use faceoff_sandbox::{Layer, affinity};
 
 #[test]
 fn an_agent_stays_on_its_cpus_and_its_cpu_time_is_known() {
     let mut subject = Subject::new("moves_cpu", &[]);
     // The last CPU that we may use ourselves.
-    let own = rustix::thread::sched_getaffinity(None).unwrap();
-    let cpu = (0..rustix::thread::CpuSet::MAX_CPU)
-        .rev()
-        .find(|&cpu| own.is_set(cpu))
-        .unwrap();
+    let cpu = *affinity::allowed().unwrap().last().unwrap();
     subject.spec.cpus = vec![cpu];
     let mut agent = subject.spawn();
     let report: serde_json::Value = serde_json::from_str(&expect_line(&mut agent)).unwrap();

@@ -1,9 +1,10 @@
 //! The scripted evaluator and a server around it.
 
 use crate::{
-    clock::Clock,
     evaluator::Evaluator,
-    service::{Pace, WorkerConfig, run_with},
+    local::LocalServer,
+    server::WorkServer,
+    service::{Intervals, WorkerConfig, run_with},
 };
 use faceoff_runner::{
     AgentEnvironment, EvaluationMeta, Observer, PlatformFault, ShardReport, ShardSpec, SmokeReport,
@@ -142,17 +143,26 @@ impl Evaluator for Scripted {
             .collect::<Vec<_>>();
         std::fs::write(archive, parts.join("\n")).unwrap();
         *self.assembled.lock().unwrap() = parts;
-        Ok(EvaluationResult {
-            ruleset: meta.ruleset.clone(),
-            profile: meta.profile,
-            seed: meta.seed,
-            tasks: BTreeMap::new(),
-            score: 50.0,
-            penalty_points: 0.0,
-            tier: Tier::Deployable,
-            timing: None,
-        })
+        Ok(result(meta))
     }
+}
+
+pub(super) fn result(meta: &EvaluationMeta) -> EvaluationResult {
+    EvaluationResult {
+        ruleset: meta.ruleset.clone(),
+        profile: meta.profile,
+        seed: meta.seed,
+        tasks: BTreeMap::new(),
+        score: 50.0,
+        penalty_points: 0.0,
+        tier: Tier::Deployable,
+        timing: None,
+    }
+}
+
+/// Off the runtime's threads, as a slot is.
+pub(super) async fn blocking<T: Send + 'static>(call: impl FnOnce() -> T + Send + 'static) -> T {
+    tokio::task::spawn_blocking(call).await.unwrap()
 }
 
 /// A store with one team's valid submission, and a clock that tests turn forward.
@@ -177,7 +187,7 @@ impl Server {
 
     pub(super) fn clock(&self) -> Clock {
         let ahead_s = Arc::clone(&self.ahead_s);
-        Clock::of(move || {
+        Clock::new(move || {
             Timestamp::now() + SignedDuration::from_secs(ahead_s.load(Ordering::SeqCst))
         })
     }
@@ -186,14 +196,30 @@ impl Server {
         self.clock().now()
     }
 
+    /// Another life of the server on the same folder.
+    pub(super) async fn reopen(self) -> Self {
+        let store = Store::open(self.folder.path()).await.unwrap();
+        Self { store, ..self }
+    }
+
+    /// Turns the clock forward.
+    pub(super) fn pass(&self, seconds: i64) {
+        self.ahead_s.fetch_add(seconds, Ordering::SeqCst);
+    }
+
+    pub(super) async fn put(&self, key: &str, content: &[u8]) {
+        let file = self.folder.path().join("upload");
+        std::fs::write(&file, content).unwrap();
+        self.store.artifacts().put_file(key, &file).await.unwrap();
+    }
+
+    /// Is there such an artifact?
+    pub(super) async fn has(&self, key: &str) -> bool {
+        self.store.artifacts().read(key).await.is_ok()
+    }
+
     pub(super) async fn upload(&self, team: &str, content: &[u8]) -> Submission {
-        let archive = self.folder.path().join("upload");
-        std::fs::write(&archive, content).unwrap();
-        self.store
-            .artifacts()
-            .put_file(&format!("bundles/{team}"), &archive)
-            .await
-            .unwrap();
+        self.put(&format!("bundles/{team}"), content).await;
         let bundle = BundleRef {
             key: format!("bundles/{team}"),
             bytes: content.len() as u64,
@@ -243,8 +269,44 @@ impl Server {
             .id
     }
 
+    /// What its slots would work for.
+    pub(super) fn local(&self) -> LocalServer {
+        self.config(1)
+            .local_server(self.store.clone(), self.clock())
+    }
+
     pub(super) fn work(&self, slots: usize, evaluator: &Arc<Scripted>) -> Running {
-        let config = WorkerConfig {
+        self.work_through(slots, evaluator, |server| Arc::new(server))
+    }
+
+    /// With something between the slots and their server.
+    pub(super) fn work_through(
+        &self,
+        slots: usize,
+        evaluator: &Arc<Scripted>,
+        between: impl FnOnce(LocalServer) -> Arc<dyn WorkServer>,
+    ) -> Running {
+        let config = self.config(slots);
+        let intervals = Intervals {
+            idle_poll: Duration::from_millis(20),
+            tidy: Duration::from_millis(20),
+            ..Intervals::default()
+        };
+        let server = config.local_server(self.store.clone(), self.clock());
+        let shutdown = CancellationToken::new();
+        let task = tokio::spawn(run_with(
+            server.clone(),
+            between(server),
+            Arc::clone(evaluator) as Arc<dyn Evaluator>,
+            config,
+            intervals,
+            shutdown.clone(),
+        ));
+        Running { shutdown, task }
+    }
+
+    fn config(&self, slots: usize) -> WorkerConfig {
+        WorkerConfig {
             slots,
             lease_s: LEASE_S,
             scratch_dir: self.folder.path().join("scratch"),
@@ -266,23 +328,7 @@ impl Server {
                 unpacked_bytes: 1,
                 files: 1,
             },
-        };
-        let pace = Pace {
-            clock: self.clock(),
-            poll: Duration::from_millis(20),
-            tidy_every: Duration::from_millis(20),
-            ..Pace::default()
-        };
-        let shutdown = CancellationToken::new();
-        let evaluator = Arc::clone(evaluator) as Arc<dyn Evaluator>;
-        let task = tokio::spawn(run_with(
-            self.store.clone(),
-            config,
-            shutdown.clone(),
-            evaluator,
-            pace,
-        ));
-        Running { shutdown, task }
+        }
     }
 
     /// Waits for an evaluation's end by the store's events.

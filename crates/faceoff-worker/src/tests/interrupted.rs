@@ -1,9 +1,19 @@
 //! Shutdowns, lost leases, cancelled evaluations and successors.
 
-use super::fixture::*;
+use super::{
+    between::{Between, Moment},
+    fixture::*,
+};
 use faceoff_runner::PlatformFault;
 use faceoff_store::*;
-use std::sync::{Arc, Mutex, atomic::Ordering};
+use faceoff_types::Task;
+use std::{
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::Duration,
+};
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_shutdown_gives_the_unit_back_and_the_next_worker_finishes() {
@@ -31,6 +41,45 @@ async fn a_shutdown_gives_the_unit_back_and_the_next_worker_finishes() {
     ));
     assert_eq!(healthy.played.lock().unwrap().len(), 6);
     running.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_shutdown_does_not_stop_a_slot_before_its_unit_was_given_back() {
+    let server = Server::new().await;
+    server.evaluation().await;
+    let (begun, mut begins) = tokio::sync::mpsc::unbounded_channel();
+    let (stopped, stops) = std::sync::mpsc::channel();
+    let hanging = Scripted::new(move |_, observer| {
+        begun.send(()).unwrap();
+        while !observer.cancelled() {
+            std::thread::yield_now();
+        }
+        Err(PlatformFault::Cancelled)
+    });
+    let (early, stops) = (Arc::new(AtomicBool::new(false)), Mutex::new(stops));
+    let running = server.work_through(1, &hanging, |local| {
+        let early = Arc::clone(&early);
+        Between::new(local, move |moment| {
+            if let Moment::GivingBack = moment {
+                // Time for a worker that does not wait to end; one that waits is not in a hurry.
+                let ended = stops
+                    .lock()
+                    .unwrap()
+                    .recv_timeout(Duration::from_millis(200));
+                early.store(ended.is_ok(), Ordering::SeqCst);
+            }
+            Ok(())
+        })
+    });
+    begins.recv().await.unwrap();
+    running.stop().await;
+    let _ = stopped.send(());
+    assert!(!early.load(Ordering::SeqCst));
+    let work = server.store.claim("next", LEASE_S, server.now()).await;
+    let Some(Work::Shard { shard, .. }) = work.unwrap() else {
+        panic!("the slot has left its shard to its lease")
+    };
+    assert_eq!((shard.task, shard.first_episode), (Task::Hit, 0));
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -77,7 +77,8 @@ impl Server {
             bundle_limits: BundleLimits::default(),
         };
         let shutdown = CancellationToken::new();
-        let run = faceoff_worker::run(self.store.clone(), config, shutdown.clone());
+        let clock = Clock::new(Timestamp::now);
+        let run = faceoff_worker::run(self.store.clone(), clock, config, shutdown.clone());
         Worker {
             shutdown,
             task: tokio::spawn(run),

@@ -2,12 +2,12 @@
 
 use super::*;
 use faceoff_http::{
-    Clock, HttpConfig, HttpLimits,
+    HttpConfig, HttpLimits,
     api::{evaluations::EvaluationStatus, submissions::SubmissionStatus},
     token::hash_token,
 };
 use faceoff_store::{EvaluationPlan, SmokeOutcome, Store, Work};
-use faceoff_types::{Profile, Task};
+use faceoff_types::{Clock, Profile, Task};
 use jiff::Timestamp;
 use tempfile::TempDir;
 

@@ -15,12 +15,11 @@ use faceoff_runner::{
     AgentEnvironment,
     bundle::{self, Bundle, BundleError, BundleLimits},
 };
-use faceoff_sandbox::{Isolation, Runtime};
+use faceoff_sandbox::{Isolation, Runtime, affinity};
 use faceoff_types::{Profile, Seed, Task};
 use faceoff_worker::CpuLayout;
 use files::RESULTS;
 use profile_run::EvalSetup;
-use rustix::thread::{CpuSet, sched_getaffinity};
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -155,11 +154,8 @@ impl EvalCommand {
         }
         let workers = usize::from(self.workers);
         // Those that this process may use: not always the machine's, nor numbered from 0.
-        let allowed = sched_getaffinity(None).context("asking for the CPUs of this process")?;
-        let cpus: Vec<usize> = (0..CpuSet::MAX_CPU)
-            .filter(|cpu| allowed.is_set(*cpu))
-            .collect();
-        let layout = CpuLayout::divide(&cpus, workers);
+        let cpus = affinity::allowed().context("asking for the CPUs of this process")?;
+        let layout = CpuLayout::divide(&cpus, workers, 1);
         if layout.shared && workers > 1 {
             println!(
                 "note: {workers} workers share {} CPUs; results are the same, computation \
@@ -171,7 +167,7 @@ impl EvalCommand {
             .slots
             .into_iter()
             .map(|cpus| AgentEnvironment {
-                agent_cpus: cpus.agent,
+                agent_cpus: cpus.of_agent(0).to_vec(),
                 ..env.clone()
             })
             .collect())

@@ -4,11 +4,12 @@ use crate::config::Config;
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use faceoff_http::{
-    Clock, HttpConfig, HttpLimits,
+    HttpConfig, HttpLimits,
     token::{Token, TokenKind, hash_token},
 };
 use faceoff_sandbox::{HostFeature, Layer, probe_host};
 use faceoff_store::Store;
+use faceoff_types::Clock;
 use faceoff_worker::{DailyPlan, WorkerConfig};
 use jiff::Timestamp;
 use std::{
@@ -117,6 +118,7 @@ async fn serve(config: Config) -> anyhow::Result<()> {
             )
         })?;
     let plan = config.plan();
+    let clock = Clock::new(Timestamp::now);
     let router = faceoff_http::router(
         store.clone(),
         HttpConfig {
@@ -125,7 +127,7 @@ async fn serve(config: Config) -> anyhow::Result<()> {
             admin_token_hash,
             upload_dir,
             daily_at: config.evaluation.at,
-            clock: Clock::new(Timestamp::now),
+            clock: clock.clone(),
             limits: HttpLimits::default(),
         },
     );
@@ -148,6 +150,7 @@ async fn serve(config: Config) -> anyhow::Result<()> {
     let mut parts = JoinSet::new();
     parts.spawn(faceoff_worker::run(
         store.clone(),
+        clock.clone(),
         workers,
         shutdown.clone(),
     ));
@@ -159,6 +162,7 @@ async fn serve(config: Config) -> anyhow::Result<()> {
         };
         parts.spawn(faceoff_worker::run_schedule(
             store.clone(),
+            clock,
             daily,
             shutdown.clone(),
         ));

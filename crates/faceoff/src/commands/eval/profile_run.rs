@@ -5,9 +5,10 @@ use super::{
     pool::{Job, Verdict, play_all},
 };
 use anyhow::{Context, bail};
-use faceoff_dataset::{ARCHIVE_FILE, Assembled, EvaluationMeta, ShardSpec, assemble};
+use faceoff_dataset::{ARCHIVE_FILE, Assembled, assemble};
 use faceoff_runner::{AgentEnvironment, bundle::Bundle};
 use faceoff_types::{AgentFault, EpisodeOutcome, EvaluationResult, Profile, RULESET, Seed, Task};
+use faceoff_wire::work::{EvaluationMeta, ShardSpec};
 use std::{
     fs,
     path::{Path, PathBuf},

@@ -1,0 +1,116 @@
+//! What an agent may use and how long it may take. Whoever orders a run states them, whoever carries
+//! it out enforces them.
+
+use serde::{Deserialize, Serialize};
+use std::time::Duration;
+
+/// Everything that an agent is held to.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct AgentLimits {
+    /// Of its archive.
+    pub bundle: BundleLimits,
+    /// Of its process tree.
+    pub resources: ResourceLimits,
+    /// Of its answers.
+    pub time: TimeLimits,
+}
+
+/// What a bundle may hold (PROTOCOL, "Bundle").
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BundleLimits {
+    /// Largest archive, in bytes.
+    pub packed_bytes: u64,
+    /// Largest sum of its files, in bytes.
+    pub unpacked_bytes: u64,
+    /// Most files and links; folders are counted separately, against the same number.
+    pub files: u64,
+}
+
+impl Default for BundleLimits {
+    fn default() -> Self {
+        Self {
+            packed_bytes: 512 << 20,
+            unpacked_bytes: 2 << 30,
+            files: 50_000,
+        }
+    }
+}
+
+/// What an agent's process tree may use.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ResourceLimits {
+    /// Memory of the tree in bytes: anonymous, page cache, scratch files and swap together.
+    pub memory_bytes: u64,
+    /// Processes and threads alive at a time, the first one included.
+    pub pids: u32,
+    /// Size of the scratch folder `/tmp` in bytes; shared memory (`/dev/shm`) may be as large again.
+    /// Both count as memory too.
+    pub scratch_bytes: u64,
+    /// Open file descriptors per process.
+    pub open_files: u32,
+    /// Largest single file in bytes.
+    pub file_size_bytes: u64,
+    /// CPU time per time: 1.0 = one CPU, enforced every 10 ms by the cgroup's quota.
+    pub cpus: f64,
+    /// How much of the end of standard error is kept, in bytes.
+    pub stderr_tail_bytes: u64,
+}
+
+impl Default for ResourceLimits {
+    /// Room for a Python agent with a small network on CPU; not for one that trains.
+    fn default() -> Self {
+        Self {
+            memory_bytes: 2 << 30,
+            pids: 128,
+            scratch_bytes: 256 << 20,
+            open_files: 1024,
+            file_size_bytes: 256 << 20,
+            cpus: 1.0,
+            stderr_tail_bytes: 64 << 10,
+        }
+    }
+}
+
+/// How long an agent may take (PROTOCOL, "Time"), in seconds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TimeLimits {
+    /// From the start of the process to its answer to `hello`.
+    pub startup_s: f64,
+    /// To answer `reset`.
+    pub reset_s: f64,
+    /// To answer one `step`.
+    pub step_s: f64,
+    /// To exit after `bye`, before it is killed.
+    pub bye_s: f64,
+    /// How often an episode is played again because the host stalled, at most; then the last try
+    /// counts as it is. 0: never.
+    pub host_noise_reruns: u32,
+}
+
+impl Default for TimeLimits {
+    fn default() -> Self {
+        Self {
+            startup_s: 120.0,
+            reset_s: 10.0,
+            step_s: 1.0,
+            bye_s: 5.0,
+            host_noise_reruns: 2,
+        }
+    }
+}
+
+impl TimeLimits {
+    /// No wait for an agent is longer.
+    pub const LONGEST: Duration = Duration::from_secs(3600);
+
+    /// A limit as a duration; one that is no sensible number of seconds counts as an hour, so that
+    /// a deadline exists whatever a configuration says.
+    #[must_use]
+    pub fn duration(limit_s: f64) -> Duration {
+        let given = Duration::try_from_secs_f64(limit_s);
+        given.map_or(Self::LONGEST, |limit| limit.min(Self::LONGEST))
+    }
+}

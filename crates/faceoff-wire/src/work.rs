@@ -1,0 +1,160 @@
+//! Work orders: all that a slot needs to know, on whichever machine it is, and what it reports back.
+//!
+//! An order carries the seeds of the episodes that it asks for, never the secret that they are
+//! derived from: whoever carries it out learns nothing of another day.
+
+use faceoff_types::{
+    AgentLimits, BundleRef, EpisodeOutcome, EvaluationId, EvaluationResult, Profile, Seed,
+    SmokeOutcome, SubmissionId, Task,
+};
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+use std::{fmt, ops::Range};
+use uuid::Uuid;
+
+/// A unit of work, leased to one slot.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct WorkOrder {
+    /// Until when it is this slot's alone.
+    pub lease: Lease,
+    /// What is to be done.
+    pub assignment: Assignment,
+}
+
+/// Proof that a unit of work is a slot's.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Lease {
+    /// The queue's name for the work; the same when it is leased again.
+    pub unit: Uuid,
+    /// Drawn for this lease alone.
+    pub nonce: Uuid,
+    /// When it ends unless renewed, by the server's clock.
+    pub expires_at: Timestamp,
+    /// For how long it was given and each renewal extends it, seconds: another machine's clock may
+    /// tell another time.
+    pub duration_s: u32,
+}
+
+/// What a slot is to do.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Assignment {
+    /// Find out whether an uploaded agent starts, answers and keeps time.
+    Smoke {
+        /// For the log of whoever does it.
+        submission: SubmissionId,
+        /// Not known to be a bundle at all.
+        agent: AgentOrder,
+    },
+    /// Play a range of episodes.
+    Play {
+        /// The evaluation or ablation that the episodes are part of; for the log.
+        run: Uuid,
+        /// It has passed its smoke run.
+        agent: AgentOrder,
+        /// Which episodes.
+        spec: ShardSpec,
+        /// Key prefix for the recording; `None`: the outcomes alone are kept.
+        recording: Option<String>,
+    },
+    /// Join an evaluation's recordings into its dataset and score them.
+    Finalise {
+        /// For the log.
+        evaluation: EvaluationId,
+        /// What the dataset says about itself.
+        meta: EvaluationMeta,
+        /// Key prefixes of the recordings, in order of play.
+        recordings: Vec<String>,
+        /// Key for the dataset.
+        dataset: String,
+    },
+}
+
+/// An agent, and what it is held to. A smoke run and the real one differ in nothing of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AgentOrder {
+    /// Its archive.
+    pub bundle: BundleRef,
+    /// Enforced by whoever carries out the order.
+    pub limits: AgentLimits,
+}
+
+/// Which episodes to simulate, and how.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ShardSpec {
+    /// The task.
+    pub task: Task,
+    /// The episodes, by their index within the evaluation.
+    pub episodes: Range<u32>,
+    /// The perturbation profile.
+    pub profile: Profile,
+    /// The evaluation's seed.
+    pub seed: Seed,
+    /// The seed of the season's model mismatch.
+    pub mismatch_seed: Seed,
+    /// More faults than this end the shard early.
+    pub max_faults: u32,
+}
+
+/// What the dataset of an evaluation says about itself.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EvaluationMeta {
+    /// The perturbation profile.
+    pub profile: Profile,
+    /// The evaluation's seed.
+    pub seed: Seed,
+    /// The seed of the season's model mismatch.
+    pub mismatch_seed: Seed,
+    /// The agent's name.
+    pub agent: String,
+    /// The ruleset's name.
+    pub ruleset: String,
+}
+
+/// What came of an order. Faults of ours are not in it: those give the unit back.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum WorkReport {
+    /// Of [`Assignment::Smoke`].
+    Smoke(SmokeOutcome),
+    /// Of [`Assignment::Play`].
+    Play {
+        /// One per episode, in order; fewer if faults stopped the shard.
+        outcomes: Vec<EpisodeOutcome>,
+        /// The end of the agent's standard error, with its faults.
+        log: String,
+        /// More faults than allowed: the remaining episodes were not played.
+        stopped_by_faults: bool,
+        /// Key prefix under which the recording is stored, if it is kept.
+        recording: Option<String>,
+    },
+    /// Of [`Assignment::Finalise`].
+    Finalise {
+        /// Key under which the dataset is stored.
+        dataset: String,
+        /// BLAKE3 of the archive, 64 hexadecimal digits.
+        blake3: String,
+        /// The score.
+        result: Box<EvaluationResult>,
+    },
+}
+
+/// As a log line names it.
+impl fmt::Display for Assignment {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Smoke { submission, .. } => write!(f, "smoke run of submission {submission}"),
+            Self::Play { run, spec, .. } => write!(
+                f,
+                "{} episodes {} to {} of {run}, profile {}",
+                spec.task,
+                spec.episodes.start,
+                spec.episodes.end.saturating_sub(1),
+                spec.profile
+            ),
+            Self::Finalise { evaluation, .. } => {
+                write!(f, "finalisation of evaluation {evaluation}")
+            }
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! Work orders and reports survive the way through JSON.
+
+use faceoff_types::*;
+use faceoff_wire::work::*;
+use serde::{Serialize, de::DeserializeOwned};
+use std::{collections::BTreeMap, fmt::Debug};
+use uuid::Uuid;
+
+fn travels<T: Serialize + DeserializeOwned + PartialEq + Debug>(value: &T) {
+    let text = serde_json::to_string(value).unwrap();
+    assert_eq!(
+        serde_json::from_str::<T>(&text).as_ref().unwrap(),
+        value,
+        "{text}"
+    );
+}
+
+fn order(assignment: Assignment) -> WorkOrder {
+    WorkOrder {
+        lease: Lease {
+            unit: Uuid::from_u128(1),
+            nonce: Uuid::from_u128(2),
+            expires_at: "2026-03-01T06:00:30.25Z".parse().unwrap(),
+            duration_s: 30,
+        },
+        assignment,
+    }
+}
+
+fn agent() -> AgentOrder {
+    AgentOrder {
+        bundle: BundleRef {
+            key: "bundles/x".into(),
+            bytes: 1 << 40,
+            blake3: "ab".repeat(32),
+            file_name: "agent é.tar.gz".into(),
+        },
+        limits: AgentLimits::default(),
+    }
+}
+
+fn shard(recording: Option<&str>) -> Assignment {
+    Assignment::Play {
+        run: Uuid::from_u128(3),
+        agent: agent(),
+        spec: ShardSpec {
+            task: Task::Defend,
+            episodes: 100..u32::MAX,
+            profile: Profile::TrackingLoss,
+            seed: Seed::from_number(4),
+            mismatch_seed: Seed::from_number(5),
+            max_faults: 6,
+        },
+        recording: recording.map(str::to_owned),
+    }
+}
+
+#[test]
+fn every_order_round_trips() {
+    let finalise = Assignment::Finalise {
+        evaluation: EvaluationId::new(),
+        meta: EvaluationMeta {
+            profile: Profile::Evaluation,
+            seed: Seed::from_number(7),
+            mismatch_seed: Seed::from_number(8),
+            agent: "striker".into(),
+            ruleset: RULESET.into(),
+        },
+        recordings: vec!["recordings/a".into(), "recordings/b".into()],
+        dataset: "datasets/c.zip".into(),
+    };
+    let smoke = Assignment::Smoke {
+        submission: SubmissionId::new(),
+        agent: agent(),
+    };
+    for assignment in [smoke, shard(Some("recordings/a")), shard(None), finalise] {
+        travels(&order(assignment));
+    }
+}
+
+#[test]
+fn every_report_round_trips() {
+    let outcome = EpisodeOutcome {
+        task: Task::Hit,
+        episode: 1,
+        steps: 499,
+        end: EpisodeEnd::AgentFault,
+        success: false,
+        violations: Violations::default(),
+        computation_time: ComputationTime {
+            mean_s: 0.1 + 0.2,
+            max_s: 1e-7,
+        },
+        fault: Some(AgentFault {
+            fault: AgentFaultKind::Exited { code: 3 },
+            contest: Task::Hit.into(),
+            episode: Some(1),
+            step: None,
+            line: Some("\u{fffd}".into()),
+        }),
+    };
+    let result = EvaluationResult {
+        ruleset: RULESET.into(),
+        profile: Profile::Evaluation,
+        seed: Seed::from_number(1),
+        tasks: BTreeMap::new(),
+        score: 54.9,
+        penalty_points: 327.5,
+        tier: Tier::Deployable,
+        timing: Some(SlotTiming::default()),
+    };
+    let reports = [
+        WorkReport::Smoke(SmokeOutcome::Valid {
+            agent_name: "striker".into(),
+            log: "begun\n".into(),
+        }),
+        WorkReport::Smoke(SmokeOutcome::Invalid {
+            agent_name: None,
+            reason: "agent.toml is missing".into(),
+            log: String::new(),
+        }),
+        WorkReport::Play {
+            outcomes: vec![outcome],
+            log: "begun\n".into(),
+            stopped_by_faults: true,
+            recording: Some("recordings/a".into()),
+        },
+        WorkReport::Finalise {
+            dataset: "datasets/c.zip".into(),
+            blake3: "cd".repeat(32),
+            result: Box::new(result),
+        },
+    ];
+    for report in reports {
+        travels(&report);
+    }
+}
+
+#[test]
+fn a_log_line_names_the_work() {
+    let told = shard(None).to_string();
+    assert_eq!(
+        told,
+        "defend episodes 100 to 4294967294 of 00000000-0000-0000-0000-000000000003, profile \
+         tracking_loss"
+    );
+}

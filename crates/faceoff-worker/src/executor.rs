@@ -1,0 +1,183 @@
+//! The three kinds of work, each from its order to what is to be reported.
+
+use crate::{
+    bundle_cache::{BundleCache, Unpacked, blake3_of},
+    cpus::SlotCpus,
+    evaluator::Evaluator,
+    lease::Progress,
+    server::WorkServer,
+};
+use anyhow::Context as _;
+use faceoff_runner::{AgentEnvironment, bundle::Bundle};
+use faceoff_sandbox::{Isolation, Runtime};
+use faceoff_types::{AgentLimits, SmokeOutcome};
+use faceoff_wire::work::{AgentOrder, Assignment, EvaluationMeta, ShardSpec, WorkReport};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+/// Carries out a slot's orders. All errors are faults of ours; a unit that is no longer the slot's
+/// ends by one, too, soon after [`Progress::stopped`] says so.
+pub(crate) struct Executor {
+    pub(crate) server: Arc<dyn WorkServer>,
+    pub(crate) evaluator: Arc<dyn Evaluator>,
+    pub(crate) host: AgentHost,
+    /// For what is under way.
+    pub(crate) folder: PathBuf,
+    pub(crate) bundles: BundleCache,
+}
+
+/// What the slot's machine gives to agents; what they are held to stands in the order.
+#[derive(Debug, Clone)]
+pub(crate) struct AgentHost {
+    pub(crate) isolation: Isolation,
+    pub(crate) runtimes: BTreeMap<String, Runtime>,
+    pub(crate) cpus: SlotCpus,
+}
+
+impl AgentHost {
+    fn environment(&self, limits: &AgentLimits) -> AgentEnvironment {
+        AgentEnvironment {
+            limits: limits.resources.clone(),
+            time: limits.time.clone(),
+            isolation: self.isolation.clone(),
+            runtimes: self.runtimes.clone(),
+            agent_cpus: self.cpus.of_agent(0).to_vec(),
+        }
+    }
+}
+
+impl Executor {
+    pub(crate) fn report(
+        &mut self,
+        assignment: &Assignment,
+        progress: &Progress,
+    ) -> anyhow::Result<WorkReport> {
+        match assignment {
+            Assignment::Smoke { agent, .. } => self.smoke(agent, progress).map(WorkReport::Smoke),
+            Assignment::Play {
+                agent,
+                spec,
+                recording,
+                ..
+            } => self.play(agent, spec, recording.as_deref(), progress.clone()),
+            Assignment::Finalise {
+                meta,
+                recordings,
+                dataset,
+                ..
+            } => self.finalise(meta, recordings, dataset),
+        }
+    }
+
+    fn bundle(&mut self, agent: &AgentOrder) -> anyhow::Result<Unpacked> {
+        self.bundles.get(agent, &*self.evaluator, &*self.server)
+    }
+
+    /// The bundle of a valid submission: it passed its smoke run, so that the archive is not to blame.
+    fn valid_bundle(&mut self, agent: &AgentOrder) -> anyhow::Result<Bundle> {
+        match self.bundle(agent)? {
+            Unpacked::Bundle(bundle) => Ok(bundle),
+            Unpacked::Invalid(reason) => anyhow::bail!(reason),
+        }
+    }
+
+    /// An empty folder that vanishes with its guard.
+    fn folder(&self, purpose: &str) -> anyhow::Result<tempfile::TempDir> {
+        tempfile::Builder::new()
+            .prefix(purpose)
+            .tempdir_in(&self.folder)
+            .with_context(|| format!("making a folder for the {purpose}"))
+    }
+
+    /// Checks an uploaded bundle in the very sandbox and under the very limits of the real run.
+    fn smoke(&mut self, agent: &AgentOrder, progress: &Progress) -> anyhow::Result<SmokeOutcome> {
+        let bundle = match self.bundle(agent)? {
+            Unpacked::Bundle(bundle) => bundle,
+            Unpacked::Invalid(reason) => {
+                return Ok(SmokeOutcome::Invalid {
+                    agent_name: None,
+                    reason,
+                    log: String::new(),
+                });
+            }
+        };
+        let environment = self.host.environment(&agent.limits);
+        let smoke = self
+            .evaluator
+            .smoke(&bundle, &environment, &|| progress.stopped())?;
+        let (agent_name, log) = (bundle.manifest.name, smoke.log);
+        Ok(match smoke.fault {
+            None => SmokeOutcome::Valid { agent_name, log },
+            Some(fault) => SmokeOutcome::Invalid {
+                agent_name: Some(agent_name),
+                reason: fault.to_string(),
+                log,
+            },
+        })
+    }
+
+    /// Plays a shard and stores its recording, if that is kept.
+    fn play(
+        &mut self,
+        agent: &AgentOrder,
+        spec: &ShardSpec,
+        recording: Option<&str>,
+        mut progress: Progress,
+    ) -> anyhow::Result<WorkReport> {
+        let bundle = self.valid_bundle(agent)?;
+        let environment = self.host.environment(&agent.limits);
+        let out = self.folder("recording")?;
+        let played = self
+            .evaluator
+            .play(spec, &bundle, &environment, out.path(), &mut progress)?;
+        if let Some(key) = recording {
+            self.server
+                .store_recording(key, out.path())
+                .context("storing the recording")?;
+        }
+        Ok(WorkReport::Play {
+            outcomes: played.outcomes,
+            log: played.log,
+            stopped_by_faults: played.stopped_by_faults,
+            recording: recording.map(str::to_owned),
+        })
+    }
+
+    /// Joins the shards' recordings into the dataset, scores them and stores the dataset.
+    fn finalise(
+        &self,
+        meta: &EvaluationMeta,
+        recordings: &[String],
+        dataset: &str,
+    ) -> anyhow::Result<WorkReport> {
+        let work = self.folder("dataset")?;
+        let recordings = self.fetch_recordings(recordings, work.path())?;
+        let archive = work.path().join("dataset.zip");
+        let result = self.evaluator.assemble(meta, &recordings, &archive)?;
+        self.server
+            .store_dataset(dataset, &archive)
+            .context("storing the dataset")?;
+        Ok(WorkReport::Finalise {
+            dataset: dataset.to_owned(),
+            blake3: blake3_of(&archive)?,
+            result: Box::new(result),
+        })
+    }
+
+    /// Copies recordings into folders of their own.
+    fn fetch_recordings(&self, keys: &[String], into: &Path) -> anyhow::Result<Vec<PathBuf>> {
+        let mut folders = Vec::with_capacity(keys.len());
+        for (position, key) in keys.iter().enumerate() {
+            let folder = into.join(format!("shard-{position:05}"));
+            fs_err::create_dir(&folder)?;
+            self.server
+                .fetch_recording(key, &folder)
+                .with_context(|| format!("fetching the recording {key}"))?;
+            folders.push(folder);
+        }
+        Ok(folders)
+    }
+}

@@ -1,0 +1,313 @@
+//! The server of the slots of its own process: the one place of this crate that works the store's
+//! queue.
+
+use crate::server::{Claimed, GivenBack, Holding, QueueMark, WorkServer};
+use anyhow::Context as _;
+use faceoff_store::{Claim, Committed, ShardCommit, Store, StoreError, Work};
+use faceoff_types::{AgentLimits, BundleRef, Clock, EvaluationResult, RULESET};
+use faceoff_wire::work::{
+    AgentOrder, Assignment, EvaluationMeta, Lease, ShardSpec, WorkOrder, WorkReport,
+};
+use jiff::SignedDuration;
+use std::{path::Path, time::Duration};
+use tokio::runtime::Handle;
+use tokio_util::sync::CancellationToken;
+
+/// No artifact is under way longer than this.
+const LONGEST_WRITE: SignedDuration = SignedDuration::from_hours(1);
+
+/// A store, and what the organiser has configured for all orders.
+#[derive(Debug, Clone)]
+pub(crate) struct LocalServer {
+    pub(crate) store: Store,
+    pub(crate) runtime: Handle,
+    pub(crate) clock: Clock,
+    /// How long a claim lasts without renewal, seconds.
+    pub(crate) lease_s: u32,
+    pub(crate) limits: AgentLimits,
+}
+
+impl LocalServer {
+    /// Ends the leases of a worker that is dead: its units need not wait for them to run out.
+    pub(crate) async fn end_leases_of(&self, worker: &str) -> Result<u64, StoreError> {
+        self.store.end_leases_of(worker, self.clock.now()).await
+    }
+
+    /// Removes recordings that are no longer needed and what kills left half written.
+    pub(crate) async fn tidy(&self) {
+        let now = self.clock.now();
+        if let Err(error) = self.store.remove_old_recordings(now).await {
+            tracing::warn!(%error, "old recordings could not be removed");
+        }
+        let abandoned = self.store.artifacts().remove_abandoned(now - LONGEST_WRITE);
+        if let Err(error) = abandoned.await {
+            tracing::warn!(%error, "half-written artifacts could not be removed");
+        }
+    }
+
+    async fn order(&self, work: Work) -> anyhow::Result<WorkOrder> {
+        let claim = work.claim();
+        let lease = Lease {
+            unit: claim.unit,
+            nonce: claim.nonce,
+            expires_at: claim.lease_until,
+            duration_s: self.lease_s,
+        };
+        let secret = self.store.season().await?.secret;
+        let assignment = match work {
+            Work::Smoke { submission, .. } => Assignment::Smoke {
+                submission: submission.id,
+                agent: self.agent(submission.bundle),
+            },
+            Work::Shard {
+                claim,
+                evaluation,
+                shard,
+                bundle,
+            } => Assignment::Play {
+                run: evaluation.id.as_uuid(),
+                agent: self.agent(bundle),
+                spec: ShardSpec {
+                    task: shard.task,
+                    episodes: shard.first_episode..shard.end_episode,
+                    profile: evaluation.plan.profile,
+                    seed: secret.day(evaluation.day),
+                    mismatch_seed: secret.model_mismatch(),
+                    max_faults: evaluation.plan.max_faults,
+                },
+                recording: Some(claim.recording_key(evaluation.id)),
+            },
+            Work::Ablation { run, bundle, .. } => Assignment::Play {
+                run: run.ablation.as_uuid(),
+                agent: self.agent(bundle),
+                spec: ShardSpec {
+                    task: run.task,
+                    episodes: 0..run.episodes,
+                    profile: run.profile,
+                    seed: secret.ablation(),
+                    mismatch_seed: secret.model_mismatch(),
+                    max_faults: run.max_faults,
+                },
+                recording: None,
+            },
+            Work::Finalise {
+                claim,
+                evaluation,
+                agent_name,
+            } => {
+                let shards = self.store.shards(evaluation.id).await?;
+                let recordings = shards.into_iter().map(|shard| shard.recording);
+                Assignment::Finalise {
+                    evaluation: evaluation.id,
+                    meta: EvaluationMeta {
+                        profile: evaluation.plan.profile,
+                        seed: secret.day(evaluation.day),
+                        mismatch_seed: secret.model_mismatch(),
+                        agent: agent_name,
+                        ruleset: RULESET.to_owned(),
+                    },
+                    recordings: recordings
+                        .collect::<Option<_>>()
+                        .context("a shard is not committed")?,
+                    dataset: format!("datasets/{}/{}.zip", evaluation.id, claim.nonce),
+                }
+            }
+        };
+        Ok(WorkOrder { lease, assignment })
+    }
+
+    fn agent(&self, bundle: BundleRef) -> AgentOrder {
+        AgentOrder {
+            bundle,
+            limits: self.limits.clone(),
+        }
+    }
+
+    /// A lost lease's recording is removed; after an error nobody knows whether the commit stands, and
+    /// it is left.
+    async fn commit_played(&self, claim: &Claim, played: ShardCommit) -> anyhow::Result<Holding> {
+        let recording = played.recording.clone();
+        let committed = self.store.commit_shard(claim, played, self.clock.now());
+        let holding = holding(committed.await?);
+        if holding == Holding::Lost
+            && let Err(error) = self.store.artifacts().delete_folder(&recording).await
+        {
+            tracing::warn!(recording, %error, "the recording of a lost lease is left");
+        }
+        Ok(holding)
+    }
+
+    /// Publishes the dataset. It is removed only when it certainly was not published; after an error
+    /// it may have been, and then the next finalisation, if there is one, removes it.
+    async fn commit_finalised(
+        &self,
+        claim: &Claim,
+        dataset: &str,
+        result: &EvaluationResult,
+    ) -> anyhow::Result<Holding> {
+        let finished = self
+            .store
+            .finish_evaluation(claim, result, dataset, self.clock.now());
+        let holding = held_unless_refused(finished.await)?;
+        let artifacts = self.store.artifacts();
+        let tidied = match (holding, dataset.rsplit_once('/')) {
+            // what finalisations left that were killed between upload and commit
+            (Holding::Held, Some((datasets, _))) => {
+                artifacts.delete_others(datasets, dataset).await
+            }
+            (Holding::Held, None) => Ok(()),
+            // no other lease names this key
+            (Holding::Lost, _) => artifacts.delete(dataset).await,
+        };
+        if let Err(error) = tidied {
+            tracing::warn!(dataset, %error, "a dataset that nobody needs is left");
+        }
+        Ok(holding)
+    }
+}
+
+impl WorkServer for LocalServer {
+    fn claim(&self, slot: &str) -> anyhow::Result<Claimed> {
+        let queue = QueueMark(*self.store.work_signal().borrow());
+        self.runtime.block_on(async {
+            let now = self.clock.now();
+            let Some(work) = self.store.claim(slot, self.lease_s, now).await? else {
+                return Ok(Claimed::Nothing { queue });
+            };
+            let claim = work.claim().clone();
+            match self.order(work).await {
+                Ok(order) => Ok(Claimed::Order(Box::new(order))),
+                Err(error) => {
+                    let reason = "the evaluator failed";
+                    self.store
+                        .release_failed(&claim, reason, self.clock.now())
+                        .await?;
+                    Err(error.context(format!("writing the order for unit {}", claim.unit)))
+                }
+            }
+        })
+    }
+
+    fn renew(&self, lease: &Lease, episodes_done: u32) -> anyhow::Result<Holding> {
+        let claim = claim(lease);
+        let renewed = self
+            .store
+            .heartbeat(&claim, episodes_done, self.lease_s, self.clock.now());
+        Ok(if self.runtime.block_on(renewed)? {
+            Holding::Held
+        } else {
+            Holding::Lost
+        })
+    }
+
+    fn commit(&self, lease: &Lease, report: WorkReport) -> anyhow::Result<Holding> {
+        let (claim, now) = (claim(lease), self.clock.now());
+        self.runtime.block_on(async {
+            match report {
+                WorkReport::Smoke(outcome) => {
+                    held_unless_refused(self.store.commit_smoke(&claim, outcome, now).await)
+                }
+                WorkReport::Play {
+                    outcomes,
+                    log,
+                    stopped_by_faults,
+                    recording: Some(recording),
+                } => {
+                    let played = ShardCommit {
+                        outcomes,
+                        log,
+                        stopped_by_faults,
+                        recording,
+                    };
+                    self.commit_played(&claim, played).await
+                }
+                WorkReport::Play {
+                    outcomes,
+                    stopped_by_faults,
+                    recording: None,
+                    ..
+                } => {
+                    let outcomes = (!stopped_by_faults).then_some(&outcomes[..]);
+                    let committed = self.store.commit_ablation_run(&claim, outcomes, now);
+                    Ok(holding(committed.await?))
+                }
+                WorkReport::Finalise {
+                    dataset, result, ..
+                } => self.commit_finalised(&claim, &dataset, &result).await,
+            }
+        })
+    }
+
+    fn give_back(&self, lease: &Lease, why: GivenBack<'_>) -> anyhow::Result<()> {
+        let (claim, now) = (claim(lease), self.clock.now());
+        Ok(self.runtime.block_on(async {
+            match why {
+                GivenBack::Shutdown => self.store.release(&claim, now).await,
+                GivenBack::PlatformFault(reason) => {
+                    self.store.release_failed(&claim, reason, now).await
+                }
+            }
+        })?)
+    }
+
+    fn wait(&self, stop: &CancellationToken, at_most: Duration, queue: Option<QueueMark>) {
+        let mut signal = self.store.work_signal();
+        let grown = async {
+            match queue {
+                Some(QueueMark(seen)) => drop(signal.wait_for(|mark| *mark != seen).await),
+                None => std::future::pending().await,
+            }
+        };
+        self.runtime.block_on(async {
+            tokio::select! {
+                () = stop.cancelled() => {}
+                () = grown => {}
+                () = tokio::time::sleep(at_most) => {}
+            }
+        });
+    }
+
+    fn fetch_bundle(&self, bundle: &BundleRef, archive: &Path) -> anyhow::Result<()> {
+        let fetched = self.store.artifacts().get_to_file(&bundle.key, archive);
+        Ok(self.runtime.block_on(fetched)?)
+    }
+
+    fn fetch_recording(&self, key: &str, folder: &Path) -> anyhow::Result<()> {
+        let fetched = self.store.artifacts().get_folder(key, folder);
+        Ok(self.runtime.block_on(fetched)?)
+    }
+
+    fn store_recording(&self, key: &str, folder: &Path) -> anyhow::Result<()> {
+        let stored = self.store.artifacts().put_folder(key, folder);
+        Ok(self.runtime.block_on(stored)?)
+    }
+
+    fn store_dataset(&self, key: &str, archive: &Path) -> anyhow::Result<()> {
+        let stored = self.store.artifacts().put_file(key, archive);
+        Ok(self.runtime.block_on(stored)?)
+    }
+}
+
+fn claim(lease: &Lease) -> Claim {
+    Claim {
+        unit: lease.unit,
+        nonce: lease.nonce,
+        lease_until: lease.expires_at,
+    }
+}
+
+fn holding(committed: Committed) -> Holding {
+    match committed {
+        Committed::Now | Committed::Before => Holding::Held,
+        Committed::LeaseLost => Holding::Lost,
+    }
+}
+
+/// Of a commit that refuses a lost lease as a conflict.
+fn held_unless_refused(committed: Result<(), StoreError>) -> anyhow::Result<Holding> {
+    match committed {
+        Ok(()) => Ok(Holding::Held),
+        Err(StoreError::Conflict(_)) => Ok(Holding::Lost),
+        Err(error) => Err(error.into()),
+    }
+}
