@@ -33,9 +33,9 @@ mod wire_env;
 
 pub use assemble::{EvaluationMeta, assemble};
 pub use config::{AgentEnvironment, TimeLimits};
+pub use faceoff_episode::Answered;
 pub use fault::PlatformFault;
 pub use host_watch::HostWatch;
-pub use faceoff_episode::Answered;
 pub use session::{Session, Trouble};
 pub use shard::{Observer, ShardReport, ShardSpec, run_shard, run_shard_watched};
 pub use smoke::{SMOKE_STEPS, SmokeReport, smoke};

@@ -81,11 +81,7 @@ impl StepSink for Recorder {
         self.episodes.step(row);
     }
 
-    fn end(
-        &mut self,
-        outcome: &EpisodeOutcome,
-        host_noise_reruns: u32,
-    ) -> Result<(), RecordError> {
+    fn end(&mut self, outcome: &EpisodeOutcome, host_noise_reruns: u32) -> Result<(), RecordError> {
         self.end_episode(outcome, host_noise_reruns)
             .map_err(|fault| RecordError {
                 what: "recording an episode".to_owned(),

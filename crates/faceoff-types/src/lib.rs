@@ -13,6 +13,7 @@ mod profile;
 mod result;
 mod ruleset;
 mod seed;
+mod seed_label;
 mod task;
 mod team_name;
 mod tier;
@@ -21,14 +22,13 @@ mod timing;
 pub use computation_time::ComputationTime;
 pub use constraint::{Constraint, Violations};
 pub use fault::{AgentFault, AgentFaultKind};
-pub use ids::{
-    AblationId, AblationRunId, EvaluationId, ParseIdError, ShardId, SubmissionId, TeamId,
-};
+pub use ids::{AblationId, EvaluationId, ParseIdError, RunId, ShardId, SubmissionId, TeamId};
 pub use outcome::{EpisodeEnd, EpisodeOutcome};
 pub use profile::{Factor, Factors, ParseProfileError, Profile};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult, ViolationCounts};
 pub use ruleset::RULESET;
 pub use seed::{ParseSeedError, Seed};
+pub use seed_label::{ParseSeedLabelError, SeedLabel};
 pub use task::{ParseTaskError, Task};
 pub use team_name::{InvalidTeamName, TeamName};
 pub use tier::Tier;

@@ -2,8 +2,9 @@ use crate::{
     lease::LeaseKeeper,
     units::{End, Ended, Tools},
 };
-use faceoff_runner::PlatformFault;
-use faceoff_store::Work;
+use faceoff_runner::{EvaluationMeta, PlatformFault};
+use faceoff_store::{Claimed, RunOwner, Work};
+use faceoff_types::RULESET;
 use std::{panic::AssertUnwindSafe, time::Duration};
 use tokio_util::sync::CancellationToken;
 
@@ -31,7 +32,7 @@ impl Slot {
                 self.tools.clock.now(),
             ));
             match claimed {
-                Ok(Some(work)) => self.work_on(&work),
+                Ok(Some(claimed)) => self.work_on(&claimed),
                 Ok(None) => self.wait_for(Some(&mut signal)),
                 Err(error) => {
                     tracing::error!(%error, "cannot claim work; trying again");
@@ -57,8 +58,8 @@ impl Slot {
         });
     }
 
-    fn work_on(&mut self, work: &Work) {
-        let claim = work.claim();
+    fn work_on(&mut self, claimed: &Claimed) {
+        let Claimed { claim, work } = claimed;
         let keeper = LeaseKeeper::keep(
             &self.tools.handle,
             self.tools.store.clone(),
@@ -69,7 +70,7 @@ impl Slot {
         );
         tracing::info!(unit = %claim.unit, work = %Description(work), "begun");
         // A defect of ours in the middle of an episode must not end the slot, nor the evaluation.
-        let ended = std::panic::catch_unwind(AssertUnwindSafe(|| self.perform(work, &keeper)))
+        let ended = std::panic::catch_unwind(AssertUnwindSafe(|| self.perform(claimed, &keeper)))
             .unwrap_or_else(|panic| {
                 Err(anyhow::anyhow!("the evaluator failed: {}", words(&*panic)))
             });
@@ -80,37 +81,45 @@ impl Slot {
             Ok(End::Stopped) => {
                 tracing::info!(unit = %claim.unit, work = %Description(work), "no longer this slot's");
             }
-            Err(error) => self.give_back(work, &keeper, &error),
+            Err(error) => self.give_back(claimed, &keeper, &error),
         }
     }
 
-    fn perform(&mut self, work: &Work, keeper: &LeaseKeeper) -> Ended {
+    fn perform(&mut self, claimed: &Claimed, keeper: &LeaseKeeper) -> Ended {
+        let Claimed { claim, work } = claimed;
         match work {
-            Work::Smoke { claim, submission } => {
-                self.tools.smoke(claim, submission, &keeper.progress())
-            }
+            Work::Smoke { submission } => self.tools.smoke(claim, submission, &keeper.progress()),
             Work::Shard {
-                claim,
-                evaluation,
+                run,
                 shard,
                 bundle,
+                seeds,
+                ..
             } => self
                 .tools
-                .shard(claim, evaluation, shard, bundle, keeper.progress()),
+                .shard(claim, (run, *seeds), shard, bundle, keeper.progress()),
             Work::Finalise {
-                claim,
                 evaluation,
+                run,
+                recordings,
                 agent_name,
-            } => self.tools.finalise(claim, evaluation, agent_name),
-            Work::Ablation { claim, run, bundle } => {
-                self.tools.ablation(claim, run, bundle, keeper.progress())
+                seeds,
+            } => {
+                let meta = EvaluationMeta {
+                    profile: run.plan.profile,
+                    seed: seeds.episodes,
+                    mismatch_seed: seeds.mismatch,
+                    agent: agent_name.clone(),
+                    ruleset: RULESET.to_owned(),
+                };
+                self.tools.finalise(claim, *evaluation, &meta, recordings)
             }
         }
     }
 
     /// Our fault. A unit whose lease was lost or given back stays as it is.
-    fn give_back(&self, work: &Work, keeper: &LeaseKeeper, error: &anyhow::Error) {
-        let claim = work.claim();
+    fn give_back(&self, claimed: &Claimed, keeper: &LeaseKeeper, error: &anyhow::Error) {
+        let Claimed { claim, work } = claimed;
         if keeper.progress().stopped() {
             tracing::info!(unit = %claim.unit, work = %Description(work), cause = format!("{error:#}"), "stopped");
             return;
@@ -162,24 +171,23 @@ impl std::fmt::Display for Description<'_> {
                 write!(f, "smoke run of submission {}", submission.id)
             }
             Work::Shard {
-                evaluation, shard, ..
-            } => write!(
-                f,
-                "{} episodes {} to {} of evaluation {}",
-                shard.task,
-                shard.first_episode,
-                shard.end_episode - 1,
-                evaluation.id
-            ),
-            Work::Finalise { evaluation, .. } => {
-                write!(f, "finalisation of evaluation {}", evaluation.id)
-            }
-            Work::Ablation { run, .. } => {
+                owner, run, shard, ..
+            } => {
                 write!(
                     f,
-                    "{} with {} of ablation {}",
-                    run.task, run.profile, run.ablation
-                )
+                    "{} episodes {} to {} with {} of ",
+                    shard.task,
+                    shard.first_episode,
+                    shard.end_episode - 1,
+                    run.plan.profile
+                )?;
+                match owner {
+                    RunOwner::Evaluation(id) => write!(f, "evaluation {id}"),
+                    RunOwner::Ablation(id) => write!(f, "ablation {id}"),
+                }
+            }
+            Work::Finalise { evaluation, .. } => {
+                write!(f, "finalisation of evaluation {evaluation}")
             }
         }
     }

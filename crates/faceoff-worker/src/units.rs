@@ -1,4 +1,4 @@
-//! The four kinds of work, each from claim to commit.
+//! The three kinds of work, each from claim to commit.
 
 use crate::{
     bundle_cache::{BundleCache, FetchError},
@@ -11,10 +11,9 @@ use faceoff_runner::{
     AgentEnvironment, EvaluationMeta, PlatformFault, ShardSpec, bundle::BundleLimits,
 };
 use faceoff_store::{
-    AblationRun, BundleRef, Claim, Committed, Evaluation, Shard, ShardCommit, SmokeOutcome, Store,
-    Submission,
+    BundleRef, Claim, Committed, Run, RunSeeds, Shard, ShardCommit, SmokeOutcome, Store, Submission,
 };
-use faceoff_types::RULESET;
+use faceoff_types::EvaluationId;
 use std::path::{Path, PathBuf};
 use tokio::runtime::Handle;
 
@@ -104,29 +103,30 @@ impl Tools {
             },
             Err(FetchError::Platform(reason)) => anyhow::bail!(reason),
         };
-        self.handle
-            .block_on(self.store.commit_smoke(claim, outcome, self.clock.now()))?;
-        Ok(End::Committed)
+        let committed = self.store.commit_smoke(claim, outcome, self.clock.now());
+        Ok(match self.handle.block_on(committed)? {
+            Committed::Now | Committed::Before => End::Committed,
+            Committed::LeaseLost => End::Stopped,
+        })
     }
 
-    /// Plays a shard, uploads its recording, and only then commits it.
+    /// Plays a shard, uploads its recording if the run keeps any, and only then commits it.
     pub(crate) fn shard(
         &mut self,
         claim: &Claim,
-        evaluation: &Evaluation,
+        (run, seeds): (&Run, RunSeeds),
         shard: &Shard,
         bundle: &BundleRef,
         mut progress: Progress,
     ) -> Ended {
         let bundle = self.valid_bundle(bundle)?;
-        let secret = self.handle.block_on(self.store.season())?.secret;
         let spec = ShardSpec {
             task: shard.task,
             episodes: shard.first_episode..shard.end_episode,
-            profile: evaluation.plan.profile,
-            seed: secret.day(evaluation.day),
-            mismatch_seed: secret.model_mismatch(),
-            max_faults: evaluation.plan.max_faults,
+            profile: run.plan.profile,
+            seed: seeds.episodes,
+            mismatch_seed: seeds.mismatch,
+            max_faults: run.plan.max_faults,
         };
         let out = self.folder("recording")?;
         let report =
@@ -138,11 +138,13 @@ impl Tools {
                 Err(PlatformFault::Cancelled) if progress.stopped() => return Ok(End::Stopped),
                 Err(fault) => return Err(fault.into()),
             };
-        let recording = claim.recording_key(evaluation.id);
+        let recording = run.keeps_recordings.then(|| claim.recording_key(run.id));
         let (store, handle) = (&self.store, &self.handle);
-        handle
-            .block_on(store.artifacts().put_folder(&recording, out.path()))
-            .context("storing the recording")?;
+        if let Some(key) = &recording {
+            handle
+                .block_on(store.artifacts().put_folder(key, out.path()))
+                .context("storing the recording")?;
+        }
         let commit = ShardCommit {
             outcomes: report.outcomes,
             log: report.log,
@@ -152,100 +154,63 @@ impl Tools {
         match handle.block_on(store.commit_shard(claim, commit, self.clock.now()))? {
             Committed::Now | Committed::Before => Ok(End::Committed),
             Committed::LeaseLost => {
-                handle
-                    .block_on(store.artifacts().delete_folder(&recording))
-                    .context("removing the recording of a lost lease")?;
+                if let Some(key) = &recording {
+                    handle
+                        .block_on(store.artifacts().delete_folder(key))
+                        .context("removing the recording of a lost lease")?;
+                }
                 Ok(End::Stopped)
             }
         }
-    }
-
-    /// Plays one task of an ablation under one profile. Only the outcomes are kept.
-    pub(crate) fn ablation(
-        &mut self,
-        claim: &Claim,
-        run: &AblationRun,
-        bundle: &BundleRef,
-        mut progress: Progress,
-    ) -> Ended {
-        let bundle = self.valid_bundle(bundle)?;
-        let secret = self.handle.block_on(self.store.season())?.secret;
-        let spec = ShardSpec {
-            task: run.task,
-            episodes: 0..run.episodes,
-            profile: run.profile,
-            seed: secret.ablation(),
-            mismatch_seed: secret.model_mismatch(),
-            max_faults: run.max_faults,
-        };
-        let out = self.folder("recording")?;
-        let played = self
-            .evaluator
-            .play(&spec, &bundle, &self.agent, out.path(), &mut progress);
-        let report = match played {
-            Ok(report) => report,
-            Err(PlatformFault::Cancelled) if progress.stopped() => return Ok(End::Stopped),
-            Err(fault) => return Err(fault.into()),
-        };
-        let outcomes = (!report.stopped_by_faults).then_some(&report.outcomes[..]);
-        let committed = self
-            .store
-            .commit_ablation_run(claim, outcomes, self.clock.now());
-        Ok(match self.handle.block_on(committed)? {
-            Committed::Now | Committed::Before => End::Committed,
-            Committed::LeaseLost => End::Stopped,
-        })
     }
 
     /// Joins the shards' recordings into the dataset, scores them, and publishes both together.
     pub(crate) fn finalise(
         &mut self,
         claim: &Claim,
-        evaluation: &Evaluation,
-        agent_name: &str,
+        evaluation: EvaluationId,
+        meta: &EvaluationMeta,
+        recordings: &[String],
     ) -> Ended {
         let work = self.folder("dataset")?;
-        let recordings = self.recordings(evaluation, work.path())?;
-        let secret = self.handle.block_on(self.store.season())?.secret;
-        let meta = EvaluationMeta {
-            profile: evaluation.plan.profile,
-            seed: secret.day(evaluation.day),
-            mismatch_seed: secret.model_mismatch(),
-            agent: agent_name.to_owned(),
-            ruleset: RULESET.to_owned(),
-        };
+        let recordings = self.recordings(recordings, work.path())?;
         let archive = work.path().join("dataset.zip");
-        let result = self.evaluator.assemble(&meta, &recordings, &archive)?;
-        let datasets = format!("datasets/{}", evaluation.id);
+        let result = self.evaluator.assemble(meta, &recordings, &archive)?;
+        let mut hasher = blake3::Hasher::new();
+        std::fs::File::open(&archive)
+            .and_then(|file| hasher.update_reader(file).map(|_| ()))
+            .context("reading the dataset")?;
+        let hash = hasher.finalize().to_string();
+        let datasets = format!("datasets/{evaluation}");
         let key = format!("{datasets}/{}.zip", claim.nonce);
         let (store, handle) = (&self.store, &self.handle);
         handle
             .block_on(store.artifacts().put_file(&key, &archive))
             .context("storing the dataset")?;
-        let finished =
-            handle.block_on(store.finish_evaluation(claim, &result, &key, self.clock.now()));
-        let tidied = match &finished {
+        // After an error the dataset may be the evaluation's all the same: it stays.
+        let finish = store.finish_evaluation(claim, &result, &key, &hash, self.clock.now());
+        let (ended, tidied) = match handle.block_on(finish)? {
             // what finalisations left that were killed between upload and commit
-            Ok(()) => handle.block_on(store.artifacts().delete_others(&datasets, &key)),
+            Committed::Now | Committed::Before => (
+                End::Committed,
+                handle.block_on(store.artifacts().delete_others(&datasets, &key)),
+            ),
             // never published: no other lease names this key
-            Err(_) => handle.block_on(store.artifacts().delete(&key)),
+            Committed::LeaseLost => (
+                End::Stopped,
+                handle.block_on(store.artifacts().delete(&key)),
+            ),
         };
         if let Err(error) = tidied {
-            tracing::warn!(evaluation = %evaluation.id, %error, "a dataset that nobody needs is left");
+            tracing::warn!(%evaluation, %error, "a dataset that nobody needs is left");
         }
-        finished?;
-        Ok(End::Committed)
+        Ok(ended)
     }
 
     /// Copies the committed recordings into folders, in order of play.
-    fn recordings(&self, evaluation: &Evaluation, into: &Path) -> anyhow::Result<Vec<PathBuf>> {
-        let shards = self.handle.block_on(self.store.shards(evaluation.id))?;
-        let mut folders = Vec::with_capacity(shards.len());
-        for (position, shard) in shards.iter().enumerate() {
-            let key = shard
-                .recording
-                .as_deref()
-                .context("a shard is not committed")?;
+    fn recordings(&self, keys: &[String], into: &Path) -> anyhow::Result<Vec<PathBuf>> {
+        let mut folders = Vec::with_capacity(keys.len());
+        for (position, key) in keys.iter().enumerate() {
             let folder = into.join(format!("shard-{position:05}"));
             std::fs::create_dir(&folder).context("making a folder for a recording")?;
             self.handle

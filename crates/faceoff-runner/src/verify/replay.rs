@@ -2,10 +2,7 @@ use super::{Difference, compare, feed::Recorded};
 use crate::{
     dataset::Columns,
     host_noise::Times,
-    recording::{
-        EPISODES_FILE, EpisodeRows, STEPS_FILE, StepRows, StepScan,
-        end_name, seconds,
-    },
+    recording::{EPISODES_FILE, EpisodeRows, STEPS_FILE, StepRows, StepScan, end_name, seconds},
 };
 use arrow_array::{
     Array, Float64Array, Int64Array, ListArray, RecordBatch,
