@@ -9,7 +9,7 @@ use axum::{
     extract::FromRequestParts,
     http::{HeaderMap, header, request::Parts},
 };
-use faceoff_store::Team;
+use faceoff_store::{Actor, Team};
 use faceoff_types::TeamId;
 
 /// A caller with a valid token.
@@ -25,6 +25,14 @@ impl Caller {
         match self {
             Self::Organiser => true,
             Self::Team(own) => own.id == team,
+        }
+    }
+
+    /// As the events name the caller.
+    pub(crate) const fn actor(&self) -> Actor {
+        match self {
+            Self::Organiser => Actor::Organiser,
+            Self::Team(team) => Actor::Team(team.id),
         }
     }
 }

@@ -15,7 +15,7 @@ mod summaries;
 pub mod token;
 
 pub use axum::Router;
-use faceoff_store::{EvaluationPlan, Store};
+use faceoff_store::{RunPlan, Store};
 use faceoff_types::Clock;
 use jiff::civil;
 use std::{io, path::PathBuf, sync::Arc, time::Duration};
@@ -55,7 +55,7 @@ pub struct HttpConfig {
     pub max_bundle_bytes: u64,
     /// How an evaluation runs: of a team's own turn, and of `POST /api/v1/days` where its body does
     /// not say otherwise.
-    pub plan: EvaluationPlan,
+    pub plan: RunPlan,
     /// BLAKE3 of the organiser's bearer token ([`token::hash_token`]).
     pub admin_token_hash: [u8; 32],
     /// Existing folder for uploads under way, on a disk with room for some bundles.

@@ -4,7 +4,7 @@ use crate::{
     AppState,
     problem::{Problem, ProblemKind},
 };
-use faceoff_store::DaySeed;
+use faceoff_store::{Actor, DaySeed};
 use faceoff_types::Seed;
 use jiff::civil;
 use std::collections::{BTreeMap, BTreeSet};
@@ -31,8 +31,9 @@ impl AppState {
     ///
     /// # Errors
     /// `NotYet` while evaluations of the day are under way.
-    pub(crate) async fn release_day(&self, day: civil::Date) -> Result<(), Problem> {
-        match self.store.release_day(day, self.config.clock.now()).await? {
+    pub(crate) async fn release_day(&self, actor: Actor, day: civil::Date) -> Result<(), Problem> {
+        let now = self.config.clock.now();
+        match self.store.release_day(actor, day, now).await? {
             DaySeed::Secret { under_way } => Err(Problem::new(
                 ProblemKind::NotYet,
                 format!(

@@ -1,4 +1,4 @@
-use crate::StoreError;
+use crate::error::{Result, StoreError};
 use bytes::Bytes;
 use futures::{StreamExt, TryStreamExt, stream::BoxStream};
 use jiff::Timestamp;
@@ -9,7 +9,7 @@ use std::{path::Path, sync::Arc, time::SystemTime};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
 /// The bytes of an artifact, in order.
-pub type ArtifactStream = BoxStream<'static, Result<Bytes, StoreError>>;
+pub type ArtifactStream = BoxStream<'static, Result<Bytes>>;
 
 /// Bytes in memory per piece of a copy.
 const PIECE_BYTES: usize = 1 << 20;
@@ -24,7 +24,7 @@ pub struct Artifacts {
 
 impl Artifacts {
     /// Artifacts in a folder, created if need be.
-    pub(crate) fn open(folder: &Path) -> Result<Self, StoreError> {
+    pub(crate) fn open(folder: &Path) -> Result<Self> {
         std::fs::create_dir_all(folder)
             .map_err(|error| StoreError::Artifacts(format!("{}: {error}", folder.display())))?;
         // A database row that names an artifact must never outlive it: file and folder are on disk
@@ -41,7 +41,7 @@ impl Artifacts {
 
     /// Stores a copy of a file under `key`, replacing what was there. It appears whole or not at all,
     /// whenever the process is killed.
-    pub async fn put_file(&self, key: &str, file: &Path) -> Result<(), StoreError> {
+    pub async fn put_file(&self, key: &str, file: &Path) -> Result<()> {
         let failed = |error| StoreError::Artifacts(format!("{}: {error}", file.display()));
         let mut source = tokio::fs::File::open(file).await.map_err(failed)?;
         let upload = self
@@ -69,7 +69,7 @@ impl Artifacts {
     }
 
     /// Copies an artifact to a new file and flushes it to disk.
-    pub async fn get_to_file(&self, key: &str, file: &Path) -> Result<(), StoreError> {
+    pub async fn get_to_file(&self, key: &str, file: &Path) -> Result<()> {
         let (bytes, mut stream) = self.read(key).await?;
         let failed = |error| StoreError::Artifacts(format!("{}: {error}", file.display()));
         let mut target = tokio::fs::File::create(file).await.map_err(failed)?;
@@ -89,7 +89,7 @@ impl Artifacts {
     }
 
     /// Length and bytes of an artifact, for a download.
-    pub async fn read(&self, key: &str) -> Result<(u64, ArtifactStream), StoreError> {
+    pub async fn read(&self, key: &str) -> Result<(u64, ArtifactStream)> {
         let found = self
             .objects
             .get(&parse(key)?)
@@ -100,7 +100,7 @@ impl Artifacts {
     }
 
     /// Removes an artifact; one that does not exist is no error, so that a removal can be repeated.
-    pub async fn delete(&self, key: &str) -> Result<(), StoreError> {
+    pub async fn delete(&self, key: &str) -> Result<()> {
         match self.objects.delete(&parse(key)?).await {
             Ok(()) | Err(object_store::Error::NotFound { .. }) => Ok(()),
             Err(error) => Err(artifact_error(error)),
@@ -108,7 +108,7 @@ impl Artifacts {
     }
 
     /// Stores every file directly in `folder` as `prefix/NAME`.
-    pub async fn put_folder(&self, prefix: &str, folder: &Path) -> Result<(), StoreError> {
+    pub async fn put_folder(&self, prefix: &str, folder: &Path) -> Result<()> {
         let failed = |error| StoreError::Artifacts(format!("{}: {error}", folder.display()));
         let mut entries = tokio::fs::read_dir(folder).await.map_err(failed)?;
         while let Some(entry) = entries.next_entry().await.map_err(failed)? {
@@ -124,7 +124,7 @@ impl Artifacts {
 
     /// Copies every artifact `prefix/NAME` to `folder/NAME`. [`StoreError::NotFound`] if there is
     /// none.
-    pub async fn get_folder(&self, prefix: &str, folder: &Path) -> Result<(), StoreError> {
+    pub async fn get_folder(&self, prefix: &str, folder: &Path) -> Result<()> {
         let listing = self
             .objects
             .list_with_delimiter(Some(&parse(prefix)?))
@@ -142,12 +142,12 @@ impl Artifacts {
     }
 
     /// Removes every artifact under `prefix/`.
-    pub async fn delete_folder(&self, prefix: &str) -> Result<(), StoreError> {
+    pub async fn delete_folder(&self, prefix: &str) -> Result<()> {
         self.delete_others(prefix, "").await
     }
 
     /// Removes every artifact under `prefix/` but the one with the key `kept`.
-    pub async fn delete_others(&self, prefix: &str, kept: &str) -> Result<(), StoreError> {
+    pub async fn delete_others(&self, prefix: &str, kept: &str) -> Result<()> {
         let listed: Vec<_> = self
             .objects
             .list(Some(&parse(prefix)?))
@@ -165,7 +165,7 @@ impl Artifacts {
 
     /// Removes what a killed process has left half written, if it was begun before `before`. Returns
     /// how many files.
-    pub async fn remove_abandoned(&self, before: Timestamp) -> Result<usize, StoreError> {
+    pub async fn remove_abandoned(&self, before: Timestamp) -> Result<usize> {
         let folder = Arc::clone(&self.folder);
         tokio::task::spawn_blocking(move || remove_staged(&folder, before.into()))
             .await
@@ -199,7 +199,7 @@ fn remove_staged(folder: &Path, before: SystemTime) -> std::io::Result<usize> {
     Ok(removed)
 }
 
-fn parse(key: &str) -> Result<Key, StoreError> {
+fn parse(key: &str) -> Result<Key> {
     Key::parse(key).map_err(|error| StoreError::Artifacts(format!("key {key:?}: {error}")))
 }
 

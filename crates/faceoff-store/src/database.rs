@@ -1,4 +1,4 @@
-use crate::StoreError;
+use crate::error::{Result, StoreError};
 use sqlx::{
     Sqlite, SqlitePool, Transaction,
     migrate::Migrator,
@@ -24,7 +24,7 @@ pub(crate) struct Database {
 impl Database {
     /// Opens and migrates the file, creating it if need be. The caller makes sure that no other
     /// process does the same at the same time: SQLite has no lock for a set of migrations.
-    pub(crate) async fn open(file: &Path) -> Result<Self, StoreError> {
+    pub(crate) async fn open(file: &Path) -> Result<Self> {
         let options = SqliteConnectOptions::new()
             .filename(file)
             .create_if_missing(true)
@@ -53,7 +53,7 @@ impl Database {
 
     /// Begins a write. IMMEDIATE: a transaction that reads first and asks for the write lock later
     /// fails at once, whatever the busy timeout, if another wrote in between.
-    pub(crate) async fn begin(&self) -> Result<Transaction<'static, Sqlite>, StoreError> {
+    pub(crate) async fn begin(&self) -> Result<Transaction<'static, Sqlite>> {
         Ok(self.write.begin_with("BEGIN IMMEDIATE").await?)
     }
 

@@ -50,6 +50,9 @@ pub enum StoreError {
     Damaged(String),
 }
 
+/// What the store's functions answer.
+pub(crate) type Result<T, E = StoreError> = std::result::Result<T, E>;
+
 impl From<sqlx::Error> for StoreError {
     fn from(error: sqlx::Error) -> Self {
         match error {

@@ -1,10 +1,12 @@
 //! What Faceoff remembers: teams, submissions, evaluations, shards and the queue of work in SQLite,
 //! bundles, recordings and datasets as artifacts in an object store.
 //!
-//! One module per entity; SQL stays in here. Every function that changes something is one
-//! transaction, so that a process killed at any point leaves either all of it or nothing. The store
-//! runs no agent, computes no score and reads no clock: instants are passed in. Per-step data never
-//! enters the database.
+//! SQL stays in here, in three levels: the queue, whose units know nothing of what they are for; the
+//! tables, with their rows; the operations, which are transactions over both. Reads stand beside the
+//! operations. Every change goes through one function, which also appends to the events table and
+//! then wakes listeners, so that a process killed at any point leaves either all of it or nothing.
+//! The store runs no agent, computes no score and reads no clock: instants are passed in. Per-step
+//! data never enters the database.
 //!
 //! # Durability
 //! Write-ahead log with `synchronous = FULL`: what a function has returned survives `kill -9` and a
@@ -16,41 +18,40 @@
 //! without a database; after a change of SQL or of a migration run `crates/faceoff-store/prepare.sh`
 //! (`--check` compares instead of writing).
 
-mod ablations;
 mod artifacts;
-mod board;
 mod column;
 mod database;
 mod error;
-mod evaluation_ends;
-mod evaluations;
-mod events;
-mod leases;
-mod plan;
+mod event;
+mod operations;
 mod queue;
-mod releases;
-mod schedule;
-mod season;
-mod shards;
-mod smoke_runs;
+mod reads;
+mod signals;
 mod store;
-mod submissions;
-mod summaries;
-mod teams;
+mod tables;
+mod write;
 
-pub use ablations::{Ablation, AblationRun, AblationState};
 pub use artifacts::{ArtifactStream, Artifacts};
-pub use board::BoardRecord;
 pub use error::StoreError;
-pub use evaluations::{Evaluation, EvaluationState};
-pub use events::Event;
-pub use faceoff_types::{BundleRef, SmokeOutcome};
-pub use leases::{Claim, Committed};
-pub use plan::EvaluationPlan;
-pub use queue::{MAX_ATTEMPTS, MAX_LEASES, Work};
-pub use releases::DaySeed;
-pub use season::Season;
-pub use shards::{Shard, ShardCommit};
+pub use event::{Actor, Change, Event, EventRecord, ParseEventError, Subject};
+pub use operations::{
+    claim::{Claimed, MAX_LEASES, RunSeeds, Work},
+    commit::Committed,
+    give_back::MAX_ATTEMPTS,
+    release_day::DaySeed,
+    runs::RunOwner,
+    tidy::RECORDINGS_KEPT,
+};
+pub use queue::Claim;
+pub use reads::{board::BoardRecord, runs::RunFaults};
 pub use store::Store;
-pub use submissions::{Submission, SubmissionState};
-pub use teams::Team;
+pub use tables::{
+    ablations::{Ablation, AblationState},
+    evaluations::{Evaluation, EvaluationState},
+    plan::RunPlan,
+    runs::Run,
+    season::Season,
+    shards::{Shard, ShardCommit},
+    submissions::{Submission, SubmissionState},
+    teams::Team,
+};

@@ -81,12 +81,12 @@ id!(
     "ablation"
 );
 id!(
-    /// One task under one profile of an ablation; a unit of work of a worker slot.
-    AblationRunId,
-    "ablation run"
+    /// What an evaluation or an ablation plays: contestants, a profile and episodes, cut into shards.
+    RunId,
+    "run"
 );
 id!(
-    /// A range of episodes of one task of one evaluation; the unit of work of a worker slot.
+    /// A range of episodes of one task of one run; the unit of work of a worker slot.
     ShardId,
     "shard"
 );

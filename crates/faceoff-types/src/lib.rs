@@ -19,6 +19,7 @@ mod profile;
 mod result;
 mod ruleset;
 mod seed;
+mod seed_label;
 mod smoke_outcome;
 mod task;
 mod team_name;
@@ -32,9 +33,7 @@ pub use computation_time::ComputationTime;
 pub use constraint::{Constraint, Violations};
 pub use contest::{Contest, Side};
 pub use fault::{AgentFault, AgentFaultKind, Phase};
-pub use ids::{
-    AblationId, AblationRunId, EvaluationId, ParseIdError, ShardId, SubmissionId, TeamId,
-};
+pub use ids::{AblationId, EvaluationId, ParseIdError, RunId, ShardId, SubmissionId, TeamId};
 pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, UnknownInterpolation};
 pub use limits::{AgentLimits, BundleLimits, ResourceLimits, TimeLimits};
 pub use outcome::{EpisodeEnd, EpisodeOutcome};
@@ -42,6 +41,7 @@ pub use profile::{Factor, Factors, ParseProfileError, Profile};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult, ViolationCounts};
 pub use ruleset::{FOULS_PER_POINT, GAME_WINDOWS, RULESET, WINDOW_STEPS};
 pub use seed::{ParseSeedError, Seed};
+pub use seed_label::{ParseSeedLabelError, SeedLabel};
 pub use smoke_outcome::SmokeOutcome;
 pub use task::{ParseTaskError, Task};
 pub use team_name::{InvalidTeamName, TeamName};

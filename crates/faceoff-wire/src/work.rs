@@ -28,6 +28,8 @@ pub struct Lease {
     pub unit: Uuid,
     /// Drawn for this lease alone.
     pub nonce: Uuid,
+    /// Whose it is.
+    pub slot: String,
     /// When it ends unless renewed, by the server's clock.
     pub expires_at: Timestamp,
     /// For how long it was given and each renewal extends it, seconds: another machine's clock may
@@ -48,8 +50,8 @@ pub enum Assignment {
     },
     /// Play a range of episodes.
     Play {
-        /// The evaluation or ablation that the episodes are part of; for the log.
-        run: Uuid,
+        /// The evaluation or ablation; for the log.
+        part_of: Uuid,
         /// It has passed its smoke run.
         agent: AgentOrder,
         /// Which episodes.
@@ -144,9 +146,9 @@ impl fmt::Display for Assignment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Smoke { submission, .. } => write!(f, "smoke run of submission {submission}"),
-            Self::Play { run, spec, .. } => write!(
+            Self::Play { part_of, spec, .. } => write!(
                 f,
-                "{} episodes {} to {} of {run}, profile {}",
+                "{} episodes {} to {} of {part_of}, profile {}",
                 spec.task,
                 spec.episodes.start,
                 spec.episodes.end.saturating_sub(1),

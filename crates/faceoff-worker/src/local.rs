@@ -2,8 +2,7 @@
 //! queue.
 
 use crate::server::{Claimed, GivenBack, Holding, QueueMark, WorkServer};
-use anyhow::Context as _;
-use faceoff_store::{Claim, Committed, ShardCommit, Store, StoreError, Work};
+use faceoff_store::{Claim, Claimed as Leased, Committed, RunOwner, ShardCommit, Store, StoreError, Work};
 use faceoff_types::{AgentLimits, BundleRef, Clock, EvaluationResult, RULESET};
 use faceoff_wire::work::{
     AgentOrder, Assignment, EvaluationMeta, Lease, ShardSpec, WorkOrder, WorkReport,
@@ -45,75 +44,62 @@ impl LocalServer {
         }
     }
 
-    async fn order(&self, work: Work) -> anyhow::Result<WorkOrder> {
-        let claim = work.claim();
-        let lease = Lease {
-            unit: claim.unit,
-            nonce: claim.nonce,
-            expires_at: claim.lease_until,
-            duration_s: self.lease_s,
-        };
-        let secret = self.store.season().await?.secret;
+    fn order(&self, leased: Leased) -> WorkOrder {
+        let Leased { claim, work } = leased;
         let assignment = match work {
-            Work::Smoke { submission, .. } => Assignment::Smoke {
+            Work::Smoke { submission } => Assignment::Smoke {
                 submission: submission.id,
                 agent: self.agent(submission.bundle),
             },
             Work::Shard {
-                claim,
-                evaluation,
+                owner,
+                run,
                 shard,
                 bundle,
+                seeds,
             } => Assignment::Play {
-                run: evaluation.id.as_uuid(),
+                part_of: match owner {
+                    RunOwner::Evaluation(id) => id.as_uuid(),
+                    RunOwner::Ablation(id) => id.as_uuid(),
+                },
                 agent: self.agent(bundle),
                 spec: ShardSpec {
                     task: shard.task,
                     episodes: shard.first_episode..shard.end_episode,
-                    profile: evaluation.plan.profile,
-                    seed: secret.day(evaluation.day),
-                    mismatch_seed: secret.model_mismatch(),
-                    max_faults: evaluation.plan.max_faults,
+                    profile: run.plan.profile,
+                    seed: seeds.episodes,
+                    mismatch_seed: seeds.mismatch,
+                    max_faults: run.plan.max_faults,
                 },
-                recording: Some(claim.recording_key(evaluation.id)),
-            },
-            Work::Ablation { run, bundle, .. } => Assignment::Play {
-                run: run.ablation.as_uuid(),
-                agent: self.agent(bundle),
-                spec: ShardSpec {
-                    task: run.task,
-                    episodes: 0..run.episodes,
-                    profile: run.profile,
-                    seed: secret.ablation(),
-                    mismatch_seed: secret.model_mismatch(),
-                    max_faults: run.max_faults,
-                },
-                recording: None,
+                recording: run.keeps_recordings.then(|| claim.recording_key(run.id)),
             },
             Work::Finalise {
-                claim,
                 evaluation,
+                run,
+                recordings,
                 agent_name,
-            } => {
-                let shards = self.store.shards(evaluation.id).await?;
-                let recordings = shards.into_iter().map(|shard| shard.recording);
-                Assignment::Finalise {
-                    evaluation: evaluation.id,
-                    meta: EvaluationMeta {
-                        profile: evaluation.plan.profile,
-                        seed: secret.day(evaluation.day),
-                        mismatch_seed: secret.model_mismatch(),
-                        agent: agent_name,
-                        ruleset: RULESET.to_owned(),
-                    },
-                    recordings: recordings
-                        .collect::<Option<_>>()
-                        .context("a shard is not committed")?,
-                    dataset: format!("datasets/{}/{}.zip", evaluation.id, claim.nonce),
-                }
-            }
+                seeds,
+            } => Assignment::Finalise {
+                evaluation,
+                meta: EvaluationMeta {
+                    profile: run.plan.profile,
+                    seed: seeds.episodes,
+                    mismatch_seed: seeds.mismatch,
+                    agent: agent_name,
+                    ruleset: RULESET.to_owned(),
+                },
+                recordings,
+                dataset: format!("datasets/{evaluation}/{}.zip", claim.nonce),
+            },
         };
-        Ok(WorkOrder { lease, assignment })
+        let lease = Lease {
+            unit: claim.unit,
+            nonce: claim.nonce,
+            slot: claim.worker,
+            expires_at: claim.lease_until,
+            duration_s: self.lease_s,
+        };
+        WorkOrder { lease, assignment }
     }
 
     fn agent(&self, bundle: BundleRef) -> AgentOrder {
@@ -130,6 +116,7 @@ impl LocalServer {
         let committed = self.store.commit_shard(claim, played, self.clock.now());
         let holding = holding(committed.await?);
         if holding == Holding::Lost
+            && let Some(recording) = recording
             && let Err(error) = self.store.artifacts().delete_folder(&recording).await
         {
             tracing::warn!(recording, %error, "the recording of a lost lease is left");
@@ -143,12 +130,13 @@ impl LocalServer {
         &self,
         claim: &Claim,
         dataset: &str,
+        blake3: &str,
         result: &EvaluationResult,
     ) -> anyhow::Result<Holding> {
-        let finished = self
-            .store
-            .finish_evaluation(claim, result, dataset, self.clock.now());
-        let holding = held_unless_refused(finished.await)?;
+        let finished =
+            self.store
+                .finish_evaluation(claim, result, dataset, blake3, self.clock.now());
+        let holding = holding(finished.await?);
         let artifacts = self.store.artifacts();
         let tidied = match (holding, dataset.rsplit_once('/')) {
             // what finalisations left that were killed between upload and commit
@@ -171,20 +159,10 @@ impl WorkServer for LocalServer {
         let queue = QueueMark(*self.store.work_signal().borrow());
         self.runtime.block_on(async {
             let now = self.clock.now();
-            let Some(work) = self.store.claim(slot, self.lease_s, now).await? else {
-                return Ok(Claimed::Nothing { queue });
-            };
-            let claim = work.claim().clone();
-            match self.order(work).await {
-                Ok(order) => Ok(Claimed::Order(Box::new(order))),
-                Err(error) => {
-                    let reason = "the evaluator failed";
-                    self.store
-                        .release_failed(&claim, reason, self.clock.now())
-                        .await?;
-                    Err(error.context(format!("writing the order for unit {}", claim.unit)))
-                }
-            }
+            Ok(match self.store.claim(slot, self.lease_s, now).await? {
+                Some(leased) => Claimed::Order(Box::new(self.order(leased))),
+                None => Claimed::Nothing { queue },
+            })
         })
     }
 
@@ -205,13 +183,13 @@ impl WorkServer for LocalServer {
         self.runtime.block_on(async {
             match report {
                 WorkReport::Smoke(outcome) => {
-                    held_unless_refused(self.store.commit_smoke(&claim, outcome, now).await)
+                    Ok(holding(self.store.commit_smoke(&claim, outcome, now).await?))
                 }
                 WorkReport::Play {
                     outcomes,
                     log,
                     stopped_by_faults,
-                    recording: Some(recording),
+                    recording,
                 } => {
                     let played = ShardCommit {
                         outcomes,
@@ -221,19 +199,14 @@ impl WorkServer for LocalServer {
                     };
                     self.commit_played(&claim, played).await
                 }
-                WorkReport::Play {
-                    outcomes,
-                    stopped_by_faults,
-                    recording: None,
-                    ..
-                } => {
-                    let outcomes = (!stopped_by_faults).then_some(&outcomes[..]);
-                    let committed = self.store.commit_ablation_run(&claim, outcomes, now);
-                    Ok(holding(committed.await?))
-                }
                 WorkReport::Finalise {
-                    dataset, result, ..
-                } => self.commit_finalised(&claim, &dataset, &result).await,
+                    dataset,
+                    blake3,
+                    result,
+                } => {
+                    self.commit_finalised(&claim, &dataset, &blake3, &result)
+                        .await
+                }
             }
         })
     }
@@ -292,6 +265,7 @@ fn claim(lease: &Lease) -> Claim {
     Claim {
         unit: lease.unit,
         nonce: lease.nonce,
+        worker: lease.slot.clone(),
         lease_until: lease.expires_at,
     }
 }
@@ -300,14 +274,5 @@ fn holding(committed: Committed) -> Holding {
     match committed {
         Committed::Now | Committed::Before => Holding::Held,
         Committed::LeaseLost => Holding::Lost,
-    }
-}
-
-/// Of a commit that refuses a lost lease as a conflict.
-fn held_unless_refused(committed: Result<(), StoreError>) -> anyhow::Result<Holding> {
-    match committed {
-        Ok(()) => Ok(Holding::Held),
-        Err(StoreError::Conflict(_)) => Ok(Holding::Lost),
-        Err(error) => Err(error.into()),
     }
 }

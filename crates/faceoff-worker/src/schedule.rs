@@ -1,5 +1,5 @@
 use anyhow::Context as _;
-use faceoff_store::{Evaluation, EvaluationPlan, Store};
+use faceoff_store::{Actor, Evaluation, RunPlan, Store};
 use faceoff_types::Clock;
 use jiff::{Timestamp, civil::Time, tz::TimeZone};
 use std::{num::NonZeroU32, time::Duration};
@@ -14,7 +14,7 @@ pub struct DailyPlan {
     /// The UTC time at which it does so.
     pub at: Time,
     /// What every team plays.
-    pub evaluation: EvaluationPlan,
+    pub evaluation: RunPlan,
     /// Episodes of each task and profile of an ablation of every submission that was started and has
     /// none yet; `None`: no ablations.
     pub ablation_episodes: Option<NonZeroU32>,
@@ -63,16 +63,20 @@ async fn order_ablations(
     store: &Store,
     started: &[Evaluation],
     episodes: NonZeroU32,
-    plan: &EvaluationPlan,
+    plan: &RunPlan,
     now: Timestamp,
 ) {
+    let plan = RunPlan {
+        episodes_per_task: episodes.get(),
+        ..plan.clone()
+    };
     for evaluation in started {
         let submission = evaluation.submission;
         let ordered = match store.newest_ablation(submission).await {
             Ok(Some(_)) => continue,
             Ok(None) => {
                 store
-                    .create_ablation(submission, episodes.get(), plan.max_faults, now)
+                    .create_ablation(Actor::Schedule, submission, &plan, now)
                     .await
             }
             Err(error) => Err(error),

@@ -7,7 +7,7 @@
 use anyhow::{Context, bail, ensure};
 use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::BundleLimits};
 use faceoff_sandbox::{Isolation, Layer, Limits, Runtime};
-use faceoff_store::EvaluationPlan;
+use faceoff_store::RunPlan;
 use faceoff_types::{Profile, Task};
 use jiff::civil::Time;
 use serde::{Deserialize, Serialize};
@@ -242,9 +242,9 @@ impl Config {
 
     /// What an evaluation plays.
     #[must_use]
-    pub fn plan(&self) -> EvaluationPlan {
+    pub fn plan(&self) -> RunPlan {
         let evaluation = &self.evaluation;
-        EvaluationPlan {
+        RunPlan {
             profile: evaluation.profile,
             tasks: evaluation.tasks.clone(),
             episodes_per_task: evaluation.episodes_per_task,

@@ -14,7 +14,7 @@ use crate::{
 };
 use axum::{Json, extract::State, http::StatusCode, response::IntoResponse};
 use faceoff_scoring::ProfileEffect;
-use faceoff_store::{Ablation, AblationState};
+use faceoff_store::{Ablation, AblationState, Actor, RunPlan};
 use faceoff_types::{SubmissionId, Task};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -91,7 +91,10 @@ impl AblationView {
                 },
             },
             AblationState::Finished { finished_at } => {
-                let runs = app.store.ablation_outcomes(ablation.id).await?;
+                let mut runs = BTreeMap::new();
+                for (profile, run) in ablation.runs {
+                    runs.insert(profile, app.store.outcomes(run).await?);
+                }
                 AblationStatus::Finished {
                     finished_at,
                     tasks: faceoff_scoring::ablation(&runs).map_err(Problem::internal)?,
@@ -163,10 +166,13 @@ pub(crate) async fn order_ablation(
         )
         .with("field", "episodes_per_task"));
     }
-    let (max_faults, now) = (app.config.plan.max_faults, app.config.clock.now());
+    let plan = RunPlan {
+        episodes_per_task: episodes,
+        ..app.config.plan.clone()
+    };
     let ablation = app
         .store
-        .create_ablation(id, episodes, max_faults, now)
+        .create_ablation(Actor::Organiser, id, &plan, app.config.clock.now())
         .await?;
     tracing::info!(submission = %id, ablation = %ablation.id, "ablation ordered");
     let view = AblationView::of(&app, ablation).await?;

@@ -9,7 +9,7 @@ use faceoff_scoring::{
 };
 use faceoff_store::BoardRecord;
 use faceoff_types::{
-    EvaluationId, Profile, RULESET, Seed, Task, TaskResult, TeamId, TeamName, Tier,
+    EvaluationId, Profile, RULESET, RunId, Seed, Task, TaskResult, TeamId, TeamName, Tier,
 };
 use jiff::{Timestamp, civil};
 use serde::{Deserialize, Serialize};
@@ -99,13 +99,13 @@ pub(crate) struct BoardLine {
 /// A board's record as comparisons need it.
 fn played<'a>(
     record: &'a BoardRecord,
-    summaries: &'a HashMap<EvaluationId, Arc<EpisodeSummary>>,
+    summaries: &'a HashMap<RunId, Arc<EpisodeSummary>>,
     mismatch_seed: Seed,
 ) -> Result<Played<'a>, Problem> {
-    let id = record.evaluation;
+    let run = record.run;
     let summary = summaries
-        .get(&id)
-        .ok_or_else(|| Problem::internal(format_args!("evaluation {id} has no summary")))?;
+        .get(&run)
+        .ok_or_else(|| Problem::internal(format_args!("run {run} has no summary")))?;
     Ok(Played {
         ruleset: &record.result.ruleset,
         profile: record.result.profile,
@@ -117,17 +117,18 @@ fn played<'a>(
 
 /// The board's records, ranked and grouped.
 pub(crate) async fn ranked(app: &App, task: Option<Task>) -> Result<Vec<BoardLine>, Problem> {
-    let mut entries = Vec::new();
-    let mut summaries = HashMap::new();
-    for record in app.store.board().await? {
-        let summary = app.summary(record.evaluation).await?;
-        summaries.insert(record.evaluation, summary);
-        entries.push(BoardEntry {
+    let records = app.store.board().await?;
+    let summaries = app
+        .summaries_of(records.iter().map(|record| record.run))
+        .await?;
+    let entries = records
+        .into_iter()
+        .map(|record| BoardEntry {
             result: record.result.clone(),
-            submitted_at_ms: record.submission.created_at.as_millisecond(),
+            submitted_at_ms: record.submitted_at.as_millisecond(),
             key: record,
-        });
-    }
+        })
+        .collect();
     let ranked = match task {
         None => overall_board(entries),
         Some(task) => rank_by_task(task, entries),
@@ -172,7 +173,7 @@ async fn view(app: &App, task: Option<Task>) -> Result<Json<BoardView>, Problem>
                 tier_change_probability: line.tier_change,
                 team: record.team.name,
                 team_id: record.team.id,
-                agent: record.submission.agent_name,
+                agent: record.agent_name,
                 evaluation: record.evaluation,
                 day: record.day,
                 finished_at: record.finished_at,

@@ -80,7 +80,7 @@ impl Side {
         };
         let result = result.clone();
         Ok(Self {
-            summary: app.summary(id).await?,
+            summary: app.summary(evaluation.run).await?,
             evaluation,
             result,
         })

@@ -12,6 +12,7 @@ use crate::{
     problem::{Problem, ProblemKind},
 };
 use axum::{Json, extract::State};
+use faceoff_store::Actor;
 use faceoff_types::{EvaluationId, Profile, TeamId};
 use jiff::civil;
 use serde::{Deserialize, Serialize};
@@ -83,7 +84,7 @@ pub(crate) async fn start_day(
     let now = app.config.clock.now();
     let created: BTreeSet<EvaluationId> = app
         .store
-        .start_day(&plan, now)
+        .start_day(Actor::Organiser, &plan, now)
         .await?
         .into_iter()
         .map(|evaluation| evaluation.id)

@@ -14,7 +14,7 @@ use axum::{
     http::{HeaderValue, header},
     response::{IntoResponse, Response},
 };
-use faceoff_store::{Evaluation, EvaluationState};
+use faceoff_store::{Actor, Evaluation, EvaluationState};
 use faceoff_types::{
     AgentFault, EvaluationId, EvaluationResult, Profile, Seed, SlotTiming, SubmissionId, Task,
     TaskResult, TeamId, TeamName, Tier,
@@ -97,10 +97,12 @@ pub enum EvaluationStatus {
         /// When.
         #[schema(value_type = String, format = DateTime)]
         finished_at: Timestamp,
-        /// What the agent did.
-        faults: Vec<FaultView>,
-        /// Last part of the agent's standard error.
-        log: String,
+        /// What the agent did; absent in lists.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        faults: Option<Vec<FaultView>>,
+        /// Last part of the agent's standard error; absent in lists.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        log: Option<String>,
     },
     /// Our fault; the day's turn was given back.
     PlatformFailed {
@@ -229,7 +231,7 @@ impl EvaluationView {
             EvaluationState::Finished {
                 finished_at,
                 result,
-                dataset: _,
+                ..
             } => EvaluationStatus::Finished {
                 finished_at,
                 result: {
@@ -238,14 +240,10 @@ impl EvaluationView {
                 },
                 dataset: format!("{}/evaluations/{}/dataset", super::BASE, evaluation.id),
             },
-            EvaluationState::AgentFailed {
+            EvaluationState::AgentFailed { finished_at } => EvaluationStatus::AgentFailed {
                 finished_at,
-                faults,
-                log,
-            } => EvaluationStatus::AgentFailed {
-                finished_at,
-                faults: faults.into_iter().map(FaultView::from).collect(),
-                log,
+                faults: None,
+                log: None,
             },
             EvaluationState::PlatformFailed {
                 finished_at,
@@ -278,14 +276,21 @@ impl EvaluationView {
     }
 }
 
-/// An evaluation with its team's name.
+/// An evaluation with its team's name, and with faults and log if it failed by them.
 pub(crate) async fn with_name(
     app: &App,
     evaluation: Evaluation,
 ) -> Result<EvaluationView, Problem> {
     let team = app.store.team(evaluation.team).await?;
     let seeds = app.day_seeds([evaluation.day].into()).await?;
-    Ok(EvaluationView::new(evaluation, team.name, &seeds))
+    let run = evaluation.run;
+    let mut view = EvaluationView::new(evaluation, team.name, &seeds);
+    if let EvaluationStatus::AgentFailed { faults, log, .. } = &mut view.status {
+        let of_run = app.store.run_faults(run).await?;
+        *faults = Some(of_run.faults.into_iter().map(FaultView::from).collect());
+        *log = Some(of_run.log);
+    }
+    Ok(view)
 }
 
 /// Evaluations with their teams' names.
@@ -398,7 +403,7 @@ pub(crate) async fn cancel_evaluation(
         .with("field", "reason"));
     }
     app.store
-        .cancel_evaluation(id, reason.trim(), app.config.clock.now())
+        .cancel_evaluation(Actor::Organiser, id, reason.trim(), app.config.clock.now())
         .await?;
     tracing::info!(evaluation = %id, reason, "evaluation cancelled");
     let evaluation = app.store.evaluation(id).await?;
@@ -427,7 +432,7 @@ pub(crate) async fn dataset(
     let evaluation = visible(&app, &caller, id).await?;
     let why_not = match &evaluation.state {
         EvaluationState::Finished { dataset, .. } => {
-            app.release_day(evaluation.day).await?;
+            app.release_day(caller.actor(), evaluation.day).await?;
             // A dataset that a finished evaluation names must be there: without it, we lost it.
             let (bytes, stream) = app
                 .store

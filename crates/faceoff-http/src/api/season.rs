@@ -8,6 +8,7 @@ use crate::{
     problem::{Problem, ProblemKind},
 };
 use axum::{Json, extract::State};
+use faceoff_store::Actor;
 use faceoff_types::{RULESET, Seed};
 use jiff::{Timestamp, civil};
 use serde::{Deserialize, Serialize};
@@ -127,7 +128,9 @@ pub(crate) async fn close_season(
         )
         .with("field", "confirm"));
     }
-    app.store.close_season(app.config.clock.now()).await?;
+    app.store
+        .close_season(Actor::Organiser, app.config.clock.now())
+        .await?;
     tracing::info!(season = name, "season closed; its secret is public");
     view(&app).await.map(Json)
 }

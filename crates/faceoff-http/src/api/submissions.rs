@@ -18,8 +18,8 @@ use axum::{
     http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header},
     response::{AppendHeaders, IntoResponse},
 };
-use faceoff_store::{BundleRef, StoreError, Submission, SubmissionState};
-use faceoff_types::{ArchiveFormat, SubmissionId, TeamId};
+use faceoff_store::{Actor, StoreError, Submission, SubmissionState};
+use faceoff_types::{ArchiveFormat, BundleRef, SubmissionId, TeamId};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
@@ -58,15 +58,17 @@ pub enum SubmissionStatus {
     Validating,
     /// It starts, answers and keeps time: it can be evaluated.
     Valid {
-        /// Last part of the agent's standard error.
-        log: String,
+        /// Last part of the agent's standard error; absent in lists.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        log: Option<String>,
     },
     /// Something is wrong with it.
     Invalid {
         /// What.
         reason: String,
-        /// Last part of the agent's standard error.
-        log: String,
+        /// Last part of the agent's standard error; absent in lists.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        log: Option<String>,
     },
     /// The smoke run failed by our fault, several times; upload it again.
     ValidationError {
@@ -75,8 +77,9 @@ pub enum SubmissionStatus {
     },
 }
 
-impl From<Submission> for SubmissionView {
-    fn from(submission: Submission) -> Self {
+impl SubmissionView {
+    /// `log` is read by itself, where one submission is shown.
+    fn new(submission: Submission, log: Option<String>) -> Self {
         Self {
             id: submission.id,
             team: submission.team,
@@ -86,11 +89,9 @@ impl From<Submission> for SubmissionView {
             created_at: submission.created_at,
             agent_name: submission.agent_name,
             status: match submission.state {
-                SubmissionState::Validating { .. } => SubmissionStatus::Validating,
-                SubmissionState::Valid { log } => SubmissionStatus::Valid { log },
-                SubmissionState::Invalid { reason, log } => {
-                    SubmissionStatus::Invalid { reason, log }
-                }
+                SubmissionState::Validating => SubmissionStatus::Validating,
+                SubmissionState::Valid => SubmissionStatus::Valid { log },
+                SubmissionState::Invalid { reason } => SubmissionStatus::Invalid { reason, log },
                 SubmissionState::ValidationError { reason } => {
                     SubmissionStatus::ValidationError { reason }
                 }
@@ -160,7 +161,7 @@ pub(crate) async fn create_submission(
         .submissions_of(team.id)
         .await?
         .iter()
-        .filter(|submission| matches!(submission.state, SubmissionState::Validating { .. }))
+        .filter(|submission| !submission.state.is_settled())
         .count();
     if pending >= limits.pending_submissions {
         return Err(Problem::new(
@@ -202,7 +203,12 @@ pub(crate) async fn create_submission(
     let key = bundle.key.clone();
     let submission = match app
         .store
-        .create_submission(team.id, bundle, app.config.clock.now())
+        .create_submission(
+            Actor::Team(team.id),
+            team.id,
+            bundle,
+            app.config.clock.now(),
+        )
         .await
     {
         Ok(submission) => submission,
@@ -219,7 +225,7 @@ pub(crate) async fn create_submission(
     Ok((
         StatusCode::CREATED,
         AppendHeaders([(header::LOCATION, location)]),
-        Json(SubmissionView::from(submission)),
+        Json(SubmissionView::new(submission, None)),
     ))
 }
 
@@ -280,7 +286,10 @@ pub(crate) async fn list_submissions(
 ) -> Result<Json<Vec<SubmissionView>>, Problem> {
     let submissions = app.store.submissions_of(team.id).await?;
     Ok(Json(
-        submissions.into_iter().map(SubmissionView::from).collect(),
+        submissions
+            .into_iter()
+            .map(|submission| SubmissionView::new(submission, None))
+            .collect(),
     ))
 }
 
@@ -298,7 +307,9 @@ pub(crate) async fn submission(
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,
 ) -> Result<Json<SubmissionView>, Problem> {
-    Ok(Json(visible(&app, &caller, id).await?.into()))
+    let submission = visible(&app, &caller, id).await?;
+    let log = app.store.submission_log(id).await?;
+    Ok(Json(SubmissionView::new(submission, log)))
 }
 
 /// Uses the team's turn of today for this submission.
@@ -320,7 +331,7 @@ pub(crate) async fn evaluate_submission(
     visible(&app, &caller, id).await?;
     let evaluation = app
         .store
-        .create_evaluation(id, &app.config.plan, app.config.clock.now())
+        .create_evaluation(caller.actor(), id, &app.config.plan, app.config.clock.now())
         .await?;
     let view = with_name(&app, evaluation).await?;
     tracing::info!(team = %view.team_name, evaluation = %view.id, "evaluation queued");

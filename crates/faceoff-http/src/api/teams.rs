@@ -9,7 +9,7 @@ use crate::{
     token::{Token, TokenKind},
 };
 use axum::{Json, extract::State, http::StatusCode};
-use faceoff_store::Team;
+use faceoff_store::{Actor, Team};
 use faceoff_types::{TeamId, TeamName};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -78,7 +78,12 @@ pub(crate) async fn create_team(
     let token = Token::generate(TokenKind::Team).map_err(Problem::internal)?;
     let team = app
         .store
-        .create_team(&name, token.hash(), app.config.clock.now())
+        .create_team(
+            Actor::Organiser,
+            &name,
+            token.hash(),
+            app.config.clock.now(),
+        )
         .await?;
     tracing::info!(team = %team.name, id = %team.id, "team created");
     let view = TeamWithToken {
@@ -117,7 +122,9 @@ pub(crate) async fn replace_token(
 ) -> Result<Json<TeamWithToken>, Problem> {
     let team = app.store.team(id).await?;
     let token = Token::generate(TokenKind::Team).map_err(Problem::internal)?;
-    app.store.set_team_token(id, token.hash()).await?;
+    app.store
+        .set_team_token(Actor::Organiser, id, token.hash(), app.config.clock.now())
+        .await?;
     tracing::info!(team = %team.name, id = %team.id, "team token replaced");
     Ok(Json(TeamWithToken {
         team: team.into(),

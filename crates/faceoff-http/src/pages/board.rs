@@ -64,7 +64,7 @@ impl Who {
             rank_group: line.rank_group,
             tier_change: figures::chance(line.tier_change),
             team: record.team.name.to_string(),
-            agent: record.submission.agent_name.clone(),
+            agent: record.agent_name.clone(),
             evaluation: record.evaluation,
             day: record.day,
             setting: common_setting.is_none().then(|| setting(line)),

@@ -193,7 +193,7 @@ pub(super) async fn page(
             let finished_at = finished_at.strftime("%Y-%m-%d %H:%M UTC").to_string();
             let seeds = app.day_seeds([evaluation.day].into()).await?;
             let seed = seeds.public(result.seed, evaluation.day);
-            let summary = app.summary(id).await?;
+            let summary = app.summary(evaluation.run).await?;
             let mut done = finished(
                 result,
                 seed.map(|seed| seed.to_string()),

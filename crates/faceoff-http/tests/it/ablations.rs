@@ -1,22 +1,20 @@
 //! Ablations: ordered by the organiser, shown to everybody, in the way of nobody.
 
 use crate::site::{ADMIN, Site, TestTeam, outcome};
-use faceoff_store::Work;
+use faceoff_store::ShardCommit;
 use faceoff_types::Profile;
 use scraper::{Html, Selector};
 use serde_json::json;
 
 /// Plays the ablation that comes next: in `ideal` all episodes succeed, with tracking loss none, in the
 /// other profiles every second.
-async fn play(site: &Site) {
-    for _ in 0..18 {
-        let Work::Ablation { claim, run, .. } = site.claim().await else {
-            panic!("expected a run of an ablation");
-        };
-        let outcomes: Vec<_> = (0..run.episodes)
+async fn play(site: &Site, shards: u32) {
+    for _ in 0..shards {
+        let (claim, run, shard) = site.claim_shard().await;
+        let outcomes: Vec<_> = (shard.first_episode..shard.end_episode)
             .map(|episode| {
-                let mut outcome = outcome(run.task, episode, false);
-                outcome.success = match run.profile {
+                let mut outcome = outcome(shard.task, episode, false);
+                outcome.success = match run.plan.profile {
                     Profile::Ideal => true,
                     Profile::TrackingLoss => false,
                     _ => episode % 2 == 0,
@@ -24,8 +22,14 @@ async fn play(site: &Site) {
                 outcome
             })
             .collect();
+        let commit = ShardCommit {
+            outcomes,
+            log: String::new(),
+            stopped_by_faults: false,
+            recording: None,
+        };
         site.store
-            .commit_ablation_run(&claim, Some(&outcomes), site.now())
+            .commit_shard(&claim, commit, site.now())
             .await
             .unwrap();
     }
@@ -65,7 +69,7 @@ async fn an_organiser_orders_one_and_its_team_and_visitors_see_what_came_of_it()
             .contains("0 of 144 episodes")
     );
 
-    play(&site).await;
+    play(&site, 2 * 18).await;
     let view = site.get(&api, Some(&team.token)).await.json(200);
     assert_eq!(view["state"], "finished");
     let hit = view["tasks"]["hit"].as_array().unwrap();
@@ -122,7 +126,7 @@ async fn it_takes_no_turn_and_leaves_the_board_alone_and_the_evaluation_leads_to
     site.post(&api, Some(ADMIN), &json!({ "episodes_per_task": 1 }))
         .await
         .json(201);
-    play(&site).await;
+    play(&site, 18).await;
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(board["rows"], json!([]));
     let submission = api.replace("/ablation", "");

@@ -236,9 +236,7 @@ async fn an_empty_board_says_what_comes_next_and_a_running_one_how_far_it_is() {
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "striker").await;
     let evaluation = site.evaluate(&team, &submission).await;
-    let faceoff_store::Work::Shard { claim, .. } = site.claim().await else {
-        panic!("expected a shard")
-    };
+    let (claim, ..) = site.claim_shard().await;
     site.store
         .heartbeat(&claim, 3, 60, site.now())
         .await

@@ -159,12 +159,13 @@ async fn the_boards_group_teams_that_the_episodes_cannot_tell_apart() {
     assert_eq!(defend["rows"][3]["tier_change_probability"], 0.0);
 
     // What was computed once is kept, across restarts.
+    let run = site.store.evaluation(best).await.unwrap().run;
     let stored = site
         .store
-        .episode_summary(best, faceoff_scoring::EpisodeSummary::VERSION)
+        .episode_summaries(&[run], faceoff_scoring::EpisodeSummary::VERSION)
         .await
         .unwrap();
-    let stored: serde_json::Value = serde_json::from_str(&stored.unwrap()).unwrap();
+    let stored: serde_json::Value = serde_json::from_str(&stored[&run]).unwrap();
     assert_eq!(stored["tasks"]["hit"]["successes"]["episodes"], 200);
 
     let resamples = faceoff_scoring::TIER_CHANGE_RESAMPLES;

@@ -1,5 +1,4 @@
 use crate::site::{ADMIN, Site, result, text};
-use faceoff_store::Work;
 use serde_json::json;
 
 #[tokio::test]
@@ -20,9 +19,7 @@ async fn an_evaluation_is_followed_from_the_queue_to_the_dataset() {
         .await
         .problem(409, "conflict", &["not finished"]);
 
-    let Work::Shard { claim, .. } = site.claim().await else {
-        panic!("expected a shard")
-    };
+    let (claim, ..) = site.claim_shard().await;
     assert!(
         site.store
             .heartbeat(&claim, 3, 60, site.now())
@@ -130,6 +127,10 @@ async fn an_agent_that_failed_sees_every_fault_and_its_log() {
     assert_eq!(fault["line"], "{\"type\":\"act\"}");
     assert!(text(&failed["log"]).contains("log of hit"));
     assert!(failed.get("result").is_none());
+    let list = site.get("/api/v1/evaluations", Some(&team.token)).await;
+    let listed = &list.json(200)[0];
+    assert_eq!(listed["state"], "agent_failed");
+    assert!(listed.get("faults").is_none() && listed.get("log").is_none());
     site.get(&format!("{path}/dataset"), Some(&team.token))
         .await
         .problem(409, "conflict", &["no dataset", "log"]);

@@ -101,14 +101,16 @@ impl Site {
         let upload_dir = folder.path().join("uploads");
         std::fs::create_dir(&upload_dir).unwrap();
         let store = Store::open(folder.path()).await.unwrap();
-        store.name_season("Test season").await.unwrap();
-        let now = Arc::new(Mutex::new(
-            "2026-03-01T10:00:00Z".parse::<Timestamp>().unwrap(),
-        ));
+        let start: Timestamp = "2026-03-01T10:00:00Z".parse().unwrap();
+        store
+            .name_season(Actor::Organiser, "Test season", start)
+            .await
+            .unwrap();
+        let now = Arc::new(Mutex::new(start));
         let clock = Arc::clone(&now);
         let config = HttpConfig {
             max_bundle_bytes: MAX_BUNDLE,
-            plan: EvaluationPlan {
+            plan: RunPlan {
                 profile: Profile::Evaluation,
                 tasks: Task::ALL.to_vec(),
                 episodes_per_task: 4,
@@ -206,18 +208,15 @@ impl Site {
 
     /// Ends the next smoke run.
     pub async fn smoke(&self, outcome: SmokeOutcome) {
-        match self.claim().await {
-            Work::Smoke { claim, .. } => {
-                self.store
-                    .commit_smoke(&claim, outcome, self.now())
-                    .await
-                    .unwrap();
-            }
-            other => panic!("expected a smoke run, claimed {other:?}"),
-        }
+        let Claimed { claim, work } = self.claim().await;
+        assert!(matches!(work, Work::Smoke { .. }), "claimed {work:?}");
+        self.store
+            .commit_smoke(&claim, outcome, self.now())
+            .await
+            .unwrap();
     }
 
-    pub async fn claim(&self) -> Work {
+    pub async fn claim(&self) -> Claimed {
         self.store
             .claim("slot 0", 60, self.now())
             .await
@@ -225,19 +224,25 @@ impl Site {
             .expect("work is queued")
     }
 
+    pub async fn claim_shard(&self) -> (Claim, Run, Shard) {
+        let Claimed { claim, work } = self.claim().await;
+        match work {
+            Work::Shard { run, shard, .. } => (claim, run, shard),
+            other => panic!("expected a shard, claimed {other:?}"),
+        }
+    }
+
     /// Plays the shards of the evaluation that comes next, with `faults` agent faults in each.
     pub async fn play_shards(&self, faults: usize) {
         for _ in Task::ALL {
-            let Work::Shard { claim, shard, .. } = self.claim().await else {
-                panic!("expected a shard");
-            };
+            let (claim, run, shard) = self.claim_shard().await;
             let commit = ShardCommit {
                 outcomes: (shard.first_episode..shard.end_episode)
                     .map(|episode| outcome(shard.task, episode, (episode as usize) < faults))
                     .collect(),
                 log: format!("log of {}\n", shard.task),
                 stopped_by_faults: false,
-                recording: claim.recording_key(EvaluationId::new()),
+                recording: Some(claim.recording_key(run.id)),
             };
             self.store
                 .commit_shard(&claim, commit, self.now())
@@ -253,13 +258,11 @@ impl Site {
     /// Plays the evaluation that comes next and scores it as given.
     pub async fn finish(&self, result: &EvaluationResult) {
         self.play_shards(0).await;
-        let Work::Finalise {
-            claim, evaluation, ..
-        } = self.claim().await
-        else {
+        let Claimed { claim, work } = self.claim().await;
+        let Work::Finalise { evaluation, .. } = work else {
             panic!("expected a finalisation");
         };
-        self.publish(&claim, evaluation.id, result).await;
+        self.publish(&claim, evaluation, result).await;
     }
 
     /// Uses the team's turn of today; the evaluation's path in the API.
@@ -277,8 +280,9 @@ impl Site {
     pub async fn finish_as(&self, played: impl Fn(Task, u32) -> EpisodeOutcome) -> EvaluationId {
         let mut outcomes = Vec::new();
         loop {
-            match self.claim().await {
-                Work::Shard { claim, shard, .. } => {
+            let Claimed { claim, work } = self.claim().await;
+            match work {
+                Work::Shard { run, shard, .. } => {
                     let of_shard: Vec<_> = (shard.first_episode..shard.end_episode)
                         .map(|episode| played(shard.task, episode))
                         .collect();
@@ -287,13 +291,16 @@ impl Site {
                         outcomes: of_shard,
                         log: String::new(),
                         stopped_by_faults: false,
-                        recording: claim.recording_key(EvaluationId::new()),
+                        recording: Some(claim.recording_key(run.id)),
                     };
                     let committed = self.store.commit_shard(&claim, commit, self.now());
                     assert_eq!(committed.await.unwrap(), Committed::Now);
                 }
                 Work::Finalise {
-                    claim, evaluation, ..
+                    evaluation,
+                    run,
+                    seeds,
+                    ..
                 } => {
                     let tasks = Task::ALL.map(|task| {
                         let of_task: Vec<_> = outcomes
@@ -306,14 +313,13 @@ impl Site {
                             faceoff_scoring::score_task(&of_task, &Default::default()),
                         )
                     });
-                    let secret = self.store.season().await.unwrap().secret;
                     let result = faceoff_scoring::score_evaluation(
-                        evaluation.plan.profile,
-                        secret.day(evaluation.day),
+                        run.plan.profile,
+                        seeds.episodes,
                         tasks.into(),
                     );
-                    self.publish(&claim, evaluation.id, &result).await;
-                    return evaluation.id;
+                    self.publish(&claim, evaluation, &result).await;
+                    return evaluation;
                 }
                 other => panic!("expected a shard or a finalisation, claimed {other:?}"),
             }
@@ -323,7 +329,9 @@ impl Site {
     /// Ends an evaluation with its score and a dataset.
     async fn publish(&self, claim: &Claim, id: EvaluationId, result: &EvaluationResult) {
         let dataset = self.folder.path().join("dataset.zip");
-        std::fs::write(&dataset, b"PK the recorded dataset").unwrap();
+        let archive = b"PK the recorded dataset";
+        std::fs::write(&dataset, archive).unwrap();
+        let hash = blake3::hash(archive).to_string();
         let key = format!("datasets/{id}.zip");
         self.store
             .artifacts()
@@ -331,7 +339,7 @@ impl Site {
             .await
             .unwrap();
         self.store
-            .finish_evaluation(claim, result, &key, self.now())
+            .finish_evaluation(claim, result, &key, &hash, self.now())
             .await
             .unwrap();
     }
@@ -346,7 +354,7 @@ impl Site {
         let team = self.team(name).await;
         let submission = self.valid_submission(&team, name).await;
         let submission = submission.rsplit('/').next().unwrap().parse().unwrap();
-        let plan = EvaluationPlan {
+        let plan = RunPlan {
             profile: Profile::Evaluation,
             tasks: Task::ALL.to_vec(),
             episodes_per_task: episodes,
@@ -354,7 +362,7 @@ impl Site {
             max_faults: 0,
         };
         self.store
-            .create_evaluation(submission, &plan, self.now())
+            .create_evaluation(Actor::Organiser, submission, &plan, self.now())
             .await
             .unwrap();
         self.finish_as(played).await

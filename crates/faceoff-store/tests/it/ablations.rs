@@ -1,25 +1,43 @@
 //! Ablations: ordered, played behind everything else, and never in the way of what counts.
 
-use crate::fixture::{Fixture, outcome, plan};
+use crate::fixture::{Fixture, commit, plan};
 use faceoff_store::*;
 use faceoff_types::*;
 
-const EPISODES: u32 = 2;
+/// Per profile: three tasks of four episodes in shards of two.
+const SHARDS: u32 = 6;
 
 impl Fixture {
-    async fn claim_run(&self) -> (Claim, AblationRun) {
+    async fn claim_ablation_shard(&self) -> (Claim, Run, Shard) {
         match self.claim().await {
-            Some(Work::Ablation { claim, run, bundle }) => {
+            Some(Claimed {
+                claim,
+                work:
+                    Work::Shard {
+                        owner: RunOwner::Ablation(_),
+                        run,
+                        shard,
+                        bundle,
+                        seeds,
+                    },
+            }) => {
                 assert_eq!(bundle, crate::fixture::bundle());
-                (claim, run)
+                let secret = self.store.season().await.unwrap().secret;
+                assert_eq!(seeds.episodes, secret.ablation());
+                assert!(!run.keeps_recordings);
+                (claim, run, shard)
             }
-            other => panic!("expected a run of an ablation, claimed {other:?}"),
+            other => panic!("expected a shard of an ablation, claimed {other:?}"),
         }
     }
 
     async fn order(&self, submission: SubmissionId) -> Ablation {
+        let plan = RunPlan {
+            max_faults: 1,
+            ..plan()
+        };
         self.store
-            .create_ablation(submission, EPISODES, 1, self.now)
+            .create_ablation(Actor::Organiser, submission, &plan, self.now)
             .await
             .unwrap()
     }
@@ -28,12 +46,20 @@ impl Fixture {
         let newest = self.store.newest_ablation(submission).await.unwrap();
         newest.expect("an ablation")
     }
+
+    async fn commit_ablation(&self, claim: &Claim, commit: ShardCommit) -> Committed {
+        self.store
+            .commit_shard(claim, commit, self.now)
+            .await
+            .unwrap()
+    }
 }
 
-fn outcomes(run: &AblationRun) -> Vec<EpisodeOutcome> {
-    (0..run.episodes)
-        .map(|episode| outcome(run.task, episode, false))
-        .collect()
+fn unrecorded(shard: &Shard, faults: u32) -> ShardCommit {
+    ShardCommit {
+        recording: None,
+        ..commit(shard, faults)
+    }
 }
 
 #[tokio::test]
@@ -42,48 +68,42 @@ async fn every_profile_and_task_is_played_once_and_then_it_is_finished() {
     let submission = f.ready_team("Alpha").await;
     assert_eq!(f.store.newest_ablation(submission.id).await.unwrap(), None);
     let ordered = f.order(submission.id).await;
-    let total = 6 * 3 * EPISODES;
     let open = |episodes_done| AblationState::Open {
         episodes_done,
-        episodes_total: total,
+        episodes_total: 6 * 3 * 4,
     };
     assert_eq!(ordered.state, open(0));
+    assert_eq!(ordered.episodes_per_task, 4);
     let mut played = Vec::new();
-    for done in 0..6 * 3 {
-        assert_eq!(f.newest(submission.id).await.state, open(done * EPISODES));
-        let (claim, run) = f.claim_run().await;
-        let outcomes = outcomes(&run);
+    for done in 0..6 * SHARDS {
+        assert_eq!(f.newest(submission.id).await.state, open(done * 2));
+        let (claim, run, shard) = f.claim_ablation_shard().await;
         for expected in [Committed::Now, Committed::Before] {
-            let committed = f
-                .store
-                .commit_ablation_run(&claim, Some(&outcomes), f.now)
-                .await
-                .unwrap();
+            let committed = f.commit_ablation(&claim, unrecorded(&shard, 0)).await;
             assert_eq!(committed, expected);
         }
-        played.push((run.profile, run.task));
+        assert_eq!(ordered.runs[&run.plan.profile], run.id);
+        played.push((run.plan.profile, shard.task, shard.first_episode));
     }
     let expected: Vec<_> = Profile::ABLATION
         .into_iter()
-        .flat_map(|profile| Task::ALL.map(|task| (profile, task)))
+        .flat_map(|profile| Task::ALL.map(|task| [(profile, task, 0), (profile, task, 2)]))
+        .flatten()
         .collect();
     assert_eq!(played, expected);
     assert!(f.claim().await.is_none());
     let newest = f.newest(submission.id).await;
     assert_eq!(newest.state, AblationState::Finished { finished_at: f.now });
-    let runs = f.store.ablation_outcomes(newest.id).await.unwrap();
-    assert_eq!(runs.len(), 6);
-    let episodes: Vec<_> = runs[&Profile::Ideal]
-        .iter()
-        .map(|outcome| (outcome.task, outcome.episode))
-        .collect();
-    assert_eq!(
-        episodes,
-        Task::ALL
+    for run in newest.runs.into_values() {
+        let outcomes = f.store.outcomes(run).await.unwrap();
+        let episodes = outcomes
+            .iter()
+            .map(|outcome| (outcome.task, outcome.episode));
+        let in_order = Task::ALL
             .into_iter()
-            .flat_map(|task| (0..EPISODES).map(move |episode| (task, episode)))
-            .collect::<Vec<_>>()
-    );
+            .flat_map(|task| (0..4).map(move |episode| (task, episode)));
+        assert!(episodes.eq(in_order));
+    }
 }
 
 #[tokio::test]
@@ -91,22 +111,15 @@ async fn it_waits_behind_what_counts_takes_no_turn_and_reaches_no_board() {
     let f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
     f.order(submission.id).await;
-    let evaluation = f
-        .store
-        .create_evaluation(submission.id, &plan(), f.now)
-        .await
-        .expect("the day's turn is free");
+    let evaluation = f.evaluate(submission.id, &plan()).await;
     for _ in 0..6 {
-        let (claim, _, shard) = f.claim_shard().await;
+        let (claim, run, shard) = f.claim_shard().await;
+        assert_eq!(run.id, evaluation.run);
         f.play(&claim, &shard, 0).await;
     }
-    assert!(matches!(f.claim().await, Some(Work::Finalise { .. })));
-    let (claim, run) = f.claim_run().await;
-    let outcomes = outcomes(&run);
-    f.store
-        .commit_ablation_run(&claim, Some(&outcomes), f.now)
-        .await
-        .unwrap();
+    f.claim_scoring().await;
+    let (claim, _, shard) = f.claim_ablation_shard().await;
+    f.commit_ablation(&claim, unrecorded(&shard, 0)).await;
     let of_team = f.store.evaluations_of(evaluation.team).await.unwrap();
     assert_eq!(of_team.len(), 1, "an ablation is no evaluation");
     assert!(f.store.board().await.unwrap().is_empty());
@@ -117,7 +130,8 @@ async fn one_is_ordered_at_a_time_and_of_valid_submissions_only() {
     let f = Fixture::new().await;
     let team = f.team("Alpha").await;
     let submission = f.upload(&team).await;
-    let order = |id| f.store.create_ablation(id, EPISODES, 1, f.now);
+    let plan = plan();
+    let order = |id| f.store.create_ablation(Actor::Organiser, id, &plan, f.now);
     assert!(matches!(
         order(submission.id).await,
         Err(StoreError::Conflict(_))
@@ -135,25 +149,19 @@ async fn faults_of_the_agent_and_of_ours_end_it_with_a_reason() {
     let mut f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
     f.order(submission.id).await;
-    let (claim, _) = f.claim_run().await;
-    f.store
-        .commit_ablation_run(&claim, None, f.now)
-        .await
-        .unwrap();
-    assert!(f.claim().await.is_none(), "its other runs are dropped");
+    let (claim, _, shard) = f.claim_ablation_shard().await;
+    f.commit_ablation(&claim, unrecorded(&shard, 2)).await;
+    assert!(f.claim().await.is_none(), "its other shards are dropped");
     let AblationState::Failed { reason, .. } = f.newest(submission.id).await.state else {
         panic!("it failed")
     };
-    assert!(
-        reason.contains("more than 1 times in hit with ideal"),
-        "{reason}"
-    );
+    assert!(reason.contains("more than 1 times with ideal"), "{reason}");
 
     // A later one may be ordered; a fault of ours is tried again, then given up.
     f.later(1);
     f.order(submission.id).await;
     for _ in 0..MAX_ATTEMPTS {
-        let (claim, _) = f.claim_run().await;
+        let (claim, ..) = f.claim_ablation_shard().await;
         f.store
             .release_failed(&claim, "the disk is full", f.now)
             .await
@@ -169,12 +177,15 @@ async fn faults_of_the_agent_and_of_ours_end_it_with_a_reason() {
 }
 
 #[tokio::test]
-async fn a_commit_that_does_not_cover_its_run_is_refused() {
+async fn a_commit_that_does_not_cover_its_shard_or_brings_a_recording_is_refused() {
     let f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
     f.order(submission.id).await;
-    let (claim, run) = f.claim_run().await;
-    let one = &outcomes(&run)[..1];
-    let refused = f.store.commit_ablation_run(&claim, Some(one), f.now).await;
-    assert!(matches!(refused, Err(StoreError::Conflict(_))));
+    let (claim, _, shard) = f.claim_ablation_shard().await;
+    let mut short = unrecorded(&shard, 0);
+    short.outcomes.pop();
+    for bad in [short, commit(&shard, 0)] {
+        let refused = f.store.commit_shard(&claim, bad, f.now).await;
+        assert!(matches!(refused, Err(StoreError::Conflict(_))));
+    }
 }

@@ -1,5 +1,5 @@
 use crate::fixture::*;
-use faceoff_store::StoreError;
+use faceoff_store::*;
 use futures::TryStreamExt;
 use std::fs;
 
@@ -89,18 +89,14 @@ async fn folders_travel_whole_and_apart() {
 }
 
 #[tokio::test]
-async fn recordings_go_once_their_evaluation_is_over() {
-    let f = Fixture::new().await;
+async fn recordings_go_once_their_evaluation_has_been_over_for_a_day() {
+    let mut f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
-    let evaluation = f
-        .store
-        .create_evaluation(submission.id, &plan(), f.now)
-        .await
-        .unwrap();
+    let evaluation = f.evaluate(submission.id, &plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     let scratch = tempfile::tempdir().unwrap();
     fs::write(scratch.path().join("steps.parquet"), "steps").unwrap();
-    let key = claim.recording_key(evaluation.id);
+    let key = claim.recording_key(evaluation.run);
     f.store
         .artifacts()
         .put_folder(&key, scratch.path())
@@ -114,9 +110,13 @@ async fn recordings_go_once_their_evaluation_is_over() {
         .await
         .unwrap();
     f.store
-        .cancel_evaluation(evaluation.id, "rain", f.now)
+        .cancel_evaluation(Actor::Organiser, evaluation.id, "rain", f.now)
         .await
         .unwrap();
+    // a backup that was begun before the end may still come to them
+    f.later(RECORDINGS_KEPT.as_secs() - 1);
+    assert_eq!(f.store.remove_old_recordings(f.now).await.unwrap(), 0);
+    f.later(1);
     assert_eq!(f.store.remove_old_recordings(f.now).await.unwrap(), 1);
     assert!(
         f.store

@@ -9,32 +9,22 @@ async fn a_submission_travels_from_upload_to_board() {
     let mut f = Fixture::new().await;
     let team = f.team("Alpha").await;
     let submission = f.upload(&team).await;
-    assert_eq!(
-        submission.state,
-        SubmissionState::Validating { attempts: 0 }
-    );
+    assert_eq!(submission.state, SubmissionState::Validating);
     assert_eq!(submission.bundle, bundle());
     let error = f
         .store
-        .create_evaluation(submission.id, &plan(), f.now)
+        .create_evaluation(Actor::Organiser, submission.id, &plan(), f.now)
         .await
         .unwrap_err();
     assert!(matches!(error, StoreError::Conflict(_)), "{error}");
 
     let valid = f.validate().await;
     assert_eq!(valid.agent_name.as_deref(), Some("striker"));
-    assert_eq!(
-        valid.state,
-        SubmissionState::Valid {
-            log: "hello\n".into()
-        }
-    );
+    assert_eq!(valid.state, SubmissionState::Valid);
+    let log = f.store.submission_log(submission.id).await.unwrap();
+    assert_eq!(log.as_deref(), Some("hello\n"));
 
-    let evaluation = f
-        .store
-        .create_evaluation(submission.id, &plan(), f.now)
-        .await
-        .unwrap();
+    let evaluation = f.evaluate(submission.id, &plan()).await;
     assert_eq!(evaluation.state, EvaluationState::Queued);
     assert_eq!(evaluation.day, jiff::civil::date(2026, 3, 1));
     assert_eq!(evaluation.plan, plan());
@@ -42,7 +32,8 @@ async fn a_submission_travels_from_upload_to_board() {
     let mut played = Vec::new();
     for index in 0..6 {
         let (claim, running, shard) = f.claim_shard().await;
-        assert_eq!(running.id, evaluation.id);
+        assert_eq!(running.id, evaluation.run);
+        assert_eq!(running.plan, plan());
         assert_eq!(
             f.state(evaluation.id).await,
             EvaluationState::Running {
@@ -69,7 +60,7 @@ async fn a_submission_travels_from_upload_to_board() {
         played.into_iter().eq(in_order),
         "shards come in (task, first episode) order"
     );
-    let outcomes = f.store.outcomes(evaluation.id).await.unwrap();
+    let outcomes = f.store.outcomes(evaluation.run).await.unwrap();
     let expected = Task::ALL
         .into_iter()
         .flat_map(|task| (0..4).map(move |e| outcome(task, e, false)));
@@ -80,35 +71,49 @@ async fn a_submission_travels_from_upload_to_board() {
 
     assert_eq!(f.state(evaluation.id).await, EvaluationState::Finalising);
     assert!(f.store.board().await.unwrap().is_empty());
-    let Some(Work::Finalise {
-        claim, agent_name, ..
+    let Some(Claimed {
+        claim,
+        work:
+            Work::Finalise {
+                evaluation: scored,
+                run,
+                recordings,
+                agent_name,
+                seeds,
+            },
     }) = f.claim().await
     else {
         panic!("the finalisation is a unit of work")
     };
+    assert_eq!((scored, run.id), (evaluation.id, evaluation.run));
     assert_eq!(agent_name, "striker");
+    let shards = f.store.shards(run.id).await.unwrap();
+    let in_order: Vec<_> = shards.into_iter().filter_map(|s| s.recording).collect();
+    assert_eq!((recordings.len(), recordings), (6, in_order));
+    let secret = f.store.season().await.unwrap().secret;
+    assert_eq!(seeds.episodes, secret.day(evaluation.day));
+    assert_eq!(seeds.mismatch, secret.model_mismatch());
     assert!(f.claim().await.is_none(), "and is claimed once");
     f.later(1);
-    f.store
-        .finish_evaluation(&claim, &result(51.2), "datasets/x.zip", f.now)
-        .await
-        .unwrap();
-    f.store
-        .finish_evaluation(&claim, &result(0.0), "datasets/y.zip", f.now)
-        .await
-        .unwrap();
+    let finished = f.finish(&claim, 51.2, "datasets/x.zip").await;
+    assert_eq!(finished, Committed::Now);
+    let again = f.finish(&claim, 0.0, "datasets/y.zip").await;
+    assert_eq!(again, Committed::Before);
     assert_eq!(
         f.state(evaluation.id).await,
         EvaluationState::Finished {
             finished_at: f.now,
             result: Box::new(result(51.2)),
-            dataset: "datasets/x.zip".into()
+            dataset: "datasets/x.zip".into(),
+            dataset_blake3: Some(blake3_of("datasets/x.zip")),
         }
     );
 
     let board = f.store.board().await.unwrap();
     assert_eq!(board.len(), 1);
     assert_eq!(board[0].team, team);
-    assert_eq!(board[0].submission.id, submission.id);
+    assert_eq!(board[0].submission, submission.id);
+    assert_eq!(board[0].agent_name.as_deref(), Some("striker"));
+    assert_eq!(board[0].run, evaluation.run);
     assert_eq!(board[0].result, result(51.2));
 }

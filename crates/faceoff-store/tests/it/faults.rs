@@ -7,11 +7,7 @@ use faceoff_store::*;
 async fn as_many_faults_as_allowed_are_scored() {
     let f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
-    let evaluation = f
-        .store
-        .create_evaluation(submission.id, &plan(), f.now)
-        .await
-        .unwrap();
+    let evaluation = f.evaluate(submission.id, &plan()).await;
     for faults in [2, 1, 0, 0, 0, 0] {
         let (claim, _, shard) = f.claim_shard().await;
         f.play(&claim, &shard, faults).await;
@@ -23,11 +19,7 @@ async fn as_many_faults_as_allowed_are_scored() {
 async fn one_fault_more_ends_the_evaluation_without_a_score() {
     let f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
-    let evaluation = f
-        .store
-        .create_evaluation(submission.id, &plan(), f.now)
-        .await
-        .unwrap();
+    let evaluation = f.evaluate(submission.id, &plan()).await;
     let (first, _, first_shard) = f.claim_shard().await;
     let (running, _, running_shard) = f.claim_shard().await;
     let (third, _, third_shard) = f.claim_shard().await;
@@ -36,15 +28,12 @@ async fn one_fault_more_ends_the_evaluation_without_a_score() {
     assert!(!f.state(evaluation.id).await.is_over());
     f.play(&first, &first_shard, 2).await;
 
-    let EvaluationState::AgentFailed {
-        finished_at,
-        faults,
-        log,
-    } = f.state(evaluation.id).await
-    else {
-        panic!("four faults are one too many")
-    };
-    assert_eq!(finished_at, f.now);
+    assert_eq!(
+        f.state(evaluation.id).await,
+        EvaluationState::AgentFailed { finished_at: f.now },
+        "four faults are one too many"
+    );
+    let RunFaults { faults, log } = f.store.run_faults(evaluation.run).await.unwrap();
     let places: Vec<_> = faults
         .iter()
         .map(|fault| (fault.contest, fault.episode))
@@ -77,7 +66,7 @@ async fn one_fault_more_ends_the_evaluation_without_a_score() {
     assert!(f.store.board().await.unwrap().is_empty());
     let again = f
         .store
-        .create_evaluation(submission.id, &plan(), f.now)
+        .create_evaluation(Actor::Organiser, submission.id, &plan(), f.now)
         .await;
     assert!(
         matches!(again, Err(StoreError::AlreadyEvaluated { .. })),
@@ -89,15 +78,11 @@ async fn one_fault_more_ends_the_evaluation_without_a_score() {
 async fn a_shard_stopped_by_faults_ends_the_evaluation() {
     let f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
-    let strict = EvaluationPlan {
+    let strict = RunPlan {
         max_faults: 0,
         ..plan()
     };
-    let evaluation = f
-        .store
-        .create_evaluation(submission.id, &strict, f.now)
-        .await
-        .unwrap();
+    let evaluation = f.evaluate(submission.id, &strict).await;
     let (claim, _, shard) = f.claim_shard().await;
     let mut stopped = commit(&shard, 1);
     stopped.outcomes.truncate(1);
@@ -106,8 +91,10 @@ async fn a_shard_stopped_by_faults_ends_the_evaluation() {
         f.store.commit_shard(&claim, stopped, f.now).await.unwrap(),
         Committed::Now
     );
-    let EvaluationState::AgentFailed { faults, .. } = f.state(evaluation.id).await else {
-        panic!()
-    };
+    assert!(matches!(
+        f.state(evaluation.id).await,
+        EvaluationState::AgentFailed { .. }
+    ));
+    let faults = f.store.run_faults(evaluation.run).await.unwrap().faults;
     assert_eq!(faults.len(), 1);
 }

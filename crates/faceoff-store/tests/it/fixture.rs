@@ -3,7 +3,11 @@
 use faceoff_store::*;
 use faceoff_types::*;
 use jiff::{SignedDuration, Timestamp};
-use std::collections::BTreeMap;
+use sqlx::{Connection, SqliteConnection};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 pub const LEASE_S: u32 = 15;
 
@@ -29,6 +33,13 @@ impl Fixture {
         Store::open(self.folder.path()).await.unwrap()
     }
 
+    /// Past the store.
+    pub async fn connection(&self) -> SqliteConnection {
+        let file = self.folder.path().join("faceoff.sqlite3");
+        let url = format!("sqlite://{}", file.display());
+        SqliteConnection::connect(&url).await.unwrap()
+    }
+
     pub fn later(&mut self, seconds: i64) {
         self.now += SignedDuration::from_secs(seconds);
     }
@@ -36,27 +47,30 @@ impl Fixture {
     pub async fn team(&self, name: &str) -> Team {
         let token_hash = *blake3::hash(name.as_bytes()).as_bytes();
         self.store
-            .create_team(&name.parse().unwrap(), token_hash, self.now)
+            .create_team(
+                Actor::Organiser,
+                &name.parse().unwrap(),
+                token_hash,
+                self.now,
+            )
             .await
             .unwrap()
     }
 
     pub async fn upload(&self, team: &Team) -> Submission {
         self.store
-            .create_submission(team.id, bundle(), self.now)
+            .create_submission(Actor::Team(team.id), team.id, bundle(), self.now)
             .await
             .unwrap()
     }
 
-    pub async fn claim(&self) -> Option<Work> {
+    pub async fn claim(&self) -> Option<Claimed> {
         self.store.claim("slot 0", LEASE_S, self.now).await.unwrap()
     }
 
     /// Claims the next unit, which must be a smoke run, and finds the agent valid.
     pub async fn validate(&self) -> Submission {
-        let Some(Work::Smoke { claim, submission }) = self.claim().await else {
-            panic!("no smoke run is queued")
-        };
+        let (claim, submission) = self.claim_smoke().await;
         let outcome = SmokeOutcome::Valid {
             agent_name: "striker".into(),
             log: "hello\n".into(),
@@ -75,16 +89,54 @@ impl Fixture {
         self.validate().await
     }
 
-    pub async fn claim_shard(&self) -> (Claim, Evaluation, Shard) {
+    pub async fn evaluate(&self, submission: SubmissionId, plan: &RunPlan) -> Evaluation {
+        self.store
+            .create_evaluation(Actor::Organiser, submission, plan, self.now)
+            .await
+            .unwrap()
+    }
+
+    pub async fn claim_smoke(&self) -> (Claim, Submission) {
         match self.claim().await {
-            Some(Work::Shard {
+            Some(Claimed {
                 claim,
-                evaluation,
-                shard,
-                ..
-            }) => (claim, evaluation, shard),
+                work: Work::Smoke { submission },
+            }) => (claim, submission),
+            other => panic!("expected a smoke run, claimed {other:?}"),
+        }
+    }
+
+    pub async fn claim_shard(&self) -> (Claim, Run, Shard) {
+        match self.claim().await {
+            Some(Claimed {
+                claim,
+                work: Work::Shard { run, shard, .. },
+            }) => (claim, run, shard),
             other => panic!("expected a shard, claimed {other:?}"),
         }
+    }
+
+    pub async fn claim_scoring(&self) -> (Claim, EvaluationId) {
+        match self.claim().await {
+            Some(Claimed {
+                claim,
+                work: Work::Finalise { evaluation, .. },
+            }) => (claim, evaluation),
+            other => panic!("expected a finalisation, claimed {other:?}"),
+        }
+    }
+
+    pub async fn finish(&self, claim: &Claim, score: f64, dataset: &str) -> Committed {
+        self.store
+            .finish_evaluation(
+                claim,
+                &result(score),
+                dataset,
+                &blake3_of(dataset),
+                self.now,
+            )
+            .await
+            .unwrap()
     }
 
     pub async fn play(&self, claim: &Claim, shard: &Shard, faults: u32) -> Committed {
@@ -99,6 +151,24 @@ impl Fixture {
     }
 }
 
+/// What `.sqlx/` holds of each query, and where.
+pub fn query_data() -> Vec<(PathBuf, serde_json::Value)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../.sqlx");
+    std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| {
+            let path = entry.unwrap().path();
+            let text = std::fs::read_to_string(&path).unwrap();
+            (path, serde_json::from_str(&text).unwrap())
+        })
+        .collect()
+}
+
+/// What stands for the hash of a dataset's archive.
+pub fn blake3_of(dataset: &str) -> String {
+    blake3::hash(dataset.as_bytes()).to_string()
+}
+
 pub fn bundle() -> BundleRef {
     BundleRef {
         key: "bundles/abc".into(),
@@ -109,8 +179,8 @@ pub fn bundle() -> BundleRef {
 }
 
 /// 3 tasks of 4 episodes in shards of 2: six shards.
-pub fn plan() -> EvaluationPlan {
-    EvaluationPlan {
+pub fn plan() -> RunPlan {
+    RunPlan {
         profile: Profile::Evaluation,
         tasks: vec![Task::Prepare, Task::Hit, Task::Defend],
         episodes_per_task: 4,
@@ -129,7 +199,7 @@ pub fn commit(shard: &Shard, faults: u32) -> ShardCommit {
         outcomes,
         log: format!("log of {} {}\n", shard.task, shard.first_episode),
         stopped_by_faults: false,
-        recording: format!("recordings/{}", shard.id),
+        recording: Some(format!("recordings/{}", shard.id)),
     }
 }
 

@@ -2,9 +2,9 @@
 
 use crate::fixture::*;
 use faceoff_store::*;
+use faceoff_types::ShardId;
 use proptest::prelude::*;
 use std::collections::HashMap;
-use uuid::Uuid;
 
 /// What a worker may do; the number picks one of the claims ever given, lost ones included.
 #[derive(Debug, Clone)]
@@ -32,46 +32,30 @@ fn act() -> impl Strategy<Value = Act> {
 
 #[derive(Default)]
 struct Played {
-    claims: Vec<(Claim, Work)>,
-    /// commits that were told "now", per unit
-    commits: HashMap<Uuid, u32>,
+    claims: Vec<Claimed>,
+    /// commits that were told "now", per shard
+    commits: HashMap<ShardId, u32>,
 }
 
 impl Played {
-    fn pick(&self, number: usize) -> Option<&(Claim, Work)> {
+    fn pick(&self, number: usize) -> Option<&Claimed> {
         self.claims.get(number.checked_rem(self.claims.len())?)
     }
 
     async fn commit(&mut self, f: &Fixture, number: usize) {
-        let Some((claim, work)) = self.pick(number).cloned() else {
+        let Some(Claimed { claim, work }) = self.pick(number).cloned() else {
             return;
         };
-        let now = match work {
+        match work {
             Work::Shard { shard, .. } => {
-                let told = f
-                    .store
-                    .commit_shard(&claim, commit(&shard, 0), f.now)
-                    .await
-                    .unwrap();
-                told == Committed::Now
-            }
-            Work::Finalise { .. } => {
-                match f
-                    .store
-                    .finish_evaluation(&claim, &result(1.0), "d", f.now)
-                    .await
-                {
-                    Ok(()) => true,
-                    Err(StoreError::Conflict(_)) => false,
-                    Err(error) => panic!("{error}"),
+                if f.play(&claim, &shard, 0).await == Committed::Now {
+                    *self.commits.entry(shard.id).or_default() += 1;
                 }
             }
-            Work::Smoke { .. } | Work::Ablation { .. } => {
-                unreachable!("the only smoke run is over, and no ablation was ordered")
+            Work::Finalise { .. } => {
+                f.finish(&claim, 1.0, "d").await;
             }
-        };
-        if now {
-            *self.commits.entry(claim.unit).or_default() += 1;
+            Work::Smoke { .. } => unreachable!("the only smoke run is over"),
         }
     }
 }
@@ -79,27 +63,23 @@ impl Played {
 async fn play(acts: Vec<Act>) {
     let mut f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
-    let evaluation = f
-        .store
-        .create_evaluation(submission.id, &plan(), f.now)
-        .await
-        .unwrap();
+    let evaluation = f.evaluate(submission.id, &plan()).await;
     let mut played = Played::default();
     for act in acts {
         match act {
             Act::Claim => {
                 if let Some(work) = f.claim().await {
-                    played.claims.push((work.claim().clone(), work));
+                    played.claims.push(work);
                 }
             }
             Act::Commit(number) => played.commit(&f, number).await,
             Act::Heartbeat(number) => {
-                if let Some((claim, _)) = played.pick(number) {
+                if let Some(Claimed { claim, .. }) = played.pick(number) {
                     f.store.heartbeat(claim, 1, LEASE_S, f.now).await.unwrap();
                 }
             }
             Act::Fail(number) => {
-                if let Some((claim, _)) = played.pick(number) {
+                if let Some(Claimed { claim, .. }) = played.pick(number) {
                     f.store
                         .release_failed(claim, "a fault of ours", f.now)
                         .await
@@ -107,7 +87,7 @@ async fn play(acts: Vec<Act>) {
                 }
             }
             Act::Release(number) => {
-                if let Some((claim, _)) = played.pick(number) {
+                if let Some(Claimed { claim, .. }) = played.pick(number) {
                     f.store.release(claim, f.now).await.unwrap();
                 }
             }
@@ -118,28 +98,24 @@ async fn play(acts: Vec<Act>) {
     // a healthy worker comes along: whatever happened, the evaluation ends
     f.later(3600);
     while let Some(work) = f.claim().await {
-        played.claims.push((work.claim().clone(), work));
+        played.claims.push(work);
         played.commit(&f, played.claims.len() - 1).await;
     }
     let state = f.state(evaluation.id).await;
-    let shards = f.store.shards(evaluation.id).await.unwrap();
+    let shards = f.store.shards(evaluation.run).await.unwrap();
     match state {
         EvaluationState::Finished { .. } => {
             for shard in &shards {
-                assert_eq!(
-                    played.commits.get(&shard.id.as_uuid()),
-                    Some(&1),
-                    "{shard:?}"
-                );
+                assert_eq!(played.commits.get(&shard.id), Some(&1), "{shard:?}");
                 assert!(shard.recording.is_some());
             }
-            assert_eq!(f.store.outcomes(evaluation.id).await.unwrap().len(), 12);
+            assert_eq!(f.store.outcomes(evaluation.run).await.unwrap().len(), 12);
         }
         EvaluationState::PlatformFailed { .. } => {
             assert!(
                 shards
                     .iter()
-                    .all(|s| played.commits.get(&s.id.as_uuid()).is_none_or(|n| *n == 1))
+                    .all(|s| played.commits.get(&s.id).is_none_or(|n| *n == 1))
             );
         }
         other => panic!("the evaluation is stuck: {other:?}"),

@@ -37,55 +37,57 @@ async fn child() {
         let mut token_hash = [0; 32];
         token_hash[..16].copy_from_slice(uuid::Uuid::now_v7().as_bytes());
         let name: TeamName = format!("t {} {round}", run.simple()).parse().unwrap();
-        let team = store.create_team(&name, token_hash, now).await.unwrap();
-        tell(format!("team {}", team.id));
-        store
-            .create_submission(team.id, bundle(), now)
+        let team = store
+            .create_team(Actor::Organiser, &name, token_hash, now)
             .await
             .unwrap();
-        let small = EvaluationPlan {
+        tell(format!("team {}", team.id));
+        store
+            .create_submission(Actor::Organiser, team.id, bundle(), now)
+            .await
+            .unwrap();
+        let small = RunPlan {
             episodes_per_task: 2,
             episodes_per_shard: 1,
             ..plan()
         };
         now += jiff::SignedDuration::from_secs(3600); // leases of earlier lives are over
         loop {
-            match store.claim("child", LEASE_S, now).await.unwrap() {
-                Some(Work::Smoke { claim, submission }) => {
+            let Some(Claimed { claim, work }) = store.claim("child", LEASE_S, now).await.unwrap()
+            else {
+                break;
+            };
+            match work {
+                Work::Smoke { submission } => {
                     let outcome = SmokeOutcome::Valid {
                         agent_name: "a".into(),
                         log: String::new(),
                     };
                     store.commit_smoke(&claim, outcome, now).await.unwrap();
                     tell(format!("valid {}", submission.id));
-                    let evaluation = store.create_evaluation(submission.id, &small, now).await;
+                    let evaluation = store
+                        .create_evaluation(Actor::Organiser, submission.id, &small, now)
+                        .await;
                     tell(format!("evaluation {}", evaluation.unwrap().id));
                 }
-                Some(Work::Shard {
-                    claim,
-                    evaluation,
-                    shard,
-                    ..
-                }) => {
+                Work::Shard { run, shard, .. } => {
                     let mut commit = commit(&shard, 0);
-                    commit.recording = claim.recording_key(evaluation.id);
-                    let key = format!("{}/steps", commit.recording);
+                    let recording = claim.recording_key(run.id);
+                    let key = format!("{recording}/steps");
+                    commit.recording = Some(recording);
                     store.artifacts().put_file(&key, file.path()).await.unwrap();
                     let committed = store.commit_shard(&claim, commit, now).await.unwrap();
                     assert_eq!(committed, Committed::Now);
                     tell(format!("shard {}", shard.id));
                 }
-                Some(Work::Finalise {
-                    claim, evaluation, ..
-                }) => {
-                    store
-                        .finish_evaluation(&claim, &result(1.0), "d", now)
+                Work::Finalise { evaluation, .. } => {
+                    let finished = store
+                        .finish_evaluation(&claim, &result(1.0), "d", &blake3_of("d"), now)
                         .await
                         .unwrap();
-                    tell(format!("finished {}", evaluation.id));
+                    assert_eq!(finished, Committed::Now);
+                    tell(format!("finished {evaluation}"));
                 }
-                Some(Work::Ablation { .. }) => unreachable!("no ablation was ordered"),
-                None => break,
             }
         }
     }
@@ -167,21 +169,32 @@ async fn check_consistency(folder: &Path, store: &Store) {
     assert!(orphans.is_empty());
     let rules = [
         ("a submission without its smoke run",
-         "SELECT COUNT(*) FROM submissions s WHERE (SELECT COUNT(*) FROM work_units u
-              WHERE u.submission_id = s.id AND u.kind = 'smoke') <> 1"),
-        ("an evaluation without all of its shards",
-         "SELECT COUNT(*) FROM evaluations e WHERE (SELECT COUNT(*) FROM shards s JOIN work_units u
-              ON u.shard_id = s.id WHERE s.evaluation_id = e.id) <> 6"),
+         "SELECT COUNT(*) FROM submissions s WHERE NOT EXISTS
+              (SELECT 1 FROM smoke_runs r JOIN units u ON u.id = r.unit_id WHERE r.submission_id = s.id)"),
+        ("an evaluation without its contestant or all of its shards",
+         "SELECT COUNT(*) FROM evaluations e
+              WHERE (SELECT COUNT(*) FROM shards s JOIN units u ON u.id = s.unit_id
+                     WHERE s.run_id = e.run_id) <> 6
+                 OR (SELECT COUNT(*) FROM contestants c WHERE c.run_id = e.run_id) <> 1"),
         ("a shard committed but not done, or done but not committed",
-         "SELECT COUNT(*) FROM shards s JOIN work_units u ON u.shard_id = s.id
+         "SELECT COUNT(*) FROM shards s JOIN units u ON u.id = s.unit_id
               WHERE (s.committed_at IS NOT NULL) <> (u.state = 'done')"),
+        ("a run played with an open shard, or not played without one",
+         "SELECT COUNT(*) FROM runs r WHERE (r.state = 'played')
+                 = EXISTS (SELECT 1 FROM shards s WHERE s.run_id = r.id AND s.committed_at IS NULL)"),
         ("a finalisation too early or missing",
          "SELECT COUNT(*) FROM evaluations e
-              WHERE EXISTS (SELECT 1 FROM work_units u WHERE u.evaluation_id = e.id AND u.kind = 'finalise')
-                 = EXISTS (SELECT 1 FROM shards s WHERE s.evaluation_id = e.id AND s.committed_at IS NULL)"),
+              WHERE EXISTS (SELECT 1 FROM finalisations f WHERE f.evaluation_id = e.id)
+                 = EXISTS (SELECT 1 FROM shards s WHERE s.run_id = e.run_id AND s.committed_at IS NULL)"),
         ("a finished evaluation whose finalisation is open",
-         "SELECT COUNT(*) FROM evaluations e JOIN work_units u ON u.evaluation_id = e.id
-              WHERE u.kind = 'finalise' AND (e.state = 'finished') <> (u.state = 'done')"),
+         "SELECT COUNT(*) FROM evaluations e JOIN finalisations f ON f.evaluation_id = e.id
+              JOIN units u ON u.id = f.unit_id WHERE (e.state = 'finished') <> (u.state = 'done')"),
+        ("a change without its event",
+         "SELECT (SELECT COUNT(*) FROM submissions) + (SELECT COUNT(*) FROM evaluations)
+               + (SELECT COUNT(*) FROM shards WHERE committed_at IS NOT NULL)
+               + (SELECT COUNT(*) FROM evaluations WHERE state = 'finished')
+               - (SELECT COUNT(*) FROM events WHERE kind IN ('submission_uploaded', 'evaluation_queued',
+                                                             'shard_committed', 'evaluation_finished'))"),
     ];
     for (breach, sql) in rules {
         let count: i64 = sqlx::query_scalar(sql)

@@ -4,12 +4,15 @@
 mod ablations;
 mod artifacts;
 mod competition;
+mod events;
 mod faults;
 mod fixture;
 mod interleavings;
 mod kill;
+mod migration;
 mod offline_data;
 mod opening;
+mod queries;
 mod queue;
 mod releases;
 mod teams;

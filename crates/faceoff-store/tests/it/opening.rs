@@ -1,6 +1,6 @@
 use crate::fixture::*;
 use faceoff_store::*;
-use sqlx::{Connection, SqliteConnection};
+use sqlx::Connection;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
 async fn openers_that_race_agree_on_one_season() {
@@ -34,11 +34,7 @@ async fn openers_that_race_agree_on_one_season() {
 async fn everything_is_there_after_reopening() {
     let f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
-    let evaluation = f
-        .store
-        .create_evaluation(submission.id, &plan(), f.now)
-        .await
-        .unwrap();
+    let evaluation = f.evaluate(submission.id, &plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.play(&claim, &shard, 1).await;
     let (held, ..) = f.claim_shard().await;
@@ -60,11 +56,7 @@ async fn everything_is_there_after_reopening() {
 
 /// Changes the file behind the store's back.
 async fn vandalise(f: &Fixture, sql: &'static str) {
-    let url = format!(
-        "sqlite://{}",
-        f.folder.path().join("faceoff.sqlite3").display()
-    );
-    let mut connection = SqliteConnection::connect(&url).await.unwrap();
+    let mut connection = f.connection().await;
     sqlx::raw_sql(sql).execute(&mut connection).await.unwrap();
     connection.close().await.unwrap();
 }
@@ -73,17 +65,13 @@ async fn vandalise(f: &Fixture, sql: &'static str) {
 async fn damaged_values_are_named_and_do_not_panic() {
     let f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
-    let evaluation = f
-        .store
-        .create_evaluation(submission.id, &plan(), f.now)
-        .await
-        .unwrap();
+    let evaluation = f.evaluate(submission.id, &plan()).await;
     let damages = [
         "UPDATE evaluations SET day = 'someday'",
-        "UPDATE evaluations SET profile = 'dream'",
-        "UPDATE evaluations SET tasks = '[\"hit\"'",
+        "UPDATE runs SET profile = 'dream'",
+        "UPDATE runs SET tasks = '[\"hit\"'",
         "UPDATE evaluations SET created_at = 9223372036854775807",
-        "UPDATE evaluations SET max_faults = 5000000000",
+        "UPDATE runs SET max_faults = 5000000000",
     ];
     for sql in damages {
         vandalise(&f, sql).await;
@@ -103,21 +91,14 @@ async fn damaged_work_does_not_hold_up_the_others() {
     let f = Fixture::new().await;
     let alpha = f.ready_team("Alpha").await;
     let beta = f.ready_team("Beta").await;
-    f.store
-        .create_evaluation(alpha.id, &plan(), f.now)
-        .await
-        .unwrap();
-    vandalise(&f, "UPDATE evaluations SET profile = 'dream'").await;
-    let sound = f
-        .store
-        .create_evaluation(beta.id, &plan(), f.now)
-        .await
-        .unwrap();
-    let (_, evaluation, _) = f.claim_shard().await;
-    assert_eq!(evaluation.id, sound.id);
+    f.evaluate(alpha.id, &plan()).await;
+    vandalise(&f, "UPDATE runs SET profile = 'dream'").await;
+    let sound = f.evaluate(beta.id, &plan()).await;
+    let (_, run, _) = f.claim_shard().await;
+    assert_eq!(run.id, sound.run);
     vandalise(
         &f,
-        "UPDATE evaluations SET profile = 'ideal' WHERE profile = 'dream'",
+        "UPDATE runs SET profile = 'ideal' WHERE profile = 'dream'",
     )
     .await;
     let evaluations = f.store.evaluations_of(alpha.team).await.unwrap();
@@ -132,21 +113,14 @@ async fn damaged_work_does_not_hold_up_the_others() {
 async fn half_made_states_cannot_be_stored() {
     let f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
-    f.store
-        .create_evaluation(submission.id, &plan(), f.now)
-        .await
-        .unwrap();
-    let url = format!(
-        "sqlite://{}",
-        f.folder.path().join("faceoff.sqlite3").display()
-    );
-    let mut connection = SqliteConnection::connect(&url).await.unwrap();
+    f.evaluate(submission.id, &plan()).await;
+    let mut connection = f.connection().await;
     for sql in [
         "UPDATE evaluations SET state = 'finished', finished_at = 1, dataset = 'd'",
         "UPDATE evaluations SET state = 'platform_failed', finished_at = 1",
         "UPDATE submissions SET state = 'invalid'",
         "UPDATE shards SET committed_at = 1, recording = 'r'",
-        "UPDATE work_units SET state = 'leased'",
+        "UPDATE units SET state = 'leased'",
         "INSERT INTO teams (id, name, token_hash, created_at) VALUES ('a', 'b', x'00', 0)",
     ] {
         let error = sqlx::raw_sql(sql)

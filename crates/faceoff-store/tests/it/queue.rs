@@ -9,15 +9,12 @@ use std::collections::HashSet;
 async fn many_claimers_never_share_a_unit() {
     let f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
-    let plan = EvaluationPlan {
+    let plan = RunPlan {
         episodes_per_task: 20,
         episodes_per_shard: 1,
         ..plan()
     };
-    f.store
-        .create_evaluation(submission.id, &plan, f.now)
-        .await
-        .unwrap();
+    f.evaluate(submission.id, &plan).await;
     let other = f.reopen().await;
     let claimers: Vec<_> = (0..12)
         .map(|index| {
@@ -31,7 +28,7 @@ async fn many_claimers_never_share_a_unit() {
                 let mut units = Vec::new();
                 let worker = format!("slot {index}");
                 while let Some(work) = store.claim(&worker, LEASE_S, now).await.unwrap() {
-                    units.push(work.claim().unit);
+                    units.push(work.claim.unit);
                 }
                 units
             })
@@ -49,10 +46,7 @@ async fn many_claimers_never_share_a_unit() {
 async fn an_expired_lease_is_leased_again_and_its_holder_told() {
     let mut f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
-    f.store
-        .create_evaluation(submission.id, &plan(), f.now)
-        .await
-        .unwrap();
+    f.evaluate(submission.id, &plan()).await;
     let (first, _, shard) = f.claim_shard().await;
     f.later(i64::from(LEASE_S) - 1);
     assert!(f.store.heartbeat(&first, 0, LEASE_S, f.now).await.unwrap());
@@ -86,10 +80,7 @@ async fn an_expired_lease_is_leased_again_and_its_holder_told() {
 async fn a_dead_workers_units_are_free_at_once_and_only_those() {
     let f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
-    f.store
-        .create_evaluation(submission.id, &plan(), f.now)
-        .await
-        .unwrap();
+    f.evaluate(submission.id, &plan()).await;
     let mut claims = Vec::new();
     for worker in ["dead/slot-0", "dead/slot-1", "deadly/slot-0", "dead"] {
         let work = f
@@ -98,13 +89,13 @@ async fn a_dead_workers_units_are_free_at_once_and_only_those() {
             .await
             .unwrap()
             .unwrap();
-        claims.push(work.claim().clone());
+        claims.push(work.claim.clone());
     }
     assert_eq!(f.store.end_leases_of("dead", f.now).await.unwrap(), 3);
     assert_eq!(f.store.end_leases_of("dead", f.now).await.unwrap(), 0);
     let mut again = Vec::new();
     while let Some(work) = f.claim().await {
-        again.push(work.claim().unit);
+        again.push(work.claim.unit);
     }
     assert_eq!(again.len(), 5, "three of the dead and two that nobody had");
     assert!(!again.contains(&claims[2].unit));
@@ -120,10 +111,7 @@ async fn a_dead_workers_units_are_free_at_once_and_only_those() {
 async fn work_finished_after_the_lease_counts_if_nobody_took_the_unit() {
     let mut f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
-    f.store
-        .create_evaluation(submission.id, &plan(), f.now)
-        .await
-        .unwrap();
+    f.evaluate(submission.id, &plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.later(3600);
     assert_eq!(f.play(&claim, &shard, 0).await, Committed::Now);
@@ -133,21 +121,17 @@ async fn work_finished_after_the_lease_counts_if_nobody_took_the_unit() {
 async fn committing_twice_changes_nothing() {
     let f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
-    let evaluation = f
-        .store
-        .create_evaluation(submission.id, &plan(), f.now)
-        .await
-        .unwrap();
+    let evaluation = f.evaluate(submission.id, &plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     assert_eq!(f.play(&claim, &shard, 0).await, Committed::Now);
     let mut other = commit(&shard, 2);
-    other.recording = "recordings/other".into();
+    other.recording = Some("recordings/other".into());
     let again = f.store.commit_shard(&claim, other, f.now).await.unwrap();
     assert_eq!(again, Committed::Before);
-    let stored = f.store.outcomes(evaluation.id).await.unwrap();
+    let stored = f.store.outcomes(evaluation.run).await.unwrap();
     assert_eq!(stored, commit(&shard, 0).outcomes);
-    let shards = f.store.shards(evaluation.id).await.unwrap();
-    assert_eq!(shards[0].recording, Some(commit(&shard, 0).recording));
+    let shards = f.store.shards(evaluation.run).await.unwrap();
+    assert_eq!(shards[0].recording, commit(&shard, 0).recording);
     assert!(!f.store.heartbeat(&claim, 2, LEASE_S, f.now).await.unwrap());
 }
 
@@ -155,11 +139,7 @@ async fn committing_twice_changes_nothing() {
 async fn outcomes_that_do_not_cover_the_shard_are_refused() {
     let f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
-    let evaluation = f
-        .store
-        .create_evaluation(submission.id, &plan(), f.now)
-        .await
-        .unwrap();
+    let evaluation = f.evaluate(submission.id, &plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     let good = commit(&shard, 0);
     let mut short = good.clone();
@@ -172,7 +152,7 @@ async fn outcomes_that_do_not_cover_the_shard_are_refused() {
         let error = f.store.commit_shard(&claim, bad, f.now).await.unwrap_err();
         assert!(matches!(error, StoreError::Conflict(_)), "{error}");
     }
-    assert!(f.store.outcomes(evaluation.id).await.unwrap().is_empty());
+    assert!(f.store.outcomes(evaluation.run).await.unwrap().is_empty());
     assert_eq!(
         f.store.commit_shard(&claim, good, f.now).await.unwrap(),
         Committed::Now
@@ -184,27 +164,21 @@ async fn smoke_runs_and_finalisations_come_before_shards() {
     let f = Fixture::new().await;
     let alpha = f.ready_team("Alpha").await;
     let beta = f.ready_team("Beta").await;
-    let small = EvaluationPlan {
+    let small = RunPlan {
         tasks: vec![Task::Hit],
         episodes_per_task: 1,
         ..plan()
     };
-    f.store
-        .create_evaluation(alpha.id, &small, f.now)
-        .await
-        .unwrap();
-    f.store
-        .create_evaluation(beta.id, &small, f.now)
-        .await
-        .unwrap();
-    let (claim, evaluation, shard) = f.claim_shard().await;
-    assert_eq!(evaluation.submission, alpha.id, "evaluations in order");
+    let first = f.evaluate(alpha.id, &small).await;
+    f.evaluate(beta.id, &small).await;
+    let (claim, run, shard) = f.claim_shard().await;
+    assert_eq!(run.id, first.run, "evaluations in order");
     f.play(&claim, &shard, 0).await;
     let team = f.team("Gamma").await;
     f.upload(&team).await;
-    assert!(matches!(f.claim().await, Some(Work::Smoke { .. })));
-    assert!(matches!(f.claim().await, Some(Work::Finalise { .. })));
-    assert!(matches!(f.claim().await, Some(Work::Shard { .. })));
+    f.claim_smoke().await;
+    f.claim_scoring().await;
+    f.claim_shard().await;
     assert!(f.claim().await.is_none());
 }
 
@@ -214,24 +188,18 @@ async fn a_unit_given_back_at_a_shutdown_is_free_at_once_and_has_lost_nothing() 
     let team = f.team("Alpha").await;
     let submission = f.upload(&team).await;
     for _ in 0..2 * MAX_LEASES {
-        let Some(Work::Smoke { claim, .. }) = f.claim().await else {
-            panic!("still queued")
-        };
+        let (claim, _) = f.claim_smoke().await;
         f.store.release(&claim, f.now).await.unwrap();
     }
     let state = f.store.submission(submission.id).await.unwrap().state;
-    assert_eq!(state, SubmissionState::Validating { attempts: 0 });
+    assert_eq!(state, SubmissionState::Validating);
 }
 
 #[tokio::test]
 async fn our_faults_cost_a_pause_and_after_some_the_turn_is_given_back() {
     let mut f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
-    let evaluation = f
-        .store
-        .create_evaluation(submission.id, &plan(), f.now)
-        .await
-        .unwrap();
+    let evaluation = f.evaluate(submission.id, &plan()).await;
     let (victim, _, shard) = f.claim_shard().await;
     f.store
         .release_failed(&victim, "disk full", f.now)
@@ -272,51 +240,35 @@ async fn our_faults_cost_a_pause_and_after_some_the_turn_is_given_back() {
     }
     f.later(60);
     assert!(f.claim().await.is_none());
-    f.store
-        .create_evaluation(submission.id, &plan(), f.now)
-        .await
-        .unwrap();
+    f.evaluate(submission.id, &plan()).await;
 }
 
 #[tokio::test]
 async fn a_finalisation_that_we_cannot_do_gives_the_turn_back() {
     let mut f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
-    let small = EvaluationPlan {
+    let small = RunPlan {
         tasks: vec![Task::Hit],
         episodes_per_task: 1,
         ..plan()
     };
-    let evaluation = f
-        .store
-        .create_evaluation(submission.id, &small, f.now)
-        .await
-        .unwrap();
+    let evaluation = f.evaluate(submission.id, &small).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.play(&claim, &shard, 0).await;
     for _ in 0..MAX_ATTEMPTS {
-        let Some(Work::Finalise { claim, .. }) = f.claim().await else {
-            panic!()
-        };
+        let (claim, _) = f.claim_scoring().await;
         f.store
             .release_failed(&claim, "no space left", f.now)
             .await
             .unwrap();
-        let late = f
-            .store
-            .finish_evaluation(&claim, &result(1.0), "d", f.now)
-            .await;
-        assert!(matches!(late, Err(StoreError::Conflict(_))));
+        assert_eq!(f.finish(&claim, 1.0, "d").await, Committed::LeaseLost);
         f.later(60);
     }
     assert!(matches!(
         f.state(evaluation.id).await,
         EvaluationState::PlatformFailed { .. }
     ));
-    f.store
-        .create_evaluation(submission.id, &small, f.now)
-        .await
-        .unwrap();
+    f.evaluate(submission.id, &small).await;
 }
 
 #[tokio::test]
@@ -324,14 +276,9 @@ async fn a_smoke_run_that_we_cannot_do_ends_with_our_excuse() {
     let mut f = Fixture::new().await;
     let team = f.team("Alpha").await;
     let submission = f.upload(&team).await;
-    for attempt in 1..=MAX_ATTEMPTS {
-        let Some(Work::Smoke { claim, submission }) = f.claim().await else {
-            panic!()
-        };
-        assert_eq!(
-            submission.state,
-            SubmissionState::Validating { attempts: attempt }
-        );
+    for _ in 0..MAX_ATTEMPTS {
+        let (claim, submission) = f.claim_smoke().await;
+        assert_eq!(submission.state, SubmissionState::Validating);
         f.store
             .release_failed(&claim, "no cgroup", f.now)
             .await
@@ -352,16 +299,12 @@ async fn a_smoke_run_that_we_cannot_do_ends_with_our_excuse() {
 async fn a_unit_that_kills_its_workers_is_given_up() {
     let mut f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
-    let small = EvaluationPlan {
+    let small = RunPlan {
         tasks: vec![Task::Hit],
         episodes_per_task: 1,
         ..plan()
     };
-    let evaluation = f
-        .store
-        .create_evaluation(submission.id, &small, f.now)
-        .await
-        .unwrap();
+    let evaluation = f.evaluate(submission.id, &small).await;
     for _ in 0..MAX_LEASES {
         f.claim_shard().await;
         f.later(i64::from(LEASE_S));
@@ -371,26 +314,4 @@ async fn a_unit_that_kills_its_workers_is_given_up() {
         f.state(evaluation.id).await,
         EvaluationState::PlatformFailed { .. }
     ));
-}
-
-#[tokio::test]
-async fn waiting_workers_hear_of_new_work_and_pages_of_changes() {
-    let f = Fixture::new().await;
-    let mut signal = f.store.work_signal();
-    let mut events = f.store.events();
-    let team = f.team("Alpha").await;
-    assert!(!signal.has_changed().unwrap());
-    let submission = f.upload(&team).await;
-    assert!(signal.has_changed().unwrap());
-    assert_eq!(events.try_recv().unwrap(), Event::Submission(submission.id));
-    signal.mark_unchanged();
-    f.validate().await;
-    let evaluation = f
-        .store
-        .create_evaluation(submission.id, &plan(), f.now)
-        .await
-        .unwrap();
-    assert!(signal.has_changed().unwrap());
-    let seen: Vec<_> = std::iter::from_fn(|| events.try_recv().ok()).collect();
-    assert_eq!(seen.last(), Some(&Event::Evaluation(evaluation.id)));
 }

@@ -9,7 +9,7 @@ async fn a_name_is_taken_whatever_its_case() {
     let name = "AIR-hockit".parse().unwrap();
     let error = f
         .store
-        .create_team(&name, [1; 32], f.now)
+        .create_team(Actor::Organiser, &name, [1; 32], f.now)
         .await
         .unwrap_err();
     assert!(matches!(error, StoreError::TeamNameTaken(taken) if taken == "AIR-hockit"));
@@ -21,13 +21,20 @@ async fn a_name_is_taken_whatever_its_case() {
 async fn a_team_is_found_by_its_token_until_that_is_replaced() {
     let f = Fixture::new().await;
     let name = "Zoë".parse().unwrap();
-    let team = f.store.create_team(&name, [7; 32], f.now).await.unwrap();
+    let team = f
+        .store
+        .create_team(Actor::Organiser, &name, [7; 32], f.now)
+        .await
+        .unwrap();
     assert_eq!(f.store.team(team.id).await.unwrap(), team);
     assert_eq!(
         f.store.team_by_token_hash([7; 32]).await.unwrap(),
         Some(team.clone())
     );
-    f.store.set_team_token(team.id, [8; 32]).await.unwrap();
+    f.store
+        .set_team_token(Actor::Organiser, team.id, [8; 32], f.now)
+        .await
+        .unwrap();
     assert_eq!(f.store.team_by_token_hash([7; 32]).await.unwrap(), None);
     assert_eq!(
         f.store.team_by_token_hash([8; 32]).await.unwrap(),
@@ -39,21 +46,25 @@ async fn a_team_is_found_by_its_token_until_that_is_replaced() {
 async fn two_teams_cannot_share_a_token() {
     let f = Fixture::new().await;
     f.store
-        .create_team(&"A".parse().unwrap(), [7; 32], f.now)
+        .create_team(Actor::Organiser, &"A".parse().unwrap(), [7; 32], f.now)
         .await
         .unwrap();
     let b = f
         .store
-        .create_team(&"B".parse().unwrap(), [8; 32], f.now)
+        .create_team(Actor::Organiser, &"B".parse().unwrap(), [8; 32], f.now)
         .await
         .unwrap();
     let error = f
         .store
-        .create_team(&"C".parse().unwrap(), [7; 32], f.now)
+        .create_team(Actor::Organiser, &"C".parse().unwrap(), [7; 32], f.now)
         .await
         .unwrap_err();
     assert!(matches!(error, StoreError::Conflict(_)), "{error}");
-    let error = f.store.set_team_token(b.id, [7; 32]).await.unwrap_err();
+    let error = f
+        .store
+        .set_team_token(Actor::Organiser, b.id, [7; 32], f.now)
+        .await
+        .unwrap_err();
     assert!(matches!(error, StoreError::Conflict(_)), "{error}");
 }
 
@@ -66,13 +77,21 @@ async fn unknown_ids_are_not_found() {
         Err(StoreError::NotFound("team"))
     ));
     assert!(matches!(
-        f.store.set_team_token(id, [1; 32]).await,
+        f.store
+            .set_team_token(Actor::Organiser, id, [1; 32], f.now)
+            .await,
         Err(StoreError::NotFound("team"))
     ));
-    let upload = f.store.create_submission(id, bundle(), f.now).await;
+    let upload = f
+        .store
+        .create_submission(Actor::Organiser, id, bundle(), f.now)
+        .await;
     assert!(matches!(upload, Err(StoreError::NotFound("team"))));
     let submission = uuid::Uuid::now_v7().into();
-    let created = f.store.create_evaluation(submission, &plan(), f.now).await;
+    let created = f
+        .store
+        .create_evaluation(Actor::Organiser, submission, &plan(), f.now)
+        .await;
     assert!(matches!(created, Err(StoreError::NotFound("submission"))));
     let evaluation = uuid::Uuid::now_v7().into();
     assert!(matches!(

@@ -16,28 +16,35 @@ async fn a_team_has_one_turn_per_utc_day() {
     let mut f = Fixture::new().await;
     let first = f.ready_team("Alpha").await;
     f.now = "2026-03-01T23:59:59.999Z".parse().unwrap();
-    f.store
-        .create_evaluation(first.id, &plan(), f.now)
-        .await
-        .unwrap();
+    f.evaluate(first.id, &plan()).await;
     // neither the same nor a new submission gets a second turn
     assert_eq!(
-        used(f.store.create_evaluation(first.id, &plan(), f.now).await),
+        used(
+            f.store
+                .create_evaluation(Actor::Organiser, first.id, &plan(), f.now)
+                .await
+        ),
         (date(2026, 3, 1), date(2026, 3, 2))
     );
     f.later(0);
     let team = f.store.team(first.team).await.unwrap();
     f.upload(&team).await;
     let second = f.validate().await;
-    used(f.store.create_evaluation(second.id, &plan(), f.now).await);
-    assert!(f.store.start_day(&plan(), f.now).await.unwrap().is_empty());
+    used(
+        f.store
+            .create_evaluation(Actor::Organiser, second.id, &plan(), f.now)
+            .await,
+    );
+    assert!(
+        f.store
+            .start_day(Actor::Organiser, &plan(), f.now)
+            .await
+            .unwrap()
+            .is_empty()
+    );
     // but the next day comes a millisecond later
     f.now = "2026-03-02T00:00:00Z".parse().unwrap();
-    let next = f
-        .store
-        .create_evaluation(second.id, &plan(), f.now)
-        .await
-        .unwrap();
+    let next = f.evaluate(second.id, &plan()).await;
     assert_eq!(next.day, date(2026, 3, 2));
     assert_eq!(f.store.evaluations_of(team.id).await.unwrap().len(), 2);
     assert_eq!(
@@ -58,7 +65,11 @@ async fn of_many_at_once_one_takes_the_turn() {
             other.clone()
         };
         let (id, now) = (submission.id, f.now);
-        tokio::spawn(async move { store.create_evaluation(id, &plan(), now).await })
+        tokio::spawn(async move {
+            store
+                .create_evaluation(Actor::Organiser, id, &plan(), now)
+                .await
+        })
     });
     let mut created = 0;
     for attempt in attempts.collect::<Vec<_>>() {
@@ -75,14 +86,15 @@ async fn of_many_at_once_one_takes_the_turn() {
 async fn a_cancelled_run_gives_the_turn_back_and_loses_its_workers() {
     let f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
-    let evaluation = f
-        .store
-        .create_evaluation(submission.id, &plan(), f.now)
-        .await
-        .unwrap();
+    let evaluation = f.evaluate(submission.id, &plan()).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.store
-        .cancel_evaluation(evaluation.id, "power cut announced", f.now)
+        .cancel_evaluation(
+            Actor::Organiser,
+            evaluation.id,
+            "power cut announced",
+            f.now,
+        )
         .await
         .unwrap();
     assert!(!f.store.heartbeat(&claim, 1, LEASE_S, f.now).await.unwrap());
@@ -95,9 +107,19 @@ async fn a_cancelled_run_gives_the_turn_back_and_loses_its_workers() {
             reason: "power cut announced".into()
         }
     );
-    let again = f.store.cancel_evaluation(evaluation.id, "", f.now).await;
+    let again = f
+        .store
+        .cancel_evaluation(Actor::Organiser, evaluation.id, "", f.now)
+        .await;
     assert!(matches!(again, Err(StoreError::Conflict(_))));
-    assert_eq!(f.store.start_day(&plan(), f.now).await.unwrap().len(), 1);
+    assert_eq!(
+        f.store
+            .start_day(Actor::Organiser, &plan(), f.now)
+            .await
+            .unwrap()
+            .len(),
+        1
+    );
 }
 
 #[tokio::test]
@@ -108,9 +130,7 @@ async fn the_day_starts_the_newest_valid_submission_of_each_team_once() {
     let silent = f.team("Never uploaded").await;
     let broken = f.team("Broken").await;
     f.upload(&broken).await;
-    let Some(Work::Smoke { claim, .. }) = f.claim().await else {
-        panic!()
-    };
+    let (claim, _) = f.claim_smoke().await;
     let outcome = SmokeOutcome::Invalid {
         agent_name: None,
         reason: "no agent.toml".into(),
@@ -123,14 +143,24 @@ async fn the_day_starts_the_newest_valid_submission_of_each_team_once() {
     let newer = f.validate().await;
     f.upload(&team).await; // still validating: the one before it counts
 
-    let started = f.store.start_day(&plan(), f.now).await.unwrap();
+    let started = f
+        .store
+        .start_day(Actor::Organiser, &plan(), f.now)
+        .await
+        .unwrap();
     let submissions: Vec<_> = started.iter().map(|e| e.submission).collect();
     assert_eq!(
         submissions,
         [beta.id, newer.id],
         "earliest submission first"
     );
-    assert!(f.store.start_day(&plan(), f.now).await.unwrap().is_empty());
+    assert!(
+        f.store
+            .start_day(Actor::Organiser, &plan(), f.now)
+            .await
+            .unwrap()
+            .is_empty()
+    );
     assert!(f.store.evaluations_of(silent.id).await.unwrap().is_empty());
     assert!(f.store.evaluations_of(broken.id).await.unwrap().is_empty());
 }
@@ -185,19 +215,19 @@ async fn an_empty_plan_is_refused() {
     let f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
     let bad = [
-        EvaluationPlan {
+        RunPlan {
             tasks: vec![],
             ..plan()
         },
-        EvaluationPlan {
+        RunPlan {
             tasks: vec![plan().tasks[0]; 2],
             ..plan()
         },
-        EvaluationPlan {
+        RunPlan {
             episodes_per_task: 0,
             ..plan()
         },
-        EvaluationPlan {
+        RunPlan {
             episodes_per_shard: 0,
             ..plan()
         },
@@ -205,11 +235,14 @@ async fn an_empty_plan_is_refused() {
     for plan in bad {
         let error = f
             .store
-            .create_evaluation(submission.id, &plan, f.now)
+            .create_evaluation(Actor::Organiser, submission.id, &plan, f.now)
             .await
             .unwrap_err();
         assert!(matches!(error, StoreError::Conflict(_)), "{error}");
-        f.store.start_day(&plan, f.now).await.unwrap_err();
+        f.store
+            .start_day(Actor::Organiser, &plan, f.now)
+            .await
+            .unwrap_err();
     }
     assert!(
         f.store
@@ -225,14 +258,21 @@ async fn the_board_shows_each_teams_newest_finished_day() {
     let mut f = Fixture::new().await;
     f.ready_team("Alpha").await;
     f.ready_team("Beta").await;
-    let small = EvaluationPlan {
+    let small = RunPlan {
         tasks: vec![faceoff_types::Task::Hit],
         episodes_per_task: 1,
         ..plan()
     };
     for (day, score) in [(1, 10.0), (2, 20.0), (3, 30.0)] {
         f.now = format!("2026-03-0{day}T12:00:00Z").parse().unwrap();
-        assert_eq!(f.store.start_day(&small, f.now).await.unwrap().len(), 2);
+        assert_eq!(
+            f.store
+                .start_day(Actor::Organiser, &small, f.now)
+                .await
+                .unwrap()
+                .len(),
+            2
+        );
         for team in 0..2 {
             let (claim, _, shard) = f.claim_shard().await;
             // on day 3 Beta's agent breaks down
@@ -241,13 +281,8 @@ async fn the_board_shows_each_teams_newest_finished_day() {
             commit.stopped_by_faults = faults > 0;
             f.store.commit_shard(&claim, commit, f.now).await.unwrap();
             if faults == 0 {
-                let Some(Work::Finalise { claim, .. }) = f.claim().await else {
-                    panic!()
-                };
-                f.store
-                    .finish_evaluation(&claim, &result(score), "d", f.now)
-                    .await
-                    .unwrap();
+                let (claim, _) = f.claim_scoring().await;
+                f.finish(&claim, score, "d").await;
             }
         }
     }

@@ -230,11 +230,11 @@ impl Server {
         let now = self.now();
         let team = self
             .store
-            .create_team(&team.parse().unwrap(), token_hash, now)
+            .create_team(Actor::Organiser, &team.parse().unwrap(), token_hash, now)
             .await
             .unwrap();
         self.store
-            .create_submission(team.id, bundle, now)
+            .create_submission(Actor::Team(team.id), team.id, bundle, now)
             .await
             .unwrap()
     }
@@ -242,11 +242,8 @@ impl Server {
     /// An evaluation of six shards, all of them queued.
     pub(super) async fn evaluation(&self) -> EvaluationId {
         let submission = self.upload("Alpha", b"archive").await;
-        let Some(Work::Smoke { claim, .. }) =
-            self.store.claim("test", LEASE_S, self.now()).await.unwrap()
-        else {
-            panic!("a smoke run is queued")
-        };
+        let claimed = self.store.claim("test", LEASE_S, self.now()).await.unwrap();
+        let claim = claimed.expect("a smoke run is queued").claim;
         let outcome = SmokeOutcome::Valid {
             agent_name: "scripted".into(),
             log: String::new(),
@@ -255,7 +252,7 @@ impl Server {
             .commit_smoke(&claim, outcome, self.now())
             .await
             .unwrap();
-        let plan = EvaluationPlan {
+        let plan = RunPlan {
             profile: Profile::Evaluation,
             tasks: Task::ALL.to_vec(),
             episodes_per_task: 4,
@@ -263,7 +260,7 @@ impl Server {
             max_faults: 10,
         };
         self.store
-            .create_evaluation(submission.id, &plan, self.now())
+            .create_evaluation(Actor::Organiser, submission.id, &plan, self.now())
             .await
             .unwrap()
             .id

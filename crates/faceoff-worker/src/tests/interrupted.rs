@@ -102,7 +102,7 @@ async fn a_cancelled_evaluation_stops_its_slots() {
     begins.recv().await.unwrap();
     server
         .store
-        .cancel_evaluation(id, "rain", server.now())
+        .cancel_evaluation(Actor::Organiser, id, "rain", server.now())
         .await
         .unwrap();
     stops.recv().await.unwrap();
@@ -128,7 +128,11 @@ async fn what_was_played_under_a_lost_lease_is_thrown_away() {
             let work = handle
                 .block_on(store.claim("thief", LEASE_S, clock.now()))
                 .unwrap();
-            let Some(Work::Shard { claim, shard, .. }) = work else {
+            let Some(Claimed {
+                claim,
+                work: Work::Shard { shard, .. },
+            }) = work
+            else {
                 panic!("{work:?}")
             };
             assert_eq!(
@@ -147,7 +151,8 @@ async fn what_was_played_under_a_lost_lease_is_thrown_away() {
     let claim = stolen.lock().unwrap().clone().unwrap();
     let scratch = tempfile::tempdir().unwrap();
     std::fs::write(scratch.path().join("steps.parquet"), "by the thief").unwrap();
-    let recording = claim.recording_key(id);
+    let run = server.store.evaluation(id).await.unwrap().run;
+    let recording = claim.recording_key(run);
     server
         .store
         .artifacts()
@@ -158,20 +163,20 @@ async fn what_was_played_under_a_lost_lease_is_thrown_away() {
         .folder
         .path()
         .join("artifacts/recordings")
-        .join(id.to_string());
+        .join(run.to_string());
     let of_the_shard = std::fs::read_dir(recordings.join(claim.unit.to_string())).unwrap();
     assert_eq!(
         of_the_shard.count(),
         1,
         "the stalled slot has removed its own"
     );
-    let shard = server.store.shards(id).await.unwrap().remove(0);
+    let shard = server.store.shards(run).await.unwrap().remove(0);
     let outcomes = (0..2).map(|episode| outcome(shard.task, episode)).collect();
     let commit = ShardCommit {
         outcomes,
         log: String::new(),
         stopped_by_faults: false,
-        recording,
+        recording: Some(recording),
     };
     let committed = server
         .store
@@ -187,7 +192,7 @@ async fn what_was_played_under_a_lost_lease_is_thrown_away() {
     running.stop().await;
     server
         .store
-        .remove_old_recordings(server.now())
+        .remove_old_recordings(server.now() + RECORDINGS_KEPT)
         .await
         .unwrap();
     assert!(!recordings.exists() || std::fs::read_dir(&recordings).unwrap().next().is_none());

@@ -64,24 +64,18 @@ async fn an_upload_is_checked_by_an_idle_worker() {
     let mut events = server.store.events();
     let good = server.upload("Alpha", b"archive").await.id;
     let bad = server.upload("Beta", b"no archive").await.id;
-    let state = async |id, events: &mut tokio::sync::broadcast::Receiver<Event>| loop {
+    let state = async |id, events: &mut tokio::sync::broadcast::Receiver<Change>| loop {
         let state = server.store.submission(id).await.unwrap().state;
         if state.is_settled() {
             break state;
         }
         let _ = events.recv().await;
     };
-    assert_eq!(
-        state(good, &mut events).await,
-        SubmissionState::Valid {
-            log: "smoke\n".into()
-        }
-    );
+    assert_eq!(state(good, &mut events).await, SubmissionState::Valid);
+    let log = server.store.submission_log(good).await.unwrap();
+    assert_eq!(log.as_deref(), Some("smoke\n"));
     let reason = "agent.toml is missing".to_owned();
-    let invalid = SubmissionState::Invalid {
-        reason,
-        log: String::new(),
-    };
+    let invalid = SubmissionState::Invalid { reason };
     assert_eq!(state(bad, &mut events).await, invalid);
     running.stop().await;
 }
@@ -159,10 +153,10 @@ async fn the_schedule_starts_a_missed_day_once() {
     };
     server
         .store
-        .commit_smoke(work.claim(), outcome, server.now())
+        .commit_smoke(&work.claim, outcome, server.now())
         .await
         .unwrap();
-    let plan = EvaluationPlan {
+    let plan = RunPlan {
         profile: Profile::Ideal,
         tasks: vec![Task::Hit],
         episodes_per_task: 1,
@@ -185,10 +179,28 @@ async fn the_schedule_starts_a_missed_day_once() {
         );
         let schedule = tokio::spawn(schedule);
         if server.store.last_scheduled_day().await.unwrap().is_none() {
-            let event = events.recv().await.unwrap();
-            assert!(matches!(event, Event::Evaluation(_)));
-            let event = events.recv().await.unwrap();
-            assert_eq!(event, Event::Submission(submission.id), "the ablation");
+            let mut kinds = Vec::new();
+            for _ in 0..3 {
+                let Change::Recorded(record) = events.recv().await.unwrap() else {
+                    panic!("nothing is claimed")
+                };
+                assert_eq!(record.actor, Actor::Schedule);
+                kinds.push(record.event);
+            }
+            assert!(
+                matches!(
+                    kinds[..],
+                    [
+                        Event::EvaluationQueued { .. },
+                        Event::DayStarted { evaluations: 1 },
+                        Event::AblationOrdered {
+                            episodes_per_task: 2,
+                            ..
+                        },
+                    ]
+                ),
+                "{kinds:?}"
+            );
         }
         shutdown.cancel();
         schedule.await.unwrap().unwrap();
@@ -220,9 +232,14 @@ async fn an_ablation_is_played_on_episodes_of_its_own_in_every_profile() {
         seen.lock().unwrap().push(spec.clone());
         Ok(())
     });
+    let plan = RunPlan {
+        episodes_per_task: 3,
+        episodes_per_shard: 3,
+        ..server.store.evaluation(evaluation).await.unwrap().plan
+    };
     server
         .store
-        .create_ablation(submission, 3, 0, server.now())
+        .create_ablation(Actor::Organiser, submission, &plan, server.now())
         .await
         .unwrap();
     let mut events = server.store.events();
@@ -254,8 +271,9 @@ async fn an_ablation_is_played_on_episodes_of_its_own_in_every_profile() {
             assert_eq!(run.mismatch_seed, secret.model_mismatch());
         }
     }
-    let outcomes = server.store.ablation_outcomes(ablation.id).await.unwrap();
-    assert!(outcomes.values().all(|outcomes| outcomes.len() == 9));
+    for run in ablation.runs.into_values() {
+        assert_eq!(server.store.outcomes(run).await.unwrap().len(), 9);
+    }
     assert!(
         server
             .store

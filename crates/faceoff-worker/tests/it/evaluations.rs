@@ -3,8 +3,8 @@ use faceoff_store::*;
 use faceoff_types::*;
 use jiff::Timestamp;
 
-pub fn plan(episodes_per_shard: u32) -> EvaluationPlan {
-    EvaluationPlan {
+pub fn plan(episodes_per_shard: u32) -> RunPlan {
+    RunPlan {
         profile: Profile::Evaluation,
         tasks: Task::ALL.to_vec(),
         episodes_per_task: 2,
@@ -29,21 +29,20 @@ async fn two_teams_meet_the_same_episodes_however_the_work_is_shared_out() {
     for (team, episodes_per_shard) in [("Alpha", 1), ("Beta", 2)] {
         let submission = server.upload(team, "").await;
         let state = server.settled(submission).await;
-        let SubmissionState::Valid { log } = &state else {
-            panic!("{state:?}")
-        };
-        assert!(log.contains("an agent's log"), "{log}");
+        assert_eq!(state, SubmissionState::Valid);
+        let log = server.store.submission_log(submission).await.unwrap();
+        assert!(log.unwrap().contains("an agent's log"));
         let now = Timestamp::now();
         let evaluation = server
             .store
-            .create_evaluation(submission, &plan(episodes_per_shard), now)
+            .create_evaluation(Actor::Organiser, submission, &plan(episodes_per_shard), now)
             .await
             .unwrap();
-        evaluations.push(evaluation.id);
+        evaluations.push(evaluation);
     }
     let mut outcomes = Vec::new();
-    for id in evaluations {
-        let state = server.over(id).await;
+    for evaluation in evaluations {
+        let state = server.over(evaluation.id).await;
         let EvaluationState::Finished {
             result, dataset, ..
         } = state
@@ -65,7 +64,9 @@ async fn two_teams_meet_the_same_episodes_however_the_work_is_shared_out() {
             .await
             .unwrap();
         assert!(std::fs::read(&archive).unwrap().starts_with(b"PK"));
-        outcomes.push(without_times(server.store.outcomes(id).await.unwrap()));
+        outcomes.push(without_times(
+            server.store.outcomes(evaluation.run).await.unwrap(),
+        ));
     }
     assert_eq!(outcomes[0], outcomes[1]);
     assert_eq!(server.store.board().await.unwrap().len(), 2);
@@ -78,28 +79,28 @@ async fn an_agent_that_breaks_off_is_told_why() {
     let worker = server.work(1);
     let broken = server.upload("Broken", "FAULTY_FROM = \"0\"").await;
     let state = server.settled(broken).await;
-    let SubmissionState::Invalid { reason, log } = &state else {
+    let SubmissionState::Invalid { reason } = &state else {
         panic!("{state:?}")
     };
     assert!(reason.contains("exited with status 3"), "{reason}");
-    assert!(log.contains("an agent's log"), "{log}");
+    let log = server.store.submission_log(broken).await.unwrap();
+    assert!(log.unwrap().contains("an agent's log"));
 
     // well in its smoke run, but not later: the faults of all shards add up
     let late = server.upload("Late", "FAULTY_FROM = \"1\"").await;
-    assert!(matches!(
-        server.settled(late).await,
-        SubmissionState::Valid { .. }
-    ));
+    assert!(matches!(server.settled(late).await, SubmissionState::Valid));
     let now = Timestamp::now();
     let evaluation = server
         .store
-        .create_evaluation(late, &plan(1), now)
+        .create_evaluation(Actor::Organiser, late, &plan(1), now)
         .await
         .unwrap();
     let state = server.over(evaluation.id).await;
-    let EvaluationState::AgentFailed { faults, log, .. } = &state else {
-        panic!("{state:?}")
-    };
+    assert!(
+        matches!(state, EvaluationState::AgentFailed { .. }),
+        "{state:?}"
+    );
+    let RunFaults { faults, log } = server.store.run_faults(evaluation.run).await.unwrap();
     assert_eq!(faults.len(), 3);
     assert!(
         faults.iter().all(|fault| fault.episode == Some(1)),
@@ -116,20 +117,20 @@ async fn an_evaluation_outlives_its_workers() {
     let submission = server.upload("Alpha", "").await;
     assert!(matches!(
         server.settled(submission).await,
-        SubmissionState::Valid { .. }
+        SubmissionState::Valid
     ));
     worker.stop().await;
     let now = Timestamp::now();
-    let id = server
+    let evaluation = server
         .store
-        .create_evaluation(submission, &plan(1), now)
+        .create_evaluation(Actor::Organiser, submission, &plan(1), now)
         .await
-        .unwrap()
-        .id;
+        .unwrap();
+    let (id, run) = (evaluation.id, evaluation.run);
     for committed in 1..4 {
         let worker = server.work(1);
         let mut events = server.store.events();
-        while server.store.outcomes(id).await.unwrap().len() < committed {
+        while server.store.outcomes(run).await.unwrap().len() < committed {
             let _ = events.recv().await;
         }
         // in the middle of the next shard
@@ -141,6 +142,6 @@ async fn an_evaluation_outlives_its_workers() {
         matches!(state, EvaluationState::Finished { .. }),
         "{state:?}"
     );
-    assert_eq!(server.store.outcomes(id).await.unwrap().len(), 6);
+    assert_eq!(server.store.outcomes(run).await.unwrap().len(), 6);
     worker.stop().await;
 }

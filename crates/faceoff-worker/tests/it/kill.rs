@@ -46,14 +46,14 @@ async fn a_killed_evaluation_ends_as_an_undisturbed_one() {
         let submission = server.upload(team, "").await;
         assert!(matches!(
             server.settled(submission).await,
-            SubmissionState::Valid { .. }
+            SubmissionState::Valid
         ));
         submissions.push(submission);
     }
     let now = Timestamp::now();
     let calm = server
         .store
-        .create_evaluation(submissions[0], &plan(1), now)
+        .create_evaluation(Actor::Organiser, submissions[0], &plan(1), now)
         .await
         .unwrap();
     let finished = server.over(calm.id).await;
@@ -65,7 +65,7 @@ async fn a_killed_evaluation_ends_as_an_undisturbed_one() {
 
     let troubled = server
         .store
-        .create_evaluation(submissions[1], &plan(1), now)
+        .create_evaluation(Actor::Organiser, submissions[1], &plan(1), now)
         .await
         .unwrap();
     for events_to_live in [1, 2, 3, 1, 4, 2] {
@@ -102,8 +102,8 @@ async fn a_killed_evaluation_ends_as_an_undisturbed_one() {
     };
     worker.stop().await;
 
-    let undisturbed = without_times(server.store.outcomes(calm.id).await.unwrap());
-    let survived = without_times(server.store.outcomes(troubled.id).await.unwrap());
+    let undisturbed = without_times(server.store.outcomes(calm.run).await.unwrap());
+    let survived = without_times(server.store.outcomes(troubled.run).await.unwrap());
     assert_eq!(survived, undisturbed);
     let published = server.path().join("data/artifacts").join(dataset);
     let datasets = std::fs::read_dir(published.parent().unwrap()).unwrap();

@@ -106,11 +106,11 @@ impl Server {
         let now = Timestamp::now();
         let team = self
             .store
-            .create_team(&team.parse().unwrap(), token_hash, now)
+            .create_team(Actor::Organiser, &team.parse().unwrap(), token_hash, now)
             .await
             .unwrap();
         self.store
-            .create_submission(team.id, bundle, now)
+            .create_submission(Actor::Team(team.id), team.id, bundle, now)
             .await
             .unwrap()
             .id

@@ -6,8 +6,8 @@ use faceoff_http::{
     api::{evaluations::EvaluationStatus, submissions::SubmissionStatus},
     token::hash_token,
 };
-use faceoff_store::{EvaluationPlan, SmokeOutcome, Store, Work};
-use faceoff_types::{Clock, Profile, Task};
+use faceoff_store::{Claimed, RunPlan, Store, Work};
+use faceoff_types::{Clock, Profile, SmokeOutcome, Task};
 use jiff::Timestamp;
 use tempfile::TempDir;
 
@@ -24,7 +24,7 @@ async fn site(max_bundle_bytes: u64) -> Site {
     let store = Store::open(folder.path()).await.unwrap();
     let config = HttpConfig {
         max_bundle_bytes,
-        plan: EvaluationPlan {
+        plan: RunPlan {
             profile: Profile::Evaluation,
             tasks: vec![Task::Hit],
             episodes_per_task: 2,
@@ -89,14 +89,9 @@ async fn a_folder_is_packed_uploaded_and_followed() {
     files.sort();
     assert_eq!(files, ["agent.py", "agent.toml"]);
 
-    let Some(Work::Smoke { claim, .. }) = site
-        .store
-        .claim("slot 0", 60, Timestamp::now())
-        .await
-        .unwrap()
-    else {
-        panic!("the smoke run is queued");
-    };
+    let claimed = site.store.claim("slot 0", 60, Timestamp::now());
+    let Claimed { claim, work } = claimed.await.unwrap().expect("the smoke run is queued");
+    assert!(matches!(work, Work::Smoke { .. }), "{work:?}");
     let outcome = SmokeOutcome::Valid {
         agent_name: "mine".into(),
         log: "hello".into(),
@@ -109,7 +104,7 @@ async fn a_folder_is_packed_uploaded_and_followed() {
     assert_eq!(
         valid.status,
         SubmissionStatus::Valid {
-            log: "hello".into()
+            log: Some("hello".into())
         }
     );
 

@@ -207,7 +207,13 @@ impl AdminCommand {
                 })
             }
             Action::Evaluations { day } => {
-                let evaluations = client.evaluations(day).await?;
+                let mut evaluations = client.evaluations(day).await?;
+                for evaluation in &mut evaluations {
+                    // a list leaves out the faults
+                    if let EvaluationStatus::AgentFailed { .. } = evaluation.status {
+                        *evaluation = client.evaluation(evaluation.id).await?;
+                    }
+                }
                 print(self.json, &evaluations, || {
                     or_none(
                         evaluations.iter().map(line).collect(),
@@ -283,7 +289,9 @@ fn line(evaluation: &EvaluationView) -> String {
         EvaluationStatus::AgentFailed { faults, .. } => format!(
             "the agent failed: {}",
             faults
-                .first()
+                .iter()
+                .flatten()
+                .next()
                 .map_or("no fault is recorded", |fault| fault.message.as_str())
         ),
         EvaluationStatus::PlatformFailed { reason, .. } => {

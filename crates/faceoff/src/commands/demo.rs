@@ -281,6 +281,7 @@ async fn validated(client: &Client, submission: &SubmissionView) -> anyhow::Resu
                 return Ok(format!("agent “{agent}” starts, answers and keeps time"));
             }
             SubmissionStatus::Invalid { reason, log } => {
+                let log = log.unwrap_or_default();
                 bail!("{} is not valid: {reason}\n{log}", submission.file_name)
             }
             SubmissionStatus::ValidationError { reason } => {

@@ -8,7 +8,7 @@ use faceoff_http::{
     token::{Token, TokenKind, hash_token},
 };
 use faceoff_sandbox::{HostFeature, Layer, probe_host};
-use faceoff_store::Store;
+use faceoff_store::{Actor, Store};
 use faceoff_types::Clock;
 use faceoff_worker::{DailyPlan, WorkerConfig};
 use jiff::Timestamp;
@@ -107,7 +107,10 @@ async fn serve(config: Config) -> anyhow::Result<()> {
         .await
         .with_context(|| format!("opening the data folder {}", data_dir.display()))?;
     if let Some(name) = &config.season.name {
-        store.name_season(name).await.context("naming the season")?;
+        store
+            .name_season(Actor::Organiser, name, jiff::Timestamp::now())
+            .await
+            .context("naming the season")?;
     }
     let listener = TcpListener::bind(config.server.listen)
         .await

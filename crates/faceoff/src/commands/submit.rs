@@ -64,11 +64,11 @@ impl SubmitCommand {
         let agent = submission.agent_name.as_deref().unwrap_or("the agent");
         match submission.status {
             SubmissionStatus::Valid { log } => {
-                print_log(&log);
+                print_log(log.as_deref());
                 println!("valid: {agent} starts, answers and keeps time");
             }
             SubmissionStatus::Invalid { reason, log } => {
-                print_log(&log);
+                print_log(log.as_deref());
                 bail!("invalid: {reason}");
             }
             SubmissionStatus::ValidationError { reason } => {
@@ -135,8 +135,8 @@ fn result(evaluation: EvaluationView) -> anyhow::Result<()> {
             Ok(())
         }
         EvaluationStatus::AgentFailed { faults, log, .. } => {
-            print_log(&log);
-            for fault in &faults {
+            print_log(log.as_deref());
+            for fault in faults.iter().flatten() {
                 let place = match (fault.episode, fault.step) {
                     (Some(episode), Some(step)) => format!("episode {episode}, step {step}"),
                     (Some(episode), None) => format!("episode {episode}, reset"),
@@ -158,8 +158,8 @@ fn result(evaluation: EvaluationView) -> anyhow::Result<()> {
     }
 }
 
-fn print_log(log: &str) {
-    if !log.trim().is_empty() {
+fn print_log(log: Option<&str>) {
+    if let Some(log) = log.filter(|log| !log.trim().is_empty()) {
         println!(
             "--- the agent's log ---\n{}\n--- end of the log ---",
             log.trim_end()

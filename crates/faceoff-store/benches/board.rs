@@ -1,0 +1,167 @@
+//! How long a season's board takes to read: 200 teams that were evaluated on each of 120 days, with a
+//! new submission every tenth day. The goal is 10 ms; `cargo bench -p faceoff-store`.
+#![expect(clippy::unwrap_used, reason = "a benchmark fails by panicking")]
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use faceoff_store::Store;
+use faceoff_types::{
+    ComputationTimeSummary, EvaluationId, EvaluationResult, Profile, RULESET, RunId, Seed, ShardId,
+    SubmissionId, Task, TaskResult, TeamId, Tier, ViolationCounts,
+};
+use jiff::{ToSpan, civil::date};
+use sqlx::{Connection, SqliteConnection};
+use std::{hint::black_box, path::Path};
+use uuid::Uuid;
+
+const TEAMS: usize = 200;
+const DAYS: i64 = 120;
+const DAYS_PER_SUBMISSION: i64 = 10;
+/// What the sandbox keeps of an agent's standard error.
+const LOG_BYTES: usize = 64 * 1024;
+/// Of a stored summary of 3 × 1000 episodes.
+const SUMMARY_BYTES: usize = 1500;
+
+fn result(score: f64) -> EvaluationResult {
+    let task = TaskResult {
+        episodes: 1000,
+        successes: 512,
+        success_rate: 0.512,
+        success_ci95: [0.481, 0.543],
+        penalty_points: 327.5,
+        violations: ViolationCounts::default(),
+        tier: Tier::Deployable,
+        steps: 123_456,
+        computation_time_s: ComputationTimeSummary {
+            mean: 2e-4,
+            p99: 9e-4,
+            max: 0.012,
+        },
+    };
+    EvaluationResult {
+        ruleset: RULESET.into(),
+        profile: Profile::Evaluation,
+        seed: Seed::from_number(1),
+        tasks: Task::ALL.map(|of| (of, task.clone())).into(),
+        score,
+        penalty_points: 327.5,
+        tier: Tier::Deployable,
+        timing: None,
+    }
+}
+
+/// Writes the season by SQL in one transaction: through the store it would be a hundred thousand
+/// commits.
+async fn fill(folder: &Path) {
+    let url = format!("sqlite://{}", folder.join("faceoff.sqlite3").display());
+    let mut connection = SqliteConnection::connect(&url).await.unwrap();
+    let mut tx = connection.begin().await.unwrap();
+    let log = "x".repeat(LOG_BYTES);
+    for team_number in 0..TEAMS {
+        let team = TeamId::new().to_string();
+        sqlx::query("INSERT INTO teams VALUES (?, ?, ?, 0)")
+            .bind(&team)
+            .bind(format!("Team {team_number}"))
+            .bind(&blake3::hash(&team_number.to_le_bytes()).as_bytes()[..])
+            .execute(&mut *tx)
+            .await
+            .unwrap();
+        let mut submission = String::new();
+        for day_number in 0..DAYS {
+            if day_number % DAYS_PER_SUBMISSION == 0 {
+                submission = SubmissionId::new().to_string();
+                sqlx::query(
+                    "INSERT INTO submissions VALUES (?, ?, 'bundles/x', 1, 'x', 'agent.zip', ?, 'agent',
+                                                     'valid', NULL, ?)",
+                )
+                .bind(&submission)
+                .bind(&team)
+                .bind(day_number)
+                .bind(&log)
+                .execute(&mut *tx)
+                .await
+                .unwrap();
+            }
+            let day = date(2026, 1, 1)
+                .saturating_add(day_number.days())
+                .to_string();
+            let (run, unit) = (RunId::new().to_string(), Uuid::now_v7().to_string());
+            sqlx::query(
+                r#"INSERT INTO runs VALUES (?, 'evaluation', ?, '["hit","defend","prepare"]', 1000, 50, 10,
+                                            1, 'played', 0)"#,
+            )
+            .bind(&run)
+            .bind(&day)
+            .execute(&mut *tx)
+            .await
+            .unwrap();
+            sqlx::query(
+                "INSERT INTO units (id, kind, urgency, state, claimable_at, worker, nonce)
+                 VALUES (?, 'shard', 2, 'done', 0, 'w', 'n')",
+            )
+            .bind(&unit)
+            .execute(&mut *tx)
+            .await
+            .unwrap();
+            sqlx::query(
+                "INSERT INTO shards VALUES (?, ?, ?, 0, 'hit', 0, 1000, 0, 'recordings/x', 0, '[]', '')",
+            )
+            .bind(ShardId::new().to_string())
+            .bind(&run)
+            .bind(&unit)
+            .execute(&mut *tx)
+            .await
+            .unwrap();
+            let scored = result(40.0 + team_number as f64 / 10.0);
+            sqlx::query(
+                "INSERT INTO evaluations VALUES (?, ?, ?, ?, ?, ?, 'finished', ?, NULL, 'datasets/x.zip',
+                                                 'x', ?)",
+            )
+            .bind(EvaluationId::new().to_string())
+            .bind(&submission)
+            .bind(&team)
+            .bind(&day)
+            .bind(&run)
+            .bind(day_number)
+            .bind(day_number)
+            .bind(serde_json::to_string(&scored).unwrap())
+            .execute(&mut *tx)
+            .await
+            .unwrap();
+            sqlx::query("INSERT INTO episode_summaries VALUES (?, 1, ?)")
+                .bind(&run)
+                .bind("y".repeat(SUMMARY_BYTES))
+                .execute(&mut *tx)
+                .await
+                .unwrap();
+        }
+    }
+    tx.commit().await.unwrap();
+    connection.close().await.unwrap();
+}
+
+#[expect(clippy::print_stderr, reason = "a benchmark reports to a terminal")]
+fn board(criterion: &mut Criterion) {
+    let runtime = tokio::runtime::Runtime::new().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let store = runtime.block_on(async {
+        drop(Store::open(folder.path()).await.unwrap());
+        fill(folder.path()).await;
+        Store::open(folder.path()).await.unwrap()
+    });
+    let bytes = std::fs::metadata(folder.path().join("faceoff.sqlite3"))
+        .unwrap()
+        .len();
+    eprintln!("the database: {} MB", bytes / 1_000_000);
+    let records = runtime.block_on(store.board()).unwrap();
+    assert_eq!(records.len(), TEAMS);
+    let runs: Vec<_> = records.iter().map(|record| record.run).collect();
+    criterion.bench_function("board of 200 teams × 120 days", |bencher| {
+        bencher.iter(|| black_box(runtime.block_on(store.board()).unwrap()));
+    });
+    criterion.bench_function("its episode summaries", |bencher| {
+        bencher.iter(|| black_box(runtime.block_on(store.episode_summaries(&runs, 1)).unwrap()));
+    });
+}
+
+criterion_group!(benches, board);
+criterion_main!(benches);

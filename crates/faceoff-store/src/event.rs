@@ -1,0 +1,290 @@
+//! What is recorded of every change: who did what to what. The audit log, and what feeds read.
+
+use faceoff_types::{
+    AblationId, EvaluationId, RunId, ShardId, SubmissionId, Task, TeamId, TeamName,
+};
+use jiff::{Timestamp, civil::Date};
+use serde::{Deserialize, Serialize};
+use std::{fmt, str::FromStr};
+use uuid::Uuid;
+
+/// Who caused a change.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum Actor {
+    /// Whoever holds the organiser's token, or the server's configuration.
+    Organiser,
+    /// Whoever holds the team's token.
+    Team(TeamId),
+    /// The daily start.
+    Schedule,
+    /// A worker's slot, by the name under which it claims.
+    Worker(String),
+    /// What the server does by itself: tidying, derived data.
+    Server,
+}
+
+impl fmt::Display for Actor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Organiser => f.write_str("organiser"),
+            Self::Team(id) => write!(f, "team:{id}"),
+            Self::Schedule => f.write_str("schedule"),
+            Self::Worker(name) => write!(f, "worker:{name}"),
+            Self::Server => f.write_str("server"),
+        }
+    }
+}
+
+/// Text that is none of an event's parts.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0:?} is no actor or subject of an event")]
+pub struct ParseEventError(String);
+
+impl FromStr for Actor {
+    type Err = ParseEventError;
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        let unknown = || ParseEventError(s.to_owned());
+        Ok(match s.split_once(':') {
+            None if s == "organiser" => Self::Organiser,
+            None if s == "schedule" => Self::Schedule,
+            None if s == "server" => Self::Server,
+            Some(("team", id)) => Self::Team(id.parse().map_err(|_| unknown())?),
+            Some(("worker", name)) => Self::Worker(name.to_owned()),
+            _ => return Err(unknown()),
+        })
+    }
+}
+
+/// What a change is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Subject {
+    /// The season, of which a data folder has one.
+    Season,
+    /// A UTC day of the season.
+    Day(Date),
+    /// A team.
+    Team(TeamId),
+    /// An upload and its smoke run.
+    Submission(SubmissionId),
+    /// An evaluation with its run and its scoring.
+    Evaluation(EvaluationId),
+    /// An ablation with its runs.
+    Ablation(AblationId),
+}
+
+impl Subject {
+    /// As the columns of the events table have it: kind and id.
+    pub(crate) fn columns(self) -> (&'static str, String) {
+        match self {
+            Self::Season => ("season", String::new()),
+            Self::Day(day) => ("day", day.to_string()),
+            Self::Team(id) => ("team", id.to_string()),
+            Self::Submission(id) => ("submission", id.to_string()),
+            Self::Evaluation(id) => ("evaluation", id.to_string()),
+            Self::Ablation(id) => ("ablation", id.to_string()),
+        }
+    }
+
+    pub(crate) fn from_columns(kind: &str, id: &str) -> Result<Self, ParseEventError> {
+        let unknown = || ParseEventError(format!("{kind} {id}"));
+        Ok(match kind {
+            "season" => Self::Season,
+            "day" => Self::Day(id.parse().map_err(|_| unknown())?),
+            "team" => Self::Team(id.parse().map_err(|_| unknown())?),
+            "submission" => Self::Submission(id.parse().map_err(|_| unknown())?),
+            "evaluation" => Self::Evaluation(id.parse().map_err(|_| unknown())?),
+            "ablation" => Self::Ablation(id.parse().map_err(|_| unknown())?),
+            _ => return Err(unknown()),
+        })
+    }
+}
+
+/// What happened. The variants' names and fields are stored: new ones may be added, old ones stay.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Event {
+    /// The organiser invited a team.
+    TeamCreated {
+        /// As it was at the invitation.
+        name: TeamName,
+    },
+    /// The team has another token; the old one is void.
+    TokenReplaced,
+    /// A bundle came, and its smoke run is queued.
+    SubmissionUploaded {
+        /// Whose it is.
+        team: TeamId,
+        /// BLAKE3 of the archive.
+        bundle_blake3: String,
+    },
+    /// The smoke run found that the agent can be evaluated.
+    SubmissionValid {
+        /// The name in its manifest.
+        agent_name: String,
+    },
+    /// The smoke run found a fault of the team's.
+    SubmissionInvalid {
+        /// What is wrong and where.
+        reason: String,
+    },
+    /// The smoke run could not be done, by our fault.
+    SubmissionNotValidated {
+        /// What failed.
+        reason: String,
+    },
+    /// A team's turn of a day was taken.
+    EvaluationQueued {
+        /// Whose turn.
+        team: TeamId,
+        /// What plays.
+        submission: SubmissionId,
+        /// The UTC day of the turn.
+        day: Date,
+        /// What is played.
+        run: RunId,
+    },
+    /// Its first shard was claimed.
+    EvaluationBegun,
+    /// Its last shard was committed; scoring is queued.
+    EvaluationFinalising,
+    /// Score and dataset are there.
+    EvaluationFinished {
+        /// In percent.
+        score: f64,
+        /// BLAKE3 of the dataset's archive.
+        dataset_blake3: String,
+    },
+    /// Too many agent faults; no score.
+    EvaluationAgentFailed,
+    /// Our fault; the turn was given back.
+    EvaluationPlatformFailed {
+        /// What went wrong.
+        reason: String,
+    },
+    /// Stopped by hand; the turn was given back.
+    EvaluationCancelled {
+        /// As it was told to the team.
+        reason: String,
+    },
+    /// A submission is to be taken apart, profile by profile.
+    AblationOrdered {
+        /// What plays.
+        submission: SubmissionId,
+        /// Of each task in each profile.
+        episodes_per_task: u32,
+    },
+    /// All of its runs are played.
+    AblationFinished,
+    /// It ended without a result.
+    AblationFailed {
+        /// Whose fault it was and which.
+        reason: String,
+    },
+    /// Episodes were played and their outcomes stored.
+    ShardCommitted {
+        /// What they are a part of.
+        run: RunId,
+        /// The range's id.
+        shard: ShardId,
+        /// What was played.
+        task: Task,
+        /// The first one.
+        first_episode: u32,
+        /// One past the last one.
+        end_episode: u32,
+        /// Episodes that ended by a fault of the agent.
+        agent_faults: u32,
+    },
+    /// A fault of ours: the unit of work will be tried again, or was given up.
+    UnitGivenBack {
+        /// The unit, as the server's log names it.
+        unit: Uuid,
+        /// Reported failures of this unit so far.
+        failures: u32,
+        /// What failed.
+        reason: String,
+    },
+    /// The evaluations of a day were queued, each with an event of its own.
+    DayStarted {
+        /// How many.
+        evaluations: u32,
+    },
+    /// The first dataset that carries the day's seed was handed out.
+    DayReleased,
+    /// The season has another name.
+    SeasonNamed {
+        /// The new one.
+        name: String,
+    },
+    /// The secret is public and nothing more is evaluated.
+    SeasonClosed,
+}
+
+/// An event as it is stored.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EventRecord {
+    /// Rises with every event of the data folder, in the order of the commits.
+    pub id: i64,
+    /// By the clock of whoever wrote it.
+    pub at: Timestamp,
+    /// Who caused it.
+    pub actor: Actor,
+    /// What it is about.
+    pub subject: Subject,
+    /// What happened.
+    pub event: Event,
+}
+
+/// What a listener of this process hears.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Change {
+    /// It is in the events table.
+    Recorded(EventRecord),
+    /// Work on the subject has advanced. Nothing is recorded of it: it comes every second from every
+    /// slot, the next one replaces it, and what matters in the end is in the shard's commit.
+    Progress(Subject),
+}
+
+impl Change {
+    /// What to look at again.
+    #[must_use]
+    pub const fn subject(&self) -> Subject {
+        match self {
+            Self::Recorded(record) => record.subject,
+            Self::Progress(subject) => *subject,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn actors_and_subjects_read_back_as_they_are_written() {
+        let actors = [
+            Actor::Organiser,
+            Actor::Team(TeamId::new()),
+            Actor::Schedule,
+            Actor::Worker("host:1/slot-0".into()),
+            Actor::Server,
+        ];
+        for actor in actors {
+            assert_eq!(actor.to_string().parse(), Ok(actor));
+        }
+        assert!("team:none".parse::<Actor>().is_err());
+        let subjects = [
+            Subject::Season,
+            Subject::Day(jiff::civil::date(2026, 3, 1)),
+            Subject::Team(TeamId::new()),
+            Subject::Submission(SubmissionId::new()),
+            Subject::Evaluation(EvaluationId::new()),
+            Subject::Ablation(AblationId::new()),
+        ];
+        for subject in subjects {
+            let (kind, id) = subject.columns();
+            assert_eq!(Subject::from_columns(kind, &id), Ok(subject));
+        }
+        assert!(Subject::from_columns("team", "none").is_err());
+    }
+}

@@ -1,0 +1,33 @@
+use crate::{
+    error::{Result, StoreError},
+    event::Actor,
+    operations::ends,
+    reads,
+    store::Store,
+    tables::evaluations::Failure,
+};
+use faceoff_types::EvaluationId;
+use jiff::Timestamp;
+
+impl Store {
+    /// Stops an evaluation that is not over and gives the day's turn back. Workers that play its
+    /// shards learn of it at their next heartbeat.
+    pub async fn cancel_evaluation(
+        &self,
+        actor: Actor,
+        id: EvaluationId,
+        reason: &str,
+        now: Timestamp,
+    ) -> Result<()> {
+        self.write(actor, now, async |tx| {
+            let evaluation = reads::evaluations::find(tx, id).await?;
+            if evaluation.state.is_over() {
+                return Err(StoreError::Conflict(
+                    "the evaluation is over already".into(),
+                ));
+            }
+            ends::fail_evaluation(tx, id, evaluation.run, Failure::Cancelled(reason)).await
+        })
+        .await
+    }
+}

@@ -1,0 +1,191 @@
+use crate::{
+    error::{Result, StoreError},
+    event::{Actor, Subject},
+    operations::{
+        ends,
+        give_back::give_up,
+        purpose::{self, Purpose},
+        runs::{self, RunOwner},
+    },
+    queue::{self, Claim},
+    store::Store,
+    tables::{
+        evaluations, runs as run_rows,
+        runs::Run,
+        season,
+        shards::{self, Shard},
+        submissions::{self, Submission},
+    },
+    write::Tx,
+};
+use faceoff_types::{BundleRef, EvaluationId, RunId, Seed, SubmissionId};
+use jiff::{SignedDuration, Timestamp};
+use uuid::Uuid;
+
+/// Leases of one unit after which it is given up although no worker reported a failure: something in
+/// it kills its worker. Far above [`MAX_ATTEMPTS`](crate::MAX_ATTEMPTS), since a server that is killed
+/// again and again for other reasons must not cost a team its evaluation.
+pub const MAX_LEASES: u32 = 50;
+
+/// A leased unit of work, with all that a worker must know of it.
+#[derive(Debug, Clone)]
+pub struct Claimed {
+    /// Proof of the lease.
+    pub claim: Claim,
+    /// What to do.
+    pub work: Work,
+}
+
+/// What a worker does under a lease.
+#[derive(Debug, Clone)]
+pub enum Work {
+    /// Check that an uploaded bundle starts, answers and keeps time.
+    Smoke {
+        /// What to check.
+        submission: Submission,
+    },
+    /// Play a range of episodes.
+    Shard {
+        /// What the run is a part of.
+        owner: RunOwner,
+        /// What the range is a part of.
+        run: Run,
+        /// The range.
+        shard: Shard,
+        /// The agent.
+        bundle: BundleRef,
+        /// Of the run's episodes.
+        seeds: RunSeeds,
+    },
+    /// Join the recordings of an evaluation whose shards are all committed, and score it.
+    Finalise {
+        /// What is scored.
+        evaluation: EvaluationId,
+        /// What was played.
+        run: Run,
+        /// Artifact key prefixes of the shards' recordings, in order of play.
+        recordings: Vec<String>,
+        /// The agent's own name.
+        agent_name: String,
+        /// Of the run's episodes.
+        seeds: RunSeeds,
+    },
+}
+
+/// The seeds of a run, derived from the season's secret, which stays in the store.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RunSeeds {
+    /// Of the episodes: that of the day, or of ablations.
+    pub episodes: Seed,
+    /// Of the season's model mismatch.
+    pub mismatch: Seed,
+}
+
+impl Store {
+    /// Leases the next unit of work for `lease_s` seconds: smoke runs first, then finalisations, then
+    /// shards in evaluation order, then those of ablations. A unit whose lease is over is leased
+    /// again. `None`: nothing to do now (see [`Store::work_signal`]).
+    pub async fn claim(
+        &self,
+        worker: &str,
+        lease_s: u32,
+        now: Timestamp,
+    ) -> Result<Option<Claimed>> {
+        let actor = Actor::Worker(worker.to_owned());
+        self.write(actor, now, async |tx| {
+            let nonce = Uuid::now_v7();
+            while let Some(unit) = queue::claim_next(tx, worker, nonce, lease_s, now).await? {
+                let reason = if unit.attempts > MAX_LEASES {
+                    format!("{MAX_LEASES} workers died over it")
+                } else {
+                    match describe(tx, unit.id.0, &unit.kind).await {
+                        Ok(work) => {
+                            let lease = SignedDuration::from_secs(lease_s.into());
+                            let claim = Claim {
+                                unit: unit.id.0,
+                                nonce,
+                                worker: worker.to_owned(),
+                                lease_until: now.saturating_add(lease).unwrap_or(Timestamp::MAX),
+                            };
+                            return Ok(Some(Claimed { claim, work }));
+                        }
+                        // Given up rather than returned: it would be the next claim's unit again, and
+                        // nobody else's work would ever be done.
+                        Err(StoreError::Damaged(what)) => {
+                            tracing::error!(unit = %unit.id.0, what, "damaged work is given up");
+                            "a stored value is damaged".to_owned()
+                        }
+                        Err(error) => return Err(error),
+                    }
+                };
+                give_up(tx, unit.id.0, &unit.kind, &reason).await?;
+            }
+            Ok(None)
+        })
+        .await
+    }
+}
+
+/// Reads what the leased unit is about.
+async fn describe(tx: &mut Tx, unit: Uuid, label: &str) -> Result<Work> {
+    match purpose::of_unit(tx, unit, label).await? {
+        Purpose::Smoke(id) => {
+            tx.advanced(Subject::Submission(id));
+            let submission = submissions::find(tx, id).await?;
+            Ok(Work::Smoke { submission })
+        }
+        Purpose::Shard { run: id, shard } => {
+            let owner = runs::owner(tx, id).await?;
+            let (run, seeds) = read_run(tx, id).await?;
+            let submission = contestant(tx, id).await?;
+            ends::run_begun(tx, id, owner).await?;
+            tx.advanced(owner.subject());
+            Ok(Work::Shard {
+                owner,
+                run,
+                shard,
+                bundle: submission.bundle,
+                seeds,
+            })
+        }
+        Purpose::Finalise(evaluation) => {
+            let id = evaluations::run_of(tx, evaluation).await?;
+            let (run, seeds) = read_run(tx, id).await?;
+            let of_run = shards::of_run(tx, id).await?;
+            let missing = |what| StoreError::Damaged(format!("evaluation {evaluation}: {what}"));
+            let recordings: Option<Vec<_>> =
+                of_run.into_iter().map(|shard| shard.recording).collect();
+            let agent_name = contestant(tx, id).await?.agent_name;
+            tx.advanced(Subject::Evaluation(evaluation));
+            Ok(Work::Finalise {
+                evaluation,
+                run,
+                recordings: recordings.ok_or_else(|| missing("a shard without a recording"))?,
+                agent_name: agent_name.ok_or_else(|| missing("an agent without a name"))?,
+                seeds,
+            })
+        }
+    }
+}
+
+async fn read_run(tx: &mut Tx, id: RunId) -> Result<(Run, RunSeeds)> {
+    let run = run_rows::find(tx, id).await?;
+    let secret = season::read(tx).await?.secret;
+    let seeds = RunSeeds {
+        episodes: run.seed.seed(&secret),
+        mismatch: secret.model_mismatch(),
+    };
+    Ok((run, seeds))
+}
+
+/// The one that plays a run of tasks.
+async fn contestant(tx: &mut Tx, run: RunId) -> Result<Submission> {
+    let sides: Vec<SubmissionId> = run_rows::contestants(tx, run).await?;
+    match sides[..] {
+        [submission] => submissions::find(tx, submission).await,
+        _ => Err(StoreError::Damaged(format!(
+            "run {run}: {} contestants, where its tasks are for one",
+            sides.len()
+        ))),
+    }
+}

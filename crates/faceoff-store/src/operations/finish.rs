@@ -1,0 +1,41 @@
+use crate::{
+    error::Result,
+    event::{Event, Subject},
+    operations::{
+        commit::{Committed, other_work},
+        purpose::Purpose,
+    },
+    queue::Claim,
+    store::Store,
+    tables::evaluations,
+};
+use faceoff_types::EvaluationResult;
+use jiff::Timestamp;
+
+impl Store {
+    /// Stores the score, the dataset's artifact key with the BLAKE3 of its archive (64 hexadecimal
+    /// digits), and the end in one transaction. Idempotent, as [`Store::commit_shard`] is. After
+    /// [`StoreError::Database`](crate::StoreError::Database) the dataset may be the evaluation's: leave it.
+    pub async fn finish_evaluation(
+        &self,
+        claim: &Claim,
+        result: &EvaluationResult,
+        dataset: &str,
+        dataset_blake3: &str,
+        now: Timestamp,
+    ) -> Result<Committed> {
+        self.commit(claim, now, async |tx, purpose| {
+            let Purpose::Finalise(id) = purpose else {
+                return Err(other_work("finalisation", &purpose));
+            };
+            evaluations::set_finished(tx, id, result, dataset, dataset_blake3, now).await?;
+            let event = Event::EvaluationFinished {
+                score: result.score,
+                dataset_blake3: dataset_blake3.to_owned(),
+            };
+            tx.record(Subject::Evaluation(id), event);
+            Ok(())
+        })
+        .await
+    }
+}

@@ -1,0 +1,119 @@
+use crate::{
+    error::{Result, StoreError},
+    event::{Actor, Event, Subject},
+    operations::{
+        ends::{self, RunEnd},
+        purpose::{self, Purpose},
+        runs,
+    },
+    queue::{self, Claim, Hold},
+    store::Store,
+    tables::{
+        evaluations::{self, Failure},
+        submissions,
+    },
+    write::Tx,
+};
+use jiff::Timestamp;
+use sqlx::SqliteConnection;
+use uuid::Uuid;
+
+/// Failures of ours after which a unit of work is given up.
+pub const MAX_ATTEMPTS: u32 = 5;
+
+/// What a unit's events are about.
+pub(crate) async fn subject(
+    connection: &mut SqliteConnection,
+    purpose: &Purpose,
+) -> Result<Subject> {
+    Ok(match purpose {
+        Purpose::Smoke(id) => Subject::Submission(*id),
+        Purpose::Shard { run, .. } => runs::owner(connection, *run).await?.subject(),
+        Purpose::Finalise(id) => Subject::Evaluation(*id),
+    })
+}
+
+/// Ends what a unit is for by our fault.
+pub(crate) async fn give_up(tx: &mut Tx, unit: Uuid, label: &str, reason: &str) -> Result<()> {
+    queue::drop_units(tx, &[unit]).await?;
+    match purpose::of_unit(tx, unit, label).await {
+        Ok(Purpose::Smoke(id)) => {
+            submissions::set_validation_error(tx, id, reason).await?;
+            let reason = reason.to_owned();
+            tx.record(
+                Subject::Submission(id),
+                Event::SubmissionNotValidated { reason },
+            );
+            Ok(())
+        }
+        Ok(Purpose::Shard { run, .. }) => {
+            let owner = runs::owner(tx, run).await?;
+            ends::run_ended(tx, run, owner, RunEnd::PlatformFailed(reason)).await
+        }
+        Ok(Purpose::Finalise(id)) => {
+            let run = evaluations::run_of(tx, id).await?;
+            ends::fail_evaluation(tx, id, run, Failure::Platform(reason)).await
+        }
+        // It is for nothing that could end.
+        Err(StoreError::Damaged(_)) => Ok(()),
+        Err(error) => Err(error),
+    }
+}
+
+impl Store {
+    /// Our fault: the unit goes back to the queue after a growing pause. After [`MAX_ATTEMPTS`]
+    /// failures the evaluation ends as
+    /// [`PlatformFailed`](crate::EvaluationState::PlatformFailed) and the team's turn is given back;
+    /// a smoke run ends as [`ValidationError`](crate::SubmissionState::ValidationError), an ablation
+    /// without a result. Of a lost lease nothing is recorded.
+    pub async fn release_failed(&self, claim: &Claim, reason: &str, now: Timestamp) -> Result<()> {
+        let actor = Actor::Worker(claim.worker.clone());
+        self.write(actor, now, async |tx| {
+            let Hold::Held { kind } = queue::hold(tx, claim).await? else {
+                return Ok(());
+            };
+            let purpose = purpose::of_unit(tx, claim.unit, &kind).await?;
+            let failures = queue::requeue_failed(tx, claim, now).await?;
+            let event = Event::UnitGivenBack {
+                unit: claim.unit,
+                failures,
+                reason: reason.to_owned(),
+            };
+            let subject = subject(tx, &purpose).await?;
+            tx.record(subject, event);
+            if failures >= MAX_ATTEMPTS {
+                give_up(tx, claim.unit, &kind, reason).await?;
+            }
+            Ok(())
+        })
+        .await
+    }
+
+    /// Shutdown: gives the unit back at once; the attempt does not count. Of a lost lease nothing is
+    /// recorded.
+    pub async fn release(&self, claim: &Claim, now: Timestamp) -> Result<()> {
+        let actor = Actor::Worker(claim.worker.clone());
+        self.write(actor, now, async |tx| {
+            let Hold::Held { kind } = queue::hold(tx, claim).await? else {
+                return Ok(());
+            };
+            queue::release(tx, claim).await?;
+            let purpose = purpose::of_unit(tx, claim.unit, &kind).await?;
+            let subject = subject(tx, &purpose).await?;
+            tx.advanced(subject);
+            Ok(())
+        })
+        .await
+    }
+
+    /// Ends the leases of a worker that is known to be dead, and of its slots, so that nobody waits
+    /// for them to run out: `worker` itself and every name `worker/…`. Returns how many. The attempts
+    /// stay counted.
+    pub async fn end_leases_of(&self, worker: &str, now: Timestamp) -> Result<u64> {
+        let actor = Actor::Worker(worker.to_owned());
+        self.write(actor, now, async |tx| {
+            queue::end_leases_of(tx, worker).await
+        })
+        .await
+    }
+}

@@ -1,0 +1,21 @@
+//! What people and workers do: transactions over the tables and the queue, each with its events.
+
+pub(crate) mod cancel;
+pub(crate) mod claim;
+pub(crate) mod commit;
+pub(crate) mod ends;
+mod finish;
+pub(crate) mod give_back;
+mod heartbeat;
+mod open;
+mod order_ablation;
+pub(crate) mod purpose;
+pub(crate) mod release_day;
+pub(crate) mod runs;
+mod season;
+pub(crate) mod smoke;
+mod start_day;
+mod submit;
+mod summaries;
+mod teams;
+pub(crate) mod tidy;

@@ -1,0 +1,42 @@
+use crate::{
+    artifacts::Artifacts,
+    database::Database,
+    error::{Result, StoreError},
+    signals::Signals,
+    store::Store,
+    tables::season,
+};
+use std::{fs::File, path::Path, sync::Arc};
+
+impl Store {
+    /// Opens `data_dir/faceoff.sqlite3` and `data_dir/artifacts`, creating and migrating them as
+    /// needed, and draws the season's secret on the first time.
+    pub async fn open(data_dir: &Path) -> Result<Self> {
+        // Two processes that start together must not both migrate.
+        let _opening = lock_folder(data_dir.to_owned()).await?;
+        let artifacts = Artifacts::open(&data_dir.join("artifacts"))?;
+        let database = Database::open(&data_dir.join("faceoff.sqlite3")).await?;
+        let mut tx = database.begin().await?;
+        season::draw_secret_once(&mut tx).await?;
+        tx.commit().await?;
+        Ok(Self {
+            database,
+            signals: Arc::new(Signals::new()),
+            artifacts,
+        })
+    }
+}
+
+/// Creates the folder and holds its lock until the file is dropped (or the process dies).
+async fn lock_folder(data_dir: std::path::PathBuf) -> Result<File> {
+    let lock = move || {
+        std::fs::create_dir_all(&data_dir)?;
+        let file = File::create(data_dir.join("faceoff.lock"))?;
+        file.lock()?;
+        Ok(file)
+    };
+    tokio::task::spawn_blocking(lock)
+        .await
+        .unwrap_or_else(|panic| Err(std::io::Error::other(panic)))
+        .map_err(|error| StoreError::Database(sqlx::Error::Io(error)))
+}

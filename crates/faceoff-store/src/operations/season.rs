@@ -1,0 +1,41 @@
+use crate::{
+    error::{Result, StoreError},
+    event::{Actor, Event, Subject},
+    store::Store,
+    tables::{evaluations, season},
+};
+use jiff::Timestamp;
+
+impl Store {
+    /// Names the season. Its name before is no event.
+    pub async fn name_season(&self, actor: Actor, name: &str, now: Timestamp) -> Result<()> {
+        self.write(actor, now, async |tx| {
+            if season::rename(tx, name).await? {
+                let name = name.to_owned();
+                tx.record(Subject::Season, Event::SeasonNamed { name });
+            }
+            Ok(())
+        })
+        .await
+    }
+
+    /// Closes the season for good: nothing more is uploaded or evaluated, and its secret is public.
+    /// [`StoreError::SeasonClosed`] if it is closed already, [`StoreError::Conflict`] while
+    /// evaluations are under way.
+    pub async fn close_season(&self, actor: Actor, now: Timestamp) -> Result<()> {
+        self.write(actor, now, async |tx| {
+            season::check_open(tx).await?;
+            let under_way = evaluations::count_open(tx, None).await?;
+            if under_way > 0 {
+                return Err(StoreError::Conflict(format!(
+                    "{under_way} evaluations are queued or running, and closing the season publishes \
+                     their seeds: wait until they are over, or cancel them"
+                )));
+            }
+            season::close(tx, now).await?;
+            tx.record(Subject::Season, Event::SeasonClosed);
+            Ok(())
+        })
+        .await
+    }
+}

@@ -1,0 +1,148 @@
+//! What a worker does with a lease: renew it, hand it back, or turn it into a commit.
+
+use crate::{column::Instant, error::Result, write::Tx};
+use jiff::{SignedDuration, Timestamp};
+use sqlx::{SqliteConnection, types::Text};
+use uuid::Uuid;
+
+/// Proof of a lease.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Claim {
+    /// What is leased.
+    pub unit: Uuid,
+    /// Drawn for this lease alone.
+    pub nonce: Uuid,
+    /// To whom; the events of what is done under the lease name it.
+    pub worker: String,
+    /// When the lease ended, had it not been renewed.
+    pub lease_until: Timestamp,
+}
+
+/// How a claim stands.
+pub(crate) enum Hold {
+    /// It is the unit's lease. Its time may be over: as long as nobody else took the unit, its
+    /// holder's work is as good as ever.
+    Held {
+        /// The unit's label.
+        kind: String,
+    },
+    /// Under this lease the unit was done.
+    DoneBefore,
+    /// The unit is another's, queued again or dropped.
+    Lost,
+}
+
+/// How a claim stands, within a transaction.
+pub(crate) async fn hold(connection: &mut SqliteConnection, claim: &Claim) -> Result<Hold> {
+    let (id, nonce) = (Text(claim.unit), Text(claim.nonce));
+    let row = sqlx::query!(
+        "SELECT kind, state = 'leased' AS held FROM units WHERE id = ? AND nonce = ?",
+        id,
+        nonce,
+    )
+    .fetch_optional(connection)
+    .await?;
+    Ok(match row {
+        Some(row) if row.held == 1 => Hold::Held { kind: row.kind },
+        Some(_) => Hold::DoneBefore,
+        None => Hold::Lost,
+    })
+}
+
+/// Extends the lease to `lease_s` seconds from now and stores the progress; the unit's kind, or
+/// `None` if the lease is lost.
+pub(crate) async fn renew(
+    connection: &mut SqliteConnection,
+    claim: &Claim,
+    progress: u32,
+    lease_s: u32,
+    now: Timestamp,
+) -> Result<Option<String>> {
+    let (id, nonce, until) = (
+        Text(claim.unit),
+        Text(claim.nonce),
+        Instant(after(now, lease_s)),
+    );
+    Ok(sqlx::query_scalar!(
+        r#"UPDATE units SET claimable_at = ?, progress = ?
+           WHERE id = ? AND nonce = ? AND state = 'leased' RETURNING kind AS "kind!""#,
+        until,
+        progress,
+        id,
+        nonce,
+    )
+    .fetch_optional(connection)
+    .await?)
+}
+
+/// Takes a held unit out of the queue.
+pub(crate) async fn mark_done(
+    connection: &mut SqliteConnection,
+    claim: &Claim,
+    progress: u32,
+) -> Result<()> {
+    let id = Text(claim.unit);
+    sqlx::query!(
+        "UPDATE units SET state = 'done', progress = ? WHERE id = ?",
+        progress,
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Counts a failure of a held unit and queues it again, to rest for a while that grows with the
+/// failures; how many there were. No worker is woken: there is nothing to claim yet.
+pub(crate) async fn requeue_failed(
+    connection: &mut SqliteConnection,
+    claim: &Claim,
+    now: Timestamp,
+) -> Result<u32> {
+    let id = Text(claim.unit);
+    let failures = sqlx::query_scalar!(
+        r#"UPDATE units SET state = 'queued', worker = NULL, nonce = NULL, progress = 0,
+                            failures = failures + 1
+           WHERE id = ? RETURNING failures AS "failures!: u32""#,
+        id,
+    )
+    .fetch_one(&mut *connection)
+    .await?;
+    let again_at = Instant(after(now, backoff_s(failures)));
+    sqlx::query!(
+        "UPDATE units SET claimable_at = ? WHERE id = ?",
+        again_at,
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(failures)
+}
+
+/// Queues a held unit again, claimable at once; the attempt does not count.
+pub(crate) async fn release(tx: &mut Tx, claim: &Claim) -> Result<()> {
+    let (id, now) = (Text(claim.unit), Instant(tx.now));
+    sqlx::query!(
+        "UPDATE units SET state = 'queued', worker = NULL, nonce = NULL, progress = 0,
+                          attempts = attempts - 1, claimable_at = ?
+         WHERE id = ?",
+        now,
+        id,
+    )
+    .execute(&mut **tx)
+    .await?;
+    tx.work_added();
+    Ok(())
+}
+
+/// An instant some seconds later.
+pub(crate) fn after(now: Timestamp, seconds: u32) -> Timestamp {
+    now.saturating_add(SignedDuration::from_secs(seconds.into()))
+        .unwrap_or(Timestamp::MAX)
+}
+
+/// How long a unit rests after its n-th failure, seconds: a full disk is not freed by trying at once.
+const fn backoff_s(failures: u32) -> u32 {
+    let doubled = if failures < 6 { 1 << failures } else { 60 };
+    if doubled < 60 { doubled } else { 60 }
+}

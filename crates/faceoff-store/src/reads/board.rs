@@ -1,0 +1,74 @@
+use crate::{
+    column::{Instant, Json},
+    error::Result,
+    store::Store,
+    tables::teams::Team,
+};
+use faceoff_types::{EvaluationId, EvaluationResult, RunId, SubmissionId, TeamId, TeamName};
+use jiff::{Timestamp, civil::Date};
+use sqlx::types::Text;
+
+/// What a board row is made of.
+#[derive(Debug, Clone)]
+pub struct BoardRecord {
+    /// Whose row it is.
+    pub team: Team,
+    /// What was evaluated.
+    pub submission: SubmissionId,
+    /// When it was uploaded.
+    pub submitted_at: Timestamp,
+    /// The agent's own name.
+    pub agent_name: Option<String>,
+    /// The team's newest finished evaluation.
+    pub evaluation: EvaluationId,
+    /// The evaluation's episodes.
+    pub run: RunId,
+    /// The UTC day of the evaluation.
+    pub day: Date,
+    /// When it was scored.
+    pub finished_at: Timestamp,
+    /// The score.
+    pub result: EvaluationResult,
+}
+
+impl Store {
+    /// What the board is made of: each team's newest finished evaluation, in the teams' order of
+    /// names. Ranks and tiers are the scoring's.
+    pub async fn board(&self) -> Result<Vec<BoardRecord>> {
+        let rows = sqlx::query!(
+            r#"/* board */ SELECT t.id AS "team: Text<TeamId>", t.name AS "name: Text<TeamName>",
+                      t.created_at AS "invited_at: Instant",
+                      s.id AS "submission: Text<SubmissionId>",
+                      s.created_at AS "submitted_at: Instant", s.agent_name,
+                      e.id AS "evaluation: Text<EvaluationId>", e.run_id AS "run: Text<RunId>",
+                      e.day AS "day: Text<Date>", e.finished_at AS "finished_at!: Instant",
+                      e.result AS "result!: Json<EvaluationResult>"
+               FROM teams t
+               JOIN evaluations e ON e.rowid = (SELECT n.rowid FROM evaluations n
+                                                WHERE n.team_id = t.id AND n.state = 'finished'
+                                                ORDER BY n.day DESC LIMIT 1)
+               JOIN submissions s ON s.id = e.submission_id
+               ORDER BY t.name"#
+        )
+        .fetch_all(&self.database.read)
+        .await?;
+        Ok(rows
+            .into_iter()
+            .map(|row| BoardRecord {
+                team: Team {
+                    id: row.team.0,
+                    name: row.name.0,
+                    created_at: row.invited_at.0,
+                },
+                submission: row.submission.0,
+                submitted_at: row.submitted_at.0,
+                agent_name: row.agent_name,
+                evaluation: row.evaluation.0,
+                run: row.run.0,
+                day: row.day.0,
+                finished_at: row.finished_at.0,
+                result: row.result.0,
+            })
+            .collect())
+    }
+}

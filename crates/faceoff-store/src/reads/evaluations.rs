@@ -1,0 +1,64 @@
+use crate::{
+    error::{Result, StoreError},
+    reads::progress,
+    store::Store,
+    tables::evaluations::{self, Evaluation, EvaluationRow},
+};
+use faceoff_types::{EvaluationId, TeamId};
+use jiff::civil::Date;
+use sqlx::SqliteConnection;
+
+/// Adds the progress of those that run.
+async fn with_progress(
+    connection: &mut SqliteConnection,
+    rows: Vec<EvaluationRow>,
+) -> Result<Vec<Evaluation>> {
+    let running: Vec<_> = rows
+        .iter()
+        .filter_map(EvaluationRow::run_under_way)
+        .collect();
+    let done = progress::of_runs(connection, &running).await?;
+    rows.into_iter()
+        .map(|row| {
+            let run = row.run_under_way();
+            let done = run.and_then(|run| done.get(&run).copied());
+            row.into_evaluation(done.unwrap_or(0))
+        })
+        .collect()
+}
+
+/// One evaluation with its progress.
+pub(crate) async fn find(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+) -> Result<Evaluation> {
+    let row = evaluations::find(connection, id).await?;
+    let mut found = with_progress(connection, vec![row]).await?;
+    found.pop().ok_or(StoreError::NotFound("evaluation"))
+}
+
+impl Store {
+    /// The evaluation with this id.
+    pub async fn evaluation(&self, id: EvaluationId) -> Result<Evaluation> {
+        find(&mut *self.database.read.begin().await?, id).await
+    }
+
+    /// A team's evaluations, newest first.
+    pub async fn evaluations_of(&self, team: TeamId) -> Result<Vec<Evaluation>> {
+        let mut tx = self.database.read.begin().await?;
+        let rows = evaluations::of_team(&mut tx, team).await?;
+        with_progress(&mut tx, rows).await
+    }
+
+    /// The evaluations of a UTC day, in the order in which they were queued.
+    pub async fn evaluations_on(&self, day: Date) -> Result<Vec<Evaluation>> {
+        let mut tx = self.database.read.begin().await?;
+        let rows = evaluations::on_day(&mut tx, day).await?;
+        with_progress(&mut tx, rows).await
+    }
+
+    /// The days that have evaluations, the newest first, each with how many of them are finished.
+    pub async fn days(&self) -> Result<Vec<(Date, u32)>> {
+        evaluations::days(&mut *self.database.read.acquire().await?).await
+    }
+}

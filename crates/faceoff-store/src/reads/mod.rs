@@ -1,0 +1,12 @@
+//! What the API and the pages ask: no one waits for it, and it changes nothing.
+
+pub(crate) mod ablations;
+pub(crate) mod board;
+pub(crate) mod evaluations;
+mod events;
+pub(crate) mod progress;
+pub(crate) mod runs;
+mod season;
+mod submissions;
+mod summaries;
+mod teams;

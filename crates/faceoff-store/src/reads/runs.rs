@@ -1,0 +1,75 @@
+use crate::{
+    error::Result,
+    store::Store,
+    tables::shards::{self, Shard},
+};
+use faceoff_types::{AgentFault, EpisodeOutcome, RunId};
+
+/// How much of its agent's standard error is shown of a failed run, bytes; the protocol's bound for
+/// one shard.
+const LOG_TAIL_BYTES: usize = 64 * 1024;
+
+/// What an agent did wrong in a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunFaults {
+    /// Every fault of the shards that were committed, in order of play.
+    pub faults: Vec<AgentFault>,
+    /// The agent's standard error in the shards with faults, the last 64 KiB.
+    pub log: String,
+}
+
+impl Store {
+    /// The shards of a run in (task, first episode) order, with recording keys.
+    pub async fn shards(&self, run: RunId) -> Result<Vec<Shard>> {
+        shards::of_run(&mut *self.database.read.acquire().await?, run).await
+    }
+
+    /// The outcomes of a run's committed shards in (task, episode) order: all that scoring needs,
+    /// without opening a recording.
+    pub async fn outcomes(&self, run: RunId) -> Result<Vec<EpisodeOutcome>> {
+        shards::outcomes(&mut *self.database.read.acquire().await?, run).await
+    }
+
+    /// What the agent did wrong in a run, and what it said.
+    pub async fn run_faults(&self, run: RunId) -> Result<RunFaults> {
+        let faulty = shards::faulty(&mut *self.database.read.acquire().await?, run).await?;
+        let mut faults = Vec::new();
+        let mut log = String::new();
+        for shard in faulty {
+            let of_shard = shard.outcomes.0.into_iter();
+            faults.extend(of_shard.filter_map(|outcome| outcome.fault));
+            if !shard.log.is_empty() {
+                log.push_str(&format!(
+                    "== {} from episode {} ==\n",
+                    shard.task.0, shard.first_episode
+                ));
+                log.push_str(shard.log.trim_end());
+                log.push('\n');
+            }
+        }
+        let log = tail(&log, LOG_TAIL_BYTES).to_owned();
+        Ok(RunFaults { faults, log })
+    }
+}
+
+/// The last `bytes` bytes, or a little less: no character is cut.
+fn tail(text: &str, bytes: usize) -> &str {
+    let mut start = text.len().saturating_sub(bytes);
+    while !text.is_char_boundary(start) {
+        start += 1;
+    }
+    &text[start..]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::tail;
+
+    #[test]
+    fn a_log_is_cut_between_characters() {
+        assert_eq!(tail("abc", 5), "abc");
+        assert_eq!(tail("abc", 2), "bc");
+        assert_eq!(tail("aéb", 2), "b");
+        assert_eq!(tail("", 2), "");
+    }
+}

@@ -1,0 +1,176 @@
+use crate::{
+    column::Instant,
+    error::{Result, StoreError},
+};
+use faceoff_types::{AblationId, Profile, RunId, SubmissionId};
+use jiff::Timestamp;
+use sqlx::{SqliteConnection, types::Text};
+use std::collections::BTreeMap;
+
+/// A submission under each perturbation alone: one run per profile, on the same episodes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ablation {
+    /// Drawn when it was ordered.
+    pub id: AblationId,
+    /// What is played.
+    pub submission: SubmissionId,
+    /// One for each of [`Profile::ABLATION`], all of the same plan otherwise.
+    pub runs: BTreeMap<Profile, RunId>,
+    /// Episodes of each task and profile.
+    pub episodes_per_task: u32,
+    /// When it was ordered.
+    pub created_at: Timestamp,
+    /// How far it is.
+    pub state: AblationState,
+}
+
+/// An ablation's way.
+#[derive(Debug, Clone, PartialEq)]
+pub enum AblationState {
+    /// It waits, or is being played.
+    Open {
+        /// As far as the workers have told.
+        episodes_done: u32,
+        /// Episodes over all profiles and tasks.
+        episodes_total: u32,
+    },
+    /// All profiles are played.
+    Finished {
+        /// When the last shard was committed.
+        finished_at: Timestamp,
+    },
+    /// It ended without a result.
+    Failed {
+        /// When it was given up.
+        finished_at: Timestamp,
+        /// Whose fault it was and which.
+        reason: String,
+    },
+}
+
+/// An ablation without its runs.
+pub(crate) struct AblationRow {
+    pub(crate) id: Text<AblationId>,
+    pub(crate) created_at: Instant,
+    pub(crate) finished_at: Option<Instant>,
+    pub(crate) reason: Option<String>,
+}
+
+/// The newest ablation of a submission.
+pub(crate) async fn newest(
+    connection: &mut SqliteConnection,
+    submission: SubmissionId,
+) -> Result<Option<AblationRow>> {
+    let submission = Text(submission);
+    Ok(sqlx::query_as!(
+        AblationRow,
+        r#"SELECT id AS "id: Text<AblationId>", created_at AS "created_at: Instant",
+                  finished_at AS "finished_at: Instant", reason
+           FROM ablations WHERE submission_id = ? ORDER BY created_at DESC, id DESC LIMIT 1"#,
+        submission
+    )
+    .fetch_optional(connection)
+    .await?)
+}
+
+/// The ablation that owns a run, if one does.
+pub(crate) async fn of_run(
+    connection: &mut SqliteConnection,
+    run: RunId,
+) -> Result<Option<AblationId>> {
+    let run = Text(run);
+    let found = sqlx::query_scalar!(
+        r#"SELECT ablation_id AS "id: Text<AblationId>" FROM ablation_runs WHERE run_id = ?"#,
+        run
+    )
+    .fetch_optional(connection)
+    .await?;
+    Ok(found.map(|id| id.0))
+}
+
+/// The runs of an ablation.
+pub(crate) async fn runs(connection: &mut SqliteConnection, id: AblationId) -> Result<Vec<RunId>> {
+    let id = Text(id);
+    let runs = sqlx::query_scalar!(
+        r#"SELECT run_id AS "id: Text<RunId>" FROM ablation_runs WHERE ablation_id = ?"#,
+        id
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(runs.into_iter().map(|id| id.0).collect())
+}
+
+/// [`StoreError::Conflict`] while another one of the submission is open.
+pub(crate) async fn insert(
+    connection: &mut SqliteConnection,
+    id: AblationId,
+    submission: SubmissionId,
+    now: Timestamp,
+) -> Result<()> {
+    let (id, submission, now) = (Text(id), Text(submission), Instant(now));
+    sqlx::query!(
+        "INSERT INTO ablations (id, submission_id, created_at) VALUES (?, ?, ?)",
+        id,
+        submission,
+        now,
+    )
+    .execute(connection)
+    .await
+    .map_err(|error| {
+        if StoreError::is_duplicate(&error, "ablations.submission_id") {
+            StoreError::Conflict(
+                "an ablation of this submission is under way: wait for its end".into(),
+            )
+        } else {
+            error.into()
+        }
+    })?;
+    Ok(())
+}
+
+pub(crate) async fn insert_run(
+    connection: &mut SqliteConnection,
+    id: AblationId,
+    run: RunId,
+) -> Result<()> {
+    let (id, run) = (Text(id), Text(run));
+    sqlx::query!(
+        "INSERT INTO ablation_runs (ablation_id, run_id) VALUES (?, ?)",
+        id,
+        run
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Ends an ablation, without a result if there is a `reason`.
+pub(crate) async fn set_over(
+    connection: &mut SqliteConnection,
+    id: AblationId,
+    reason: Option<&str>,
+    now: Timestamp,
+) -> Result<()> {
+    let (id, now) = (Text(id), Instant(now));
+    sqlx::query!(
+        "UPDATE ablations SET finished_at = ?, reason = ? WHERE id = ? AND finished_at IS NULL",
+        now,
+        reason,
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Is every run of the ablation played?
+pub(crate) async fn all_played(connection: &mut SqliteConnection, id: AblationId) -> Result<bool> {
+    let id = Text(id);
+    Ok(sqlx::query_scalar!(
+        r#"SELECT NOT EXISTS (SELECT 1 FROM ablation_runs a JOIN runs r ON r.id = a.run_id
+                              WHERE a.ablation_id = ? AND r.state <> 'played') AS "played!: bool""#,
+        id,
+    )
+    .fetch_one(connection)
+    .await?)
+}

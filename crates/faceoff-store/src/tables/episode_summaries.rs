@@ -1,0 +1,50 @@
+//! What boards and comparisons need of a run's episodes. Derived data, which may be made again.
+
+use crate::{column::Json, error::Result};
+use faceoff_types::RunId;
+use sqlx::{SqliteConnection, types::Text};
+use std::collections::HashMap;
+
+/// The summaries of these runs that were stored under `version`.
+pub(crate) async fn of_runs(
+    connection: &mut SqliteConnection,
+    runs: &[RunId],
+    version: u32,
+) -> Result<HashMap<RunId, String>> {
+    if runs.is_empty() {
+        return Ok(HashMap::new());
+    }
+    let runs = Json(runs);
+    let rows = sqlx::query!(
+        r#"SELECT run_id AS "run: Text<RunId>", summary FROM episode_summaries
+           WHERE version = ? AND run_id IN (SELECT value FROM json_each(?))"#,
+        version,
+        runs,
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows
+        .into_iter()
+        .map(|row| (row.run.0, row.summary))
+        .collect())
+}
+
+/// Keeps a summary in place of an earlier one.
+pub(crate) async fn put(
+    connection: &mut SqliteConnection,
+    run: RunId,
+    version: u32,
+    summary: &str,
+) -> Result<()> {
+    let run = Text(run);
+    sqlx::query!(
+        "INSERT INTO episode_summaries (run_id, version, summary) VALUES (?, ?, ?)
+         ON CONFLICT (run_id) DO UPDATE SET version = excluded.version, summary = excluded.summary",
+        run,
+        version,
+        summary,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}

@@ -1,0 +1,399 @@
+use crate::{
+    column::{Instant, Json},
+    error::{Result, StoreError},
+    tables::{plan::RunPlan, runs::RunState},
+};
+use faceoff_types::{EvaluationId, EvaluationResult, Profile, RunId, SubmissionId, Task, TeamId};
+use jiff::{Timestamp, civil::Date};
+use sqlx::{SqliteConnection, types::Text};
+
+/// A submission's run that counts: it takes its team's turn of a day and is scored.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Evaluation {
+    /// Part of its URLs.
+    pub id: EvaluationId,
+    /// What is evaluated.
+    pub submission: SubmissionId,
+    /// Whose turn it takes.
+    pub team: TeamId,
+    /// The UTC day whose turn and seed it takes.
+    pub day: Date,
+    /// Its episodes and shards.
+    pub run: RunId,
+    /// What the run plays.
+    pub plan: RunPlan,
+    /// When it was queued.
+    pub created_at: Timestamp,
+    /// How far it is.
+    pub state: EvaluationState,
+}
+
+/// An evaluation's way from the queue to the board.
+#[derive(Debug, Clone, PartialEq)]
+pub enum EvaluationState {
+    /// No shard was begun.
+    Queued,
+    /// Shards are played.
+    Running {
+        /// As far as the workers have told.
+        episodes_done: u32,
+        /// Of all tasks.
+        episodes_total: u32,
+    },
+    /// All shards are in, the score is being computed.
+    Finalising,
+    /// Scored.
+    Finished {
+        /// When score and dataset were stored.
+        finished_at: Timestamp,
+        /// The score.
+        result: Box<EvaluationResult>,
+        /// Artifact key of the dataset archive.
+        dataset: String,
+        /// BLAKE3 of the archive, 64 hexadecimal digits; unknown of those that older programs made.
+        dataset_blake3: Option<String>,
+    },
+    /// Too many agent faults; no score. They and the log are read by themselves
+    /// ([`Store::run_faults`](crate::Store::run_faults)).
+    AgentFailed {
+        /// When the fault was committed that was one too many.
+        finished_at: Timestamp,
+    },
+    /// Our fault; the day's turn was given back.
+    PlatformFailed {
+        /// When it was given up.
+        finished_at: Timestamp,
+        /// What went wrong.
+        reason: String,
+    },
+    /// Stopped by an organiser; the day's turn was given back.
+    Cancelled {
+        /// When it was stopped.
+        finished_at: Timestamp,
+        /// As told to the team.
+        reason: String,
+    },
+}
+
+impl EvaluationState {
+    /// Has it come to an end, whichever?
+    #[must_use]
+    pub const fn is_over(&self) -> bool {
+        !matches!(self, Self::Queued | Self::Running { .. } | Self::Finalising)
+    }
+
+    /// Does it use up its team's turn of the day?
+    #[must_use]
+    pub const fn takes_turn(&self) -> bool {
+        !matches!(self, Self::PlatformFailed { .. } | Self::Cancelled { .. })
+    }
+}
+
+/// An evaluation with its run, without the run's progress.
+pub(crate) struct EvaluationRow {
+    id: Text<EvaluationId>,
+    submission_id: Text<SubmissionId>,
+    team_id: Text<TeamId>,
+    day: Text<Date>,
+    run_id: Text<RunId>,
+    profile: Text<Profile>,
+    tasks: Json<Vec<Task>>,
+    episodes_per_task: u32,
+    episodes_per_shard: u32,
+    max_faults: u32,
+    run_state: RunState,
+    created_at: Instant,
+    state: String,
+    finished_at: Option<Instant>,
+    result: Option<Json<EvaluationResult>>,
+    dataset: Option<String>,
+    dataset_blake3: Option<String>,
+    reason: Option<String>,
+}
+
+impl EvaluationRow {
+    /// The run, if its progress is part of the evaluation's state.
+    pub(crate) fn run_under_way(&self) -> Option<RunId> {
+        (self.state == "open" && self.run_state == RunState::Running).then_some(self.run_id.0)
+    }
+
+    pub(crate) fn into_evaluation(self, episodes_done: u32) -> Result<Evaluation> {
+        let damaged = |what: &str| {
+            StoreError::Damaged(format!("evaluation {}: {} {what}", self.id.0, self.state))
+        };
+        let plan = RunPlan {
+            profile: self.profile.0,
+            tasks: self.tasks.0,
+            episodes_per_task: self.episodes_per_task,
+            episodes_per_shard: self.episodes_per_shard,
+            max_faults: self.max_faults,
+        };
+        let finished_at = || {
+            self.finished_at
+                .map(|at| at.0)
+                .ok_or_else(|| damaged("without an end"))
+        };
+        let reason = || {
+            self.reason
+                .clone()
+                .ok_or_else(|| damaged("without a reason"))
+        };
+        let episodes_total = plan.episodes_total();
+        let state = match (self.state.as_str(), self.run_state) {
+            ("open", RunState::Queued) => EvaluationState::Queued,
+            ("open", RunState::Running) => EvaluationState::Running {
+                episodes_done: episodes_done.min(episodes_total),
+                episodes_total,
+            },
+            ("open", RunState::Played) => EvaluationState::Finalising,
+            ("finished", _) => EvaluationState::Finished {
+                finished_at: finished_at()?,
+                result: match self.result {
+                    Some(result) => Box::new(result.0),
+                    None => return Err(damaged("without a result")),
+                },
+                dataset: match self.dataset {
+                    Some(dataset) => dataset,
+                    None => return Err(damaged("without a dataset")),
+                },
+                dataset_blake3: self.dataset_blake3,
+            },
+            ("agent_failed", _) => EvaluationState::AgentFailed {
+                finished_at: finished_at()?,
+            },
+            ("platform_failed", _) => EvaluationState::PlatformFailed {
+                finished_at: finished_at()?,
+                reason: reason()?,
+            },
+            ("cancelled", _) => EvaluationState::Cancelled {
+                finished_at: finished_at()?,
+                reason: reason()?,
+            },
+            (_, run) => return Err(damaged(&format!("with a run that is {run:?}"))),
+        };
+        Ok(Evaluation {
+            id: self.id.0,
+            submission: self.submission_id.0,
+            team: self.team_id.0,
+            day: self.day.0,
+            run: self.run_id.0,
+            plan,
+            created_at: self.created_at.0,
+            state,
+        })
+    }
+}
+
+/// `SELECT` of evaluations `e` with their runs `r`; the argument is what follows `FROM`'s tables.
+macro_rules! select_evaluations {
+    ($tail:literal $(, $argument:expr)*) => {
+        sqlx::query_as!(
+            EvaluationRow,
+            r#"SELECT e.id AS "id: Text<EvaluationId>",
+                      e.submission_id AS "submission_id: Text<SubmissionId>",
+                      e.team_id AS "team_id: Text<TeamId>", e.day AS "day: Text<Date>",
+                      e.run_id AS "run_id: Text<RunId>", r.profile AS "profile: Text<Profile>",
+                      r.tasks AS "tasks: Json<Vec<Task>>",
+                      r.episodes_per_task AS "episodes_per_task: u32",
+                      r.episodes_per_shard AS "episodes_per_shard: u32",
+                      r.max_faults AS "max_faults: u32", r.state AS "run_state: RunState",
+                      e.created_at AS "created_at: Instant", e.state,
+                      e.finished_at AS "finished_at: Instant",
+                      e.result AS "result: Json<EvaluationResult>", e.dataset, e.dataset_blake3,
+                      e.reason
+               FROM evaluations e JOIN runs r ON r.id = e.run_id "# + $tail
+            $(, $argument)*
+        )
+    };
+}
+
+pub(crate) async fn find(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+) -> Result<EvaluationRow> {
+    let id = Text(id);
+    select_evaluations!("WHERE e.id = ?", id)
+        .fetch_optional(connection)
+        .await?
+        .ok_or(StoreError::NotFound("evaluation"))
+}
+
+/// A team's evaluations, newest first.
+pub(crate) async fn of_team(
+    connection: &mut SqliteConnection,
+    team: TeamId,
+) -> Result<Vec<EvaluationRow>> {
+    let team = Text(team);
+    Ok(select_evaluations!(
+        "WHERE e.team_id = ? ORDER BY e.created_at DESC, e.id DESC",
+        team
+    )
+    .fetch_all(connection)
+    .await?)
+}
+
+/// The evaluations of a day, in the order in which they were queued.
+pub(crate) async fn on_day(
+    connection: &mut SqliteConnection,
+    day: Date,
+) -> Result<Vec<EvaluationRow>> {
+    let day = Text(day);
+    Ok(
+        select_evaluations!("WHERE e.day = ? ORDER BY e.created_at, e.id", day)
+            .fetch_all(connection)
+            .await?,
+    )
+}
+
+/// The evaluation that owns a run, if one does.
+pub(crate) async fn of_run(
+    connection: &mut SqliteConnection,
+    run: RunId,
+) -> Result<Option<EvaluationId>> {
+    let run = Text(run);
+    let found = sqlx::query_scalar!(
+        r#"SELECT id AS "id: Text<EvaluationId>" FROM evaluations WHERE run_id = ?"#,
+        run
+    )
+    .fetch_optional(connection)
+    .await?;
+    Ok(found.map(|id| id.0))
+}
+
+/// The run that an evaluation owns.
+pub(crate) async fn run_of(connection: &mut SqliteConnection, id: EvaluationId) -> Result<RunId> {
+    let id = Text(id);
+    sqlx::query_scalar!(
+        r#"SELECT run_id AS "id: Text<RunId>" FROM evaluations WHERE id = ?"#,
+        id
+    )
+    .fetch_optional(connection)
+    .await?
+    .map(|run| run.0)
+    .ok_or(StoreError::NotFound("evaluation"))
+}
+
+/// An evaluation to be queued.
+pub(crate) struct NewEvaluation {
+    pub(crate) id: EvaluationId,
+    pub(crate) submission: SubmissionId,
+    pub(crate) team: TeamId,
+    pub(crate) day: Date,
+    pub(crate) run: RunId,
+}
+
+/// Takes the team's turn of the day; [`StoreError::AlreadyEvaluated`] if that is used.
+pub(crate) async fn insert(
+    connection: &mut SqliteConnection,
+    new: &NewEvaluation,
+    now: Timestamp,
+) -> Result<()> {
+    let (id, submission, team) = (Text(new.id), Text(new.submission), Text(new.team));
+    let (day, run, now) = (Text(new.day), Text(new.run), Instant(now));
+    sqlx::query!(
+        "INSERT INTO evaluations (id, submission_id, team_id, day, run_id, created_at, state)
+         VALUES (?, ?, ?, ?, ?, ?, 'open')",
+        id,
+        submission,
+        team,
+        day,
+        run,
+        now,
+    )
+    .execute(connection)
+    .await
+    .map_err(|error| match new.day.tomorrow() {
+        Ok(next) if StoreError::is_duplicate(&error, "evaluations.day") => {
+            StoreError::AlreadyEvaluated { day: new.day, next }
+        }
+        _ => error.into(),
+    })?;
+    Ok(())
+}
+
+pub(crate) async fn set_finished(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+    result: &EvaluationResult,
+    dataset: &str,
+    dataset_blake3: &str,
+    now: Timestamp,
+) -> Result<()> {
+    let (id, result, now) = (Text(id), Json(result), Instant(now));
+    sqlx::query!(
+        "UPDATE evaluations SET state = 'finished', finished_at = ?, result = ?, dataset = ?,
+                                dataset_blake3 = ?
+         WHERE id = ?",
+        now,
+        result,
+        dataset,
+        dataset_blake3,
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// How an evaluation ends without a score.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Failure<'a> {
+    Agent,
+    /// With what went wrong.
+    Platform(&'a str),
+    /// With why.
+    Cancelled(&'a str),
+}
+
+pub(crate) async fn set_failed(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+    failure: Failure<'_>,
+    now: Timestamp,
+) -> Result<()> {
+    let (id, now) = (Text(id), Instant(now));
+    let (state, reason) = match failure {
+        Failure::Agent => ("agent_failed", None),
+        Failure::Platform(reason) => ("platform_failed", Some(reason)),
+        Failure::Cancelled(reason) => ("cancelled", Some(reason)),
+    };
+    sqlx::query!(
+        "UPDATE evaluations SET state = ?, finished_at = ?, reason = ? WHERE id = ?",
+        state,
+        now,
+        reason,
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// How many are not over, of one day or of all.
+pub(crate) async fn count_open(
+    connection: &mut SqliteConnection,
+    day: Option<Date>,
+) -> Result<u32> {
+    let day = day.map(Text);
+    Ok(sqlx::query_scalar!(
+        r#"SELECT COUNT(*) AS "count!: u32" FROM evaluations
+           WHERE state = 'open' AND (?1 IS NULL OR day = ?1)"#,
+        day
+    )
+    .fetch_one(connection)
+    .await?)
+}
+
+/// The days that have evaluations, the newest first, each with how many of them are finished.
+pub(crate) async fn days(connection: &mut SqliteConnection) -> Result<Vec<(Date, u32)>> {
+    let days = sqlx::query!(
+        r#"SELECT day AS "day: Text<Date>", SUM(state = 'finished') AS "finished!: u32"
+           FROM evaluations GROUP BY day ORDER BY day DESC"#
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(days
+        .into_iter()
+        .map(|row| (row.day.0, row.finished))
+        .collect())
+}

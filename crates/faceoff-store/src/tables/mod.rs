@@ -1,0 +1,16 @@
+//! The tables: rows as types, and changes of single rows. When a change may happen, and what else
+//! changes with it, is the operations' business.
+
+pub(crate) mod ablations;
+pub(crate) mod episode_summaries;
+pub(crate) mod evaluations;
+pub(crate) mod events;
+pub(crate) mod finalisations;
+pub(crate) mod plan;
+pub(crate) mod released_days;
+pub(crate) mod runs;
+pub(crate) mod season;
+pub(crate) mod shards;
+pub(crate) mod smoke_runs;
+pub(crate) mod submissions;
+pub(crate) mod teams;

@@ -1,0 +1,179 @@
+use crate::{
+    column::{Instant, Json},
+    error::{Result, StoreError},
+    tables::plan::RunPlan,
+};
+use faceoff_types::{Profile, RunId, SeedLabel, SubmissionId, Task};
+use jiff::Timestamp;
+use sqlx::{SqliteConnection, types::Text};
+
+/// Contestants, a profile and episodes, cut into shards.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// Part of the artifact keys of its recordings.
+    pub id: RunId,
+    /// What is played.
+    pub plan: RunPlan,
+    /// On which episodes.
+    pub seed: SeedLabel,
+    /// Are its shards recorded? If not, their outcomes are all that is kept.
+    pub keeps_recordings: bool,
+}
+
+/// How far a run is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, sqlx::Type)]
+#[sqlx(rename_all = "snake_case")]
+pub(crate) enum RunState {
+    /// No shard was claimed.
+    Queued,
+    Running,
+    /// Every shard is committed.
+    Played,
+    /// Its owner has ended without it.
+    Stopped,
+}
+
+/// Adds a run that nobody has begun, with its contestants from side 0 on.
+pub(crate) async fn insert(
+    connection: &mut SqliteConnection,
+    run: &Run,
+    contestants: &[SubmissionId],
+) -> Result<()> {
+    let (id, plan) = (Text(run.id), &run.plan);
+    let (profile, seed, tasks) = (Text(plan.profile), Text(run.seed), Json(&plan.tasks));
+    sqlx::query!(
+        "INSERT INTO runs (id, profile, seed, tasks, episodes_per_task, episodes_per_shard, max_faults,
+                           keeps_recordings, state)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, 'queued')",
+        id,
+        profile,
+        seed,
+        tasks,
+        plan.episodes_per_task,
+        plan.episodes_per_shard,
+        plan.max_faults,
+        run.keeps_recordings,
+    )
+    .execute(&mut *connection)
+    .await?;
+    for (side, submission) in (0_u32..).zip(contestants) {
+        let submission = Text(*submission);
+        sqlx::query!(
+            "INSERT INTO contestants (run_id, side, submission_id) VALUES (?, ?, ?)",
+            id,
+            side,
+            submission,
+        )
+        .execute(&mut *connection)
+        .await?;
+    }
+    Ok(())
+}
+
+pub(crate) async fn find(connection: &mut SqliteConnection, id: RunId) -> Result<Run> {
+    let id_text = Text(id);
+    let row = sqlx::query!(
+        r#"SELECT profile AS "profile: Text<Profile>", seed AS "seed: Text<SeedLabel>",
+                  tasks AS "tasks: Json<Vec<Task>>", episodes_per_task AS "episodes_per_task: u32",
+                  episodes_per_shard AS "episodes_per_shard: u32", max_faults AS "max_faults: u32",
+                  keeps_recordings AS "keeps_recordings: bool"
+           FROM runs WHERE id = ?"#,
+        id_text,
+    )
+    .fetch_optional(connection)
+    .await?
+    .ok_or(StoreError::NotFound("run"))?;
+    Ok(Run {
+        id,
+        plan: RunPlan {
+            profile: row.profile.0,
+            tasks: row.tasks.0,
+            episodes_per_task: row.episodes_per_task,
+            episodes_per_shard: row.episodes_per_shard,
+            max_faults: row.max_faults,
+        },
+        seed: row.seed.0,
+        keeps_recordings: row.keeps_recordings,
+    })
+}
+
+/// What plays, from side 0 on.
+pub(crate) async fn contestants(
+    connection: &mut SqliteConnection,
+    id: RunId,
+) -> Result<Vec<SubmissionId>> {
+    let id = Text(id);
+    let rows = sqlx::query_scalar!(
+        r#"SELECT submission_id AS "id: Text<SubmissionId>" FROM contestants
+           WHERE run_id = ? ORDER BY side"#,
+        id,
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows.into_iter().map(|id| id.0).collect())
+}
+
+/// A shard was claimed. True if it was the run's first.
+pub(crate) async fn begin(connection: &mut SqliteConnection, id: RunId) -> Result<bool> {
+    let id = Text(id);
+    let begun = sqlx::query!(
+        "UPDATE runs SET state = 'running' WHERE id = ? AND state = 'queued'",
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(begun.rows_affected() == 1)
+}
+
+/// Every shard is committed.
+pub(crate) async fn set_played(connection: &mut SqliteConnection, id: RunId) -> Result<()> {
+    let id = Text(id);
+    sqlx::query!("UPDATE runs SET state = 'played' WHERE id = ?", id)
+        .execute(connection)
+        .await?;
+    Ok(())
+}
+
+/// Ends a run that is not played.
+pub(crate) async fn set_stopped(connection: &mut SqliteConnection, id: RunId) -> Result<()> {
+    let id = Text(id);
+    sqlx::query!(
+        "UPDATE runs SET state = 'stopped' WHERE id = ? AND state IN ('queued', 'running')",
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// The runs whose recordings are kept although their evaluation was over at `before` or earlier.
+pub(crate) async fn with_old_recordings(
+    connection: &mut SqliteConnection,
+    before: Timestamp,
+) -> Result<Vec<RunId>> {
+    let before = Instant(before);
+    let runs = sqlx::query_scalar!(
+        r#"SELECT r.id AS "id: Text<RunId>" FROM runs r JOIN evaluations e ON e.run_id = r.id
+           WHERE r.keeps_recordings = 1 AND r.recordings_removed_at IS NULL AND e.finished_at <= ?"#,
+        before,
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(runs.into_iter().map(|id| id.0).collect())
+}
+
+pub(crate) async fn set_recordings_removed(
+    connection: &mut SqliteConnection,
+    id: RunId,
+    now: Timestamp,
+) -> Result<()> {
+    let (id, now) = (Text(id), Instant(now));
+    sqlx::query!(
+        "UPDATE runs SET recordings_removed_at = ? WHERE id = ?",
+        now,
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}

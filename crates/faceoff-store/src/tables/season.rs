@@ -1,0 +1,106 @@
+use crate::{
+    column::{Bytes32, Instant},
+    error::{Result, StoreError},
+};
+use faceoff_types::Seed;
+use jiff::{Timestamp, civil::Date};
+use sqlx::{SqliteConnection, types::Text};
+
+/// The season: one per data folder.
+#[derive(Debug, Clone)]
+pub struct Season {
+    /// As shown to teams.
+    pub name: String,
+    /// All seeds derive from it; published when the season closes.
+    pub secret: Seed,
+    /// BLAKE3 of the secret's 32 bytes, 64 hexadecimal digits; published before the season opens, so
+    /// that nobody can choose the episodes afterwards.
+    pub commitment: String,
+    /// When the data folder was first opened.
+    pub created_at: Timestamp,
+    /// When it was closed; `None` while it runs.
+    pub closed_at: Option<Timestamp>,
+}
+
+pub(crate) async fn read(connection: &mut SqliteConnection) -> Result<Season> {
+    let row = sqlx::query!(
+        r#"SELECT name, secret AS "secret: Bytes32", created_at AS "created_at: Instant",
+                  closed_at AS "closed_at: Instant" FROM season"#
+    )
+    .fetch_optional(connection)
+    .await?
+    .ok_or_else(|| StoreError::Damaged("the season is missing".into()))?;
+    Ok(Season {
+        name: row.name,
+        secret: Seed::from_bytes(row.secret.0),
+        commitment: blake3::hash(&row.secret.0).to_string(),
+        created_at: row.created_at.0,
+        closed_at: row.closed_at.map(|at| at.0),
+    })
+}
+
+/// Refuses what a closed season no longer takes.
+pub(crate) async fn check_open(connection: &mut SqliteConnection) -> Result<()> {
+    match read(connection).await?.closed_at {
+        Some(closed_at) => Err(StoreError::SeasonClosed { closed_at }),
+        None => Ok(()),
+    }
+}
+
+/// False if that was its name before.
+pub(crate) async fn rename(connection: &mut SqliteConnection, name: &str) -> Result<bool> {
+    let renamed = sqlx::query!("UPDATE season SET name = ?1 WHERE name <> ?1", name)
+        .execute(connection)
+        .await?;
+    Ok(renamed.rows_affected() > 0)
+}
+
+pub(crate) async fn close(connection: &mut SqliteConnection, now: Timestamp) -> Result<()> {
+    let now = Instant(now);
+    sqlx::query!("UPDATE season SET closed_at = ?", now)
+        .execute(connection)
+        .await?;
+    Ok(())
+}
+
+/// The last UTC day that the daily schedule has started; `None` before the first.
+pub(crate) async fn last_scheduled_day(connection: &mut SqliteConnection) -> Result<Option<Date>> {
+    let day = sqlx::query_scalar!(r#"SELECT last_scheduled_day AS "day: Text<Date>" FROM season"#)
+        .fetch_one(connection)
+        .await?;
+    Ok(day.map(|day| day.0))
+}
+
+/// Notes that the schedule starts `day`; false if it has started that day or a later one before.
+pub(crate) async fn note_scheduled_day(
+    connection: &mut SqliteConnection,
+    day: Date,
+) -> Result<bool> {
+    let day = Text(day);
+    // ISO dates sort as text
+    let noted = sqlx::query!(
+        "UPDATE season SET last_scheduled_day = ?1
+         WHERE last_scheduled_day IS NULL OR last_scheduled_day < ?1",
+        day,
+    )
+    .execute(connection)
+    .await?;
+    Ok(noted.rows_affected() > 0)
+}
+
+/// Gives a new data folder its season, with a secret from the operating system's generator.
+pub(crate) async fn draw_secret_once(connection: &mut SqliteConnection) -> Result<()> {
+    let mut secret = [0; 32];
+    getrandom::fill(&mut secret)
+        .map_err(|error| StoreError::Database(sqlx::Error::Io(std::io::Error::other(error))))?;
+    let secret = Bytes32(secret);
+    sqlx::query!(
+        "INSERT INTO season (id, name, secret, created_at)
+         VALUES (1, 'Season 1', ?, CAST(unixepoch('subsec') * 1000 AS INTEGER))
+         ON CONFLICT (id) DO NOTHING",
+        secret,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}

@@ -1,0 +1,265 @@
+use crate::{
+    column::{Instant, Json},
+    error::{Result, StoreError},
+};
+use faceoff_types::{EpisodeOutcome, RunId, ShardId, Task};
+use jiff::Timestamp;
+use sqlx::{SqliteConnection, types::Text};
+use uuid::Uuid;
+
+/// A range of episodes of one task of one run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shard {
+    /// Drawn when the run was cut.
+    pub id: ShardId,
+    /// What is played.
+    pub task: Task,
+    /// Its index within the run's task, from 0.
+    pub first_episode: u32,
+    /// One past the last episode.
+    pub end_episode: u32,
+    /// Artifact key prefix of its recording, once committed, if its run keeps recordings. The
+    /// artifacts are removed some time after the run's owner is over.
+    pub recording: Option<String>,
+}
+
+impl Shard {
+    /// How many episodes it plays.
+    #[must_use]
+    pub const fn episodes(&self) -> u32 {
+        self.end_episode - self.first_episode
+    }
+}
+
+/// What playing a shard yields.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShardCommit {
+    /// One outcome per episode, in order; fewer only if the shard was stopped by faults.
+    pub outcomes: Vec<EpisodeOutcome>,
+    /// Tail of the agent's standard error.
+    pub log: String,
+    /// The agent's faults exceeded the plan's bound within this shard.
+    pub stopped_by_faults: bool,
+    /// Artifact key prefix of the recording, uploaded before; `None` exactly if the run keeps none.
+    pub recording: Option<String>,
+}
+
+impl ShardCommit {
+    /// A commit that does not cover its shard would publish a score of fewer episodes.
+    pub(crate) fn check(&self, shard: &Shard, keeps_recordings: bool) -> Result<()> {
+        let episodes = shard.first_episode..shard.end_episode;
+        let in_order = self
+            .outcomes
+            .iter()
+            .zip(episodes.clone())
+            .all(|(outcome, episode)| outcome.task == shard.task && outcome.episode == episode);
+        let complete = self.outcomes.len() == episodes.len()
+            || (self.stopped_by_faults && self.outcomes.len() < episodes.len());
+        if !(in_order && complete) {
+            return Err(StoreError::Conflict(format!(
+                "the outcomes do not cover {} episodes {} to {}",
+                shard.task,
+                shard.first_episode,
+                shard.end_episode - 1
+            )));
+        }
+        match (&self.recording, keeps_recordings) {
+            (Some(_), true) | (None, false) => Ok(()),
+            (None, true) => Err(StoreError::Conflict(
+                "the run keeps recordings: upload the shard's and name its key".into(),
+            )),
+            (Some(key), false) => Err(StoreError::Conflict(format!(
+                "the run keeps no recordings: do not upload one (came: {key})"
+            ))),
+        }
+    }
+
+    pub(crate) fn agent_faults(&self) -> u32 {
+        let faults = self
+            .outcomes
+            .iter()
+            .filter(|outcome| outcome.fault.is_some())
+            .count();
+        u32::try_from(faults).unwrap_or(u32::MAX)
+    }
+}
+
+struct ShardRow {
+    id: Text<ShardId>,
+    run: Text<RunId>,
+    task: Text<Task>,
+    first_episode: u32,
+    end_episode: u32,
+    recording: Option<String>,
+}
+
+impl From<ShardRow> for Shard {
+    fn from(row: ShardRow) -> Self {
+        Self {
+            id: row.id.0,
+            task: row.task.0,
+            first_episode: row.first_episode,
+            end_episode: row.end_episode,
+            recording: row.recording,
+        }
+    }
+}
+
+/// `SELECT` of shards without outcomes and logs; the argument is what follows `FROM shards`.
+macro_rules! select_shards {
+    ($tail:literal $(, $argument:expr)*) => {
+        sqlx::query_as!(
+            ShardRow,
+            r#"SELECT id AS "id: Text<ShardId>", run_id AS "run: Text<RunId>",
+                      task AS "task: Text<Task>", first_episode AS "first_episode: u32",
+                      end_episode AS "end_episode: u32", recording
+               FROM shards "# + $tail
+            $(, $argument)*
+        )
+    };
+}
+
+/// The shard that a unit of work plays, and its run.
+pub(crate) async fn of_unit(
+    connection: &mut SqliteConnection,
+    unit: Uuid,
+) -> Result<Option<(RunId, Shard)>> {
+    let unit = Text(unit);
+    Ok(select_shards!("WHERE unit_id = ?", unit)
+        .fetch_optional(connection)
+        .await?
+        .map(|row| (row.run.0, row.into())))
+}
+
+/// The shards of a run in (task, first episode) order.
+pub(crate) async fn of_run(connection: &mut SqliteConnection, run: RunId) -> Result<Vec<Shard>> {
+    let run = Text(run);
+    let shards = select_shards!("WHERE run_id = ? ORDER BY position", run)
+        .fetch_all(connection)
+        .await?;
+    Ok(shards.into_iter().map(Shard::from).collect())
+}
+
+/// The units of work of a run's shards that are not committed.
+pub(crate) async fn open_units(connection: &mut SqliteConnection, run: RunId) -> Result<Vec<Uuid>> {
+    let run = Text(run);
+    let units = sqlx::query_scalar!(
+        r#"SELECT unit_id AS "id: Text<Uuid>" FROM shards WHERE run_id = ? AND committed_at IS NULL"#,
+        run,
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(units.into_iter().map(|id| id.0).collect())
+}
+
+/// Adds a shard at its `position` in the run, to be played by `unit`.
+pub(crate) async fn insert(
+    connection: &mut SqliteConnection,
+    run: RunId,
+    shard: &Shard,
+    position: u32,
+    unit: Uuid,
+) -> Result<()> {
+    let (id, run, unit, task) = (Text(shard.id), Text(run), Text(unit), Text(shard.task));
+    sqlx::query!(
+        "INSERT INTO shards (id, run_id, unit_id, position, task, first_episode, end_episode)
+         VALUES (?, ?, ?, ?, ?, ?, ?)",
+        id,
+        run,
+        unit,
+        position,
+        task,
+        shard.first_episode,
+        shard.end_episode,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Stores what playing an uncommitted shard yielded.
+pub(crate) async fn commit(
+    connection: &mut SqliteConnection,
+    id: ShardId,
+    commit: &ShardCommit,
+    now: Timestamp,
+) -> Result<()> {
+    let (id_text, now, outcomes) = (Text(id), Instant(now), Json(&commit.outcomes));
+    let agent_faults = commit.agent_faults();
+    let stored = sqlx::query!(
+        "UPDATE shards SET committed_at = ?, recording = ?, outcomes = ?, agent_faults = ?, log = ?
+         WHERE id = ? AND committed_at IS NULL",
+        now,
+        commit.recording,
+        outcomes,
+        agent_faults,
+        commit.log,
+        id_text,
+    )
+    .execute(connection)
+    .await?;
+    match stored.rows_affected() {
+        1 => Ok(()),
+        _ => Err(StoreError::Damaged(format!(
+            "shard {id}: committed, but its unit of work is open"
+        ))),
+    }
+}
+
+/// What a run's shards come to so far.
+pub(crate) struct Sums {
+    pub(crate) agent_faults: i64,
+    /// Shards that are not committed.
+    pub(crate) open: i64,
+}
+
+pub(crate) async fn sums(connection: &mut SqliteConnection, run: RunId) -> Result<Sums> {
+    let run = Text(run);
+    Ok(sqlx::query_as!(
+        Sums,
+        r#"SELECT COALESCE(SUM(agent_faults), 0) AS "agent_faults!: i64",
+                  COUNT(*) - COUNT(committed_at) AS "open!: i64"
+           FROM shards WHERE run_id = ?"#,
+        run,
+    )
+    .fetch_one(connection)
+    .await?)
+}
+
+/// The outcomes of a run's committed shards in (task, episode) order.
+pub(crate) async fn outcomes(
+    connection: &mut SqliteConnection,
+    run: RunId,
+) -> Result<Vec<EpisodeOutcome>> {
+    let run = Text(run);
+    let shards = sqlx::query_scalar!(
+        r#"SELECT outcomes AS "outcomes!: Json<Vec<EpisodeOutcome>>" FROM shards
+           WHERE run_id = ? AND outcomes IS NOT NULL ORDER BY position"#,
+        run,
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(shards.into_iter().flat_map(|outcomes| outcomes.0).collect())
+}
+
+/// A committed shard in which the agent broke the protocol or a limit.
+pub(crate) struct Faulty {
+    pub(crate) task: Text<Task>,
+    pub(crate) first_episode: u32,
+    pub(crate) outcomes: Json<Vec<EpisodeOutcome>>,
+    pub(crate) log: String,
+}
+
+/// In order of play.
+pub(crate) async fn faulty(connection: &mut SqliteConnection, run: RunId) -> Result<Vec<Faulty>> {
+    let run = Text(run);
+    Ok(sqlx::query_as!(
+        Faulty,
+        r#"SELECT task AS "task: Text<Task>", first_episode AS "first_episode: u32",
+                  outcomes AS "outcomes!: Json<Vec<EpisodeOutcome>>", log AS "log!"
+           FROM shards WHERE run_id = ? AND agent_faults > 0 ORDER BY position"#,
+        run,
+    )
+    .fetch_all(connection)
+    .await?)
+}

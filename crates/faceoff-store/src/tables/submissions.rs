@@ -1,0 +1,263 @@
+use crate::{
+    column::Instant,
+    error::{Result, StoreError},
+};
+use faceoff_types::{BundleRef, SubmissionId, TeamId};
+use jiff::{Timestamp, civil::Date};
+use sqlx::{SqliteConnection, types::Text};
+
+/// One uploaded agent.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Submission {
+    /// Drawn at the upload.
+    pub id: SubmissionId,
+    /// Whose it is.
+    pub team: TeamId,
+    /// What was uploaded.
+    pub bundle: BundleRef,
+    /// When its upload was complete.
+    pub created_at: Timestamp,
+    /// The agent's own name; known once the bundle was unpacked.
+    pub agent_name: Option<String>,
+    /// How far its smoke run is.
+    pub state: SubmissionState,
+}
+
+/// A submission's way through its smoke run. The agent's log is read by itself
+/// ([`Store::submission_log`](crate::Store::submission_log)).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum SubmissionState {
+    /// The smoke run is queued or running.
+    Validating,
+    /// It starts, answers and keeps time.
+    Valid,
+    /// The team's fault.
+    Invalid {
+        /// What is wrong and where.
+        reason: String,
+    },
+    /// Our fault, after several attempts; the team may upload again.
+    ValidationError {
+        /// What went wrong.
+        reason: String,
+    },
+}
+
+impl SubmissionState {
+    /// Has the smoke run come to an end, whichever?
+    #[must_use]
+    pub const fn is_settled(&self) -> bool {
+        !matches!(self, Self::Validating)
+    }
+}
+
+struct SubmissionRow {
+    id: Text<SubmissionId>,
+    team_id: Text<TeamId>,
+    bundle_key: String,
+    bundle_bytes: u64,
+    bundle_blake3: String,
+    bundle_file_name: String,
+    created_at: Instant,
+    agent_name: Option<String>,
+    state: String,
+    reason: Option<String>,
+}
+
+impl TryFrom<SubmissionRow> for Submission {
+    type Error = StoreError;
+
+    fn try_from(row: SubmissionRow) -> Result<Self> {
+        let state = match (row.state.as_str(), row.reason) {
+            ("validating", None) => SubmissionState::Validating,
+            ("valid", None) => SubmissionState::Valid,
+            ("invalid", Some(reason)) => SubmissionState::Invalid { reason },
+            ("validation_error", Some(reason)) => SubmissionState::ValidationError { reason },
+            (state, _) => {
+                return Err(StoreError::Damaged(format!(
+                    "submission {}: state {state:?} with other data than it has",
+                    row.id.0
+                )));
+            }
+        };
+        Ok(Self {
+            id: row.id.0,
+            team: row.team_id.0,
+            bundle: BundleRef {
+                key: row.bundle_key,
+                bytes: row.bundle_bytes,
+                blake3: row.bundle_blake3,
+                file_name: row.bundle_file_name,
+            },
+            created_at: row.created_at.0,
+            agent_name: row.agent_name,
+            state,
+        })
+    }
+}
+
+/// `SELECT` of submissions `s` without their logs; the argument is what follows `FROM submissions s`.
+macro_rules! select_submissions {
+    ($tail:literal $(, $argument:expr)*) => {
+        sqlx::query_as!(
+            SubmissionRow,
+            r#"SELECT s.id AS "id: Text<SubmissionId>", s.team_id AS "team_id: Text<TeamId>",
+                      s.bundle_key, s.bundle_bytes AS "bundle_bytes: u64", s.bundle_blake3,
+                      s.bundle_file_name, s.created_at AS "created_at: Instant",
+                      s.agent_name, s.state, s.reason
+               FROM submissions s "# + $tail
+            $(, $argument)*
+        )
+    };
+}
+
+pub(crate) async fn find(
+    connection: &mut SqliteConnection,
+    id: SubmissionId,
+) -> Result<Submission> {
+    let id = Text(id);
+    select_submissions!("WHERE s.id = ?", id)
+        .fetch_optional(connection)
+        .await?
+        .ok_or(StoreError::NotFound("submission"))?
+        .try_into()
+}
+
+/// A team's submissions, newest first.
+pub(crate) async fn of_team(
+    connection: &mut SqliteConnection,
+    team: TeamId,
+) -> Result<Vec<Submission>> {
+    let team = Text(team);
+    select_submissions!(
+        "WHERE s.team_id = ? ORDER BY s.created_at DESC, s.id DESC",
+        team
+    )
+    .fetch_all(connection)
+    .await?
+    .into_iter()
+    .map(Submission::try_from)
+    .collect()
+}
+
+/// The newest valid submission of each team whose turn of `day` is free, earliest first; of those
+/// uploaded before `released_at`, when the day's seed became known.
+pub(crate) async fn awaiting_turn(
+    connection: &mut SqliteConnection,
+    day: Date,
+    released_at: Option<Timestamp>,
+) -> Result<Vec<Submission>> {
+    let (day, released_at) = (Text(day), Instant(released_at.unwrap_or(Timestamp::MAX)));
+    select_submissions!(
+        "WHERE s.state = 'valid' AND s.created_at < ?1
+           AND NOT EXISTS (SELECT 1 FROM submissions n
+                           WHERE n.team_id = s.team_id AND n.state = 'valid'
+                             AND n.created_at < ?1 AND (n.created_at, n.id) > (s.created_at, s.id))
+           AND NOT EXISTS (SELECT 1 FROM evaluations e
+                           WHERE e.team_id = s.team_id AND e.day = ?2
+                             AND e.state NOT IN ('platform_failed', 'cancelled'))
+         ORDER BY s.created_at, s.id",
+        released_at,
+        day
+    )
+    .fetch_all(connection)
+    .await?
+    .into_iter()
+    .map(Submission::try_from)
+    .collect()
+}
+
+/// The tail of the agent's standard error in the smoke run; `None` if there was none, or it is not
+/// over.
+pub(crate) async fn log(
+    connection: &mut SqliteConnection,
+    id: SubmissionId,
+) -> Result<Option<String>> {
+    let id = Text(id);
+    sqlx::query_scalar!("SELECT log FROM submissions WHERE id = ?", id)
+        .fetch_optional(connection)
+        .await?
+        .ok_or(StoreError::NotFound("submission"))
+}
+
+/// Adds an upload whose smoke run is to come.
+pub(crate) async fn insert(
+    connection: &mut SqliteConnection,
+    id: SubmissionId,
+    team: TeamId,
+    bundle: &BundleRef,
+    now: Timestamp,
+) -> Result<()> {
+    let bytes = i64::try_from(bundle.bytes)
+        .map_err(|_| StoreError::Conflict("the bundle is larger than any disk".into()))?;
+    let (id, team, now) = (Text(id), Text(team), Instant(now));
+    sqlx::query!(
+        "INSERT INTO submissions (id, team_id, bundle_key, bundle_bytes, bundle_blake3,
+                                  bundle_file_name, created_at, state)
+         VALUES (?, ?, ?, ?, ?, ?, ?, 'validating')",
+        id,
+        team,
+        bundle.key,
+        bytes,
+        bundle.blake3,
+        bundle.file_name,
+        now,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+pub(crate) async fn set_valid(
+    connection: &mut SqliteConnection,
+    id: SubmissionId,
+    agent_name: &str,
+    log: &str,
+) -> Result<()> {
+    let id = Text(id);
+    sqlx::query!(
+        "UPDATE submissions SET state = 'valid', agent_name = ?, log = ? WHERE id = ?",
+        agent_name,
+        log,
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+pub(crate) async fn set_invalid(
+    connection: &mut SqliteConnection,
+    id: SubmissionId,
+    agent_name: Option<&str>,
+    reason: &str,
+    log: &str,
+) -> Result<()> {
+    let id = Text(id);
+    sqlx::query!(
+        "UPDATE submissions SET state = 'invalid', agent_name = ?, reason = ?, log = ? WHERE id = ?",
+        agent_name,
+        reason,
+        log,
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+pub(crate) async fn set_validation_error(
+    connection: &mut SqliteConnection,
+    id: SubmissionId,
+    reason: &str,
+) -> Result<()> {
+    let id = Text(id);
+    sqlx::query!(
+        "UPDATE submissions SET state = 'validation_error', reason = ? WHERE id = ?",
+        reason,
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}

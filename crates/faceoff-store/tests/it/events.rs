@@ -1,0 +1,212 @@
+//! What happened is recorded with the change, and told after it.
+
+use crate::fixture::*;
+use faceoff_store::*;
+use std::collections::BTreeSet;
+
+async fn recorded(f: &Fixture) -> Vec<EventRecord> {
+    f.store.events_after(0, 1000).await.unwrap()
+}
+
+/// The variants' names, as they are stored.
+fn kinds(records: &[EventRecord]) -> Vec<String> {
+    records
+        .iter()
+        .map(|record| {
+            let json = serde_json::to_value(&record.event).unwrap();
+            json["kind"].as_str().unwrap().to_owned()
+        })
+        .collect()
+}
+
+#[tokio::test]
+async fn a_submissions_way_to_the_board_is_recorded_step_by_step() {
+    let f = Fixture::new().await;
+    let submission = f.ready_team("Alpha").await;
+    let small = RunPlan {
+        tasks: vec![faceoff_types::Task::Hit],
+        ..plan()
+    };
+    let evaluation = f.evaluate(submission.id, &small).await;
+    let (claim, _, shard) = f.claim_shard().await;
+    f.play(&claim, &shard, 0).await;
+    let (claim, ..) = f.claim_shard().await;
+    f.store
+        .release_failed(&claim, "disk full", f.now)
+        .await
+        .unwrap();
+    f.store
+        .set_team_token(Actor::Organiser, submission.team, [9; 32], f.now)
+        .await
+        .unwrap();
+    let records = recorded(&f).await;
+    assert_eq!(
+        kinds(&records),
+        [
+            "team_created",
+            "submission_uploaded",
+            "submission_valid",
+            "evaluation_queued",
+            "evaluation_begun",
+            "shard_committed",
+            "unit_given_back",
+            "token_replaced",
+        ]
+    );
+    let team = Subject::Team(submission.team);
+    assert_eq!((records[0].subject, records[7].subject), (team, team));
+    assert_eq!(records[1].actor, Actor::Team(submission.team));
+    assert_eq!(records[1].subject, Subject::Submission(submission.id));
+    let slot = Actor::Worker("slot 0".into());
+    for record in &records[4..7] {
+        assert_eq!(record.actor, slot);
+        assert_eq!(record.subject, Subject::Evaluation(evaluation.id));
+        assert_eq!(record.at, f.now);
+    }
+    assert_eq!(
+        records[5].event,
+        Event::ShardCommitted {
+            run: evaluation.run,
+            shard: shard.id,
+            task: shard.task,
+            first_episode: 0,
+            end_episode: 2,
+            agent_faults: 0,
+        }
+    );
+    assert_eq!(
+        records[6].event,
+        Event::UnitGivenBack {
+            unit: claim.unit,
+            failures: 1,
+            reason: "disk full".into(),
+        }
+    );
+    // read on from where one was
+    let later = f.store.events_after(records[4].id, 2).await.unwrap();
+    assert_eq!(later, records[5..7]);
+}
+
+#[tokio::test]
+async fn every_end_is_recorded() {
+    let mut f = Fixture::new().await;
+    let alpha = f.ready_team("Alpha").await;
+    let small = RunPlan {
+        tasks: vec![faceoff_types::Task::Hit],
+        episodes_per_task: 1,
+        max_faults: 0,
+        ..plan()
+    };
+    // one day for each end
+    for end in 0..4 {
+        f.later(86_400);
+        let evaluation = f.evaluate(alpha.id, &small).await;
+        let (claim, _, shard) = f.claim_shard().await;
+        match end {
+            0 => {
+                f.play(&claim, &shard, 0).await;
+                let (claim, _) = f.claim_scoring().await;
+                f.finish(&claim, 7.0, "d").await;
+            }
+            1 => drop(f.play(&claim, &shard, 1).await),
+            2 => {
+                let stop =
+                    f.store
+                        .cancel_evaluation(Actor::Organiser, evaluation.id, "rain", f.now);
+                stop.await.unwrap();
+            }
+            _ => {
+                f.store.release(&claim, f.now).await.unwrap();
+                for _ in 0..MAX_ATTEMPTS {
+                    let (claim, ..) = f.claim_shard().await;
+                    let fail = f.store.release_failed(&claim, "no disk", f.now);
+                    fail.await.unwrap();
+                    f.later(60);
+                }
+            }
+        }
+    }
+    let today = "2026-03-02".parse().unwrap();
+    f.store
+        .start_day(Actor::Organiser, &small, f.now)
+        .await
+        .unwrap();
+    let released = f.store.release_day(Actor::Team(alpha.team), today, f.now);
+    assert_eq!(released.await.unwrap(), DaySeed::Public, "it is over");
+    let seen: BTreeSet<_> = kinds(&recorded(&f).await).into_iter().collect();
+    for kind in [
+        "evaluation_finalising",
+        "evaluation_finished",
+        "evaluation_agent_failed",
+        "evaluation_cancelled",
+        "evaluation_platform_failed",
+        "day_started",
+    ] {
+        assert!(seen.contains(kind), "{kind} is not in {seen:?}");
+    }
+}
+
+#[tokio::test]
+async fn what_fails_changes_nothing_and_tells_nobody() {
+    let f = Fixture::new().await;
+    let submission = f.ready_team("Alpha").await;
+    f.evaluate(submission.id, &plan()).await;
+    let before = recorded(&f).await;
+    let (mut events, mut signal) = (f.store.events(), f.store.work_signal());
+    signal.mark_unchanged();
+    // it fails after a run was cut and queued
+    let again = f
+        .store
+        .create_evaluation(Actor::Organiser, submission.id, &plan(), f.now)
+        .await;
+    assert!(matches!(again, Err(StoreError::AlreadyEvaluated { .. })));
+    assert_eq!(recorded(&f).await, before);
+    assert!(events.try_recv().is_err());
+    assert!(!signal.has_changed().unwrap());
+    for _ in 0..6 {
+        f.claim_shard().await;
+    }
+    assert!(f.claim().await.is_none(), "nothing of it is queued");
+}
+
+#[tokio::test]
+async fn waiting_workers_hear_of_new_work_and_pages_of_changes() {
+    let f = Fixture::new().await;
+    let mut signal = f.store.work_signal();
+    let mut events = f.store.events();
+    let team = f.team("Alpha").await;
+    assert!(!signal.has_changed().unwrap());
+    let submission = f.upload(&team).await;
+    assert!(signal.has_changed().unwrap());
+    signal.mark_unchanged();
+    f.validate().await;
+    let evaluation = f.evaluate(submission.id, &plan()).await;
+    assert!(signal.has_changed().unwrap());
+    let (claim, _, shard) = f.claim_shard().await;
+    f.store.heartbeat(&claim, 1, LEASE_S, f.now).await.unwrap();
+    signal.mark_unchanged();
+    f.store.release(&claim, f.now).await.unwrap();
+    assert!(signal.has_changed().unwrap());
+    signal.mark_unchanged();
+    let (claim, ..) = f.claim_shard().await;
+    f.play(&claim, &shard, 0).await;
+    assert!(!signal.has_changed().unwrap(), "nothing more to claim");
+
+    let told: Vec<_> = std::iter::from_fn(|| events.try_recv().ok()).collect();
+    let in_table = recorded(&f).await;
+    let of_table: Vec<_> = told
+        .iter()
+        .filter_map(|change| match change {
+            Change::Recorded(record) => Some(record.clone()),
+            Change::Progress(_) => None,
+        })
+        .collect();
+    assert_eq!(of_table, in_table, "what is told is what is stored");
+    let subject = Subject::Evaluation(evaluation.id);
+    let progress = told
+        .iter()
+        .filter(|change| **change == Change::Progress(subject))
+        .count();
+    assert_eq!(progress, 4, "two claims, a heartbeat and a release");
+    assert_eq!(told.last().unwrap().subject(), subject);
+}

@@ -1,0 +1,69 @@
+//! How SQLite goes about the queries: a list that grows with the season must not be scanned for one
+//! row of it.
+
+use crate::fixture::*;
+use sqlx::{Row, SqlSafeStr};
+
+/// What grows with teams × days.
+const LARGE: [&str; 7] = [
+    "evaluations",
+    "runs",
+    "shards",
+    "units",
+    "contestants",
+    "events",
+    "episode_summaries",
+];
+
+/// Indexes of what is open or still kept: a scan of one reads nothing that is over.
+const SMALL_INDEXES: [&str; 3] = ["units_open", "evaluations_open", "runs_with_recordings"];
+
+/// Queries that may read a whole index or table, by words of theirs, each with its reason.
+const MAY_SCAN: [(&str, &str); 2] = [
+    (
+        "SUM(state = 'finished')",
+        "counts all days, in an index alone",
+    ),
+    ("substr(worker, 1", "once at a worker's start"),
+];
+
+#[tokio::test]
+async fn no_query_scans_a_table_that_grows_with_the_season() {
+    let f = Fixture::new().await;
+    let mut connection = f.connection().await;
+    let mut boards = 0;
+    for (_, data) in query_data() {
+        let sql = data["query"].as_str().unwrap().to_owned();
+        boards += usize::from(sql.contains("/* board */"));
+        if MAY_SCAN.iter().any(|(words, _)| sql.contains(words)) {
+            continue;
+        }
+        let explain = sqlx::AssertSqlSafe(format!("EXPLAIN QUERY PLAN {sql}")).into_sql_str();
+        let plan = sqlx::raw_sql(explain)
+            .fetch_all(&mut connection)
+            .await
+            .unwrap();
+        for step in plan {
+            let step: String = step.get("detail");
+            let scanned = step.strip_prefix("SCAN ").map(|rest| {
+                let name = rest.split(' ').next().unwrap();
+                alias(&sql, name)
+            });
+            let small = SMALL_INDEXES.iter().any(|index| step.ends_with(index));
+            if let Some(table) = scanned.filter(|_| !small) {
+                assert!(!LARGE.contains(&table.as_str()), "{step} in {sql}");
+            }
+        }
+    }
+    assert_eq!(boards, 1, "the board is among them");
+}
+
+/// The table behind an alias of a query (`FROM evaluations e`).
+fn alias(sql: &str, name: &str) -> String {
+    let words: Vec<_> = sql.split_whitespace().collect();
+    words
+        .windows(2)
+        .find(|pair| pair[1] == name && LARGE.contains(&pair[0]))
+        .map_or(name, |pair| pair[0])
+        .to_owned()
+}

@@ -1,0 +1,65 @@
+use crate::seed::Seed;
+use jiff::civil::Date;
+use std::{fmt, str::FromStr};
+
+/// What the seed of a run follows from, beside the season's secret. Runs of one label meet the same
+/// episodes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum SeedLabel {
+    /// All that counts of one UTC day. Its text is the ISO date.
+    Day(Date),
+    /// All ablations of the season. Its text is `ablation`.
+    Ablation,
+}
+
+impl SeedLabel {
+    /// The seed that follows from the season's secret.
+    #[must_use]
+    pub fn seed(self, season_secret: &Seed) -> Seed {
+        match self {
+            Self::Day(day) => season_secret.day(day),
+            Self::Ablation => season_secret.ablation(),
+        }
+    }
+}
+
+impl fmt::Display for SeedLabel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Day(day) => day.fmt(f),
+            Self::Ablation => f.write_str("ablation"),
+        }
+    }
+}
+
+/// Text that is no seed label.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("not a seed label: expected a day as YYYY-MM-DD or “ablation”")]
+pub struct ParseSeedLabelError;
+
+impl FromStr for SeedLabel {
+    type Err = ParseSeedLabelError;
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        match s {
+            "ablation" => Ok(Self::Ablation),
+            day => day.parse().map(Self::Day).map_err(|_| ParseSeedLabelError),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_label_gives_the_seed_of_its_day_or_of_ablations() {
+        let secret = Seed::from_number(7);
+        let day = jiff::civil::date(2026, 3, 1);
+        assert_eq!(SeedLabel::Day(day).seed(&secret), secret.day(day));
+        assert_eq!(SeedLabel::Ablation.seed(&secret), secret.ablation());
+        for label in [SeedLabel::Day(day), SeedLabel::Ablation] {
+            assert_eq!(label.to_string().parse(), Ok(label));
+        }
+        assert!("someday".parse::<SeedLabel>().is_err());
+    }
+}
