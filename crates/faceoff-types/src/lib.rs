@@ -29,7 +29,7 @@ pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult, Violation
 pub use ruleset::RULESET;
 pub use seed::{ParseSeedError, Seed};
 pub use seed_label::{ParseSeedLabelError, SeedLabel};
-pub use task::{ParseTaskError, Task};
+pub use task::{MAX_EPISODES_PER_TASK, ParseTaskError, Task};
 pub use team_name::{InvalidTeamName, TeamName};
 pub use tier::Tier;
 pub use timing::{RoundTrips, SlotTiming};

@@ -14,7 +14,10 @@ use faceoff_runner::{
     bundle::{self, Bundle, BundleError, BundleLimits},
 };
 use faceoff_sandbox::{Isolation, Runtime};
-use faceoff_types::{AgentFault, EpisodeOutcome, EvaluationResult, Profile, RULESET, Seed, Task};
+use faceoff_types::{
+    AgentFault, EpisodeOutcome, EvaluationResult, MAX_EPISODES_PER_TASK, Profile, RULESET, Seed,
+    Task,
+};
 use faceoff_worker::CpuLayout;
 use rustix::thread::{CpuSet, sched_getaffinity};
 use std::{
@@ -37,7 +40,7 @@ pub struct EvalCommand {
     )]
     tasks: Vec<Task>,
     /// Episodes of each task
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_EPISODES_PER_TASK)))]
     episodes: u32,
     /// Perturbations: ideal, one factor's name, or evaluation
     #[arg(long, default_value = "evaluation")]
