@@ -1,6 +1,7 @@
 use crate::{
-    episode::{has_fault, time_or_fault_penalty},
-    episode_penalty, tier_of, wilson95,
+    episode::{episode_penalty, has_fault, time_or_fault_penalty},
+    interval::wilson95,
+    tier::tier_of,
 };
 use faceoff_types::{ComputationTimeSummary, EpisodeOutcome, TaskResult, ViolationCounts};
 

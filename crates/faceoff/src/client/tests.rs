@@ -3,8 +3,8 @@
 use super::*;
 use faceoff_http::{
     Clock, HttpConfig, HttpLimits,
-    api::{evaluations::EvaluationStatus, submissions::SubmissionStatus},
     token::hash_token,
+    views::{evaluation::EvaluationStatus, submission::SubmissionStatus},
 };
 use faceoff_store::{Claimed, RunPlan, SmokeOutcome, Store, Work};
 use faceoff_types::{Profile, Task};

@@ -2,7 +2,7 @@
 
 use super::{EvalCommand, Ground, write_json};
 use anyhow::Context;
-use faceoff_scoring::ProfileEffect;
+use faceoff_scoring::{EpisodeSummary, ProfileEffect};
 use faceoff_types::{Profile, RULESET, Seed, Task};
 use serde::Serialize;
 use std::{collections::BTreeMap, fmt::Write as _};
@@ -26,7 +26,8 @@ pub(super) fn run(command: &EvalCommand, ground: &Ground) -> anyhow::Result<()> 
         let played = command
             .play(ground, profile, &command.out.join(profile.as_str()))
             .with_context(|| format!("profile {profile}"))?;
-        runs.insert(profile, played.outcomes);
+        let summary = EpisodeSummary::of(&played.outcomes);
+        runs.insert(profile, summary.context("comparing the profiles")?);
     }
     let tasks = faceoff_scoring::ablation(&runs).context("comparing the profiles")?;
     let agent = ground.bundle.manifest.name.clone();
