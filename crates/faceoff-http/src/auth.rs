@@ -1,7 +1,7 @@
 //! Who is calling: extractors that turn the bearer token into a team or the organiser.
 
 use crate::{
-    App,
+    app::App,
     problem::{Problem, ProblemKind},
     token::{hash_token, same_hash},
 };
@@ -9,7 +9,7 @@ use axum::{
     extract::FromRequestParts,
     http::{HeaderMap, header, request::Parts},
 };
-use faceoff_store::{Actor, Team};
+use faceoff_store::{Actor, StoreError, Team};
 use faceoff_types::TeamId;
 
 /// A caller with a valid token.
@@ -20,19 +20,29 @@ pub(crate) enum Caller {
 }
 
 impl Caller {
-    /// May the caller see what belongs to `team`?
-    pub(crate) fn may_see(&self, team: TeamId) -> bool {
-        match self {
-            Self::Organiser => true,
-            Self::Team(own) => own.id == team,
-        }
-    }
-
     /// As the events name the caller.
     pub(crate) const fn actor(&self) -> Actor {
         match self {
             Self::Organiser => Actor::Organiser,
             Self::Team(team) => Actor::Team(team.id),
+        }
+    }
+
+    /// What was `found`, if it is of the caller's `team`; another team's looks like none at all.
+    pub(crate) fn visible<T>(
+        &self,
+        what: &str,
+        found: Result<T, StoreError>,
+        team: impl Fn(&T) -> TeamId,
+    ) -> Result<T, Problem> {
+        let may_see = |found: &T| match self {
+            Self::Organiser => true,
+            Self::Team(own) => own.id == team(found),
+        };
+        match found {
+            Ok(found) if may_see(&found) => Ok(found),
+            Ok(_) | Err(StoreError::NotFound(_)) => Err(Problem::not_found(what)),
+            Err(error) => Err(error.into()),
         }
     }
 }

@@ -103,11 +103,11 @@ fn parse<T: DeserializeOwned>((is_json, bytes): (bool, Bytes)) -> Result<T, Prob
     })
 }
 
-/// The single parameter of the path.
+/// The parameters of the path, in its order.
 #[derive(Debug)]
-pub(crate) struct PathParam<T>(pub(crate) T);
+pub(crate) struct PathParams<T, const N: usize>(pub(crate) [T; N]);
 
-impl<S, T> FromRequestParts<S> for PathParam<T>
+impl<S, T, const N: usize> FromRequestParts<S> for PathParams<T, N>
 where
     S: Send + Sync,
     T: FromStr<Err: Display>,
@@ -120,18 +120,21 @@ where
         let params = RawPathParams::from_request_parts(parts, state)
             .await
             .map_err(|rejection| not_found(rejection.body_text()))?;
-        let text = params.iter().next().map_or("", |(_, text)| text);
-        text.parse()
-            .map(Self)
-            .map_err(|error: T::Err| not_found(error.to_string()))
+        let params = params.iter().map(|(_, text)| text.parse());
+        let params: Vec<T> = params
+            .collect::<Result<_, _>>()
+            .map_err(|error: T::Err| not_found(error.to_string()))?;
+        params.try_into().map(Self).map_err(|other: Vec<T>| {
+            Problem::internal(format_args!("a path of {N} parameters has {}", other.len()))
+        })
     }
 }
 
-/// The two parameters of the path, in its order.
+/// The single parameter of the path.
 #[derive(Debug)]
-pub(crate) struct TwoPathParams<T>(pub(crate) T, pub(crate) T);
+pub(crate) struct PathParam<T>(pub(crate) T);
 
-impl<S, T> FromRequestParts<S> for TwoPathParams<T>
+impl<S, T> FromRequestParts<S> for PathParam<T>
 where
     S: Send + Sync,
     T: FromStr<Err: Display>,
@@ -139,18 +142,8 @@ where
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
-        let not_found = |detail: String| Problem::new(ProblemKind::NotFound, detail);
-        let params = RawPathParams::from_request_parts(parts, state)
-            .await
-            .map_err(|rejection| not_found(rejection.body_text()))?;
-        let mut params = params.iter().map(|(_, text)| text.parse::<T>());
-        let mut next = || {
-            params
-                .next()
-                .ok_or_else(|| not_found("the path has too few parts".into()))?
-                .map_err(|error| not_found(error.to_string()))
-        };
-        Ok(Self(next()?, next()?))
+        let PathParams([one]) = PathParams::from_request_parts(parts, state).await?;
+        Ok(Self(one))
     }
 }
 

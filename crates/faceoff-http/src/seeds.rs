@@ -1,7 +1,7 @@
 //! Who may know which day's seed: one rule for the API and the pages.
 
 use crate::{
-    AppState,
+    app::AppState,
     problem::{Problem, ProblemKind},
 };
 use faceoff_store::{Actor, DaySeed};

@@ -1,80 +1,70 @@
-//! The episode summaries of finished runs: made once from the stored outcomes, then kept in the
-//! database.
+//! The episode summaries of played runs: made once from the stored outcomes, then kept in the database
+//! and in memory. A board or an ablation never reads outcomes twice.
 
-use crate::{AppState, problem::Problem};
+use crate::problem::Problem;
 use faceoff_scoring::EpisodeSummary;
-use faceoff_types::RunId;
-use std::{collections::HashMap, sync::Arc};
+use faceoff_store::Store;
+use faceoff_types::{Clock, RunId};
+use std::{
+    collections::HashMap,
+    sync::{Arc, Mutex, MutexGuard},
+};
 
 /// Summaries held in memory; enough for the boards of several seasons of teams.
 const CACHED: usize = 1000;
 
-/// Summaries in memory. A finished run never changes, so neither do they.
-#[derive(Debug, Default)]
-pub(crate) struct SummaryCache(std::sync::Mutex<HashMap<RunId, Arc<EpisodeSummary>>>);
+/// Summaries by run. A run that has been played never changes, so neither do they.
+pub(crate) type RunSummaries = HashMap<RunId, Arc<EpisodeSummary>>;
 
-impl SummaryCache {
-    fn get(&self, id: RunId) -> Option<Arc<EpisodeSummary>> {
-        self.lock().get(&id).cloned()
-    }
-
-    fn put(&self, id: RunId, summary: &Arc<EpisodeSummary>) {
-        let mut cached = self.lock();
-        if cached.len() >= CACHED {
-            // rare, and all of it is in the database
-            cached.clear();
-        }
-        cached.insert(id, Arc::clone(summary));
-    }
-
-    fn lock(&self) -> std::sync::MutexGuard<'_, HashMap<RunId, Arc<EpisodeSummary>>> {
-        // whoever panicked left whole entries behind
-        self.0
-            .lock()
-            .unwrap_or_else(|poisoned| poisoned.into_inner())
-    }
+#[derive(Debug)]
+pub(crate) struct Summaries {
+    store: Store,
+    clock: Clock,
+    cached: Mutex<RunSummaries>,
 }
 
-impl AppState {
-    /// The summary of a finished run's episodes.
-    pub(crate) async fn summary(&self, run: RunId) -> Result<Arc<EpisodeSummary>, Problem> {
-        let mut summaries = self.summaries_of([run]).await?;
-        summaries
-            .remove(&run)
-            .ok_or_else(|| Problem::internal(format_args!("run {run} has no summary")))
+impl Summaries {
+    pub(crate) fn new(store: Store, clock: Clock) -> Self {
+        Self {
+            store,
+            clock,
+            cached: Mutex::default(),
+        }
     }
 
-    /// The summaries of these finished runs' episodes, in one query where they are stored.
-    pub(crate) async fn summaries_of(
-        &self,
-        runs: impl IntoIterator<Item = RunId>,
-    ) -> Result<HashMap<RunId, Arc<EpisodeSummary>>, Problem> {
-        let mut found = HashMap::new();
-        let mut missing = Vec::new();
-        for run in runs {
-            match self.summaries.get(run) {
-                Some(summary) => drop(found.insert(run, summary)),
-                None => missing.push(run),
+    /// The summary of one run that has been played.
+    pub(crate) async fn of_run(&self, run: RunId) -> Result<Arc<EpisodeSummary>, Problem> {
+        let summary = self.of(&[run]).await?.remove(&run);
+        summary.ok_or_else(|| Problem::internal(format_args!("run {run} has no summary")))
+    }
+
+    /// The summaries of `runs`, all of which have been played: one read for those that are not in memory.
+    pub(crate) async fn of(&self, runs: &[RunId]) -> Result<RunSummaries, Problem> {
+        let mut summaries = self.in_memory(runs);
+        let missing = |summaries: &RunSummaries| -> Vec<RunId> {
+            let missing = runs.iter().filter(|run| !summaries.contains_key(run));
+            missing.copied().collect()
+        };
+        let unread = missing(&summaries);
+        if !unread.is_empty() {
+            let stored = self
+                .store
+                .episode_summaries(&unread, EpisodeSummary::VERSION)
+                .await?;
+            for (run, json) in stored {
+                match serde_json::from_str(&json) {
+                    Ok(summary) => self.keep(&mut summaries, run, summary),
+                    Err(error) => {
+                        tracing::warn!(%run, %error, "a stored summary is damaged; making it again");
+                    }
+                }
+            }
+            for run in missing(&summaries) {
+                let summary = self.summarise(run).await?;
+                self.keep(&mut summaries, run, summary);
             }
         }
-        let version = EpisodeSummary::VERSION;
-        let stored = self.store.episode_summaries(&missing, version).await?;
-        for run in missing {
-            let parsed = stored.get(&run).and_then(|json| {
-                serde_json::from_str(json)
-                    .inspect_err(|error| {
-                        tracing::warn!(%run, %error, "a stored summary is damaged; making it again");
-                    })
-                    .ok()
-            });
-            let summary = Arc::new(match parsed {
-                Some(summary) => summary,
-                None => self.summarise(run).await?,
-            });
-            self.summaries.put(run, &summary);
-            found.insert(run, summary);
-        }
-        Ok(found)
+        Ok(summaries)
     }
 
     async fn summarise(&self, run: RunId) -> Result<EpisodeSummary, Problem> {
@@ -86,8 +76,32 @@ impl AppState {
             .map_err(|error| Problem::internal(format_args!("run {run}: {error}")))?;
         let json = serde_json::to_string(&summary).map_err(Problem::internal)?;
         self.store
-            .keep_episode_summary(run, EpisodeSummary::VERSION, &json, self.config.clock.now())
+            .keep_episode_summary(run, EpisodeSummary::VERSION, &json, self.clock.now())
             .await?;
         Ok(summary)
+    }
+
+    fn in_memory(&self, runs: &[RunId]) -> RunSummaries {
+        let cached = self.lock();
+        let known = |run: &RunId| Some((*run, Arc::clone(cached.get(run)?)));
+        runs.iter().filter_map(known).collect()
+    }
+
+    fn keep(&self, summaries: &mut RunSummaries, run: RunId, summary: EpisodeSummary) {
+        let summary = Arc::new(summary);
+        let mut cached = self.lock();
+        if cached.len() >= CACHED {
+            // rare, and all of it is in the database
+            cached.clear();
+        }
+        cached.insert(run, Arc::clone(&summary));
+        summaries.insert(run, summary);
+    }
+
+    fn lock(&self) -> MutexGuard<'_, RunSummaries> {
+        // whoever panicked left whole entries behind
+        self.cached
+            .lock()
+            .unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 }

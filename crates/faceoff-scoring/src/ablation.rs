@@ -1,10 +1,15 @@
-use crate::{PairedTally, PairingError, episode_penalty, wilson95};
-use faceoff_types::{EpisodeOutcome, Profile, Task};
+use crate::{
+    interval::wilson95,
+    paired::{PairedTally, PairingError},
+    summary::{EpisodeSummary, TaskSummary},
+};
+use faceoff_types::{Profile, Task};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::{borrow::Borrow, collections::BTreeMap};
 
 /// How an agent did in one task under one profile, beside the ideal one on the same episodes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ProfileEffect {
     /// The perturbations.
     pub profile: Profile,
@@ -15,6 +20,7 @@ pub struct ProfileEffect {
     /// Fraction of successes.
     pub success_rate: f64,
     /// 95 % Wilson interval of the success rate, as fractions.
+    #[cfg_attr(feature = "openapi", schema(min_items = 2, max_items = 2))]
     pub success_ci95: [f64; 2],
     /// Penalty points over all episodes.
     pub penalty_points: f64,
@@ -34,55 +40,51 @@ pub struct ProfileEffect {
 /// The caller sees to it that all runs come from one seed.
 ///
 /// # Errors
-/// If a profile did not play exactly the episodes of the ideal one, each once.
+/// If a profile did not play as many episodes as the ideal one.
 pub fn ablation(
-    runs: &BTreeMap<Profile, Vec<EpisodeOutcome>>,
+    runs: &BTreeMap<Profile, impl Borrow<EpisodeSummary>>,
 ) -> Result<BTreeMap<Task, Vec<ProfileEffect>>, PairingError> {
-    let mut tasks = BTreeMap::new();
-    for task in Task::ALL {
-        let of_task = |outcomes: &[EpisodeOutcome]| -> Vec<EpisodeOutcome> {
-            let of_task = outcomes.iter().filter(|outcome| outcome.task == task);
-            of_task.cloned().collect()
-        };
-        let ideal = runs.get(&Profile::Ideal).map(|all| of_task(all));
-        let Some(ideal) = ideal.filter(|ideal| !ideal.is_empty()) else {
-            continue;
-        };
-        let effects = runs
-            .iter()
-            .map(|(profile, outcomes)| effect(*profile, &ideal, &of_task(outcomes)))
-            .collect::<Result<Vec<_>, _>>()?;
-        tasks.insert(task, effects);
-    }
-    Ok(tasks)
+    let Some(ideal) = runs.get(&Profile::Ideal) else {
+        return Ok(BTreeMap::new());
+    };
+    let effects_of = |(task, ideal): (&Task, &TaskSummary)| {
+        let effects = runs.iter().map(|(profile, run)| {
+            let played = run.borrow().tasks.get(task);
+            let played = played.ok_or(PairingError::Unpaired(*task, 0))?;
+            let tally = PairedTally::of(*task, &ideal.successes, &played.successes)?;
+            Ok(effect(*profile, &tally, played.penalty_points))
+        });
+        Ok((*task, effects.collect::<Result<_, _>>()?))
+    };
+    ideal.borrow().tasks.iter().map(effects_of).collect()
 }
 
-fn effect(
-    profile: Profile,
-    ideal: &[EpisodeOutcome],
-    outcomes: &[EpisodeOutcome],
-) -> Result<ProfileEffect, PairingError> {
-    let tally = PairedTally::of(ideal, outcomes)?;
+/// Of a profile, which is `tally`'s second; the ideal one is its first.
+fn effect(profile: Profile, tally: &PairedTally, penalty_points: f64) -> ProfileEffect {
     let (episodes, successes) = (tally.episodes(), tally.both + tally.only_b);
     let rate = |successes: u32| f64::from(successes) / f64::from(episodes);
-    Ok(ProfileEffect {
+    ProfileEffect {
         profile,
         episodes,
         successes,
         success_rate: rate(successes),
         success_ci95: wilson95(successes, episodes),
-        penalty_points: outcomes.iter().map(episode_penalty).sum(),
+        penalty_points,
         difference: rate(successes) - rate(tally.both + tally.only_a),
         lost: tally.only_a,
         gained: tally.only_b,
         p_value: tally.p_value(),
-    })
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use faceoff_types::{ComputationTime, EpisodeEnd, Violations};
+    use faceoff_types::{ComputationTime, EpisodeEnd, EpisodeOutcome, Violations};
+
+    fn played(outcomes: &[EpisodeOutcome]) -> EpisodeSummary {
+        EpisodeSummary::of(outcomes).unwrap()
+    }
 
     fn run(task: Task, successes: &[bool]) -> Vec<EpisodeOutcome> {
         (0..)
@@ -112,7 +114,10 @@ mod tests {
             &[false, false, false, false, false, false, true, true],
         );
         lost.extend(run(Task::Prepare, &[false, true]));
-        let runs = BTreeMap::from([(Profile::TrackingLoss, lost), (Profile::Ideal, ideal)]);
+        let runs = BTreeMap::from([
+            (Profile::TrackingLoss, played(&lost)),
+            (Profile::Ideal, played(&ideal)),
+        ]);
         let tasks = ablation(&runs).unwrap();
         assert_eq!(
             tasks.keys().collect::<Vec<_>>(),
@@ -141,10 +146,18 @@ mod tests {
     #[test]
     fn runs_of_different_episodes_are_refused() {
         let runs = BTreeMap::from([
-            (Profile::Ideal, run(Task::Hit, &[true, true])),
-            (Profile::Evaluation, run(Task::Hit, &[true])),
+            (Profile::Ideal, played(&run(Task::Hit, &[true, true]))),
+            (Profile::Evaluation, played(&run(Task::Hit, &[true]))),
         ]);
-        assert!(ablation(&runs).is_err());
-        assert!(ablation(&BTreeMap::new()).unwrap().is_empty());
+        let unpaired = |task, episode| Err(PairingError::Unpaired(task, episode));
+        assert_eq!(ablation(&runs), unpaired(Task::Hit, 1));
+        let other_task = played(&run(Task::Defend, &[true, true]));
+        let runs = BTreeMap::from([
+            (Profile::Ideal, runs[&Profile::Ideal].clone()),
+            (Profile::Evaluation, other_task),
+        ]);
+        assert_eq!(ablation(&runs), unpaired(Task::Hit, 0));
+        let none = BTreeMap::<_, EpisodeSummary>::new();
+        assert!(ablation(&none).unwrap().is_empty());
     }
 }

@@ -1,7 +1,8 @@
 use crate::{
-    EpisodeSummary, PairedTally, SIGNIFICANCE,
     difference::{paired_difference, score_difference, unpaired_difference},
-    overall_p_value, overall_score,
+    evaluation::overall_score,
+    paired::{PairedTally, SIGNIFICANCE, overall_p_value},
+    summary::EpisodeSummary,
 };
 use faceoff_types::{Profile, Seed, Task};
 use serde::{Deserialize, Serialize};
@@ -75,6 +76,7 @@ pub struct Comparison {
 
 /// Two evaluations on the same episodes of one task.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct TaskComparison {
     /// Episodes that both solved.
     pub both: u32,
@@ -91,6 +93,7 @@ pub struct TaskComparison {
     /// Success rate of A minus that of B.
     pub difference: f64,
     /// Its 95 % interval for paired data: Newcombe's score interval (method 10).
+    #[cfg_attr(feature = "openapi", schema(min_items = 2, max_items = 2))]
     pub difference_ci95: [f64; 2],
     /// McNemar's exact test, two-sided.
     pub p_value: f64,
@@ -100,6 +103,7 @@ pub struct TaskComparison {
 
 /// The overall scores of two evaluations on the same episodes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct OverallComparison {
     /// A's score in percent.
     pub score_a: f64,
@@ -108,6 +112,7 @@ pub struct OverallComparison {
     /// Score of A minus that of B, in percentage points.
     pub difference: f64,
     /// Its 95 % interval: the tasks' intervals, weighed and joined by the square-and-add method.
+    #[cfg_attr(feature = "openapi", schema(min_items = 2, max_items = 2))]
     pub difference_ci95: [f64; 2],
     /// The exact paired test of the weighted score ([`overall_p_value`]).
     pub p_value: f64,
@@ -222,17 +227,8 @@ impl Played<'_> {
             .zip(b.values())
             .map(|((task, a), b)| {
                 let (a, b) = (&a.successes, &b.successes);
-                if a.episodes() != b.episodes() {
-                    return Err(NotPaired::Episodes(*task, a.episodes(), b.episodes()));
-                }
-                let both = a.in_common(b);
-                let (only_a, only_b) = (a.count() - both, b.count() - both);
-                let tally = PairedTally {
-                    both,
-                    only_a,
-                    only_b,
-                    neither: a.episodes() - both - only_a - only_b,
-                };
+                let tally = PairedTally::of(*task, a, b)
+                    .map_err(|_| NotPaired::Episodes(*task, a.episodes(), b.episodes()))?;
                 Ok((*task, tally))
             })
             .collect()

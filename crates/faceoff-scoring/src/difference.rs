@@ -2,7 +2,7 @@
 //! estimate as the root of the summed squares of its parts' distances (Newcombe, Statistics in Medicine
 //! 17, 1998; Zou and Donner, Statistics in Medicine 27, 2008).
 
-use crate::{PairedTally, interval::wilson95, task_weight_percent};
+use crate::{evaluation::task_weight_percent, interval::wilson95, paired::PairedTally};
 use faceoff_types::Task;
 
 /// An estimate and its 95 % interval.

@@ -1,5 +1,5 @@
-use crate::{binomial::FairTosses, episode::has_fault, evaluation::task_weight_percent};
-use faceoff_types::{EpisodeOutcome, Task};
+use crate::{binomial::FairTosses, evaluation::task_weight_percent, successes::Successes};
+use faceoff_types::Task;
 use std::collections::BTreeMap;
 
 /// Two teams are told apart when a difference like theirs, or a larger one, would come by chance with
@@ -19,47 +19,41 @@ pub struct PairedTally {
     pub neither: u32,
 }
 
-/// Why two lists of episodes cannot be paired.
+/// Why episodes cannot be paired with another agent's.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PairingError {
-    /// An episode occurs twice in one list.
+    /// Which of the two counts?
     #[error("{0} episode {1} occurs twice")]
     Repeated(Task, u32),
     /// Episodes are numbered without gaps.
     #[error("{0} episode {1} is missing")]
     Missing(Task, u32),
-    /// An episode that only one of the two played.
-    #[error("{0} episode {1} was played by one of the two teams only")]
+    /// The first episode that only one of the two played.
+    #[error("{0} episode {1} was played by one of the two only")]
     Unpaired(Task, u32),
 }
 
 impl PairedTally {
-    /// Pairs two teams' outcomes of one task by episode index, in any order.
+    /// Pairs two teams' episodes of one task.
     ///
     /// The caller sees to it that both come from the same evaluation seed and profile: only then did
     /// both teams meet the same episodes.
     ///
     /// # Errors
-    /// If the two did not play exactly the same episodes, each once.
-    pub fn of(a: &[EpisodeOutcome], b: &[EpisodeOutcome]) -> Result<Self, PairingError> {
-        let a = by_episode(a)?;
-        let mut b = by_episode(b)?;
-        let mut tally = Self::default();
-        for ((task, episode), a_succeeded) in a {
-            let b_succeeded = b
-                .remove(&(task, episode))
-                .ok_or(PairingError::Unpaired(task, episode))?;
-            *match (a_succeeded, b_succeeded) {
-                (true, true) => &mut tally.both,
-                (true, false) => &mut tally.only_a,
-                (false, true) => &mut tally.only_b,
-                (false, false) => &mut tally.neither,
-            } += 1;
+    /// If the two did not play equally many.
+    pub fn of(task: Task, a: &Successes, b: &Successes) -> Result<Self, PairingError> {
+        if a.episodes() != b.episodes() {
+            let first = a.episodes().min(b.episodes());
+            return Err(PairingError::Unpaired(task, first));
         }
-        match b.into_keys().next() {
-            Some((task, episode)) => Err(PairingError::Unpaired(task, episode)),
-            None => Ok(tally),
-        }
+        let both = a.in_common(b);
+        let (only_a, only_b) = (a.count() - both, b.count() - both);
+        Ok(Self {
+            both,
+            only_a,
+            only_b,
+            neither: a.episodes() - both - only_a - only_b,
+        })
     }
 
     /// Episodes played.
@@ -75,18 +69,6 @@ impl PairedTally {
         // One task alone: its weight does not matter.
         overall_p_value(&BTreeMap::from([(Task::Hit, *self)]))
     }
-}
-
-fn by_episode(outcomes: &[EpisodeOutcome]) -> Result<BTreeMap<(Task, u32), bool>, PairingError> {
-    let mut episodes = BTreeMap::new();
-    for outcome in outcomes {
-        let (task, episode) = (outcome.task, outcome.episode);
-        let succeeded = outcome.success && !has_fault(outcome);
-        if episodes.insert((task, episode), succeeded).is_some() {
-            return Err(PairingError::Repeated(task, episode));
-        }
-    }
-    Ok(episodes)
 }
 
 /// The exact paired test of two teams' overall scores, two-sided: McNemar's test, carried over to the

@@ -1,6 +1,6 @@
 use crate::{
-    board::Placing, episode::MAX_EPISODE_PENALTY, interval::wilson95_of_rate, overall_score,
-    tier_of, unique_map::UniqueMap,
+    board::Placing, episode::MAX_EPISODE_PENALTY, evaluation::overall_score,
+    interval::wilson95_of_rate, tier::tier_of, unique_map::UniqueMap,
 };
 use faceoff_types::{Task, TeamName, Tier};
 use serde::{

@@ -1,4 +1,4 @@
-use crate::RankedEntry;
+use crate::board::RankedEntry;
 
 /// Rank groups of a board: neighbours that the day's episodes cannot tell apart.
 ///

@@ -1,5 +1,8 @@
 use crate::{
-    PairingError, Successes, episode::has_fault, episode_penalty, tier_change::TierChange,
+    episode::{episode_penalty, has_fault},
+    paired::PairingError,
+    successes::Successes,
+    tier_change::TierChange,
 };
 use faceoff_types::{EpisodeOutcome, Task};
 use serde::{Deserialize, Serialize};
@@ -22,6 +25,8 @@ pub struct EpisodeSummary {
 pub struct TaskSummary {
     /// Which episodes were solved.
     pub successes: Successes,
+    /// Penalty points over all episodes.
+    pub penalty_points: f64,
     /// Probability that other episodes of the same kind would put the agent in another tier, by a
     /// bootstrap of [`TIER_CHANGE_RESAMPLES`](crate::TIER_CHANGE_RESAMPLES) resamples of the episodes'
     /// penalty points.
@@ -31,7 +36,7 @@ pub struct TaskSummary {
 impl EpisodeSummary {
     /// Changes whenever the same outcomes would give another summary: one that was stored under
     /// another version is to be made again.
-    pub const VERSION: u32 = 1;
+    pub const VERSION: u32 = 2;
 
     /// Sums up an evaluation's episodes, given in any order. The same episodes give the same summary,
     /// to the last bit.
@@ -68,6 +73,11 @@ impl EpisodeSummary {
                     .iter()
                     .map(|outcome| outcome.success && !has_fault(outcome))
                     .collect(),
+                // Multiples of one half: the sum is exact in any order.
+                penalty_points: episodes
+                    .iter()
+                    .map(|outcome| episode_penalty(outcome))
+                    .sum(),
                 tier_change: change.tasks.get(&task).copied().unwrap_or_default(),
             };
             (task, summary)
@@ -76,5 +86,14 @@ impl EpisodeSummary {
             tasks: tasks.collect(),
             tier_change: change.overall,
         })
+    }
+
+    /// The probability of another tier: of `task`, or overall. A task that was not played has none.
+    #[must_use]
+    pub fn tier_change_of(&self, task: Option<Task>) -> f64 {
+        match task {
+            None => self.tier_change,
+            Some(task) => self.tasks.get(&task).map_or(0.0, |task| task.tier_change),
+        }
     }
 }

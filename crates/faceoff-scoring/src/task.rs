@@ -1,8 +1,8 @@
 use crate::{
-    episode::{has_fault, time_or_fault_penalty},
-    episode_penalty,
+    episode::{episode_penalty, has_fault, time_or_fault_penalty},
+    interval::wilson95,
     step_times::StepTimes,
-    tier_of, wilson95,
+    tier::tier_of,
 };
 use faceoff_types::{EpisodeOutcome, TaskResult, ViolationCounts};
 

@@ -1,6 +1,6 @@
 //! How sure a tier is: the bootstrap over episodes.
 
-use crate::{MAX_EPISODE_PENALTY, tier_of};
+use crate::{episode::MAX_EPISODE_PENALTY, tier::tier_of};
 use faceoff_types::{Task, Tier};
 use std::collections::BTreeMap;
 

@@ -43,7 +43,7 @@ pub use ruleset::{FOULS_PER_POINT, GAME_WINDOWS, RULESET, WINDOW_STEPS};
 pub use seed::{ParseSeedError, Seed};
 pub use seed_label::{ParseSeedLabelError, SeedLabel};
 pub use smoke_outcome::SmokeOutcome;
-pub use task::{ParseTaskError, Task};
+pub use task::{MAX_EPISODES_PER_TASK, ParseTaskError, Task};
 pub use team_name::{InvalidTeamName, TeamName};
 pub use tier::Tier;
 pub use timing::{RoundTrips, SlotTiming};

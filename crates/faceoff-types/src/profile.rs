@@ -78,6 +78,7 @@ impl Factors {
 ///
 /// The rules' rehearsal profile, with its safety layer, is not offered yet; its delays are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Profile {
     /// The simulator the teams have.

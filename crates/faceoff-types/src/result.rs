@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 /// Episodes in which each constraint was violated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ViolationCounts {
     /// End-effector position.
     pub ee: u32,
@@ -19,6 +20,7 @@ pub struct ViolationCounts {
 
 /// Computation times over all steps of a task, in seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ComputationTimeSummary {
     /// Mean.
     pub mean: f64,
@@ -30,6 +32,7 @@ pub struct ComputationTimeSummary {
 
 /// The score of one task.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct TaskResult {
     /// Episodes played.
     pub episodes: u32,
@@ -38,6 +41,7 @@ pub struct TaskResult {
     /// Fraction of successes.
     pub success_rate: f64,
     /// 95 % Wilson interval of the success rate, as fractions.
+    #[cfg_attr(feature = "openapi", schema(min_items = 2, max_items = 2))]
     pub success_ci95: [f64; 2],
     /// Penalty points over all episodes: the task's deployability score (DS).
     pub penalty_points: f64,

@@ -8,6 +8,7 @@ use std::{fmt, str::FromStr};
 /// A child seed is `BLAKE3(key = parent, label ‖ 0x00 ‖ data)`, so that knowing a child says nothing
 /// about its parent or its siblings: publishing the seed of one evaluation keeps the others secret.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema), schema(value_type = String))]
 pub struct Seed([u8; 32]);
 
 impl Seed {

@@ -4,6 +4,7 @@ use std::{fmt, str::FromStr};
 /// A team's name as the board shows it: 1 to 40 characters, letters, digits, spaces and `. _ -`,
 /// without leading or trailing space.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(try_from = "String", into = "String")]
 pub struct TeamName(String);
 

@@ -3,6 +3,7 @@ use std::fmt;
 
 /// Deployability tier, best first (RULES, "Constraints and penalty points").
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Tier {
     /// Safe enough for the real robot.

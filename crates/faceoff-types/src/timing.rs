@@ -2,6 +2,7 @@ use serde::{Deserialize, Serialize};
 
 /// Round trips to an agent that answers at once, in seconds: what a slot adds to every answer.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct RoundTrips {
     /// How many were measured.
     pub count: u32,
@@ -28,6 +29,7 @@ impl RoundTrips {
 
 /// How evenly a slot kept time, measured by the platform's own calibration agent on the agent's CPUs.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct SlotTiming {
     /// Round trips before the first episode, in seconds.
     pub before_s: RoundTrips,

@@ -2,7 +2,9 @@
 //! queue.
 
 use crate::server::{Claimed, GivenBack, Holding, QueueMark, WorkServer};
-use faceoff_store::{Claim, Claimed as Leased, Committed, RunOwner, ShardCommit, Store, StoreError, Work};
+use faceoff_store::{
+    Claim, Claimed as Leased, Committed, RunOwner, ShardCommit, Store, StoreError, Work,
+};
 use faceoff_types::{AgentLimits, BundleRef, Clock, EvaluationResult, RULESET};
 use faceoff_wire::work::{
     AgentOrder, Assignment, EvaluationMeta, Lease, ShardSpec, WorkOrder, WorkReport,
@@ -182,9 +184,9 @@ impl WorkServer for LocalServer {
         let (claim, now) = (claim(lease), self.clock.now());
         self.runtime.block_on(async {
             match report {
-                WorkReport::Smoke(outcome) => {
-                    Ok(holding(self.store.commit_smoke(&claim, outcome, now).await?))
-                }
+                WorkReport::Smoke(outcome) => Ok(holding(
+                    self.store.commit_smoke(&claim, outcome, now).await?,
+                )),
                 WorkReport::Play {
                     outcomes,
                     log,

@@ -4,16 +4,19 @@ mod bundle_file;
 
 use anyhow::{Context, bail};
 use bundle_file::BundleFile;
-use faceoff_http::api::{
-    BASE,
-    board::BoardView,
-    comparisons::ComparisonView,
-    days::{DayView, StartDay},
-    evaluations::{Cancellation, EvaluationView},
-    me::MeView,
-    season::{CloseSeason, SeasonView},
-    submissions::SubmissionView,
-    teams::{NewTeam, TeamView, TeamWithToken},
+use faceoff_http::{
+    API_BASE,
+    requests::{Cancellation, CloseSeason, NewTeam, StartDay},
+    views::{
+        board::BoardView,
+        comparison::ComparisonView,
+        day::DayView,
+        evaluation::EvaluationView,
+        me::MeView,
+        season::SeasonView,
+        submission::SubmissionView,
+        team::{TeamView, TeamWithToken},
+    },
 };
 use faceoff_types::{EvaluationId, SubmissionId, TeamId};
 use futures::StreamExt;
@@ -283,7 +286,7 @@ impl Client {
     fn request(&self, method: Method, path: &str) -> RequestBuilder {
         let request = self
             .http
-            .request(method, format!("{}{BASE}{path}", self.base));
+            .request(method, format!("{}{API_BASE}{path}", self.base));
         match &self.token {
             Some(token) => request.bearer_auth(token),
             None => request,

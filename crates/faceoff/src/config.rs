@@ -8,7 +8,7 @@ use anyhow::{Context, bail, ensure};
 use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::BundleLimits};
 use faceoff_sandbox::{Isolation, Layer, Limits, Runtime};
 use faceoff_store::RunPlan;
-use faceoff_types::{Profile, Task};
+use faceoff_types::{MAX_EPISODES_PER_TASK, Profile, Task};
 use jiff::civil::Time;
 use serde::{Deserialize, Serialize};
 use std::{
@@ -184,8 +184,8 @@ impl Config {
     fn check(&self) -> anyhow::Result<()> {
         let evaluation = &self.evaluation;
         ensure!(
-            (1..=100_000).contains(&evaluation.episodes_per_task),
-            "evaluation.episodes_per_task: expected 1 to 100000, got {}",
+            (1..=MAX_EPISODES_PER_TASK).contains(&evaluation.episodes_per_task),
+            "evaluation.episodes_per_task: expected 1 to {MAX_EPISODES_PER_TASK}, got {}",
             evaluation.episodes_per_task
         );
         ensure!(
@@ -193,8 +193,8 @@ impl Config {
             "evaluation.episodes_per_shard: expected at least 1, got 0"
         );
         ensure!(
-            evaluation.ablation_episodes <= 100_000,
-            "evaluation.ablation_episodes: expected at most 100000, got {}",
+            evaluation.ablation_episodes <= MAX_EPISODES_PER_TASK,
+            "evaluation.ablation_episodes: expected at most {MAX_EPISODES_PER_TASK}, got {}",
             evaluation.ablation_episodes
         );
         ensure!(

@@ -1,6 +1,6 @@
 //! Is the server up?
 
-use crate::{App, problem::Problem};
+use crate::{app::App, problem::Problem};
 use axum::{Json, extract::State};
 use serde::Serialize;
 use utoipa::ToSchema;

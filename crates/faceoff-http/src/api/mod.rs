@@ -1,72 +1,28 @@
-//! The REST API. One file per resource: its routes, views and handlers carry the same name.
-//!
-//! The views are public: the command line's client reads the very types that the server writes.
+//! The REST API: routes, parsing and their description. One file per resource; what it shows of one is in
+//! [`views`](crate::views).
 
-pub mod ablations;
-pub mod board;
-pub mod comparisons;
-pub mod days;
-pub mod evaluations;
+mod ablations;
+mod board;
+mod bundle_stream;
+mod comparisons;
+mod datasets;
+mod days;
+mod document;
+mod episodes;
+mod evaluations;
 mod health;
-pub mod me;
-mod schema;
-pub mod season;
-pub mod submissions;
-pub mod teams;
+mod me;
+mod season;
+mod submissions;
+mod teams;
 mod upload;
 
-use crate::{App, extract::MAX_JSON_BYTES, layers};
+use crate::{app::App, extract::MAX_JSON_BYTES, layers, paths::API_BASE};
 use axum::{Json, Router, extract::DefaultBodyLimit, middleware, routing::get};
+use document::{Document, describe_errors};
 use std::{sync::Arc, time::Duration};
-use utoipa::{
-    Modify, OpenApi,
-    openapi::security::{HttpAuthScheme, HttpBuilder, SecurityScheme},
-};
+use utoipa::OpenApi;
 use utoipa_axum::{router::OpenApiRouter, routes};
-
-/// Where the API lives.
-pub const BASE: &str = "/api/v1";
-
-#[derive(OpenApi)]
-#[openapi(
-    info(
-        title = "Faceoff",
-        description = "Competition server for robot learning: teams upload agents, the server evaluates them daily.",
-        license(name = "MIT OR Apache-2.0")
-    ),
-    modifiers(&Tokens),
-    tags(
-        (name = "public", description = "For everybody, without a token"),
-        (name = "team", description = "With a team's token"),
-        (name = "organiser", description = "With the organiser's token"),
-    )
-)]
-struct Document;
-
-struct Tokens;
-
-impl Modify for Tokens {
-    fn modify(&self, openapi: &mut utoipa::openapi::OpenApi) {
-        let components = openapi.components.get_or_insert_default();
-        for (name, description) in [
-            ("team", "A team's token, fo_team_…, from POST /api/v1/teams"),
-            (
-                "organiser",
-                "The organiser's token, fo_admin_…, made at the server's first start",
-            ),
-        ] {
-            components.add_security_scheme(
-                name,
-                SecurityScheme::Http(
-                    HttpBuilder::new()
-                        .scheme(HttpAuthScheme::Bearer)
-                        .description(Some(description))
-                        .build(),
-                ),
-            );
-        }
-    }
-}
 
 /// All routes. `patience` bounds the time of every answer but an upload's.
 pub(crate) fn router(patience: Duration) -> Router<App> {
@@ -87,22 +43,22 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(evaluations::list_evaluations))
         .routes(routes!(evaluations::evaluation))
         .routes(routes!(evaluations::cancel_evaluation))
-        .routes(routes!(evaluations::dataset))
+        .routes(routes!(datasets::dataset))
         .routes(routes!(comparisons::compare))
         .layer(middleware::from_fn_with_state(patience, layers::time_out))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES));
     // An upload may take long as long as it moves; `upload` itself watches size and pauses.
     let uploads = OpenApiRouter::new()
-        .routes(routes!(submissions::create_submission))
+        .routes(routes!(upload::create_submission))
         .layer(DefaultBodyLimit::disable());
-    let (router, document) = OpenApiRouter::new()
-        .nest(BASE, resources.merge(uploads))
+    let (router, mut document) = OpenApiRouter::new()
+        .nest(API_BASE, resources.merge(uploads))
         .split_for_parts();
-    let mut document = document;
     document.info = Document::openapi().info;
+    describe_errors(&mut document);
     let document = Arc::new(document);
     router.route(
-        &format!("{BASE}/openapi.json"),
+        &format!("{API_BASE}/openapi.json"),
         get(move || {
             let document = Arc::clone(&document);
             async move { Json((*document).clone()) }

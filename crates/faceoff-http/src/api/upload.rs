@@ -1,145 +1,212 @@
-//! Receives a bundle: streamed to a file, counted, hashed, and recognised by its first bytes. It is
-//! never held in memory and never unpacked here.
+//! Uploading an agent.
 
-use crate::problem::{Problem, ProblemKind};
-use axum::{
-    body::{Body, BodyDataStream},
-    http::HeaderValue,
+use super::bundle_stream;
+use crate::{
+    app::App,
+    auth::TeamCaller,
+    extract::QueryParams,
+    paths,
+    problem::{Problem, ProblemKind},
+    views::submission::SubmissionView,
 };
-use faceoff_types::ArchiveFormat;
-use futures::StreamExt;
-use std::{path::Path, time::Duration};
-use tempfile::NamedTempFile;
-use tokio::io::AsyncWriteExt;
+use axum::{
+    Json,
+    body::Body,
+    extract::State,
+    http::{HeaderMap, HeaderName, StatusCode, header},
+    response::{AppendHeaders, IntoResponse},
+};
+use faceoff_store::{Actor, StoreError};
+use faceoff_types::{ArchiveFormat, BundleRef};
+use serde::Deserialize;
+use utoipa::IntoParams;
+use uuid::Uuid;
 
-/// After a refusal we read on and throw away this much, so that a client that is still sending gets
-/// the answer instead of a broken connection.
-const DRAIN_BYTES: u64 = 64 * 1024 * 1024;
-
-/// A bundle on disk; the file goes when this is dropped.
-#[derive(Debug)]
-pub(crate) struct Uploaded {
-    pub(crate) file: NamedTempFile,
-    pub(crate) bytes: u64,
-    pub(crate) blake3: blake3::Hash,
-    pub(crate) format: ArchiveFormat,
+#[derive(Debug, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(crate) struct UploadQuery {
+    /// Name of the archive, e.g. `striker.tar.gz`; shown with the submission.
+    file_name: Option<String>,
 }
 
-/// Streams `body` into a file under `dir`.
-///
-/// # Errors
-/// `TooLarge` beyond `max_bytes`, whether or not a length was announced; `UnsupportedMediaType` when
-/// the first bytes are no archive's; `RequestTimeout` after a pause of `patience`; `InvalidRequest`
-/// when the body is empty or breaks off; `Internal` when the disk fails.
-pub(crate) async fn receive(
-    body: Body,
-    announced: Option<&HeaderValue>,
-    dir: &Path,
-    max_bytes: u64,
-    patience: Duration,
-) -> Result<Uploaded, Problem> {
-    let announced: Option<u64> = announced.and_then(|value| value.to_str().ok()?.parse().ok());
-    let mut stream = body.into_data_stream();
-    if let Some(bytes) = announced.filter(|bytes| *bytes > max_bytes) {
-        drain(&mut stream, bytes, patience).await;
-        return Err(too_large(max_bytes, Some(bytes)));
-    }
+/// Another place for the archive's name, for clients that cannot set a query.
+const FILE_NAME: HeaderName = HeaderName::from_static("x-file-name");
 
-    let file = tempfile::Builder::new()
-        .prefix("upload-")
-        .tempfile_in(dir)
-        .map_err(Problem::internal)?;
-    let mut writer = tokio::fs::File::from_std(file.reopen().map_err(Problem::internal)?);
-    let mut hasher = blake3::Hasher::new();
-    let mut head = Vec::with_capacity(ArchiveFormat::LONGEST_MAGIC);
-    let mut format = None;
-    let mut bytes = 0;
-    while let Some(chunk) = next(&mut stream, patience).await? {
-        bytes += chunk.len() as u64;
-        if bytes > max_bytes {
-            drain(&mut stream, DRAIN_BYTES, patience).await;
-            return Err(too_large(max_bytes, None));
-        }
-        if format.is_none() {
-            let missing = ArchiveFormat::LONGEST_MAGIC - head.len();
-            head.extend_from_slice(&chunk[..missing.min(chunk.len())]);
-            format = ArchiveFormat::detect(&head);
-            if format.is_none() && head.len() == ArchiveFormat::LONGEST_MAGIC {
-                drain(&mut stream, announced.unwrap_or(DRAIN_BYTES), patience).await;
-                return Err(not_an_archive(&head));
-            }
-        }
-        hasher.update(&chunk);
-        writer.write_all(&chunk).await.map_err(Problem::internal)?;
+/// Media types that an archive may claim; none at all is fine too.
+const ARCHIVE_TYPES: [&str; 8] = [
+    "application/octet-stream",
+    "application/gzip",
+    "application/x-gzip",
+    "application/x-gtar",
+    "application/x-tar",
+    "application/zstd",
+    "application/zip",
+    "application/x-zip-compressed",
+];
+
+/// Uploads a bundle: the request's body is the archive itself (.tar.gz, .tar.zst or .zip).
+///
+/// It is unpacked and started in a smoke run; follow the submission until it is `valid` or `invalid`.
+#[utoipa::path(
+    post, path = "/submissions", tag = "team", security(("team" = [])), params(UploadQuery),
+    request_body(content = Vec<u8>, content_type = "application/octet-stream"),
+    responses(
+        (status = 201, body = SubmissionView),
+        (status = 409, description = "the season is closed"),
+        (status = 413, description = "larger than max_bundle_bytes"),
+        (status = 415, description = "not one of the archive formats"),
+        (status = 429, description = "several uploads wait for their smoke run"),
+    )
+)]
+pub(crate) async fn create_submission(
+    TeamCaller(team): TeamCaller,
+    State(app): State<App>,
+    QueryParams(query): QueryParams<UploadQuery>,
+    headers: HeaderMap,
+    body: Body,
+) -> Result<impl IntoResponse, Problem> {
+    check_media_type(&headers)?;
+    let _slot = app.uploads.try_acquire().map_err(|_| {
+        Problem::new(
+            ProblemKind::Busy,
+            "the server takes as many uploads as it may at once; try again in 2 s",
+        )
+    })?;
+    // before the bundle travels in vain; the store looks again
+    if let Some(closed_at) = app.store.season().await?.closed_at {
+        return Err(StoreError::SeasonClosed { closed_at }.into());
     }
-    if bytes == 0 {
+    let limits = &app.config.limits;
+    let pending = app
+        .store
+        .submissions_of(team.id)
+        .await?
+        .iter()
+        .filter(|submission| !submission.state.is_settled())
+        .count();
+    if pending >= limits.pending_submissions {
         return Err(Problem::new(
-            ProblemKind::InvalidRequest,
-            "the body is empty; send the archive (.tar.gz, .tar.zst or .zip) as the request's body",
+            ProblemKind::TooManyPending,
+            format!(
+                "{pending} uploads of your team wait for their smoke run already; wait until one has \
+                 its verdict (GET /api/v1/submissions)"
+            ),
         ));
     }
-    let format = format.ok_or_else(|| not_an_archive(&head))?;
-    // The artifact is copied from this file by name; all of it must have left the writer's buffer.
-    writer.flush().await.map_err(Problem::internal)?;
-    Ok(Uploaded {
-        file,
-        bytes,
-        blake3: hasher.finalize(),
-        format,
-    })
-}
 
-async fn next(
-    stream: &mut BodyDataStream,
-    patience: Duration,
-) -> Result<Option<axum::body::Bytes>, Problem> {
-    match tokio::time::timeout(patience, stream.next()).await {
-        Ok(None) => Ok(None),
-        Ok(Some(Ok(chunk))) => Ok(Some(chunk)),
-        Ok(Some(Err(error))) => Err(Problem::new(
-            ProblemKind::InvalidRequest,
-            format!("the upload broke off ({error}); nothing was stored, send it again"),
-        )),
-        Err(_) => Err(Problem::new(
-            ProblemKind::RequestTimeout,
-            format!(
-                "nothing came for {} s in the middle of the upload; nothing was stored, send it again",
-                patience.as_secs_f64()
-            ),
-        )),
-    }
-}
-
-/// Throws away what the client still sends, up to [`DRAIN_BYTES`].
-async fn drain(stream: &mut BodyDataStream, at_most: u64, patience: Duration) {
-    let mut left = at_most.min(DRAIN_BYTES);
-    while left > 0 {
-        match next(stream, patience).await {
-            Ok(Some(chunk)) => left = left.saturating_sub(chunk.len() as u64),
-            Ok(None) | Err(_) => return,
-        }
-    }
-}
-
-fn too_large(max_bytes: u64, announced: Option<u64>) -> Problem {
-    let came = announced.map_or_else(|| "more came".to_owned(), |n| format!("{n} were announced"));
-    Problem::new(
-        ProblemKind::TooLarge,
-        format!(
-            "a bundle has at most {max_bytes} bytes, {came}; leave out what the agent does not need \
-             to run (training data, checkpoints, virtual environments)"
-        ),
+    let claimed_name = query
+        .file_name
+        .or_else(|| Some(headers.get(FILE_NAME)?.to_str().ok()?.to_owned()))
+        .unwrap_or_default();
+    let uploaded = bundle_stream::receive(
+        body,
+        headers.get(header::CONTENT_LENGTH),
+        &app.config.upload_dir,
+        app.config.max_bundle_bytes,
+        limits.upload_pause,
     )
-    .with("limit_bytes", max_bytes)
+    .await?;
+    let bundle = BundleRef {
+        key: format!(
+            "bundles/{}/{}.{}",
+            team.id,
+            Uuid::now_v7(),
+            uploaded.format.extension()
+        ),
+        bytes: uploaded.bytes,
+        blake3: uploaded.blake3.to_string(),
+        file_name: file_name(&claimed_name, uploaded.format),
+    };
+    app.store
+        .artifacts()
+        .put_file(&bundle.key, uploaded.file.path())
+        .await?;
+    let key = bundle.key.clone();
+    let submission = match app
+        .store
+        .create_submission(
+            Actor::Team(team.id),
+            team.id,
+            bundle,
+            app.config.clock.now(),
+        )
+        .await
+    {
+        Ok(submission) => submission,
+        Err(error) => {
+            if let Err(left) = app.store.artifacts().delete(&key).await {
+                tracing::warn!(key, %left, "an artifact without a submission is left behind");
+            }
+            return Err(error.into());
+        }
+    };
+    tracing::info!(team = %team.name, submission = %submission.id, bytes = uploaded.bytes, "uploaded");
+    let location = [(header::LOCATION, paths::submission(submission.id))];
+    let view = SubmissionView::new(submission, None);
+    Ok((StatusCode::CREATED, AppendHeaders(location), Json(view)))
 }
 
-fn not_an_archive(head: &[u8]) -> Problem {
-    Problem::new(
+fn check_media_type(headers: &HeaderMap) -> Result<(), Problem> {
+    let Some(value) = headers.get(header::CONTENT_TYPE) else {
+        return Ok(());
+    };
+    let text = value.to_str().unwrap_or("(not text)");
+    let essence = text
+        .split(';')
+        .next()
+        .unwrap_or_default()
+        .trim()
+        .to_ascii_lowercase();
+    if ARCHIVE_TYPES.contains(&essence.as_str()) {
+        return Ok(());
+    }
+    Err(Problem::new(
         ProblemKind::UnsupportedMediaType,
         format!(
-            "expected a .tar.gz, .tar.zst or .zip archive as the body; it begins with the bytes {}. \
-             Send the archive itself, not a form and not text",
-            hex::encode(head)
+            "expected the archive itself as the body, with “Content-Type: application/octet-stream”; \
+             got {text:?}. With curl: --data-binary @agent.tar.gz -H 'Content-Type: \
+             application/octet-stream'"
         ),
-    )
+    ))
+}
+
+/// A harmless name that ends as the archive's format does, whatever was claimed.
+fn file_name(claimed: &str, format: ArchiveFormat) -> String {
+    let last = claimed.rsplit(['/', '\\']).next().unwrap_or_default();
+    let safe: String = last
+        .chars()
+        .filter(|c| c.is_alphanumeric() || "._-".contains(*c))
+        .take(80)
+        .collect();
+    let stem = safe.trim_start_matches('.');
+    if stem.is_empty() {
+        format!("agent.{}", format.extension())
+    } else if format
+        .names()
+        .iter()
+        .any(|end| stem.to_lowercase().ends_with(end))
+    {
+        stem.to_owned()
+    } else {
+        format!("{stem}.{}", format.extension())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_name_is_harmless_and_ends_as_its_format_does() {
+        let gz = |claimed| file_name(claimed, ArchiveFormat::TarGz);
+        assert_eq!(gz("striker.tar.gz"), "striker.tar.gz");
+        assert_eq!(gz("striker.tgz"), "striker.tgz");
+        assert_eq!(gz("../../etc/passwd"), "passwd.tar.gz");
+        assert_eq!(gz("C:\\agents\\a b.zip"), "ab.zip.tar.gz");
+        assert_eq!(gz(""), "agent.tar.gz");
+        assert_eq!(gz(".."), "agent.tar.gz");
+        assert_eq!(file_name("x", ArchiveFormat::Zip), "x.zip");
+        assert!(gz(&"a".repeat(500)).len() < 100);
+    }
 }

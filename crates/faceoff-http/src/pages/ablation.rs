@@ -1,11 +1,19 @@
 //! `/submissions/{id}/ablation`: what each perturbation costs an agent, as a chart and as a table.
 
-use super::{Frame, PageProblem, figures, render};
+use super::{
+    figures,
+    frame::{Frame, PageProblem, render},
+};
 use crate::{
-    App,
-    api::ablations::{AblationStatus, AblationView},
+    app::App,
     extract::PathParam,
     problem::{Problem, ProblemKind},
+    views::{
+        ablation::{AblationStatus, AblationView},
+        season::SeasonHead,
+        submission::SubmissionView,
+        team::TeamView,
+    },
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
@@ -77,14 +85,13 @@ pub(super) async fn page(
     id: Result<PathParam<SubmissionId>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PathParam(id) = id?;
-    let submission = app.store.submission(id).await?;
-    let Some(ablation) = app.store.newest_ablation(id).await? else {
+    let submission = SubmissionView::find(&app, id).await?;
+    let Some(view) = AblationView::newest(&app, id).await? else {
         let detail = "there is no ablation of this submission";
         return Err(Problem::new(ProblemKind::NotFound, detail).into());
     };
-    let team = app.store.team(submission.team).await?;
-    let season = app.store.season().await?;
-    let view = AblationView::of(&app, ablation).await?;
+    let team = TeamView::find(&app, submission.team).await?;
+    let season = SeasonHead::now(&app).await?;
     let groups = match &view.status {
         AblationStatus::Finished { tasks, .. } => {
             let left = (0..).map(|group| LEFT + f64::from(group) * GROUP_STEP);

@@ -1,18 +1,21 @@
 //! The boards: `/` in tiers as in the paper's qualifying table, `/tasks/{task}` by task.
 
-use super::{Frame, PageProblem, figures, render};
+use super::{
+    figures,
+    frame::{Frame, PageProblem, render},
+};
 use crate::{
-    App,
-    api::{
-        board::{BoardLine, ranked},
-        evaluations::{EvaluationStatus, Progress, with_names},
-    },
+    app::App,
     extract::PathParam,
     problem::Problem,
+    views::{
+        board::{BoardRow, BoardView},
+        evaluation::{EvaluationStatus, EvaluationView, Progress},
+        season::SeasonHead,
+    },
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
-use faceoff_store::Evaluation;
 use faceoff_types::{EvaluationId, Task, TaskResult, Tier, ViolationCounts};
 use figures::Rate;
 use jiff::civil;
@@ -33,41 +36,40 @@ struct Who {
 }
 
 /// How a result came about; results of different settings do not compare.
-fn setting(line: &BoardLine) -> String {
-    let result = &line.ranked.entry.result;
-    let episodes = result
-        .tasks
-        .values()
-        .map(|task| task.episodes)
-        .max()
-        .unwrap_or(0);
+fn setting(row: &BoardRow) -> String {
     format!(
-        "{} profile, {episodes} episodes per task, rules {}",
-        result.profile, result.ruleset
+        "{} profile, {} episodes per task, rules {}",
+        row.profile,
+        episodes(row),
+        row.ruleset
     )
 }
 
+/// Of the task with the most.
+fn episodes(row: &BoardRow) -> u32 {
+    let episodes = row.tasks.values().map(|task| task.episodes);
+    episodes.max().unwrap_or(0)
+}
+
 /// The setting of the whole board; `None` where its rows differ.
-fn common_setting(lines: &[BoardLine]) -> Option<String> {
-    let first = setting(lines.first()?);
-    lines
-        .iter()
-        .all(|line| setting(line) == first)
+fn common_setting(rows: &[BoardRow]) -> Option<String> {
+    let first = setting(rows.first()?);
+    rows.iter()
+        .all(|row| setting(row) == first)
         .then_some(first)
 }
 
 impl Who {
-    fn of(line: &BoardLine, common_setting: Option<&String>) -> Self {
-        let record = &line.ranked.entry.key;
+    fn of(row: &BoardRow, common_setting: Option<&String>) -> Self {
         Self {
-            rank: line.ranked.rank,
-            rank_group: line.rank_group,
-            tier_change: figures::chance(line.tier_change),
-            team: record.team.name.to_string(),
-            agent: record.agent_name.clone(),
-            evaluation: record.evaluation,
-            day: record.day,
-            setting: common_setting.is_none().then(|| setting(line)),
+            rank: row.rank,
+            rank_group: row.rank_group,
+            tier_change: figures::chance(row.tier_change_probability),
+            team: row.team.to_string(),
+            agent: row.agent.clone(),
+            evaluation: row.evaluation,
+            day: row.day,
+            setting: common_setting.is_none().then(|| setting(row)),
         }
     }
 }
@@ -81,7 +83,7 @@ struct TierRows<Row> {
     rows: Vec<Row>,
 }
 
-fn by_tier<Row>(lines: &[BoardLine], row: impl Fn(&BoardLine) -> Row) -> Vec<TierRows<Row>> {
+fn by_tier<Row>(board: &BoardView, row: impl Fn(&BoardRow) -> Row) -> Vec<TierRows<Row>> {
     let mut tiers: Vec<TierRows<Row>> = Tier::ALL
         .into_iter()
         .map(|tier| TierRows {
@@ -92,9 +94,8 @@ fn by_tier<Row>(lines: &[BoardLine], row: impl Fn(&BoardLine) -> Row) -> Vec<Tie
             rows: Vec::new(),
         })
         .collect();
-    for line in lines {
-        let tier = line.ranked.tier as usize;
-        tiers[tier].rows.push(row(line));
+    for of_board in &board.rows {
+        tiers[of_board.tier as usize].rows.push(row(of_board));
     }
     tiers.retain(|tier| !tier.rows.is_empty());
     tiers
@@ -110,23 +111,16 @@ struct OverallRow {
 }
 
 impl OverallRow {
-    fn of(line: &BoardLine, common_setting: Option<&String>) -> Self {
-        let result = &line.ranked.entry.result;
-        let episodes = result
-            .tasks
-            .values()
-            .map(|task| task.episodes)
-            .max()
-            .unwrap_or(0);
+    fn of(row: &BoardRow, common_setting: Option<&String>) -> Self {
         Self {
-            who: Who::of(line, common_setting),
+            who: Who::of(row, common_setting),
             rates: Task::ALL
                 .into_iter()
-                .map(|task| (task, result.tasks.get(&task).map(Rate::of)))
+                .map(|task| (task, row.tasks.get(&task).map(Rate::of)))
                 .collect(),
-            penalty_points: figures::one(result.penalty_points),
-            per_episode: figures::per_episode(result.penalty_points, episodes),
-            score: figures::one(result.score),
+            penalty_points: figures::one(row.penalty_points),
+            per_episode: figures::per_episode(row.penalty_points, episodes(row)),
+            score: figures::one(row.score),
         }
     }
 }
@@ -153,10 +147,10 @@ struct OverallPage {
 
 /// The overall board.
 pub(super) async fn overall(State(app): State<App>) -> Result<Response, PageProblem> {
-    let season = app.store.season().await?;
+    let season = SeasonHead::now(&app).await?;
     let today = app.config.clock.today();
-    let lines = ranked(&app, None).await?;
-    let setting = common_setting(&lines);
+    let board = BoardView::of(&app, None).await?;
+    let setting = common_setting(&board.rows);
     let page = OverallPage {
         frame: Frame::new(season.name, "/"),
         today,
@@ -165,7 +159,7 @@ pub(super) async fn overall(State(app): State<App>) -> Result<Response, PageProb
             .daily_at
             .map(|at| at.strftime("%H:%M").to_string()),
         commitment: season.commitment,
-        tiers: by_tier(&lines, |line| OverallRow::of(line, setting.as_ref())),
+        tiers: by_tier(&board, |row| OverallRow::of(row, setting.as_ref())),
         setting,
         under_way: under_way(&app, today).await?,
     };
@@ -173,38 +167,28 @@ pub(super) async fn overall(State(app): State<App>) -> Result<Response, PageProb
 }
 
 async fn under_way(app: &App, today: civil::Date) -> Result<Vec<UnderWay>, PageProblem> {
-    // A run that began before midnight may still be going.
-    let mut evaluations: Vec<Evaluation> = match today.yesterday() {
-        Ok(yesterday) => app.store.evaluations_on(yesterday).await?,
-        Err(_) => Vec::new(),
-    };
-    evaluations.retain(|evaluation| !evaluation.state.is_over());
-    evaluations.extend(app.store.evaluations_on(today).await?);
-    let views = with_names(app, evaluations).await?;
-    Ok(views
-        .into_iter()
-        .filter_map(|view| {
-            let (state, moving) = match view.status {
-                EvaluationStatus::Finished { .. } => return None,
-                EvaluationStatus::Queued => ("Queued", true),
-                EvaluationStatus::Running => ("Running", true),
-                EvaluationStatus::Finalising => ("Computing the score", true),
-                EvaluationStatus::AgentFailed { .. } => {
-                    ("The agent failed; its team sees why", false)
-                }
-                EvaluationStatus::PlatformFailed { .. } => {
-                    ("Stopped by our fault; the turn was given back", false)
-                }
-                EvaluationStatus::Cancelled { .. } => ("Cancelled by the organiser", false),
-            };
-            Some(UnderWay {
-                team: view.team_name.to_string(),
-                evaluation: view.id,
-                state,
-                progress: moving.then_some(view.progress),
-            })
+    let evaluations = EvaluationView::current(app, today).await?;
+    let under_way = evaluations.into_iter().filter_map(|evaluation| {
+        let state = match evaluation.status {
+            EvaluationStatus::Finished { .. } => return None,
+            EvaluationStatus::Queued => "Queued",
+            EvaluationStatus::Running => "Running",
+            EvaluationStatus::Finalising => "Computing the score",
+            EvaluationStatus::AgentFailed { .. } => "The agent failed; its team sees why",
+            EvaluationStatus::PlatformFailed { .. } => {
+                "Stopped by our fault; the turn was given back"
+            }
+            EvaluationStatus::Cancelled { .. } => "Cancelled by the organiser",
+        };
+        let moving = !evaluation.status.is_final();
+        Some(UnderWay {
+            team: evaluation.team_name.to_string(),
+            evaluation: evaluation.id,
+            state,
+            progress: moving.then_some(evaluation.progress),
         })
-        .collect())
+    });
+    Ok(under_way.collect())
 }
 
 struct TaskRow {
@@ -219,10 +203,10 @@ struct TaskRow {
 }
 
 impl TaskRow {
-    fn of(line: &BoardLine, result: &TaskResult, common_setting: Option<&String>) -> Self {
+    fn of(row: &BoardRow, result: &TaskResult, common_setting: Option<&String>) -> Self {
         let time = result.computation_time_s;
         Self {
-            who: Who::of(line, common_setting),
+            who: Who::of(row, common_setting),
             rate: Rate::of(result),
             penalty_points: figures::one(result.penalty_points),
             per_episode: figures::per_episode(result.penalty_points, result.episodes),
@@ -250,7 +234,7 @@ pub(super) async fn by_task(
     task: Result<PathParam<Task>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PathParam(task) = task?;
-    let season = app.store.season().await?;
+    let season = SeasonHead::now(&app).await?;
     let (title, aim) = match task {
         Task::Hit => (
             "Hit",
@@ -265,13 +249,12 @@ pub(super) async fn by_task(
             "Bring a puck from the border to a good hitting position.",
         ),
     };
-    let mut lines = ranked(&app, Some(task)).await?;
-    // `task_board` leaves out teams without the task; a row without one could show nothing.
-    lines.retain(|line| line.ranked.entry.result.tasks.contains_key(&task));
-    let setting = common_setting(&lines);
-    let tiers = by_tier(&lines, |line| {
-        let result = &line.ranked.entry.result.tasks[&task];
-        TaskRow::of(line, result, setting.as_ref())
+    let mut board = BoardView::of(&app, Some(task)).await?;
+    // The board leaves out teams without the task; a row without one could show nothing.
+    board.rows.retain(|row| row.tasks.contains_key(&task));
+    let setting = common_setting(&board.rows);
+    let tiers = by_tier(&board, |row| {
+        TaskRow::of(row, &row.tasks[&task], setting.as_ref())
     });
     let frame = Frame::new(season.name, format!("/tasks/{task}"));
     render(&TaskPage {

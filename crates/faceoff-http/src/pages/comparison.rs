@@ -1,11 +1,14 @@
 //! `/evaluations/{a}/compare/{b}`: two evaluations on the same episodes.
 
-use super::{Frame, PageProblem, figures, render};
+use super::{
+    figures,
+    frame::{Frame, PageProblem, render},
+};
 use crate::{
-    App,
-    api::comparisons::{ComparisonView, comparison},
-    extract::TwoPathParams,
+    app::App,
+    extract::PathParams,
     problem::Problem,
+    views::{comparison::ComparisonView, season::SeasonHead},
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
@@ -63,11 +66,11 @@ struct Page {
 /// The comparison of two evaluations.
 pub(super) async fn page(
     State(app): State<App>,
-    ids: Result<TwoPathParams<EvaluationId>, Problem>,
+    ids: Result<PathParams<EvaluationId, 2>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let TwoPathParams(a, b) = ids?;
-    let view = comparison(&app, a, b).await?;
-    let season = app.store.season().await?;
+    let PathParams(ids) = ids?;
+    let view = ComparisonView::of(&app, ids).await?;
+    let season = SeasonHead::now(&app).await?;
     let names = [view.a.team.as_str(), view.b.team.as_str()];
     let rows = view
         .tasks

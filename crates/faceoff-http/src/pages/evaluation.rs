@@ -1,22 +1,27 @@
 //! `/evaluations/{id}`: what everybody may know of an evaluation. Log, faults and dataset are its
 //! team's and stay in the API.
 
-use super::{Frame, PageProblem, figures, render};
+use super::{
+    figures,
+    frame::{Frame, PageProblem, render},
+};
 use crate::{
-    App,
-    api::evaluations::{EvaluationStatus, Progress, with_names},
+    app::App,
     extract::PathParam,
     problem::Problem,
+    views::{
+        ablation,
+        evaluation::{EvaluationStatus, EvaluationView, Progress, ResultView},
+        season::SeasonHead,
+        submission::SubmissionView,
+    },
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
 use faceoff_scoring::{EpisodeSummary, TIER_CHANGE_RESAMPLES};
-use faceoff_store::{Evaluation, EvaluationState};
-use faceoff_types::{
-    EvaluationId, EvaluationResult, Profile, RoundTrips, SlotTiming, Task, TaskResult,
-};
+use faceoff_types::{EvaluationId, Profile, RoundTrips, SlotTiming, Task, TaskResult};
 use figures::Rate;
-use jiff::civil;
+use jiff::{Timestamp, civil};
 
 /// A task's results, in words.
 struct TaskFigures {
@@ -56,12 +61,7 @@ impl TaskFigures {
             tier_name: result.tier.as_str(),
             tier_title: result.tier.title(),
             tier_sign: figures::tier_sign(result.tier),
-            tier_change: figures::chance(
-                summary
-                    .tasks
-                    .get(&task)
-                    .map_or(0.0, |task| task.tier_change),
-            ),
+            tier_change: figures::chance(summary.tier_change_of(Some(task))),
             steps: result.steps,
             ee: count(violations.ee),
             link: count(violations.link),
@@ -159,79 +159,66 @@ pub(super) async fn page(
     id: Result<PathParam<EvaluationId>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PathParam(id) = id?;
-    let evaluation = app.store.evaluation(id).await?;
-    let team = app.store.team(evaluation.team).await?;
-    let submission = app.store.submission(evaluation.submission).await?;
-    let ablation = app.store.newest_ablation(submission.id).await?;
-    let season = app.store.season().await?;
-    let progress = Progress::of(&evaluation);
-    let (state, moving) = match &evaluation.state {
-        EvaluationState::Queued => ("It waits for a worker.", true),
-        EvaluationState::Running { .. } => ("Episodes are being played.", true),
-        EvaluationState::Finalising => (
-            "All episodes are played; the score is being computed.",
-            true,
-        ),
-        EvaluationState::Finished { .. } => ("", false),
-        EvaluationState::AgentFailed { .. } => (
-            "The agent broke the protocol or a limit too often and was stopped; there is no score. \
-             Its team sees the faults and the log.",
-            false,
-        ),
-        EvaluationState::PlatformFailed { .. } => (
-            "It was stopped by a fault of this server, not of the agent. The team's turn was given back.",
-            false,
-        ),
-        EvaluationState::Cancelled { .. } => ("The organiser cancelled it.", false),
-    };
-    let finished = match &evaluation.state {
-        EvaluationState::Finished {
+    let view = EvaluationView::find(&app, id).await?;
+    let submission = SubmissionView::find(&app, view.submission).await?;
+    let ablation = ablation::exists(&app, submission.id).await?;
+    let season = SeasonHead::now(&app).await?;
+    let finished = match &view.status {
+        EvaluationStatus::Finished {
             finished_at,
             result,
             ..
         } => {
-            let finished_at = finished_at.strftime("%Y-%m-%d %H:%M UTC").to_string();
-            let seeds = app.day_seeds([evaluation.day].into()).await?;
-            let seed = seeds.public(result.seed, evaluation.day);
-            let summary = app.summary(evaluation.run).await?;
-            let mut done = finished(
-                result,
-                seed.map(|seed| seed.to_string()),
-                finished_at,
-                &summary,
-            );
-            done.others = others(&app, &evaluation).await?;
-            Some(done)
+            let summary = view.summary(&app).await?;
+            let others = others(&app, &view).await?;
+            Some(Finished::of(result, *finished_at, &summary, others))
         }
         _ => None,
     };
     render(&Page {
         frame: Frame::new(season.name, ""),
         id,
-        team: team.name.to_string(),
+        team: view.team_name.to_string(),
         agent: submission.agent_name,
-        day: evaluation.day,
-        profile: evaluation.plan.profile,
-        ablation: ablation.map(|ablation| format!("/submissions/{}/ablation", ablation.submission)),
-        state,
-        progress: moving.then_some(progress),
+        day: view.day,
+        profile: view.profile,
+        ablation: ablation.then(|| format!("/submissions/{}/ablation", submission.id)),
+        state: in_words(&view.status),
+        progress: (!view.status.is_final()).then_some(view.progress),
         finished,
     })
 }
 
+/// What has become of an evaluation without a result.
+const fn in_words(status: &EvaluationStatus) -> &'static str {
+    match status {
+        EvaluationStatus::Queued => "It waits for a worker.",
+        EvaluationStatus::Running => "Episodes are being played.",
+        EvaluationStatus::Finalising => "All episodes are played; the score is being computed.",
+        EvaluationStatus::Finished { .. } => "",
+        EvaluationStatus::AgentFailed { .. } => {
+            "The agent broke the protocol or a limit too often and was stopped; there is no score. \
+             Its team sees the faults and the log."
+        }
+        EvaluationStatus::PlatformFailed { .. } => {
+            "It was stopped by a fault of this server, not of the agent. The team's turn was given back."
+        }
+        EvaluationStatus::Cancelled { .. } => "The organiser cancelled it.",
+    }
+}
+
 /// The finished evaluations that can be compared with this one, in the order of their scores.
-async fn others(app: &App, evaluation: &Evaluation) -> Result<Vec<Other>, PageProblem> {
-    let mut same = app.store.evaluations_on(evaluation.day).await?;
-    same.retain(|other| {
-        let (plan, of_other) = (&evaluation.plan, &other.plan);
-        other.id != evaluation.id
-            && of_other.profile == plan.profile
-            && of_other.episodes_per_task == plan.episodes_per_task
-            && of_other.tasks == plan.tasks
-    });
-    let mut others: Vec<_> = with_names(app, same)
-        .await?
+async fn others(app: &App, of: &EvaluationView) -> Result<Vec<Other>, PageProblem> {
+    let same_episodes = |other: &EvaluationView| {
+        other.id != of.id
+            && other.profile == of.profile
+            && other.episodes_per_task == of.episodes_per_task
+            && other.tasks == of.tasks
+    };
+    let same_day = EvaluationView::all_on(app, of.day).await?;
+    let mut others: Vec<_> = same_day
         .into_iter()
+        .filter(same_episodes)
         .filter_map(|view| match view.status {
             EvaluationStatus::Finished { result, .. } => {
                 Some((result.score, view.team_name, view.id))
@@ -250,30 +237,32 @@ async fn others(app: &App, evaluation: &Evaluation) -> Result<Vec<Other>, PagePr
         .collect())
 }
 
-fn finished(
-    result: &EvaluationResult,
-    seed: Option<String>,
-    finished_at: String,
-    summary: &EpisodeSummary,
-) -> Finished {
-    Finished {
-        score: figures::one(result.score),
-        penalty_points: figures::one(result.penalty_points),
-        tier_name: result.tier.as_str(),
-        tier_title: result.tier.title(),
-        tier_sign: figures::tier_sign(result.tier),
-        tier_bounds: figures::tier_bounds(result.tier),
-        tier_change: figures::chance(summary.tier_change),
-        resamples: TIER_CHANGE_RESAMPLES,
-        ruleset: result.ruleset.clone(),
-        seed,
-        finished_at,
-        tasks: result
-            .tasks
-            .iter()
-            .map(|(task, result)| TaskFigures::of(*task, result, summary))
-            .collect(),
-        others: Vec::new(),
-        timing: result.timing.as_ref().map(TimingFigures::of),
+impl Finished {
+    fn of(
+        result: &ResultView,
+        finished_at: Timestamp,
+        summary: &EpisodeSummary,
+        others: Vec<Other>,
+    ) -> Self {
+        Self {
+            score: figures::one(result.score),
+            penalty_points: figures::one(result.penalty_points),
+            tier_name: result.tier.as_str(),
+            tier_title: result.tier.title(),
+            tier_sign: figures::tier_sign(result.tier),
+            tier_bounds: figures::tier_bounds(result.tier),
+            tier_change: figures::chance(summary.tier_change_of(None)),
+            resamples: TIER_CHANGE_RESAMPLES,
+            ruleset: result.ruleset.clone(),
+            seed: result.seed.map(|seed| seed.to_string()),
+            finished_at: finished_at.strftime("%Y-%m-%d %H:%M UTC").to_string(),
+            tasks: result
+                .tasks
+                .iter()
+                .map(|(task, result)| TaskFigures::of(*task, result, summary))
+                .collect(),
+            others,
+            timing: result.timing.as_ref().map(TimingFigures::of),
+        }
     }
 }

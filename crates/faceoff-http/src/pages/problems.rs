@@ -1,6 +1,6 @@
 //! `/problems`: what each kind of error means; the `type` of every problem points here.
 
-use super::{Frame, PageProblem, render};
+use super::frame::{Frame, PageProblem, render};
 use crate::problem::ProblemKind;
 use askama::Template;
 use axum::response::Response;
@@ -9,7 +9,7 @@ use axum::response::Response;
 #[template(path = "problems.html")]
 struct Page {
     frame: Frame,
-    kinds: [ProblemKind; ProblemKind::ALL.len()],
+    kinds: &'static [ProblemKind],
 }
 
 pub(super) async fn page() -> Result<Response, PageProblem> {

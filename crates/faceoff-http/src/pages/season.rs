@@ -1,11 +1,8 @@
 //! `/season`: for sceptics. The commitment, the secret once it is public, and how every draw follows
 //! from it.
 
-use super::{Frame, PageProblem, render};
-use crate::{
-    App,
-    api::season::{SeasonView, view},
-};
+use super::frame::{Frame, PageProblem, render};
+use crate::{app::App, views::season::SeasonView};
 use askama::Template;
 use axum::{extract::State, response::Response};
 use jiff::Timestamp;
@@ -20,7 +17,7 @@ struct Page {
 }
 
 pub(super) async fn page(State(app): State<App>) -> Result<Response, PageProblem> {
-    let season = view(&app).await?;
+    let season = SeasonView::now(&app).await?;
     let instant = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M:%S UTC").to_string();
     render(&Page {
         frame: Frame::new(season.name.clone(), "/season"),

@@ -1,8 +1,9 @@
 //! Ablations: ordered by the organiser, shown to everybody, in the way of nobody.
 
 use crate::site::{ADMIN, Site, TestTeam, outcome};
+use faceoff_scoring::EpisodeSummary;
 use faceoff_store::ShardCommit;
-use faceoff_types::Profile;
+use faceoff_types::{Profile, SubmissionId};
 use scraper::{Html, Selector};
 use serde_json::json;
 
@@ -133,4 +134,41 @@ async fn it_takes_no_turn_and_leaves_the_board_alone_and_the_evaluation_leads_to
     let evaluation = site.evaluate(&team, &submission).await;
     let shown = site.get(&evaluation.replace("/api/v1", ""), None).await;
     assert!(shown.body.contains(&format!("href=\"{page}\"")));
+}
+
+/// A summary is told from the outcomes by a success that no outcome knows: whoever shows it has not read
+/// the outcomes again.
+#[tokio::test]
+async fn its_outcomes_are_read_once_and_never_again() {
+    let mut site = Site::start().await;
+    let (_, api, page) = competitor(&site).await;
+    site.post(&api, Some(ADMIN), &json!({ "episodes_per_task": 4 }))
+        .await
+        .json(201);
+    play(&site, 18).await;
+    let first = site.get(&api, Some(ADMIN)).await.json(200);
+    assert_eq!(first["tasks"]["hit"][4]["successes"], 0);
+
+    let submission: SubmissionId = api.split('/').nth(4).unwrap().parse().unwrap();
+    let ablation = site.store.newest_ablation(submission).await.unwrap();
+    let runs = ablation.unwrap().runs;
+    let ids: Vec<_> = runs.values().copied().collect();
+    let version = EpisodeSummary::VERSION;
+    let stored = site.store.episode_summaries(&ids, version).await.unwrap();
+    assert_eq!(stored.len(), Profile::ABLATION.len());
+    let run = runs[&Profile::TrackingLoss];
+    let marked = stored[&run].replacen(r#""words":[0]"#, r#""words":[1]"#, 1);
+    assert_ne!(marked, stored[&run]);
+    let kept = site
+        .store
+        .keep_episode_summary(run, version, &marked, site.now());
+    kept.await.unwrap();
+
+    let again = site.get(&api, Some(ADMIN)).await.json(200);
+    assert_eq!(again, first, "what is in memory is not read at all");
+    site.restart().await;
+    let restarted = site.get(&api, Some(ADMIN)).await.json(200);
+    assert_eq!(restarted["tasks"]["hit"][4]["successes"], 1);
+    let page = site.get(&page, None).await;
+    assert!(page.body.contains("1 of 4"), "{}", page.body);
 }

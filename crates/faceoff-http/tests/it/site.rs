@@ -19,6 +19,7 @@ pub struct Site {
     pub url: String,
     pub store: Store,
     pub folder: tempfile::TempDir,
+    config: HttpConfig,
     now: Arc<Mutex<Timestamp>>,
     http: reqwest::Client,
     server: JoinHandle<()>,
@@ -123,23 +124,23 @@ impl Site {
             clock: Clock::new(move || *clock.lock().unwrap()),
             limits,
         };
-        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
-        let url = format!("http://{}", listener.local_addr().unwrap());
-        let site = router(store.clone(), config);
-        let server = tokio::spawn(async move {
-            faceoff_http::serve(listener, site, std::future::pending())
-                .await
-                .unwrap();
-        });
+        let (url, server) = serve(&store, &config).await;
         let http = reqwest::Client::builder().no_proxy().build().unwrap();
         Self {
             url,
             store,
             folder,
+            config,
             now,
             http,
             server,
         }
+    }
+
+    /// Another server on the same folder, which remembers nothing.
+    pub async fn restart(&mut self) {
+        self.server.abort();
+        (self.url, self.server) = serve(&self.store, &self.config).await;
     }
 
     pub fn now(&self) -> Timestamp {
@@ -376,6 +377,18 @@ impl Site {
         self.finish(result).await;
         team
     }
+}
+
+async fn serve(store: &Store, config: &HttpConfig) -> (String, JoinHandle<()>) {
+    let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let url = format!("http://{}", listener.local_addr().unwrap());
+    let site = router(store.clone(), config.clone());
+    let server = tokio::spawn(async move {
+        faceoff_http::serve(listener, site, std::future::pending())
+            .await
+            .unwrap();
+    });
+    (url, server)
 }
 
 pub fn text(value: &Value) -> String {

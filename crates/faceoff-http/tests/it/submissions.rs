@@ -1,7 +1,7 @@
 use crate::site::{ADMIN, Answer, GZIP, MAX_BUNDLE, Site, text};
 use bytes::Bytes;
 use faceoff_http::HttpLimits;
-use faceoff_store::SmokeOutcome;
+use faceoff_types::SmokeOutcome;
 use reqwest::{Body, Method};
 use serde_json::json;
 use std::{convert::Infallible, time::Duration};

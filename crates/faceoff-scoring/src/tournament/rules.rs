@@ -1,4 +1,4 @@
-use crate::tier_of;
+use crate::tier::tier_of;
 use faceoff_types::{FOULS_PER_POINT, Tier};
 use std::cmp::Ordering;
 

@@ -203,10 +203,16 @@ proptest! {
         let tallies: BTreeMap<Task, PairedTally> = Task::ALL
             .into_iter()
             .map(|task| {
-                let only = |all: &[EpisodeOutcome]| -> Vec<_> {
-                    all.iter().filter(|outcome| outcome.task == task).cloned().collect()
-                };
-                (task, PairedTally::of(&only(&of_a), &only(&of_b)).unwrap())
+                let mut tally = PairedTally::default();
+                for (a, b) in of_a.iter().zip(&of_b).filter(|(a, _)| a.task == task) {
+                    *match (a.success, b.success) {
+                        (true, true) => &mut tally.both,
+                        (true, false) => &mut tally.only_a,
+                        (false, true) => &mut tally.only_b,
+                        (false, false) => &mut tally.neither,
+                    } += 1;
+                }
+                (task, tally)
             })
             .collect();
         for (task, tally) in &tallies {

@@ -1,5 +1,5 @@
 use crate::support::episode;
-use faceoff_scoring::{PairedTally, PairingError, overall_p_value};
+use faceoff_scoring::{EpisodeSummary, PairedTally, PairingError, Successes, overall_p_value};
 use faceoff_types::{EpisodeEnd, EpisodeOutcome, Task};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
@@ -14,14 +14,23 @@ fn outcomes(successes: &[bool]) -> Vec<EpisodeOutcome> {
         .collect()
 }
 
+fn tally(a: &[EpisodeOutcome], b: &[EpisodeOutcome]) -> Result<PairedTally, PairingError> {
+    let solved = |outcomes: &[EpisodeOutcome]| -> Result<Successes, PairingError> {
+        let mut summary = EpisodeSummary::of(outcomes)?;
+        let hit = summary.tasks.remove(&Task::Hit);
+        Ok(hit.map_or_else(|| [].into_iter().collect(), |hit| hit.successes))
+    };
+    PairedTally::of(Task::Hit, &solved(a)?, &solved(b)?)
+}
+
 #[test]
 fn episodes_are_paired_by_their_number() {
     let a = outcomes(&[true, true, false, false, false]);
     let mut b = outcomes(&[true, false, true, true, false]);
     b.reverse();
-    let tally = PairedTally::of(&a, &b).unwrap();
+    let paired = tally(&a, &b).unwrap();
     assert_eq!(
-        tally,
+        paired,
         PairedTally {
             both: 1,
             only_a: 1,
@@ -29,7 +38,7 @@ fn episodes_are_paired_by_their_number() {
             neither: 1
         }
     );
-    assert_eq!(tally.episodes(), 5);
+    assert_eq!(paired.episodes(), 5);
 }
 
 #[test]
@@ -37,21 +46,21 @@ fn an_episode_lost_to_a_fault_is_no_success() {
     let a = outcomes(&[true]);
     let mut b = outcomes(&[true]);
     b[0].end = EpisodeEnd::AgentFault;
-    assert_eq!(PairedTally::of(&a, &b).unwrap().only_a, 1);
+    assert_eq!(tally(&a, &b).unwrap().only_a, 1);
 }
 
 #[test]
 fn what_cannot_be_paired_is_refused() {
     let (short, long) = (outcomes(&[true; 3]), outcomes(&[true; 4]));
     let unpaired = Err(PairingError::Unpaired(Task::Hit, 3));
-    assert_eq!(PairedTally::of(&short, &long), unpaired);
-    assert_eq!(PairedTally::of(&long, &short), unpaired);
-    let twice = [short[1].clone(), short[1].clone()];
+    assert_eq!(tally(&short, &long), unpaired);
+    assert_eq!(tally(&long, &short), unpaired);
+    let twice = [short[0].clone(), short[1].clone(), short[1].clone()];
     assert_eq!(
-        PairedTally::of(&short, &twice),
+        tally(&short, &twice),
         Err(PairingError::Repeated(Task::Hit, 1))
     );
-    assert_eq!(PairedTally::of(&[], &[]).unwrap().p_value(), 1.0);
+    assert_eq!(tally(&[], &[]).unwrap().p_value(), 1.0);
 }
 
 proptest! {

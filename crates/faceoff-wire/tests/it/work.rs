@@ -20,7 +20,7 @@ fn order(assignment: Assignment) -> WorkOrder {
         lease: Lease {
             unit: Uuid::from_u128(1),
             nonce: Uuid::from_u128(2),
-        slot: "worker/slot-0".into(),
+            slot: "worker/slot-0".into(),
             expires_at: "2026-03-01T06:00:30.25Z".parse().unwrap(),
             duration_s: 30,
         },

@@ -76,7 +76,7 @@ async fn a_shutdown_does_not_stop_a_slot_before_its_unit_was_given_back() {
     let _ = stopped.send(());
     assert!(!early.load(Ordering::SeqCst));
     let work = server.store.claim("next", LEASE_S, server.now()).await;
-    let Some(Work::Shard { shard, .. }) = work.unwrap() else {
+    let Some(Work::Shard { shard, .. }) = work.unwrap().map(|claimed| claimed.work) else {
         panic!("the slot has left its shard to its lease")
     };
     assert_eq!((shard.task, shard.first_episode), (Task::Hit, 0));

@@ -6,6 +6,7 @@ use super::{
 };
 use crate::server::{Claimed, Holding, WorkServer as _};
 use faceoff_store::*;
+use faceoff_types::{Profile, SmokeOutcome, Task};
 use faceoff_wire::work::{Assignment, WorkOrder, WorkReport};
 
 async fn next(server: &Server) -> Option<WorkOrder> {
@@ -63,9 +64,16 @@ async fn no_order_tells_the_seasons_secret() {
     let id = server.evaluation().await;
     let submission = server.store.evaluation(id).await.unwrap().submission;
     server.upload("Beta", b"archive").await;
+    let plan = RunPlan {
+        profile: Profile::Evaluation,
+        tasks: Task::ALL.to_vec(),
+        episodes_per_task: 3,
+        episodes_per_shard: 3,
+        max_faults: 0,
+    };
     server
         .store
-        .create_ablation(submission, 3, 0, server.now())
+        .create_ablation(Actor::Organiser, submission, &plan, server.now())
         .await
         .unwrap();
     let secret = server.store.season().await.unwrap().secret;

@@ -3,8 +3,8 @@
 use super::*;
 use faceoff_http::{
     HttpConfig, HttpLimits,
-    api::{evaluations::EvaluationStatus, submissions::SubmissionStatus},
     token::hash_token,
+    views::{evaluation::EvaluationStatus, submission::SubmissionStatus},
 };
 use faceoff_store::{Claimed, RunPlan, Store, Work};
 use faceoff_types::{Clock, Profile, SmokeOutcome, Task};

@@ -5,12 +5,14 @@ use super::serve::ADMIN_TOKEN_FILE;
 use crate::{client::Client, config::Config};
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
-use faceoff_http::api::{
-    days::StartDay,
-    evaluations::{EvaluationStatus, EvaluationView},
-    season::SeasonView,
+use faceoff_http::{
+    requests::StartDay,
+    views::{
+        evaluation::{EvaluationStatus, EvaluationView},
+        season::SeasonView,
+    },
 };
-use faceoff_types::{EvaluationId, Profile, TeamId};
+use faceoff_types::{EvaluationId, MAX_EPISODES_PER_TASK, Profile, TeamId};
 use jiff::civil::Date;
 use std::path::{Path, PathBuf};
 
@@ -59,7 +61,7 @@ enum Action {
     /// Start today's evaluation of each team that has not had it; asking again is harmless
     StartDay {
         /// Episodes of each task [default: the server's configuration]
-        #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+        #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_EPISODES_PER_TASK)))]
         episodes: Option<u32>,
         /// Perturbation profile [default: the server's configuration]
         #[arg(long)]

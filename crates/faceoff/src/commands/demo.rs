@@ -5,11 +5,11 @@ mod board_table;
 use crate::{client::Client, commands::verify};
 use anyhow::{Context, bail, ensure};
 use clap::Args;
-use faceoff_http::api::{
-    evaluations::{EvaluationStatus, EvaluationView},
-    submissions::{SubmissionStatus, SubmissionView},
+use faceoff_http::views::{
+    evaluation::{EvaluationStatus, EvaluationView},
+    submission::{SubmissionStatus, SubmissionView},
 };
-use faceoff_types::EvaluationId;
+use faceoff_types::{EvaluationId, MAX_EPISODES_PER_TASK};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use std::{
     collections::BTreeMap,
@@ -33,7 +33,7 @@ pub struct DemoCommand {
     #[arg(long = "bundle", required = true, value_name = "BUNDLE")]
     bundles: Vec<PathBuf>,
     /// Episodes of each task
-    #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_EPISODES_PER_TASK)))]
     episodes: u32,
     /// Address of the server
     #[arg(long, default_value = "127.0.0.1:8080")]

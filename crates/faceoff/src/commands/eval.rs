@@ -16,7 +16,7 @@ use faceoff_runner::{
     bundle::{self, Bundle, BundleError, BundleLimits},
 };
 use faceoff_sandbox::{Isolation, Runtime, affinity};
-use faceoff_types::{Profile, Seed, Task};
+use faceoff_types::{MAX_EPISODES_PER_TASK, Profile, Seed, Task};
 use faceoff_worker::CpuLayout;
 use files::RESULTS;
 use profile_run::EvalSetup;
@@ -40,7 +40,7 @@ pub struct EvalCommand {
     )]
     tasks: Vec<Task>,
     /// Episodes of each task
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_EPISODES_PER_TASK)))]
     episodes: u32,
     /// Perturbations: ideal, one factor's name, or evaluation
     #[arg(long, default_value = "evaluation")]

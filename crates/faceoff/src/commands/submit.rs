@@ -4,9 +4,9 @@
 use crate::client::Client;
 use anyhow::{Context, bail};
 use clap::Args;
-use faceoff_http::api::{
-    evaluations::{EvaluationStatus, EvaluationView},
-    submissions::{SubmissionStatus, SubmissionView},
+use faceoff_http::views::{
+    evaluation::{EvaluationStatus, EvaluationView},
+    submission::{SubmissionStatus, SubmissionView},
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{path::PathBuf, time::Duration};

@@ -5,7 +5,7 @@ use super::{
     profile_run::{EvalSetup, play},
 };
 use anyhow::Context;
-use faceoff_scoring::ProfileEffect;
+use faceoff_scoring::{EpisodeSummary, ProfileEffect};
 use faceoff_types::{Profile, RULESET, Seed, Task};
 use serde::Serialize;
 use std::{collections::BTreeMap, fmt::Write as _, path::Path};
@@ -25,7 +25,8 @@ pub(super) fn run(setup: &EvalSetup, out: &Path) -> anyhow::Result<()> {
     for profile in Profile::ABLATION {
         let played = play(setup, profile, &out.join(profile.as_str()))
             .with_context(|| format!("profile {profile}"))?;
-        runs.insert(profile, played.outcomes);
+        let summary = EpisodeSummary::of(&played.outcomes);
+        runs.insert(profile, summary.context("comparing the profiles")?);
     }
     let tasks = faceoff_scoring::ablation(&runs).context("comparing the profiles")?;
     let agent = setup.bundle.manifest.name.clone();

@@ -1,0 +1,86 @@
+//! Downloads of recorded datasets.
+
+use crate::{
+    app::App,
+    auth::Caller,
+    extract::PathParam,
+    problem::{Problem, ProblemKind},
+};
+use axum::{
+    body::Body,
+    extract::State,
+    http::{HeaderValue, header},
+    response::{IntoResponse, Response},
+};
+use faceoff_store::EvaluationState;
+use faceoff_types::EvaluationId;
+use jiff::civil::Date;
+
+/// The recorded dataset, a zip archive; for its team and the organiser.
+///
+/// It carries the day's seed. So it is handed out once no evaluation of the day is under way, and the
+/// first one handed out ends the day for what is uploaded after it.
+#[utoipa::path(
+    get, path = "/evaluations/{id}/dataset", tag = "team",
+    security(("team" = []), ("organiser" = [])),
+    params(("id" = EvaluationId, Path)),
+    responses(
+        (status = 200, body = Vec<u8>, content_type = "application/zip"),
+        (status = 404),
+        (status = 409, description = "not finished yet, or failed, or other evaluations of its day are under way"),
+    )
+)]
+pub(crate) async fn dataset(
+    caller: Caller,
+    State(app): State<App>,
+    PathParam(id): PathParam<EvaluationId>,
+) -> Result<Response, Problem> {
+    let found = app.store.evaluation(id).await;
+    let evaluation = caller.visible("evaluation", found, |evaluation| evaluation.team)?;
+    let why_not = match &evaluation.state {
+        EvaluationState::Finished { dataset, .. } => {
+            app.release_day(caller.actor(), evaluation.day).await?;
+            // A dataset that a finished evaluation names must be there: without it, we lost it.
+            let (bytes, stream) = app
+                .store
+                .artifacts()
+                .read(dataset)
+                .await
+                .map_err(Problem::internal)?;
+            let team = app.store.team(evaluation.team).await?;
+            let name = download_name(team.name.as_str(), evaluation.day);
+            let disposition = HeaderValue::try_from(format!("attachment; filename=\"{name}\""))
+                .map_err(Problem::internal)?;
+            let headers = [
+                (
+                    header::CONTENT_TYPE,
+                    HeaderValue::from_static("application/zip"),
+                ),
+                (header::CONTENT_LENGTH, HeaderValue::from(bytes)),
+                (header::CONTENT_DISPOSITION, disposition),
+            ];
+            return Ok((headers, Body::from_stream(stream)).into_response());
+        }
+        EvaluationState::Queued | EvaluationState::Running { .. } | EvaluationState::Finalising => {
+            "the evaluation is not finished; follow it until its state is “finished”"
+        }
+        EvaluationState::AgentFailed { .. } => {
+            "the agent failed too often, so there is no dataset; its faults and log are in \
+             GET /api/v1/evaluations/ID"
+        }
+        EvaluationState::PlatformFailed { .. } => {
+            "the evaluation failed by our fault and has no dataset; the day's turn was given back"
+        }
+        EvaluationState::Cancelled { .. } => "the evaluation was cancelled and has no dataset",
+    };
+    Err(Problem::new(ProblemKind::Conflict, why_not))
+}
+
+/// A file name without anything that a header or a file system could trip over.
+fn download_name(team: &str, day: Date) -> String {
+    let team: String = team
+        .chars()
+        .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
+        .collect();
+    format!("faceoff-{team}-{day}.zip")
+}

@@ -1,0 +1,51 @@
+use faceoff_store::RunPlan;
+use faceoff_types::Clock;
+use jiff::civil;
+use std::{path::PathBuf, time::Duration};
+
+/// How much the web side takes on at a time, and how long it waits.
+#[derive(Debug, Clone, Copy)]
+pub struct HttpLimits {
+    /// Requests being answered at the same time; more are told to come back.
+    pub requests: usize,
+    /// Uploads at the same time; each one writes to disk.
+    pub uploads: usize,
+    /// Longest time to answer a request that is no upload.
+    pub answer: Duration,
+    /// Longest pause inside an upload.
+    pub upload_pause: Duration,
+    /// Uploads of one team that may wait for their smoke run.
+    pub pending_submissions: usize,
+}
+
+impl Default for HttpLimits {
+    fn default() -> Self {
+        Self {
+            requests: 512,
+            uploads: 16,
+            answer: Duration::from_secs(30),
+            upload_pause: Duration::from_secs(30),
+            pending_submissions: 5,
+        }
+    }
+}
+
+/// What [`router`](crate::router) needs besides the store.
+#[derive(Debug, Clone)]
+pub struct HttpConfig {
+    /// Largest packed bundle, in bytes.
+    pub max_bundle_bytes: u64,
+    /// How an evaluation runs: of a team's own turn, and of `POST /api/v1/days` where its body does
+    /// not say otherwise.
+    pub plan: RunPlan,
+    /// BLAKE3 of the organiser's bearer token ([`token::hash_token`](crate::token::hash_token)).
+    pub admin_token_hash: [u8; 32],
+    /// Existing folder for uploads under way, on a disk with room for some bundles.
+    pub upload_dir: PathBuf,
+    /// UTC time of the daily evaluation; `None` when the organiser starts it by hand. Shown only.
+    pub daily_at: Option<civil::Time>,
+    /// Stamps what is written, and tells which day's turn is used.
+    pub clock: Clock,
+    /// Concurrency and patience.
+    pub limits: HttpLimits,
+}

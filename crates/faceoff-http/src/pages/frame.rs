@@ -1,0 +1,77 @@
+use super::assets;
+use crate::problem::Problem;
+use askama::Template;
+use axum::response::{Html, IntoResponse, Response};
+use faceoff_types::RULESET;
+
+/// What surrounds the content of every page.
+#[derive(Debug)]
+pub(super) struct Frame {
+    /// The season's name; empty where the page does not know it.
+    pub(super) season: String,
+    pub(super) ruleset: &'static str,
+    /// Path of the navigation entry that this page is.
+    pub(super) current: String,
+    pub(super) style: &'static str,
+    pub(super) icon: &'static str,
+}
+
+impl Frame {
+    pub(super) fn new(season: String, current: impl Into<String>) -> Self {
+        Self {
+            season,
+            ruleset: RULESET,
+            current: current.into(),
+            style: assets::style_url(),
+            icon: assets::ICON_PATH,
+        }
+    }
+}
+
+/// Renders a page.
+pub(super) fn render(page: &impl Template) -> Result<Response, PageProblem> {
+    match page.render() {
+        Ok(html) => Ok(Html(html).into_response()),
+        Err(error) => Err(PageProblem(Problem::internal(error))),
+    }
+}
+
+/// A problem, shown as a page.
+pub(super) struct PageProblem(Problem);
+
+impl From<Problem> for PageProblem {
+    fn from(problem: Problem) -> Self {
+        Self(problem)
+    }
+}
+
+#[derive(Template)]
+#[template(path = "problem.html")]
+struct ProblemPage<'a> {
+    frame: Frame,
+    title: &'a str,
+    detail: &'a str,
+    status: u16,
+}
+
+impl IntoResponse for PageProblem {
+    fn into_response(self) -> Response {
+        let kind = self.0.kind();
+        let page = ProblemPage {
+            frame: Frame::new(String::new(), ""),
+            title: kind.title(),
+            detail: self.0.detail(),
+            status: kind.status().as_u16(),
+        };
+        match page.render() {
+            Ok(html) => {
+                let mut response = (kind.status(), Html(html)).into_response();
+                response
+                    .headers_mut()
+                    .extend(self.0.headers().iter().cloned());
+                response
+            }
+            Err(error) => Problem::internal(error).into_response(),
+        }
+    }
+}

@@ -1,0 +1,130 @@
+use super::kind::ProblemKind;
+use axum::{
+    Json,
+    http::{HeaderName, HeaderValue, header},
+    response::{IntoResponse, Response},
+};
+use serde::Serialize;
+use serde_json::{Map, Value};
+use std::fmt::Display;
+use utoipa::ToSchema;
+
+/// One problem, ready to be sent.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    kind: ProblemKind,
+    detail: String,
+    members: Map<String, Value>,
+    headers: Vec<(HeaderName, HeaderValue)>,
+}
+
+impl Problem {
+    /// Media type of RFC 9457.
+    pub const MEDIA_TYPE: &'static str = "application/problem+json";
+
+    /// A problem; `detail` says what was expected, what came and what to do.
+    #[must_use]
+    pub fn new(kind: ProblemKind, detail: impl Into<String>) -> Self {
+        let headers = match kind {
+            ProblemKind::Unauthenticated => vec![(
+                header::WWW_AUTHENTICATE,
+                HeaderValue::from_static("Bearer realm=\"faceoff\""),
+            )],
+            ProblemKind::Busy => vec![(header::RETRY_AFTER, HeaderValue::from_static("2"))],
+            ProblemKind::TooManyPending | ProblemKind::NotYet => {
+                vec![(header::RETRY_AFTER, HeaderValue::from_static("30"))]
+            }
+            _ => Vec::new(),
+        };
+        Self {
+            kind,
+            detail: detail.into(),
+            members: Map::new(),
+            headers,
+        }
+    }
+
+    /// With an extension member, for programs.
+    #[must_use]
+    pub fn with(mut self, name: &str, value: impl Into<Value>) -> Self {
+        self.members.insert(name.to_owned(), value.into());
+        self
+    }
+
+    /// Decides status, title and `type`.
+    #[must_use]
+    pub const fn kind(&self) -> ProblemKind {
+        self.kind
+    }
+
+    /// What happened and what to do.
+    #[must_use]
+    pub fn detail(&self) -> &str {
+        &self.detail
+    }
+
+    /// A `field` of the request whose value cannot be used; `detail` says what was expected and what
+    /// came.
+    pub(crate) fn invalid(field: &str, detail: impl Display) -> Self {
+        Self::new(ProblemKind::InvalidContent, format!("{field}: {detail}")).with("field", field)
+    }
+
+    /// Our fault: `cause` goes to the log only.
+    pub(crate) fn internal(cause: impl Display) -> Self {
+        tracing::error!(%cause, "request failed");
+        Self::new(
+            ProblemKind::Internal,
+            "the server could not complete the request; nothing is wrong with what you sent. Try again; \
+             if it stays, send the organiser the x-request-id header of this answer",
+        )
+    }
+
+    /// No such `what` (or not the caller's: the two must look alike).
+    pub(crate) fn not_found(what: &str) -> Self {
+        Self::new(
+            ProblemKind::NotFound,
+            format!("there is no such {what} of yours; check the id and the token's team"),
+        )
+    }
+
+    pub(crate) fn headers(&self) -> &[(HeaderName, HeaderValue)] {
+        &self.headers
+    }
+}
+
+/// Problem details (RFC 9457).
+#[derive(Serialize, ToSchema)]
+#[schema(as = Problem)]
+pub(crate) struct ProblemBody<'a> {
+    /// Kind of the problem, explained at that place of the server.
+    #[schema(example = "/problems#already-evaluated")]
+    r#type: String,
+    /// The kind in a few words.
+    title: &'a str,
+    /// The HTTP status.
+    status: u16,
+    /// What was expected, what came and what to do.
+    detail: &'a str,
+    #[serde(flatten)]
+    #[schema(ignore)]
+    members: &'a Map<String, Value>,
+}
+
+impl IntoResponse for Problem {
+    fn into_response(self) -> Response {
+        let body = ProblemBody {
+            r#type: format!("/problems#{}", self.kind.slug()),
+            title: self.kind.title(),
+            status: self.kind.status().as_u16(),
+            detail: &self.detail,
+            members: &self.members,
+        };
+        let media_type = (
+            header::CONTENT_TYPE,
+            HeaderValue::from_static(Self::MEDIA_TYPE),
+        );
+        let mut response = (self.kind.status(), [media_type], Json(body)).into_response();
+        response.headers_mut().extend(self.headers);
+        response
+    }
+}

@@ -1,0 +1,69 @@
+use super::{details::Problem, kind::ProblemKind};
+use faceoff_store::StoreError;
+
+impl From<StoreError> for Problem {
+    fn from(error: StoreError) -> Self {
+        match error {
+            StoreError::NotFound(what) => Self::new(
+                ProblemKind::NotFound,
+                format!("there is no such {what}; check the id"),
+            ),
+            StoreError::TeamNameTaken(name) => Self::new(
+                ProblemKind::TeamNameTaken,
+                format!(
+                    "a team named {name:?} exists already; choose another name, or make a new token \
+                     for it with POST /api/v1/teams/ID/token"
+                ),
+            ),
+            StoreError::AlreadyEvaluated { day, next } => Self::new(
+                ProblemKind::AlreadyEvaluated,
+                format!(
+                    "this team's evaluation of {day} exists already, and a team is evaluated once per \
+                     UTC day; the next turn is on {next}, from 00:00 UTC"
+                ),
+            )
+            .with("day", day.to_string())
+            .with("next_turn", next.to_string()),
+            StoreError::DayReleased {
+                day,
+                released_at,
+                next,
+            } => Self::new(
+                ProblemKind::DayReleased,
+                format!(
+                    "the seed of {day} is known since {}, when the first dataset of the day was handed \
+                     out, and this submission was uploaded after that; it can play from {next}, 00:00 \
+                     UTC. A submission that was uploaded before can still play {day}",
+                    released_at.strftime("%H:%M:%S UTC")
+                ),
+            )
+            .with("day", day.to_string())
+            .with("next_turn", next.to_string()),
+            StoreError::SeasonClosed { closed_at } => Self::new(
+                ProblemKind::SeasonClosed,
+                format!(
+                    "the season was closed on {} and its secret is public, so nothing more is uploaded \
+                     or evaluated; results and datasets stay",
+                    closed_at.strftime("%Y-%m-%d at %H:%M UTC")
+                ),
+            )
+            .with("closed_at", closed_at.to_string()),
+            StoreError::Conflict(detail) => Self::new(ProblemKind::Conflict, detail),
+            error @ (StoreError::Database(_)
+            | StoreError::Artifacts(_)
+            | StoreError::Damaged(_)) => Self::internal(error),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cause_that_is_ours_stays_inside() {
+        let problem = Problem::from(StoreError::Artifacts("disk /dev/secret is full".into()));
+        assert_eq!(problem.kind(), ProblemKind::Internal);
+        assert!(!problem.detail().contains("secret"));
+    }
+}

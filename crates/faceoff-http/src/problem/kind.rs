@@ -1,0 +1,126 @@
+use axum::http::StatusCode;
+
+/// One line per kind: variant, name in `type`, HTTP status, title, and what it means with what to do.
+macro_rules! kinds {
+    ($($kind:ident $slug:literal $status:ident $title:literal $meaning:literal)*) => {
+        /// What kind of problem it is. `type` in the answer is `/problems#` and the kind's name; that page
+        /// explains them all.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum ProblemKind {
+            $(#[doc = $meaning] $kind,)*
+        }
+
+        impl ProblemKind {
+            /// All kinds, as the page `/problems` lists them.
+            pub const ALL: &[Self] = &[$(Self::$kind,)*];
+
+            const fn row(self) -> (&'static str, StatusCode, &'static str, &'static str) {
+                match self {
+                    $(Self::$kind => ($slug, StatusCode::$status, $title, $meaning),)*
+                }
+            }
+        }
+    };
+}
+
+kinds! {
+    Unauthenticated "unauthenticated" UNAUTHORIZED
+        "A valid token is needed"
+        "Send the header “Authorization: Bearer TOKEN”. A lost token is replaced by the organiser."
+    Forbidden "forbidden" FORBIDDEN
+        "This token may not do that"
+        "The token is valid, but of the wrong kind: some requests are a team's, some are the organiser's."
+    NotFound "not-found" NOT_FOUND
+        "Not found"
+        "There is no such thing, or it belongs to another team. Check the id."
+    MethodNotAllowed "method-not-allowed" METHOD_NOT_ALLOWED
+        "Method not allowed"
+        "The path exists, but not with this method. The header “Allow” lists what it takes."
+    InvalidRequest "invalid-request" BAD_REQUEST
+        "The request is not understood"
+        "The JSON, an id, a header or the query is malformed. The detail names the place."
+    InvalidContent "invalid-content" UNPROCESSABLE_ENTITY
+        "A value is not acceptable"
+        "The request is well-formed, but a field has a value that cannot be used. The detail names it."
+    UnsupportedMediaType "unsupported-media-type" UNSUPPORTED_MEDIA_TYPE
+        "Unsupported media type"
+        "A bundle is a .tar.gz, .tar.zst or .zip sent as the body itself; everything else is JSON."
+    TooLarge "too-large" PAYLOAD_TOO_LARGE
+        "The body is too large"
+        "The detail and “limit_bytes” state the limit. Leave data out of the bundle that the agent does not need."
+    RequestTimeout "request-timeout" REQUEST_TIMEOUT
+        "The body stopped coming"
+        "The upload stalled for too long. Nothing was stored; send it again."
+    TeamNameTaken "team-name-taken" CONFLICT
+        "The name is taken"
+        "Another team has this name. Choose another one, or ask for a new token for the existing team."
+    AlreadyEvaluated "already-evaluated" CONFLICT
+        "Today's turn is used"
+        "A team is evaluated once per UTC day. “next_turn” is the next day it can be."
+    DayReleased "day-released" CONFLICT
+        "Too late for today's episodes"
+        "A dataset of today was handed out, and with it the seed of today's episodes. What was uploaded after that plays from “next_turn” on."
+    NotYet "not-yet" CONFLICT
+        "Not yet"
+        "A dataset carries the seed of its day. It is handed out once no evaluation of that day is queued or running."
+    SeasonClosed "season-closed" CONFLICT
+        "The season is over"
+        "The season's secret is published, so nothing more is uploaded or evaluated. Results and datasets stay."
+    NotPaired "not-paired" CONFLICT
+        "Not the same episodes"
+        "Two evaluations are compared if they are of the same day and played equally many episodes of the same tasks under the same rules and profile. “field” names what differs."
+    Conflict "conflict" CONFLICT
+        "Not possible in this state"
+        "The detail says which state the thing is in and what it waits for."
+    TooManyPending "too-many-pending" TOO_MANY_REQUESTS
+        "Too many uploads are waiting"
+        "Several uploads of the team are not validated yet. Wait until one has its verdict."
+    Busy "busy" SERVICE_UNAVAILABLE
+        "The server is busy"
+        "Try again after the seconds stated in the header “Retry-After”."
+    Internal "internal" INTERNAL_SERVER_ERROR
+        "The server failed"
+        "Our fault. Try again; if it stays, send the organiser the header “X-Request-Id” of the answer."
+}
+
+impl ProblemKind {
+    /// Name in `type`.
+    #[must_use]
+    pub const fn slug(self) -> &'static str {
+        self.row().0
+    }
+
+    /// HTTP status.
+    #[must_use]
+    pub const fn status(self) -> StatusCode {
+        self.row().1
+    }
+
+    /// Short title, the same for every problem of the kind.
+    #[must_use]
+    pub const fn title(self) -> &'static str {
+        self.row().2
+    }
+
+    /// What the kind means and what to do, for the page `/problems`.
+    #[must_use]
+    pub const fn meaning(self) -> &'static str {
+        self.row().3
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn kinds_are_told_apart_and_are_errors() {
+        let slugs: BTreeSet<_> = ProblemKind::ALL.iter().map(|kind| kind.slug()).collect();
+        assert_eq!(slugs.len(), ProblemKind::ALL.len());
+        for kind in ProblemKind::ALL {
+            assert!(kind.status().is_client_error() || kind.status().is_server_error());
+            assert!(kind.meaning().ends_with('.'));
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! Who stands where, and how sure that is.
+
+use crate::{app::AppState, problem::Problem, seeds::DaySeeds, summaries::RunSummaries};
+use faceoff_scoring::{
+    BoardEntry, Played, RankedEntry, SIGNIFICANCE, TIER_CHANGE_RESAMPLES, overall_board,
+    rank_groups, task_board,
+};
+use faceoff_store::BoardRecord;
+use faceoff_types::{
+    EvaluationId, Profile, RULESET, Seed, Task, TaskResult, TeamId, TeamName, Tier,
+};
+use jiff::{Timestamp, civil::Date};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use utoipa::ToSchema;
+
+/// A board: each team's newest finished evaluation, in board order.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct BoardView {
+    /// The rules that the scores refer to.
+    #[schema(example = "airhockey-2023.1")]
+    pub ruleset: String,
+    /// The task, or null for the overall board.
+    pub task: Option<Task>,
+    /// The level at which teams are told apart: rows of one rank group stand in the same tier and
+    /// cannot be told from the group's first row.
+    #[schema(example = 0.05)]
+    pub significance: f64,
+    /// Bootstrap resamples behind each `tier_change_probability`.
+    #[schema(example = 2000)]
+    pub tier_change_resamples: u32,
+    /// Deployable teams first, then improvable, then non-deployable; inside a tier the higher score,
+    /// then the fewer penalty points, then the earlier submission.
+    pub rows: Vec<BoardRow>,
+}
+
+/// One team on a board.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct BoardRow {
+    /// Place on the whole board, from 1.
+    pub rank: u32,
+    /// Teams of one group cannot be told from the group's first; from 1 down the board.
+    pub rank_group: u32,
+    /// The overall one, or the task's.
+    pub tier: Tier,
+    /// Probability that other episodes of the same kind would give another tier.
+    pub tier_change_probability: f64,
+    /// The team's name.
+    pub team: TeamName,
+    /// Stays when names change.
+    pub team_id: TeamId,
+    /// The agent's own name.
+    pub agent: Option<String>,
+    /// The newest that the team finished.
+    pub evaluation: EvaluationId,
+    /// The UTC day whose episodes it played.
+    pub day: Date,
+    /// When its score was published.
+    pub finished_at: Timestamp,
+    /// The rules that it was scored by.
+    pub ruleset: String,
+    /// The perturbations.
+    pub profile: Profile,
+    /// Overall score in percent.
+    pub score: f64,
+    /// Overall penalty points: the maximum over the tasks.
+    pub penalty_points: f64,
+    /// The seed of the day's evaluations; null while teams that have not used their turn must not know
+    /// their episodes.
+    pub seed: Option<Seed>,
+    /// Results by task: hit, defend, prepare.
+    pub tasks: BTreeMap<Task, TaskResult>,
+}
+
+impl BoardView {
+    /// The overall board, or that of one task. A constant number of reads, however many teams there are.
+    pub(crate) async fn of(app: &AppState, task: Option<Task>) -> Result<Self, Problem> {
+        let records = app.store.board().await?;
+        let runs: Vec<_> = records.iter().map(|record| record.run).collect();
+        let summaries = app.summaries.of(&runs).await?;
+        let seeds = app
+            .day_seeds(records.iter().map(|record| record.day).collect())
+            .await?;
+        let mismatch_seed = app.store.season().await?.secret.model_mismatch();
+
+        let entries = records.into_iter().map(|record| BoardEntry {
+            result: record.result.clone(),
+            submitted_at_ms: record.submitted_at.as_millisecond(),
+            key: record,
+        });
+        let ranked = match task {
+            None => overall_board(entries.collect()),
+            Some(task) => task_board(task, entries.collect()),
+        };
+        let groups = rank_groups(&ranked, |leader, row| {
+            let leader = played(leader, &summaries, mismatch_seed)?;
+            Ok::<_, Problem>(leader.told_apart(&played(row, &summaries, mismatch_seed)?, task))
+        })?;
+        let rows = ranked.into_iter().zip(groups).map(|(ranked, rank_group)| {
+            let summary = played(&ranked.entry.key, &summaries, mismatch_seed)?.summary;
+            let tier_change_probability = summary.tier_change_of(task);
+            Ok(row(ranked, rank_group, tier_change_probability, &seeds))
+        });
+        Ok(Self {
+            ruleset: RULESET.to_owned(),
+            task,
+            significance: SIGNIFICANCE,
+            tier_change_resamples: TIER_CHANGE_RESAMPLES,
+            rows: rows.collect::<Result<_, Problem>>()?,
+        })
+    }
+}
+
+/// A board's record as comparisons need it.
+fn played<'a>(
+    record: &'a BoardRecord,
+    summaries: &'a RunSummaries,
+    mismatch_seed: Seed,
+) -> Result<Played<'a>, Problem> {
+    let run = record.run;
+    let summary = summaries
+        .get(&run)
+        .ok_or_else(|| Problem::internal(format_args!("run {run} has no summary")))?;
+    Ok(Played {
+        ruleset: &record.result.ruleset,
+        profile: record.result.profile,
+        seed: record.result.seed,
+        mismatch_seed,
+        summary,
+    })
+}
+
+fn row(
+    ranked: RankedEntry<BoardRecord>,
+    rank_group: u32,
+    tier_change_probability: f64,
+    seeds: &DaySeeds,
+) -> BoardRow {
+    let RankedEntry { rank, tier, entry } = ranked;
+    let (record, result) = (entry.key, entry.result);
+    BoardRow {
+        rank,
+        rank_group,
+        tier,
+        tier_change_probability,
+        team: record.team.name,
+        team_id: record.team.id,
+        agent: record.agent_name,
+        evaluation: record.evaluation,
+        day: record.day,
+        finished_at: record.finished_at,
+        ruleset: result.ruleset,
+        profile: result.profile,
+        score: result.score,
+        penalty_points: result.penalty_points,
+        seed: seeds.public(result.seed, record.day),
+        tasks: result.tasks,
+    }
+}

@@ -1,0 +1,135 @@
+//! Whether one of two agents is better, by the episodes that both played.
+
+use crate::{
+    app::AppState,
+    problem::{Problem, ProblemKind},
+};
+use faceoff_scoring::{Comparison, EpisodeSummary, OverallComparison, Played, TaskComparison};
+use faceoff_store::{Evaluation, EvaluationState, StoreError};
+use faceoff_types::{EvaluationId, EvaluationResult, Profile, Seed, Task, TeamName};
+use jiff::civil::Date;
+use serde::{Deserialize, Serialize};
+use std::{collections::BTreeMap, sync::Arc};
+use utoipa::ToSchema;
+
+/// Two evaluations on the same episodes. Differences are A minus B.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ComparisonView {
+    /// The first evaluation.
+    pub a: ComparedView,
+    /// The second evaluation.
+    pub b: ComparedView,
+    /// The UTC day whose episodes both played.
+    pub day: Date,
+    /// The rules that both were scored by.
+    pub ruleset: String,
+    /// The perturbations that both met.
+    pub profile: Profile,
+    /// By task: hit, defend, prepare.
+    pub tasks: BTreeMap<Task, TaskComparison>,
+    /// Of the overall scores.
+    pub overall: OverallComparison,
+}
+
+/// One side of a comparison.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ComparedView {
+    /// A finished one.
+    pub evaluation: EvaluationId,
+    /// Whose agent played.
+    pub team: TeamName,
+}
+
+/// A finished evaluation with what a comparison needs.
+struct Side {
+    evaluation: Evaluation,
+    result: Box<EvaluationResult>,
+    summary: Arc<EpisodeSummary>,
+}
+
+impl Side {
+    async fn load(app: &AppState, id: EvaluationId) -> Result<Self, Problem> {
+        let evaluation = app
+            .store
+            .evaluation(id)
+            .await
+            .map_err(|error| match error {
+                StoreError::NotFound(_) => Problem::new(
+                    ProblemKind::NotFound,
+                    format!("there is no evaluation {id}; check the id"),
+                ),
+                error => error.into(),
+            })?;
+        let EvaluationState::Finished { result, .. } = &evaluation.state else {
+            return Err(Problem::new(
+                ProblemKind::Conflict,
+                format!(
+                    "evaluation {id} has no result, so there is nothing to compare; only finished \
+                     evaluations are compared"
+                ),
+            ));
+        };
+        let result = result.clone();
+        Ok(Self {
+            summary: app.summaries.of_run(evaluation.run).await?,
+            evaluation,
+            result,
+        })
+    }
+
+    fn played(&self, mismatch_seed: Seed) -> Played<'_> {
+        Played {
+            ruleset: &self.result.ruleset,
+            profile: self.result.profile,
+            seed: self.result.seed,
+            mismatch_seed,
+            summary: &self.summary,
+        }
+    }
+
+    async fn view(&self, app: &AppState) -> Result<ComparedView, Problem> {
+        Ok(ComparedView {
+            evaluation: self.evaluation.id,
+            team: app.store.team(self.evaluation.team).await?.name,
+        })
+    }
+}
+
+impl ComparisonView {
+    /// Compares two finished evaluations.
+    ///
+    /// # Errors
+    /// `NotFound`, `Conflict` while one has no result, `NotPaired` when they did not play the same episodes.
+    pub(crate) async fn of(app: &AppState, [a, b]: [EvaluationId; 2]) -> Result<Self, Problem> {
+        let (a, b) = (Side::load(app, a).await?, Side::load(app, b).await?);
+        let not_paired = |field: &str, detail: String| {
+            Problem::new(
+                ProblemKind::NotPaired,
+                format!("{detail}; only evaluations that played the same episodes are compared"),
+            )
+            .with("field", field)
+        };
+        let (day_a, day_b) = (a.evaluation.day, b.evaluation.day);
+        if day_a != day_b {
+            return Err(not_paired(
+                "day",
+                format!("day: the first evaluation is of {day_a}, the second of {day_b}"),
+            ));
+        }
+        // that of the season, which both share
+        let mismatch_seed = app.store.season().await?.secret.model_mismatch();
+        let Comparison { tasks, overall } = a
+            .played(mismatch_seed)
+            .compare(&b.played(mismatch_seed))
+            .map_err(|error| not_paired(error.field(), error.to_string()))?;
+        Ok(Self {
+            a: a.view(app).await?,
+            b: b.view(app).await?,
+            day: day_a,
+            ruleset: a.result.ruleset.clone(),
+            profile: a.result.profile,
+            tasks,
+            overall,
+        })
+    }
+}

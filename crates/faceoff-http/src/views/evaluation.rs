@@ -1,0 +1,299 @@
+//! An evaluation on its way to a score or a failure.
+
+use crate::{app::AppState, paths, problem::Problem, seeds::DaySeeds};
+use faceoff_scoring::EpisodeSummary;
+use faceoff_store::{Evaluation, EvaluationState};
+use faceoff_types::{
+    AgentFault, EvaluationId, EvaluationResult, Profile, Seed, SlotTiming, SubmissionId, Task,
+    TaskResult, TeamId, TeamName, Tier,
+};
+use jiff::{Timestamp, civil::Date};
+use serde::{Deserialize, Serialize};
+use std::{collections::BTreeMap, sync::Arc};
+use utoipa::ToSchema;
+
+/// One run of a submission over the tasks.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct EvaluationView {
+    /// Names the evaluation in paths.
+    pub id: EvaluationId,
+    /// The submission that plays.
+    pub submission: SubmissionId,
+    /// The submission's team.
+    pub team: TeamId,
+    /// As the board shows it.
+    pub team_name: TeamName,
+    /// The UTC day whose turn it uses.
+    pub day: Date,
+    /// The perturbations.
+    pub profile: Profile,
+    /// In the order of play.
+    pub tasks: Vec<Task>,
+    /// Episodes of each task.
+    pub episodes_per_task: u32,
+    /// When it was queued.
+    pub created_at: Timestamp,
+    /// How far it is.
+    pub progress: Progress,
+    /// What has become of it.
+    #[serde(flatten)]
+    pub status: EvaluationStatus,
+}
+
+/// How much of an evaluation or of an ablation is played.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct Progress {
+    /// Episodes played.
+    pub episodes_done: u32,
+    /// Episodes to play, over all tasks (and profiles).
+    pub episodes_total: u32,
+}
+
+/// What has become of an evaluation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "state", rename_all = "snake_case")]
+pub enum EvaluationStatus {
+    /// It waits for a worker.
+    Queued,
+    /// Episodes are being played.
+    Running,
+    /// All episodes are played, the score is being computed.
+    Finalising,
+    /// It has a score.
+    Finished {
+        /// When the score was published.
+        finished_at: Timestamp,
+        /// The score.
+        result: Box<ResultView>,
+        /// Path of the recorded dataset on this server.
+        dataset: String,
+    },
+    /// The agent broke the protocol or a limit too often; no score.
+    AgentFailed {
+        /// When the last of its faults was stored.
+        finished_at: Timestamp,
+        /// What the agent did; absent in lists.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        faults: Option<Vec<FaultView>>,
+        /// Last part of the agent's standard error; absent in lists.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        log: Option<String>,
+    },
+    /// Our fault; the day's turn was given back.
+    PlatformFailed {
+        /// When we gave it up.
+        finished_at: Timestamp,
+        /// What failed.
+        reason: String,
+    },
+    /// Stopped by the organiser.
+    Cancelled {
+        /// When it was stopped.
+        finished_at: Timestamp,
+        /// The organiser's words.
+        reason: String,
+    },
+}
+
+impl EvaluationStatus {
+    /// Will nothing change any more?
+    #[must_use]
+    pub const fn is_final(&self) -> bool {
+        !matches!(self, Self::Queued | Self::Running | Self::Finalising)
+    }
+}
+
+/// The score of one evaluation; laid out as `results.json` of the dataset.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ResultView {
+    /// The rules that it was scored by.
+    pub ruleset: String,
+    /// The perturbations.
+    pub profile: Profile,
+    /// The seed of the day's evaluations, 64 hexadecimal digits; null while teams that have not used
+    /// their turn must not know their episodes.
+    pub seed: Option<Seed>,
+    /// By task: hit, defend, prepare.
+    pub tasks: BTreeMap<Task, TaskResult>,
+    /// Overall score in percent.
+    pub score: f64,
+    /// Penalty points: the maximum over the tasks.
+    pub penalty_points: f64,
+    /// The worst of the tasks' tiers.
+    pub tier: Tier,
+    /// The slots' noise floor and re-runs; absent in results of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub timing: Option<SlotTiming>,
+}
+
+impl ResultView {
+    fn new(result: EvaluationResult, seed: Option<Seed>) -> Self {
+        Self {
+            ruleset: result.ruleset,
+            profile: result.profile,
+            seed,
+            tasks: result.tasks,
+            score: result.score,
+            penalty_points: result.penalty_points,
+            tier: result.tier,
+            timing: result.timing,
+        }
+    }
+}
+
+/// Something an agent did wrong.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct FaultView {
+    /// What it did, in words.
+    pub message: String,
+    /// In which task.
+    pub task: String,
+    /// In which episode; null during start-up.
+    pub episode: Option<u32>,
+    /// At which control step; null outside of an episode.
+    pub step: Option<u32>,
+    /// The offending line, cut, where there was one.
+    pub line: Option<String>,
+}
+
+impl From<AgentFault> for FaultView {
+    fn from(fault: AgentFault) -> Self {
+        Self {
+            message: fault.fault.to_string(),
+            task: fault.contest.to_string(),
+            episode: fault.episode,
+            step: fault.step,
+            line: fault.line,
+        }
+    }
+}
+
+impl EvaluationView {
+    pub(crate) async fn find(app: &AppState, id: EvaluationId) -> Result<Self, Problem> {
+        Self::of(app, app.store.evaluation(id).await?).await
+    }
+
+    /// With faults and log, if it failed by them.
+    pub(crate) async fn of(app: &AppState, evaluation: Evaluation) -> Result<Self, Problem> {
+        let team = app.store.team(evaluation.team).await?;
+        let seeds = app.day_seeds([evaluation.day].into()).await?;
+        let run = evaluation.run;
+        let mut view = Self::new(evaluation, team.name, &seeds);
+        if let EvaluationStatus::AgentFailed { faults, log, .. } = &mut view.status {
+            let of_run = app.store.run_faults(run).await?;
+            *faults = Some(of_run.faults.into_iter().map(FaultView::from).collect());
+            *log = Some(of_run.log);
+        }
+        Ok(view)
+    }
+
+    /// All evaluations of a UTC day, in the order in which they were queued; without faults and logs,
+    /// which are long, as in all lists.
+    pub(crate) async fn all_on(app: &AppState, day: Date) -> Result<Vec<Self>, Problem> {
+        Self::all(app, app.store.evaluations_on(day).await?).await
+    }
+
+    /// Those of `today`, after what began before midnight and is still going.
+    pub(crate) async fn current(app: &AppState, today: Date) -> Result<Vec<Self>, Problem> {
+        let mut evaluations = match today.yesterday() {
+            Ok(yesterday) => app.store.evaluations_on(yesterday).await?,
+            Err(_) => Vec::new(),
+        };
+        evaluations.retain(|evaluation| !evaluation.state.is_over());
+        evaluations.extend(app.store.evaluations_on(today).await?);
+        Self::all(app, evaluations).await
+    }
+
+    /// Of a team, newest first.
+    pub(crate) async fn of_team(app: &AppState, team: TeamId) -> Result<Vec<Self>, Problem> {
+        Self::all(app, app.store.evaluations_of(team).await?).await
+    }
+
+    async fn all(app: &AppState, evaluations: Vec<Evaluation>) -> Result<Vec<Self>, Problem> {
+        let teams = app.store.teams().await?;
+        let names: BTreeMap<TeamId, TeamName> =
+            teams.into_iter().map(|team| (team.id, team.name)).collect();
+        let days = evaluations.iter().map(|evaluation| evaluation.day);
+        let seeds = app.day_seeds(days.collect()).await?;
+        evaluations
+            .into_iter()
+            .map(|evaluation| match names.get(&evaluation.team) {
+                Some(name) => Ok(Self::new(evaluation, name.clone(), &seeds)),
+                None => Err(Problem::internal(format_args!(
+                    "evaluation {} has no team",
+                    evaluation.id
+                ))),
+            })
+            .collect()
+    }
+
+    fn new(evaluation: Evaluation, team_name: TeamName, seeds: &DaySeeds) -> Self {
+        let episodes_total = evaluation.plan.episodes_total();
+        let episodes_done = match &evaluation.state {
+            EvaluationState::Running { episodes_done, .. } => *episodes_done,
+            EvaluationState::Finalising | EvaluationState::Finished { .. } => episodes_total,
+            EvaluationState::Queued
+            | EvaluationState::AgentFailed { .. }
+            | EvaluationState::PlatformFailed { .. }
+            | EvaluationState::Cancelled { .. } => 0,
+        };
+        let status = match evaluation.state {
+            EvaluationState::Queued => EvaluationStatus::Queued,
+            EvaluationState::Running { .. } => EvaluationStatus::Running,
+            EvaluationState::Finalising => EvaluationStatus::Finalising,
+            EvaluationState::Finished {
+                finished_at,
+                result,
+                ..
+            } => {
+                let seed = seeds.public(result.seed, evaluation.day);
+                EvaluationStatus::Finished {
+                    finished_at,
+                    result: Box::new(ResultView::new(*result, seed)),
+                    dataset: format!("{}/dataset", paths::evaluation(evaluation.id)),
+                }
+            }
+            EvaluationState::AgentFailed { finished_at } => EvaluationStatus::AgentFailed {
+                finished_at,
+                faults: None,
+                log: None,
+            },
+            EvaluationState::PlatformFailed {
+                finished_at,
+                reason,
+            } => EvaluationStatus::PlatformFailed {
+                finished_at,
+                reason,
+            },
+            EvaluationState::Cancelled {
+                finished_at,
+                reason,
+            } => EvaluationStatus::Cancelled {
+                finished_at,
+                reason,
+            },
+        };
+        Self {
+            id: evaluation.id,
+            submission: evaluation.submission,
+            team: evaluation.team,
+            team_name,
+            day: evaluation.day,
+            profile: evaluation.plan.profile,
+            tasks: evaluation.plan.tasks,
+            episodes_per_task: evaluation.plan.episodes_per_task,
+            created_at: evaluation.created_at,
+            progress: Progress {
+                episodes_done,
+                episodes_total,
+            },
+            status,
+        }
+    }
+
+    /// Of a finished evaluation: which episodes were solved, and how sure its tiers are.
+    pub(crate) async fn summary(&self, app: &AppState) -> Result<Arc<EpisodeSummary>, Problem> {
+        let run = app.store.evaluation(self.id).await?.run;
+        app.summaries.of_run(run).await
+    }
+}

@@ -1,0 +1,95 @@
+//! The season's commitment, and what may be known of its seeds.
+
+use crate::{app::AppState, problem::Problem};
+use faceoff_types::{RULESET, Seed};
+use jiff::{
+    Timestamp,
+    civil::{Date, Time},
+};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// What everybody may know of the season.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct SeasonView {
+    /// As the organiser named it.
+    pub name: String,
+    /// The rules that all scores refer to.
+    #[schema(example = "airhockey-2023.1")]
+    pub ruleset: String,
+    /// BLAKE3 of the season secret, 64 hexadecimal digits. All seeds derive from the secret, so that
+    /// nobody can change them after the commitment is known.
+    pub commitment: String,
+    /// When the secret was drawn and the season began.
+    pub created_at: Timestamp,
+    /// When it was closed; null while it runs.
+    pub closed_at: Option<Timestamp>,
+    /// The season secret, 64 hexadecimal digits; null until the season is closed.
+    pub secret: Option<Seed>,
+    /// The seed of the season's model mismatch; null until the season is closed.
+    pub mismatch_seed: Option<Seed>,
+    /// The current UTC day.
+    pub today: Date,
+    /// UTC time of the daily evaluation; null when the organiser starts it by hand.
+    #[schema(value_type = Option<String>, example = "00:00:00")]
+    pub daily_at: Option<Time>,
+    /// The days that have evaluations, the newest first.
+    pub days: Vec<SeasonDay>,
+}
+
+/// A day of the season.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct SeasonDay {
+    /// In UTC.
+    pub day: Date,
+    /// Its finished evaluations.
+    pub finished: u32,
+    /// The seed of its evaluations; null while somebody must not know it.
+    pub seed: Option<Seed>,
+}
+
+impl SeasonView {
+    pub(crate) async fn now(app: &AppState) -> Result<Self, Problem> {
+        let season = app.store.season().await?;
+        let days = app.store.days().await?;
+        let seeds = app
+            .day_seeds(days.iter().map(|(day, _)| *day).collect())
+            .await?;
+        let revealed = |seed: Seed| season.closed_at.map(|_| seed);
+        Ok(Self {
+            ruleset: RULESET.to_owned(),
+            created_at: season.created_at,
+            closed_at: season.closed_at,
+            secret: revealed(season.secret),
+            mismatch_seed: revealed(season.secret.model_mismatch()),
+            today: app.config.clock.today(),
+            daily_at: app.config.daily_at,
+            days: days
+                .into_iter()
+                .map(|(day, finished)| SeasonDay {
+                    day,
+                    finished,
+                    seed: seeds.public(season.secret.day(day), day),
+                })
+                .collect(),
+            name: season.name,
+            commitment: season.commitment,
+        })
+    }
+}
+
+/// What the heads of pages tell of the season: one read, however long the season is.
+pub(crate) struct SeasonHead {
+    pub(crate) name: String,
+    pub(crate) commitment: String,
+}
+
+impl SeasonHead {
+    pub(crate) async fn now(app: &AppState) -> Result<Self, Problem> {
+        let season = app.store.season().await?;
+        Ok(Self {
+            name: season.name,
+            commitment: season.commitment,
+        })
+    }
+}

@@ -1,0 +1,96 @@
+//! An uploaded agent and its smoke run's verdict.
+
+use crate::{app::AppState, problem::Problem};
+use faceoff_store::{Submission, SubmissionState};
+use faceoff_types::{SubmissionId, TeamId};
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// One uploaded agent.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct SubmissionView {
+    /// Names the submission in paths.
+    pub id: SubmissionId,
+    /// Who uploaded it.
+    pub team: TeamId,
+    /// Name of the archive.
+    pub file_name: String,
+    /// Size of the archive in bytes.
+    pub bytes: u64,
+    /// BLAKE3 of the archive, 64 hexadecimal digits.
+    pub blake3: String,
+    /// When the upload was complete.
+    pub created_at: Timestamp,
+    /// The agent's own name, known once the bundle was unpacked.
+    pub agent_name: Option<String>,
+    /// The smoke run's verdict.
+    #[serde(flatten)]
+    pub status: SubmissionStatus,
+}
+
+/// What has become of a submission.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(tag = "state", rename_all = "snake_case")]
+pub enum SubmissionStatus {
+    /// It waits for its smoke run, or is in it.
+    Validating,
+    /// It starts, answers and keeps time: it can be evaluated.
+    Valid {
+        /// Last part of the agent's standard error; absent in lists.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        log: Option<String>,
+    },
+    /// The bundle or the agent is at fault.
+    Invalid {
+        /// What is wrong and where.
+        reason: String,
+        /// Last part of the agent's standard error; absent in lists.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        log: Option<String>,
+    },
+    /// The smoke run failed by our fault, several times; upload it again.
+    ValidationError {
+        /// What failed.
+        reason: String,
+    },
+}
+
+impl SubmissionView {
+    pub(crate) async fn find(app: &AppState, id: SubmissionId) -> Result<Self, Problem> {
+        Self::of(app, app.store.submission(id).await?).await
+    }
+
+    /// With its log.
+    pub(crate) async fn of(app: &AppState, submission: Submission) -> Result<Self, Problem> {
+        let log = app.store.submission_log(submission.id).await?;
+        Ok(Self::new(submission, log))
+    }
+
+    /// Of a team, newest first; without their logs, which are long.
+    pub(crate) async fn of_team(app: &AppState, team: TeamId) -> Result<Vec<Self>, Problem> {
+        let submissions = app.store.submissions_of(team).await?;
+        let without_log = |submission| Self::new(submission, None);
+        Ok(submissions.into_iter().map(without_log).collect())
+    }
+
+    pub(crate) fn new(submission: Submission, log: Option<String>) -> Self {
+        Self {
+            id: submission.id,
+            team: submission.team,
+            file_name: submission.bundle.file_name,
+            bytes: submission.bundle.bytes,
+            blake3: submission.bundle.blake3,
+            created_at: submission.created_at,
+            agent_name: submission.agent_name,
+            status: match submission.state {
+                SubmissionState::Validating => SubmissionStatus::Validating,
+                SubmissionState::Valid => SubmissionStatus::Valid { log },
+                SubmissionState::Invalid { reason } => SubmissionStatus::Invalid { reason, log },
+                SubmissionState::ValidationError { reason } => {
+                    SubmissionStatus::ValidationError { reason }
+                }
+            },
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! Teams, and their tokens as they are handed out.
+
+use crate::{app::AppState, problem::Problem};
+use faceoff_store::Team;
+use faceoff_types::{TeamId, TeamName};
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// A team.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct TeamView {
+    /// Names the team in paths; a name may hold spaces.
+    pub id: TeamId,
+    /// As the board shows it.
+    #[schema(example = "AiRLIHockey")]
+    pub name: TeamName,
+    /// When the organiser invited it.
+    pub created_at: Timestamp,
+}
+
+impl From<Team> for TeamView {
+    fn from(team: Team) -> Self {
+        Self {
+            id: team.id,
+            name: team.name,
+            created_at: team.created_at,
+        }
+    }
+}
+
+impl TeamView {
+    pub(crate) async fn find(app: &AppState, id: TeamId) -> Result<Self, Problem> {
+        Ok(app.store.team(id).await?.into())
+    }
+
+    /// All teams, by name.
+    pub(crate) async fn all(app: &AppState) -> Result<Vec<Self>, Problem> {
+        let teams = app.store.teams().await?;
+        Ok(teams.into_iter().map(Self::from).collect())
+    }
+}
+
+/// A team and its new token, which is shown this once.
+#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
+pub struct TeamWithToken {
+    /// Whose token it is.
+    #[serde(flatten)]
+    pub team: TeamView,
+    /// The bearer token; only its hash is stored.
+    #[schema(example = "fo_team_…")]
+    pub token: String,
+}
