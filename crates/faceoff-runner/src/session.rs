@@ -5,9 +5,6 @@ use faceoff_types::{AgentFaultKind, Task};
 use faceoff_wire::{InterpolationCode, MAX_LINE_BYTES, Message, answer, quote_line};
 use std::time::{Duration, Instant};
 
-/// How long an agent that has closed its output gets to end, so that its exit status can be told.
-const DIAGNOSIS: Duration = Duration::from_secs(1);
-
 /// What ended a conversation.
 #[derive(Debug)]
 pub enum Trouble {
@@ -297,11 +294,12 @@ impl Session {
         }
     }
 
-    /// The agent's end of a pipe is closed: by exit, by a kill, or by itself.
+    /// The agent's end of a pipe is closed: by exit, by a kill, or by itself. As after `bye` it gets time to
+    /// exit, so that its status can be told.
     fn closed(&mut self) -> Trouble {
         let fault = self
             .process
-            .diagnose_end(DIAGNOSIS)
+            .diagnose_end(TimeLimits::duration(self.time.bye_s))
             .unwrap_or(AgentFaultKind::ClosedOutput);
         Trouble::Agent { fault, line: None }
     }
