@@ -28,7 +28,16 @@ pub async fn run_schedule(
     daily: DailyPlan,
     shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
-    let clock = Clock::system();
+    run_by(store, daily, shutdown, Clock::system()).await
+}
+
+/// [`run_schedule`] by another clock.
+pub(crate) async fn run_by(
+    store: Store,
+    daily: DailyPlan,
+    shutdown: CancellationToken,
+    clock: Clock,
+) -> anyhow::Result<()> {
     loop {
         let now = clock.now();
         let wait = match until_next(now, daily.at)

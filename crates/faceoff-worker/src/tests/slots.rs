@@ -177,8 +177,12 @@ async fn the_schedule_starts_a_missed_day_once() {
             evaluation: plan.clone(),
             ablation_episodes: std::num::NonZeroU32::new(2),
         };
-        let schedule = crate::run_schedule(server.store.clone(), daily, shutdown.clone());
-        let schedule = tokio::spawn(schedule);
+        let schedule = tokio::spawn(crate::schedule::run_by(
+            server.store.clone(),
+            daily,
+            shutdown.clone(),
+            server.clock(),
+        ));
         if server.store.last_scheduled_day().await.unwrap().is_none() {
             let event = events.recv().await.unwrap();
             assert!(matches!(event, Event::Evaluation(_)));
