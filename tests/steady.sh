@@ -48,7 +48,7 @@ play() { # play ROUND LOAD
     cargo nextest run --cargo-metadata "$log/metadata.json" --binaries-metadata "$log/binaries.json" \
         --no-fail-fast --color never --status-level fail --final-status-level fail >>"$out" 2>&1 || {
         # FAIL, TIMEOUT, SIGSEGV …: [time] (number) binary test
-        names=$(sed -nE 's/^ *[A-Z]+ \[[^]]*\] *(\([^)]*\) *)?([^ ]+ [^ ]+)$/\2/p' "$out" | sort -u | tr ' \n' ': ')
+        names=$(sed -nE '/SLOW/!s/^ *[A-Z]+ \[[^]]*\] *(\([^)]*\) *)?([^ ]+ [^ ]+)$/\2/p' "$out" | sort -u | tr ' \n' ': ')
         failed="$failed ${names:-nextest}"
     }
     passed=$(sed -nE 's/^ *Summary .* ([0-9]+) passed.*/\1/p' "$out" | tail -n 1)
