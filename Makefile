@@ -10,11 +10,12 @@ CARGO      ?= cargo
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
 
-.PHONY: demo test lint format fidelity setup setup-test agents clean-demo help
+.PHONY: demo test steady lint format fidelity setup setup-test agents clean-demo help
 
 help:
 	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
 	@echo "make test   run everything that proves that it works"
+	@echo "make steady run the tests ten times, and three times on a busy machine"
 	@echo "make lint   format check and lints"
 	@echo "make fidelity   draw how far the simulator is from the recordings"
 
@@ -47,6 +48,11 @@ test: setup-test
 	    else $(CARGO) test --locked --workspace --no-fail-fast -- --test-threads 2; fi
 	@# The golden hashes again, as the released program computes them: the same bits.
 	$(CARGO) test --release --locked --package faceoff-sim --test it golden
+
+# No verdict may depend on how busy the machine is.
+steady:
+	@docker/setup.sh steady
+	@tests/steady.sh
 
 # The pictures and numbers of docs/simulator.md.
 fidelity:

@@ -11,6 +11,8 @@ import unittest
 from pathlib import Path
 
 AGENTS = Path(__file__).parent
+# Seconds for an agent to end; only a dead machine needs more.
+PATIENCE = 600
 POSE = [0.0, -0.1961, 0.0, -1.8436, 0.0, 0.9704, 0.0]
 POS_LIMIT = [2.96706, 2.0944, 2.96706, 2.0944, 2.96706, 2.0944, 3.05433]
 VEL_LIMIT = [math.radians(limit) for limit in (85, 85, 100, 75, 130, 135, 135)]
@@ -82,13 +84,13 @@ class EveryAgent(unittest.TestCase):
                             self.assertTrue(all(math.isfinite(x) for row in action for x in row))
                         agent.send({"type": "end", "episode": episode, "steps": 500})
                     agent.send({"type": "bye"})
-                    self.assertEqual(agent.process.wait(timeout=5), 0)
+                    self.assertEqual(agent.process.wait(timeout=PATIENCE), 0)
 
     def test_ends_when_the_evaluator_goes_away(self):
         for name in self.names:
             with self.subTest(name), Agent(name) as agent:
                 agent.process.stdin.close()
-                self.assertEqual(agent.process.wait(timeout=5), 0)
+                self.assertEqual(agent.process.wait(timeout=PATIENCE), 0)
                 agent.process.stdin = None
 
     def test_manifest_and_protocol_are_those_of_the_folder(self):

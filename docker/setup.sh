@@ -4,6 +4,7 @@
 #   docker/setup.sh build    to compile and run the service (cc for the C parts of SQLite and zstd,
 #                            bubblewrap for the sandbox)
 #   docker/setup.sh test     also what the tests drive (a browser, so that pages are really opened)
+#   docker/setup.sh steady   also what keeps the machine busy while the tests run again and again
 #
 # As root it installs them with apt-get; otherwise it prints the command and fails.
 set -eu
@@ -18,8 +19,12 @@ need cc build-essential
 need bwrap bubblewrap
 # Reference agents are interpreted by it.
 need python3 python3
-if [ "$purpose" = test ]; then
+if [ "$purpose" = test ] || [ "$purpose" = steady ]; then
     need chromium chromium
+fi
+if [ "$purpose" = steady ]; then
+    need stress-ng stress-ng
+    need column bsdextrautils
 fi
 
 if ! command -v cargo >/dev/null 2>&1; then

@@ -9,7 +9,7 @@ port, path, abstract = int(sys.argv[2]), sys.argv[3], sys.argv[4]
 def attempt(family, kind, address, protocol=0):
     try:
         with socket.socket(family, kind, protocol) as line:
-            line.settimeout(2)
+            line.settimeout(60)
             line.connect(address)
             line.send(b"hello")
             return "reached"

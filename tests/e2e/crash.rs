@@ -1,7 +1,7 @@
 //! Power cuts, and the same score from anyone's machine.
 
 use crate::{CONFIG, Team, without_times};
-use faceoff_tests::{bundle, program, server::Server};
+use faceoff_tests::{bundle, program, repository, server::Server};
 use serde_json::Value;
 use std::{fs, io::Cursor, process::Command};
 
@@ -69,6 +69,8 @@ fn an_evaluation_survives_kill_9_and_scores_as_the_local_evaluator_does() {
                 .expect("the manifest names the season's draw"),
         ])
         .args(["--workers", "2"])
+        .arg("--config")
+        .arg(repository().join("tests/patient.toml"))
         .arg("--out")
         .arg(&out)
         .output()

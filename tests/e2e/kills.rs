@@ -1,5 +1,6 @@
-//! `kill -9` again and again, at moments drawn in advance: the dataset is the one of a run that nobody
-//! disturbed.
+//! `kill -9` again and again, at moments drawn in advance and counted in entries of the server's log, so
+//! that a quick machine and a slow one are killed in the same places: the dataset is the one of a run
+//! that nobody disturbed.
 
 use crate::{Team, without_times};
 use arrow_array::RecordBatch;
@@ -8,22 +9,26 @@ use faceoff_tests::{bundle, server::Server};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::Value;
 use std::{
+    collections::BTreeSet,
     fs,
     io::{Cursor, Read as _},
     path::Path,
-    thread,
     time::{Duration, Instant},
 };
 
-const EPISODES: u32 = 8;
+/// Three tasks of so many are more shards than [`KILLS`], of which each commits one at most.
+const EPISODES: u32 = 10;
 /// One episode per shard: many commits for the kills to hit.
-const CONFIG: &str = r#"
+const CONFIG: &str = concat!(
+    include_str!("../patient.toml"),
+    r#"
 [evaluation]
-episodes_per_task = 8
+episodes_per_task = 10
 episodes_per_shard = 1
 [workers]
 slots = 1
-"#;
+"#
+);
 /// A server's lives that end with `kill -9`.
 const KILLS: u64 = 28;
 /// What no run can repeat.
@@ -55,6 +60,71 @@ fn copy_folder(from: &Path, to: &Path) {
             copy_folder(&from, &to);
         } else {
             fs::copy(&from, &to).expect("a scratch file can be copied");
+        }
+    }
+}
+
+/// When a life ends.
+#[derive(Debug, Clone, Copy)]
+enum Moment {
+    /// So many entries after the server began to start, or after what another moment waits for.
+    After(u32),
+    /// So many entries after a shard was claimed: while it is played, handed over, committed.
+    AfterClaim(u32),
+    /// Some time after a shard was claimed.
+    During,
+    /// So many entries after a shard was committed.
+    AfterCommit(u32),
+}
+
+impl Moment {
+    fn of(life: u64) -> Self {
+        // A start tells some 30 entries, a shard 6 until it begins and 8 until it is committed; a page of
+        // log, which the server may be further, holds 7.
+        let entries = |most: u32| (f64::from(most) * draw(life)) as u32;
+        match life % 4 {
+            0 => Self::AfterCommit(entries(5)),
+            1 => Self::AfterClaim(entries(13)),
+            2 => Self::During,
+            _ => Self::After(entries(45)),
+        }
+    }
+
+    /// Told of every entry of the log, in order.
+    fn has_come(&mut self, event: &Event) -> bool {
+        *self = match (*self, event) {
+            (Self::After(0), _) | (Self::During, Event::Begun(_)) => return true,
+            (Self::After(entries), _) => Self::After(entries - 1),
+            (Self::AfterClaim(entries), Event::Begun(_))
+            | (Self::AfterCommit(entries), Event::Committed(_)) => Self::After(entries),
+            (waiting, _) => waiting,
+        };
+        false
+    }
+}
+
+/// What an entry of the server's log tells of a shard.
+enum Event {
+    Begun(String),
+    Committed(String),
+    /// Something else, a statement of the database mostly.
+    Other,
+}
+
+impl Event {
+    /// # Panics
+    /// If no shard is left: whatever is killed from then on shows nothing.
+    fn of(entry: &Value) -> Self {
+        let text = |field: &str| entry["fields"][field].as_str().unwrap_or_default();
+        let work = text("work");
+        assert!(
+            !work.starts_with("finalisation"),
+            "the run is over too early"
+        );
+        match text("message") {
+            "begun" => Self::Begun(work.to_owned()),
+            "committed" => Self::Committed(work.to_owned()),
+            _ => Self::Other,
         }
     }
 }
@@ -161,30 +231,30 @@ fn killed_at_any_moment_a_run_ends_as_an_undisturbed_one() {
     server.kill();
     let per_episode = started.elapsed() / (3 * EPISODES);
 
-    // Less than one episode on average, so that the run outlasts all kills on a fast and a slow machine.
-    // Every fourth is killed while it starts.
-    let mut done = 0;
+    let mut committed = BTreeSet::new();
     for life in 0..KILLS {
-        let lifetime = per_episode.mul_f64(1.5 * draw(life));
-        if life % 4 == 3 {
-            Server::start_and_kill(&killed, CONFIG, lifetime.min(Duration::from_millis(200)));
-            continue;
-        }
-        let server = Server::start(&killed, CONFIG);
-        let before: Value = server
-            .get(&evaluation, Some(&team.token))
-            .json()
-            .expect("the API speaks JSON");
-        let episodes = before["progress"]["episodes_done"]
-            .as_u64()
-            .unwrap_or_else(|| panic!("life {life}: the run is over too early: {before:#}"));
-        assert!(episodes >= done, "life {life} lost episodes: {before:#}");
-        done = episodes;
-        // Not to wait for something: this is the moment that was drawn.
-        thread::sleep(lifetime);
-        server.kill();
+        let mut moment = Moment::of(life);
+        let pause = match moment {
+            // Anywhere between a claim and what follows from the episode, by the measure of the other run.
+            Moment::During => per_episode.mul_f64(1.2 * draw(life)),
+            _ => Duration::ZERO,
+        };
+        let reached = |entry: &Value| {
+            let event = Event::of(entry);
+            match &event {
+                Event::Begun(shard) => assert!(
+                    !committed.contains(shard),
+                    "life {life} plays {shard} again, which was committed"
+                ),
+                Event::Committed(shard) => drop(committed.insert(shard.clone())),
+                Event::Other => {}
+            }
+            moment.has_come(&event)
+        };
+        Server::start_and_kill(&killed, CONFIG, reached, pause);
     }
-    assert!(done > 0, "no life was long enough for an episode");
+    // Every fourth life lasts until a commit.
+    assert!(committed.len() as u64 >= KILLS / 4, "{committed:?}");
     let server = Server::start(&killed, CONFIG);
     let (result, mut dataset) = outcome(&server, &team, &evaluation);
 

@@ -13,14 +13,17 @@ use faceoff_tests::{bundle, server::Server};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// A configuration for tests: few episodes, small shards, one slot.
-const CONFIG: &str = r#"
+/// A configuration for tests: few episodes, small shards, one slot, time for every answer.
+const CONFIG: &str = concat!(
+    include_str!("../patient.toml"),
+    r#"
 [evaluation]
 episodes_per_task = 4
 episodes_per_shard = 2
 [workers]
 slots = 1
-"#;
+"#
+);
 
 /// A team of a test.
 struct Team {

@@ -5,8 +5,7 @@ use reqwest::blocking::{Client, Response};
 use serde_json::Value;
 use std::{
     fs,
-    io::{BufRead, BufReader},
-    net::TcpListener,
+    io::{self, BufRead, BufReader},
     path::Path,
     process::{Child, Command, Stdio},
     sync::mpsc,
@@ -14,13 +13,28 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// How long a test waits for something that should happen before it calls it lost.
-pub const PATIENCE: Duration = Duration::from_secs(180);
+/// How long a test waits for something that should happen before it calls it lost: so long that only a
+/// dead machine is called that.
+pub const PATIENCE: Duration = Duration::from_secs(1800);
+/// The smallest pipe that Linux offers: a page.
+const PAGE_BYTES: usize = 4096;
 
-/// A running server. Dropping it ends the process.
+/// A process that does not outlive the test, however that ends.
+#[derive(Debug)]
+struct Process(Child);
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // Already ended is fine.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A running server. Dropping it ends the process at once, as a power cut would (SIGKILL).
 #[derive(Debug)]
 pub struct Server {
-    child: Child,
+    _process: Process,
     /// `http://127.0.0.1:PORT`
     pub url: String,
     /// The organiser's bearer token.
@@ -36,63 +50,80 @@ impl Server {
     /// If it does not start; the panic shows its log.
     #[must_use]
     pub fn start(data_dir: &Path, config: &str) -> Self {
-        let port = TcpListener::bind("127.0.0.1:0")
-            .and_then(|listener| listener.local_addr())
-            .expect("a port is free")
-            .port();
-        let mut child = spawn(data_dir, config, port);
+        let child = command(data_dir, config).stdout(Stdio::piped()).spawn();
+        let mut process = Process(child.expect("the program can be started"));
+        let child = &mut process.0;
         let log = collect(child.stderr.take().expect("standard error is piped"));
         let client = Client::builder()
-            .timeout(Duration::from_secs(60))
+            .timeout(PATIENCE)
             .build()
             .expect("a client needs nothing");
-        let url = format!("http://127.0.0.1:{port}");
-        let started = Instant::now();
-        loop {
-            if client.get(format!("{url}/api/v1/health")).send().is_ok() {
-                break;
-            }
-            if let Some(status) = child.try_wait().expect("a child can be asked") {
-                panic!(
-                    "the server ended with {status}:\n{}",
-                    log.recv().unwrap_or_default()
-                );
-            }
-            assert!(started.elapsed() < PATIENCE, "the server does not answer");
-            thread::yield_now();
-        }
+        // The only line on its standard output is its address; none comes if it ends before.
+        let mut told =
+            BufReader::new(child.stdout.take().expect("standard output is piped")).lines();
+        let Some(url) = told.next().transpose().expect("a pipe can be read") else {
+            let status = child.wait().expect("a child can be reaped");
+            panic!(
+                "the server ended with {status}:\n{}",
+                log.recv().unwrap_or_default()
+            );
+        };
         let admin_token = fs::read_to_string(data_dir.join("admin-token"))
             .expect("the server leaves the organiser's token in its folder")
             .trim()
             .to_owned();
         Self {
-            child,
+            _process: process,
             url,
             admin_token,
             client,
         }
     }
 
-    /// Ends the server at once, as a power cut would (SIGKILL), and reaps it.
-    ///
-    /// # Panics
-    /// If the process is not ours to kill.
-    pub fn kill(mut self) {
-        self.child.kill().expect("a child can be killed");
-        self.child.wait().expect("a child can be reaped");
+    /// Ends the server, as dropping it does.
+    pub fn kill(self) {
+        drop(self);
     }
 
-    /// Starts the server and ends it as [`kill`](Self::kill) does, `lifetime` after the process began:
-    /// it may not have come as far as to answer.
+    /// Starts the server and ends it as [`kill`](Self::kill) does, `later` after `reached` has said yes
+    /// to an entry of its log. The log tells every statement of the database, and goes through a
+    /// pipe of one page: however quick the server and however slow this thread, the server is at most
+    /// a page of log further than what `reached` has seen.
     ///
     /// # Panics
-    /// If it cannot be started.
-    pub fn start_and_kill(data_dir: &Path, config: &str, lifetime: Duration) {
-        let mut child = spawn(data_dir, config, 0);
-        let _log = collect(child.stderr.take().expect("standard error is piped"));
-        thread::sleep(lifetime);
-        child.kill().expect("a child can be killed");
-        child.wait().expect("a child can be reaped");
+    /// If it cannot be started, or ends by itself.
+    pub fn start_and_kill(
+        data_dir: &Path,
+        config: &str,
+        mut reached: impl FnMut(&Value) -> bool,
+        later: Duration,
+    ) {
+        let (log, writer) = io::pipe().expect("there are pipes");
+        rustix::pipe::fcntl_setpipe_size(&log, PAGE_BYTES).expect("a pipe can be made smaller");
+        let child = command(data_dir, config)
+            .args(["--log-format", "json"])
+            .env("RUST_LOG", "info,sqlx::query=debug")
+            .stdout(Stdio::null())
+            .stderr(writer)
+            .spawn();
+        let process = Process(child.expect("the program can be started"));
+        // A reader that reads ahead would let the server run ahead.
+        let mut log = BufReader::with_capacity(1, log);
+        let mut line = String::new();
+        loop {
+            line.clear();
+            let length = log.read_line(&mut line).expect("a log is text");
+            assert!(length > 0, "the server ended by itself");
+            let entry = serde_json::from_str(&line)
+                .unwrap_or_else(|error| panic!("a line of the log: {error}: {line}"));
+            if reached(&entry) {
+                break;
+            }
+        }
+        // Not to wait for something: the moment that was drawn.
+        thread::sleep(later);
+        // While its log is still held: nothing would hold the server back.
+        drop(process);
     }
 
     /// `GET`, with a token if one is given.
@@ -162,31 +193,22 @@ impl Server {
     }
 }
 
-impl Drop for Server {
-    fn drop(&mut self) {
-        // Already ended is fine: the process must only not outlive the test.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
-/// The process, with its log on a pipe. Port 0 is any free one.
-fn spawn(data_dir: &Path, config: &str, port: u16) -> Child {
+/// The server on any free port, with its log on a pipe.
+fn command(data_dir: &Path, config: &str) -> Command {
     fs::create_dir_all(data_dir).expect("a scratch folder can be made");
     let config_file = data_dir.join("faceoff.toml");
     fs::write(&config_file, config).expect("a scratch file can be written");
-    Command::new(program("faceoff"))
+    let mut command = Command::new(program("faceoff"));
+    command
         .arg("serve")
-        .args(["--listen", &format!("127.0.0.1:{port}")])
+        .args(["--listen", "127.0.0.1:0"])
         .arg("--data-dir")
         .arg(data_dir)
         .arg("--config")
         .arg(&config_file)
         .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("the program can be started")
+        .stderr(Stdio::piped());
+    command
 }
 
 /// Drains a child's log so that it never blocks, and hands it over when the child ends.

@@ -11,15 +11,14 @@ use faceoff_types::{AgentFaultKind, Phase, TimeLimits};
 use faceoff_wire::{MAX_LINE_BYTES, Message, answer, quote_line};
 use std::time::{Duration, Instant};
 
-/// How long an agent that has closed its output gets to end, so that its exit status can be told.
-const DIAGNOSIS: Duration = Duration::from_secs(1);
-
 /// The running process.
 #[derive(Debug)]
 pub(crate) struct Exchange {
     process: AgentProcess,
     /// The message being written; its memory is reused.
     line: Vec<u8>,
+    /// How long it may take to exit once it has closed its output, so that its status can be told.
+    exit_grace: Duration,
 }
 
 /// A question that was written and waits for its answer.
@@ -79,6 +78,7 @@ impl Exchange {
         Ok(Self {
             process,
             line: Vec::with_capacity(4096),
+            exit_grace: TimeLimits::duration(env.time.bye_s),
         })
     }
 
@@ -188,7 +188,7 @@ impl Exchange {
     /// The agent's end of a pipe is closed: by exit, by a kill, or by itself.
     fn closed(&mut self) -> Trouble {
         self.process
-            .diagnose_end(DIAGNOSIS)
+            .diagnose_end(self.exit_grace)
             .unwrap_or(AgentFaultKind::ClosedOutput)
             .into()
     }

@@ -95,7 +95,7 @@ impl HostWatch for StallWatch {
     }
 
     fn longest_stall_s(&self) -> f64 {
-        Duration::from_nanos(self.shared.longest_ns.load(Ordering::Relaxed)).as_secs_f64()
+        self.shared.longest(Instant::now()).as_secs_f64()
     }
 }
 
@@ -120,18 +120,23 @@ impl Shared {
         while !self.stop.load(Ordering::Relaxed) {
             thread::park_timeout(BEAT);
             let now = Instant::now();
-            if is_stall(last, now) {
-                let mut stalls = self.stalls.lock().unwrap_or_else(PoisonError::into_inner);
-                if stalls.len() == REMEMBERED {
-                    stalls.pop_front();
-                }
-                stalls.push_back((last, now));
-                self.longest_ns
-                    .fetch_max(nanoseconds(now - last), Ordering::Relaxed);
-            }
-            self.beat(index, now);
+            self.woke(index, last, now);
             last = now;
         }
+    }
+
+    /// A watcher woke at `now`; the last time was `last`.
+    fn woke(&self, index: usize, last: Instant, now: Instant) {
+        if is_stall(last, now) {
+            let mut stalls = self.stalls.lock().unwrap_or_else(PoisonError::into_inner);
+            if stalls.len() == REMEMBERED {
+                stalls.pop_front();
+            }
+            stalls.push_back((last, now));
+            self.longest_ns
+                .fetch_max(nanoseconds(now - last), Ordering::Relaxed);
+        }
+        self.beat(index, now);
     }
 
     fn beat(&self, index: usize, now: Instant) {
@@ -142,13 +147,7 @@ impl Shared {
     /// How much of `from` to `to` lies within stalls, those included that go on until `now`.
     fn stalled(&self, from: Instant, to: Instant, now: Instant) -> Duration {
         // A watcher notes a stall before it beats: looked at in the other order, none is missed.
-        let mut spans: Vec<(Instant, Instant)> = self
-            .last_beat_ns
-            .iter()
-            .map(|beat| self.begun + Duration::from_nanos(beat.load(Ordering::Acquire)))
-            .filter(|beat| is_stall(*beat, now))
-            .map(|beat| (beat, now))
-            .collect();
+        let mut spans: Vec<_> = self.going_on(now).collect();
         spans.extend(
             self.stalls
                 .lock()
@@ -156,6 +155,22 @@ impl Shared {
                 .iter(),
         );
         covered(spans, from, to)
+    }
+
+    /// The longest stall until `now`.
+    fn longest(&self, now: Instant) -> Duration {
+        let going_on = self.going_on(now).map(|(from, to)| to - from).max();
+        let over = Duration::from_nanos(self.longest_ns.load(Ordering::Relaxed));
+        over.max(going_on.unwrap_or_default())
+    }
+
+    /// Stalls that are not over `now`, of which their watchers know nothing yet.
+    fn going_on(&self, now: Instant) -> impl Iterator<Item = (Instant, Instant)> {
+        self.last_beat_ns
+            .iter()
+            .map(|beat| self.begun + Duration::from_nanos(beat.load(Ordering::Acquire)))
+            .filter(move |beat| is_stall(*beat, now))
+            .map(move |beat| (beat, now))
     }
 }
 
@@ -211,21 +226,72 @@ mod tests {
         assert_eq!(covered(100, 150), 50);
     }
 
-    #[test]
-    fn a_stall_that_is_not_over_counts_until_now_and_an_ordinary_pause_does_not() {
-        let begun = Instant::now();
-        let shared = Shared {
+    /// One watcher that beat last `ms` milliseconds after `begun`.
+    fn beat_at(begun: Instant, ms: u64) -> Shared {
+        Shared {
             begun,
             stop: AtomicBool::new(false),
             stalls: Mutex::default(),
             longest_ns: AtomicU64::new(0),
-            last_beat_ns: vec![AtomicU64::new(5_000_000)],
-        };
+            last_beat_ns: vec![AtomicU64::new(ms * 1_000_000)],
+        }
+    }
+
+    #[test]
+    fn a_stall_that_is_not_over_counts_until_now_and_an_ordinary_pause_does_not() {
+        let begun = Instant::now();
+        let shared = beat_at(begun, 5);
         let at = |ms| begun + Duration::from_millis(ms);
         assert_eq!(shared.stalled(at(6), at(12), at(12)), Duration::ZERO);
+        assert_eq!(shared.longest(at(12)), Duration::ZERO);
         assert_eq!(
             shared.stalled(at(10), at(40), at(45)),
             Duration::from_millis(30)
         );
+        assert_eq!(shared.longest(at(45)), Duration::from_millis(40));
+    }
+
+    #[test]
+    fn a_wait_through_which_the_watchers_wake_on_time_is_no_stall() {
+        let begun = Instant::now();
+        let shared = beat_at(begun, 0);
+        let at = |ms| begun + Duration::from_millis(ms);
+        for ms in (0..2000).step_by(8) {
+            shared.woke(0, at(ms), at(ms + 8));
+        }
+        assert_eq!(shared.stalled(at(100), at(1900), at(2000)), Duration::ZERO);
+        assert_eq!(shared.longest(at(2000)), Duration::ZERO);
+        shared.woke(0, at(2000), at(2150));
+        assert_eq!(
+            shared.stalled(at(100), at(2100), at(2150)),
+            Duration::from_millis(100)
+        );
+    }
+
+    /// Stops its parent, for 0.15 s from when each of its threads is seen to stand still.
+    const STOPS_ITS_PARENT: &str = "\
+import os, signal, time
+parent = os.getppid()
+def stands(thread):
+    try: return open(f'/proc/{parent}/task/{thread}/stat').read().rpartition(')')[2].split()[0] == 'T'
+    except OSError: return True
+os.kill(parent, signal.SIGSTOP)
+while not all(map(stands, os.listdir(f'/proc/{parent}/task'))): time.sleep(0.001)
+time.sleep(0.15)
+os.kill(parent, signal.SIGCONT)
+";
+
+    #[test]
+    fn a_process_that_really_stands_still_is_seen() {
+        let watch = StallWatch::start(&[]).unwrap();
+        let from = Instant::now();
+        let stopped = std::process::Command::new("python3")
+            .args(["-c", STOPS_ITS_PARENT])
+            .status()
+            .unwrap();
+        assert!(stopped.success());
+        let seen_s = watch.stalled_s(from, Instant::now());
+        assert!(seen_s >= 0.15, "{seen_s}");
+        assert!(watch.longest_stall_s() >= 0.15);
     }
 }

@@ -27,7 +27,7 @@ use std::{
 };
 
 /// How long bubblewrap may take to make a sandbox before that is a failure of the host.
-const SET_UP_PATIENCE: Duration = Duration::from_secs(20);
+const SET_UP_PATIENCE: Duration = Duration::from_secs(120);
 
 /// What runs, and our ends of it.
 pub(crate) struct Started {

@@ -14,7 +14,7 @@ use std::{
 };
 
 /// How long a probe may take on a loaded host.
-const PATIENCE: Duration = Duration::from_secs(20);
+const PATIENCE: Duration = Duration::from_secs(120);
 /// Recognisable in `/proc/self/limits`.
 const PROBE_OPEN_FILES: u32 = 61;
 

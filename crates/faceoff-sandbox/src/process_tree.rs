@@ -15,7 +15,7 @@ use std::{
 };
 
 /// How long a killed process may take to disappear before we say so and go on.
-const KILL_PATIENCE: Duration = Duration::from_secs(10);
+const KILL_PATIENCE: Duration = Duration::from_secs(60);
 /// How long bubblewrap may take to follow the sandbox it watches.
 const FOLLOW_PATIENCE: Duration = Duration::from_secs(2);
 

@@ -83,7 +83,7 @@ pub struct TimeLimits {
     pub reset_s: f64,
     /// To answer one `step`.
     pub step_s: f64,
-    /// To exit after `bye`, before it is killed.
+    /// To exit after `bye`, or once it has closed its output, before it is killed.
     pub bye_s: f64,
     /// How often an episode is played again because the host stalled, at most; then the last try
     /// counts as it is. 0: never.

@@ -1,4 +1,4 @@
-use crate::site::{ADMIN, Answer, Site};
+use crate::site::{ADMIN, Answer, Site, patient};
 use faceoff_http::HttpLimits;
 use reqwest::Method;
 use std::time::Duration;
@@ -112,7 +112,7 @@ async fn every_answer_carries_its_id_and_the_security_headers() {
 async fn a_server_at_its_limit_says_when_to_come_back() {
     let site = Site::start_with(HttpLimits {
         requests: 0,
-        ..HttpLimits::default()
+        ..patient()
     })
     .await;
     let busy = site.get("/api/v1/health", None).await;
@@ -122,7 +122,7 @@ async fn a_server_at_its_limit_says_when_to_come_back() {
     // A body that never ends keeps the handler waiting.
     let limits = HttpLimits {
         answer: Duration::from_millis(50),
-        ..HttpLimits::default()
+        ..patient()
     };
     let site = Site::start_with(limits).await;
     let endless = futures::stream::pending::<Result<bytes::Bytes, std::io::Error>>();

@@ -7,7 +7,10 @@ use faceoff_types::*;
 use jiff::{SignedDuration, Timestamp};
 use reqwest::{Method, RequestBuilder, Response, StatusCode};
 use serde_json::{Value, json};
-use std::sync::{Arc, Mutex};
+use std::{
+    sync::{Arc, Mutex},
+    time::Duration,
+};
 use tokio::{net::TcpListener, task::JoinHandle};
 
 pub const ADMIN: &str = "fo_admin_0123456789abcdef";
@@ -92,9 +95,18 @@ impl Answer {
     }
 }
 
+/// As usual, but with a patience that only a dead machine wears out.
+pub fn patient() -> HttpLimits {
+    HttpLimits {
+        answer: Duration::from_secs(600),
+        upload_pause: Duration::from_secs(600),
+        ..HttpLimits::default()
+    }
+}
+
 impl Site {
     pub async fn start() -> Self {
-        Self::start_with(HttpLimits::default()).await
+        Self::start_with(patient()).await
     }
 
     pub async fn start_with(limits: HttpLimits) -> Self {

@@ -1,4 +1,4 @@
-use crate::site::{ADMIN, Answer, GZIP, MAX_BUNDLE, Site, text};
+use crate::site::{ADMIN, Answer, GZIP, MAX_BUNDLE, Site, patient, text};
 use bytes::Bytes;
 use faceoff_http::HttpLimits;
 use faceoff_types::SmokeOutcome;
@@ -174,7 +174,7 @@ async fn what_is_no_archive_is_refused_at_once() {
 async fn an_upload_that_stalls_is_given_up() {
     let limits = HttpLimits {
         upload_pause: Duration::from_millis(50),
-        ..HttpLimits::default()
+        ..patient()
     };
     let site = Site::start_with(limits).await;
     let team = site.team("Alpha").await;
@@ -191,7 +191,7 @@ async fn an_upload_that_stalls_is_given_up() {
 async fn a_team_cannot_fill_the_queue_with_uploads() {
     let limits = HttpLimits {
         pending_submissions: 2,
-        ..HttpLimits::default()
+        ..patient()
     };
     let site = Site::start_with(limits).await;
     let team = site.team("Alpha").await;

@@ -83,7 +83,8 @@ impl Agent {
         self
     }
 }
-/// The full sandbox with short but ample deadlines.
+
+/// The full sandbox with deadlines that only a dead machine meets.
 pub fn sandboxed() -> AgentEnvironment {
     AgentEnvironment {
         limits: Limits {
@@ -92,10 +93,10 @@ pub fn sandboxed() -> AgentEnvironment {
             ..Limits::default()
         },
         time: TimeLimits {
-            startup_s: 60.0,
-            reset_s: 30.0,
-            step_s: 30.0,
-            bye_s: 10.0,
+            startup_s: 600.0,
+            reset_s: 600.0,
+            step_s: 600.0,
+            bye_s: 600.0,
             // Tests of other things must not depend on what else the machine does.
             host_noise_reruns: 0,
         },
@@ -113,7 +114,7 @@ pub fn sandboxed() -> AgentEnvironment {
     }
 }
 
-/// The sandbox with a short step limit, for agents that are meant to meet it.
+/// The sandbox with a short step limit, for agents that meet it because they never answer.
 pub fn impatient() -> AgentEnvironment {
     let mut env = sandboxed();
     env.time.step_s = 0.5;

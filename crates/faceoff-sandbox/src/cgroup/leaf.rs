@@ -17,7 +17,7 @@ static NEXT: AtomicU64 = AtomicU64::new(0);
 /// last one. What cannot be removed is logged and left for the next start's sweep.
 pub(super) fn remove_leaf(leaf: &Path) {
     /// The kernel lets go of a dead process's cgroup a moment after its parent has seen it end.
-    const PATIENCE: Duration = Duration::from_secs(5);
+    const PATIENCE: Duration = Duration::from_secs(60);
     let deadline = Instant::now() + PATIENCE;
     loop {
         kill_all(leaf);

@@ -25,7 +25,10 @@ fn a_flood_of_output_is_read_as_far_as_it_is_asked_for() {
     for _ in 0..1000 {
         assert_eq!(expect_line(&mut agent).len(), 99);
     }
-    assert!(agent.has_pending_output().unwrap());
+    // What comes next is in the pipe, or about to be written.
+    while !agent.has_pending_output().unwrap() {
+        std::thread::yield_now();
+    }
     assert!(agent.stderr_tail().len() <= 64 << 10);
     subject.finish(agent);
 }
@@ -37,6 +40,9 @@ fn a_flood_of_log_neither_blocks_the_agent_nor_fills_the_service() {
     let mut agent = subject.spawn();
     for number in 0..200 {
         expect_echo(&mut agent, &number.to_string());
+    }
+    while agent.stderr_tail().len() < 1000 {
+        std::thread::yield_now();
     }
     let usage = subject.finish(agent);
     assert_eq!(usage.stderr_tail.len(), 1000);

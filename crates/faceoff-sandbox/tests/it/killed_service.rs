@@ -57,7 +57,7 @@ fn an_agent_dies_with_a_killed_service_and_its_cgroup_is_swept() {
     }
     assert_eq!(processes_marked(&mark), [] as [i32; 0]);
     if had_cgroups {
-        assert!(!left().is_empty(), "nobody could have removed them yet");
+        // Another test's process may have swept meanwhile, as each does when it begins.
         sweep_stale();
         assert_eq!(left(), [] as [std::path::PathBuf; 0]);
     }

@@ -165,14 +165,18 @@ pub(super) async fn blocking<T: Send + 'static>(call: impl FnOnce() -> T + Send 
     tokio::task::spawn_blocking(call).await.unwrap()
 }
 
-/// A store with one team's valid submission, and a clock that tests turn forward.
+/// A store with one team's valid submission, and a clock that only tests turn forward: no lease ends and
+/// no day passes because a machine was slow.
 pub(super) struct Server {
     pub(super) store: Store,
     pub(super) folder: tempfile::TempDir,
+    /// About the real time, by which files are dated.
+    begun: Timestamp,
     pub(super) ahead_s: Arc<AtomicI64>,
 }
 
-pub(super) const LEASE_S: u32 = 30;
+/// Renewed after a third of it by the real time: never while a test looks.
+pub(super) const LEASE_S: u32 = 1800;
 
 impl Server {
     pub(super) async fn new() -> Self {
@@ -181,15 +185,14 @@ impl Server {
         Self {
             store,
             folder,
+            begun: Timestamp::now(),
             ahead_s: Arc::default(),
         }
     }
 
     pub(super) fn clock(&self) -> Clock {
-        let ahead_s = Arc::clone(&self.ahead_s);
-        Clock::new(move || {
-            Timestamp::now() + SignedDuration::from_secs(ahead_s.load(Ordering::SeqCst))
-        })
+        let (begun, ahead_s) = (self.begun, Arc::clone(&self.ahead_s));
+        Clock::new(move || begun + SignedDuration::from_secs(ahead_s.load(Ordering::SeqCst)))
     }
 
     pub(super) fn now(&self) -> Timestamp {

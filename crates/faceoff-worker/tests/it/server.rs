@@ -63,11 +63,19 @@ impl Server {
         )]);
         let config = WorkerConfig {
             slots,
-            lease_s: 30,
+            // Nobody waits for its end: a killed worker's successor takes over at once.
+            lease_s: 3600,
             scratch_dir: self.path().join("scratch"),
             agent: AgentEnvironment {
                 limits: Limits::default(),
-                time: TimeLimits::default(),
+                // Only a dead machine meets them: what an agent does must not depend on a busy one.
+                time: TimeLimits {
+                    startup_s: 600.0,
+                    reset_s: 600.0,
+                    step_s: 600.0,
+                    bye_s: 600.0,
+                    ..TimeLimits::default()
+                },
                 isolation: Isolation::Sandboxed {
                     given_up: Vec::new(),
                 },

@@ -19,6 +19,11 @@ struct Site {
     folder: TempDir,
 }
 
+/// One moment for site and test: leases do not run out, and the day does not change, under a test.
+fn now() -> Timestamp {
+    "2026-03-01T10:00:00Z".parse().unwrap()
+}
+
 async fn site(max_bundle_bytes: u64) -> Site {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
@@ -34,7 +39,7 @@ async fn site(max_bundle_bytes: u64) -> Site {
         admin_token_hash: hash_token(ADMIN),
         upload_dir: folder.path().to_owned(),
         daily_at: None,
-        clock: Clock::new(Timestamp::now),
+        clock: Clock::new(now),
         limits: HttpLimits::default(),
     };
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
@@ -89,7 +94,7 @@ async fn a_folder_is_packed_uploaded_and_followed() {
     files.sort();
     assert_eq!(files, ["agent.py", "agent.toml"]);
 
-    let claimed = site.store.claim("slot 0", 60, Timestamp::now());
+    let claimed = site.store.claim("slot 0", 60, now());
     let Claimed { claim, work } = claimed.await.unwrap().expect("the smoke run is queued");
     assert!(matches!(work, Work::Smoke { .. }), "{work:?}");
     let outcome = SmokeOutcome::Valid {
@@ -97,7 +102,7 @@ async fn a_folder_is_packed_uploaded_and_followed() {
         log: "hello".into(),
     };
     site.store
-        .commit_smoke(&claim, outcome, Timestamp::now())
+        .commit_smoke(&claim, outcome, now())
         .await
         .unwrap();
     let valid = client.submission(uploaded.id).await.unwrap();

@@ -18,12 +18,16 @@ use std::{
     process::Stdio,
     time::Duration,
 };
-use tokio::process::{Child, Command};
+use tokio::{
+    io::{AsyncBufReadExt as _, BufReader},
+    process::{Child, Command},
+};
 
 /// How often the demo asks the server for news.
 const POLL: Duration = Duration::from_millis(200);
-/// How long the server may take to answer for the first time.
-const START_LIMIT: Duration = Duration::from_secs(30);
+/// How long the server may take to start. Its end is seen at once, so this is for one that hangs, and
+/// long enough for a busy machine.
+const START_LIMIT: Duration = Duration::from_secs(600);
 
 /// Starts a server on an empty folder, creates a team per bundle, uploads the bundles, runs the day's
 /// evaluation, prints the board and downloads a dataset.
@@ -35,7 +39,7 @@ pub struct DemoCommand {
     /// Episodes of each task
     #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_EPISODES_PER_TASK)))]
     episodes: u32,
-    /// Address of the server
+    /// Address of the server; port 0 is any free one
     #[arg(long, default_value = "127.0.0.1:8080")]
     listen: SocketAddr,
     /// Folder for the demo's database and artifacts; the one of an earlier demo is replaced
@@ -143,8 +147,8 @@ impl DemoCommand {
             return server.stop().await;
         }
         println!(
-            "\nThe same board: http://{}/   (Ctrl-C ends the server)",
-            self.listen
+            "\nThe same board: {}/   (Ctrl-C ends the server)",
+            server.url
         );
         tokio::select! {
             stopped = tokio::signal::ctrl_c() => stopped.context("waiting for Ctrl-C")?,
@@ -201,7 +205,8 @@ fn team_name(bundle: &Path) -> anyhow::Result<String> {
 /// The server as a process of its own, as an organiser would run it.
 struct Server {
     child: Child,
-    listen: SocketAddr,
+    /// Known once it is [`ready`](Self::ready).
+    url: String,
     data_dir: PathBuf,
 }
 
@@ -218,35 +223,39 @@ impl Server {
             .arg("--data-dir")
             .arg(data_dir)
             .stdin(Stdio::null())
-            .stdout(log.try_clone().context("sharing the log")?)
+            .stdout(Stdio::piped())
             .stderr(log)
             // A demo that fails half way leaves no server behind.
             .kill_on_drop(true);
         let child = command.spawn().context("starting the server")?;
         Ok(Self {
             child,
-            listen,
+            url: String::new(),
             data_dir: data_dir.to_owned(),
         })
     }
 
-    /// Waits until the server answers; returns the organiser's client.
+    /// Waits until the server tells its address; returns the organiser's client.
     async fn ready(&mut self) -> anyhow::Result<Client> {
-        let url = format!("http://{}", self.listen);
-        let visitor = Client::new(&url, None)?;
-        let answering = async {
-            loop {
-                if visitor.health().await.is_ok() {
-                    return;
-                }
-                tokio::time::sleep(POLL).await;
-            }
+        let stdout = self
+            .child
+            .stdout
+            .take()
+            .context("its output is not piped")?;
+        let mut told = BufReader::new(stdout).lines();
+        let url = tokio::time::timeout(START_LIMIT, told.next_line())
+            .await
+            .with_context(|| format!("no word from it in {START_LIMIT:?}"))?
+            .context("reading its address")?;
+        let Some(url) = url else {
+            bail!(
+                "it ended with {}",
+                self.child.wait().await.context("waiting for it")?
+            )
         };
-        tokio::select! {
-            () = answering => {}
-            ended = self.child.wait() => bail!("it ended with {}", ended.context("waiting for it")?),
-            () = tokio::time::sleep(START_LIMIT) => bail!("no answer in {START_LIMIT:?}"),
-        }
+        self.url = url;
+        let visitor = Client::new(&self.url, None)?;
+        visitor.health().await?;
         let token = std::fs::read_to_string(self.data_dir.join("admin-token"))
             .context("reading the organiser's token")?;
         Ok(visitor.with_token(token.trim()))

@@ -120,6 +120,9 @@ async fn serve(config: Config) -> anyhow::Result<()> {
                 config.server.listen
             )
         })?;
+    let address = listener
+        .local_addr()
+        .context("asking for the address that was bound")?;
     let plan = config.plan();
     let clock = Clock::new(Timestamp::now);
     let router = faceoff_http::router(
@@ -142,7 +145,7 @@ async fn serve(config: Config) -> anyhow::Result<()> {
         bundle_limits: config.bundle,
     };
     tracing::info!(
-        address = %config.server.listen,
+        %address,
         data_dir = %data_dir.display(),
         slots = workers.slots,
         daily_at = config.evaluation.at.map(|at| at.to_string()),
@@ -171,6 +174,9 @@ async fn serve(config: Config) -> anyhow::Result<()> {
         ));
     }
     parts.spawn(answer(listener, router, shutdown.clone()));
+    // For the program that started this one, whatever is logged: from now on a connection is answered,
+    // and a port that the system chose is known. That nobody listens is no fault.
+    let _ = writeln!(std::io::stdout(), "http://{address}");
 
     let signal = signalled()?;
     let mut outcome = Ok(());

@@ -1,3 +1,4 @@
+use crate::PATIENT;
 use serde_json::Value;
 use std::{
     fs,
@@ -27,7 +28,8 @@ fn agent(name: &str) -> PathBuf {
 fn eval(folder: &Path, name: &str, out: &str, args: &[&str]) {
     let bundle = agent(name);
     let bundle = bundle.to_str().unwrap();
-    let output = faceoff(&[&["eval", bundle, "--out", out], args].concat(), folder);
+    let eval = ["eval", bundle, "--out", out, "--config", PATIENT];
+    let output = faceoff(&[&eval, args].concat(), folder);
     assert!(output.status.success(), "{out}: {}", text(&output.stderr));
 }
 

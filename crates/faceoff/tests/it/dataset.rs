@@ -1,5 +1,6 @@
 //! What `faceoff eval` records, `verify` confirms and `dataset` converts: the program itself.
 
+use crate::PATIENT;
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -27,6 +28,7 @@ fn eval(out: &Path, extra: &[&str]) {
         "--out",
         out.to_str().unwrap(),
     ];
+    args.extend(["--config", PATIENT]);
     args.extend(["--task", "hit,defend", "--episodes", "2", "--seed", "5"]);
     args.extend(extra);
     let output = Command::new(env!("CARGO_BIN_EXE_faceoff"))

@@ -1,3 +1,4 @@
+use crate::PATIENT;
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -18,6 +19,7 @@ fn eval(bundle: &Path, out: &Path, args: &[&str]) -> Output {
         .args(args)
         .arg("--out")
         .arg(out)
+        .args(["--config", PATIENT])
         // Another configuration in the working folder must not decide.
         .current_dir(out.parent().unwrap())
         .output()

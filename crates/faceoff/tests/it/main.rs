@@ -4,3 +4,6 @@
 mod compare;
 mod dataset;
 mod eval;
+
+/// A configuration that gives agents time: what is played again must not differ by a busy machine's faults.
+const PATIENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/patient.toml");
