@@ -120,7 +120,8 @@ impl Container {
                 Ok(FileRange {
                     file: file.clone(),
                     start,
-                    bytes: entry.size(),
+                    // Of the two sizes that a zip states, the one by which streams are read, too.
+                    bytes: entry.compressed_size(),
                 })
             }
         }
