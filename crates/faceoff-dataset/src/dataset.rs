@@ -123,12 +123,6 @@ impl Dataset {
         })
     }
 
-    /// The archive or folder.
-    #[must_use]
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
     /// Which layout its files have.
     #[must_use]
     pub const fn layout(&self) -> Layout {
