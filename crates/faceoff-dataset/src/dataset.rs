@@ -123,12 +123,6 @@ impl Dataset {
         })
     }
 
-    /// The archive or folder.
-    #[must_use]
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
     /// Which layout its files have.
     #[must_use]
     pub const fn layout(&self) -> Layout {
@@ -229,7 +223,7 @@ impl Dataset {
             }
             Some(_) => {}
         }
-        by_index::episode(self.container.range(STEPS_FILE)?, task, episode, columns)
+        by_index::episode(self.range(STEPS_FILE)?, task, episode, columns)
     }
 
     /// A small file's bytes.
@@ -240,7 +234,19 @@ impl Dataset {
 
     fn table(&self, name: &str) -> Result<FileRange, DatasetError> {
         self.check_if_unread(name)?;
-        self.container.range(name)
+        self.range(name)
+    }
+
+    /// A table of the size that the manifest says.
+    fn range(&self, name: &str) -> Result<FileRange, DatasetError> {
+        let (range, listed) = (self.container.range(name)?, &self.manifest.files[name]);
+        if range.bytes == listed.bytes {
+            return Ok(range);
+        }
+        Err(DatasetError::Altered(format!(
+            "{name} has {} bytes, {MANIFEST_FILE} says {}",
+            range.bytes, listed.bytes
+        )))
     }
 
     fn check_if_unread(&self, name: &str) -> Result<(), DatasetError> {

@@ -120,7 +120,8 @@ impl Container {
                 Ok(FileRange {
                     file: file.clone(),
                     start,
-                    bytes: entry.size(),
+                    // Of the two sizes that a zip states, the one by which streams are read, too.
+                    bytes: entry.compressed_size(),
                 })
             }
         }
@@ -142,8 +143,11 @@ impl Container {
             Self::Archive { zip, .. } => {
                 let mut zip = zip.lock().unwrap_or_else(PoisonError::into_inner);
                 let mut entry = zip.by_name(name).map_err(DatasetError::unreadable(name))?;
-                // A wrong checksum or a broken stream is an error of reading.
-                read(&mut entry).map_err(DatasetError::unreadable(name))
+                read(&mut entry).map_err(|error| match error.raw_os_error() {
+                    Some(_) => DatasetError::Io(error),
+                    // The zip's own checksum, or a stream that no longer unpacks.
+                    None => DatasetError::Altered(format!("{name}: {error}")),
+                })
             }
         }
     }
