@@ -25,7 +25,7 @@ pub(super) struct Between {
 }
 
 impl Between {
-    pub(super) fn new(
+    pub(super) fn slots_and(
         server: LocalServer,
         disturb: impl Fn(Moment<'_>) -> anyhow::Result<()> + Send + Sync + 'static,
     ) -> Arc<dyn WorkServer> {

@@ -59,7 +59,7 @@ async fn a_shutdown_does_not_stop_a_slot_before_its_unit_was_given_back() {
     let (early, stops) = (Arc::new(AtomicBool::new(false)), Mutex::new(stops));
     let running = server.work_through(1, &hanging, |local| {
         let early = Arc::clone(&early);
-        Between::new(local, move |moment| {
+        Between::slots_and(local, move |moment| {
             if let Moment::GivingBack = moment {
                 // Time for a worker that does not wait to end; one that waits is not in a hurry.
                 let ended = stops

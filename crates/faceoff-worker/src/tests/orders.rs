@@ -165,7 +165,7 @@ async fn an_answer_to_a_commit_that_is_lost_on_the_way_costs_no_dataset() {
     let id = server.evaluation().await;
     let healthy = Scripted::new(|_, _| Ok(()));
     let running = server.work_through(2, &healthy, |local| {
-        Between::new(local, |moment| match moment {
+        Between::slots_and(local, |moment| match moment {
             Moment::Committed(WorkReport::Finalise { .. }) => {
                 anyhow::bail!("the connection broke")
             }
