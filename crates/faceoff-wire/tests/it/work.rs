@@ -7,9 +7,11 @@ use std::{collections::BTreeMap, fmt::Debug};
 use uuid::Uuid;
 
 fn travels<T: Serialize + DeserializeOwned + PartialEq + Debug>(value: &T) {
-    let text = serde_json::to_string(value).unwrap();
+    let text = serde_json::to_string(value).expect("it is JSON");
     assert_eq!(
-        serde_json::from_str::<T>(&text).as_ref().unwrap(),
+        serde_json::from_str::<T>(&text)
+            .as_ref()
+            .expect("it comes back"),
         value,
         "{text}"
     );
@@ -21,7 +23,7 @@ fn order(assignment: Assignment) -> WorkOrder {
             unit: Uuid::from_u128(1),
             nonce: Uuid::from_u128(2),
             slot: "worker/slot-0".into(),
-            expires_at: "2026-03-01T06:00:30.25Z".parse().unwrap(),
+            expires_at: "2026-03-01T06:00:30.25Z".parse().expect("an instant"),
             duration_s: 30,
         },
         assignment,
