@@ -73,14 +73,17 @@ fn both_sides_are_asked_before_either_is_waited_for() {
     assert_eq!(logs, ["tournament 1\ngoodbye\n", "tournament 2\ngoodbye\n"]);
 }
 
-/// One says nothing, the other has closed its output inside of a sandbox that still holds it open.
+/// One says nothing, the other has closed its output inside of a sandbox that still holds it open, and
+/// does not exit either.
 #[test]
 fn each_side_gets_its_own_verdict() {
+    let mut soon_judged = sandboxed();
+    soon_judged.time.bye_s = 0.5;
     let agents = [
         ("def on_step(step, answer): return None", impatient()),
         (
-            "def on_step(step, answer):\n    os.close(1); time.sleep(60)",
-            sandboxed(),
+            "def on_step(step, answer):\n    os.close(1); time.sleep(3600)",
+            soon_judged,
         ),
     ]
     .map(|(hooks, env)| (Agent::with(hooks), env));
