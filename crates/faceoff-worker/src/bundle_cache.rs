@@ -83,7 +83,7 @@ impl BundleCache {
 }
 
 /// BLAKE3 of a file, 64 hexadecimal digits.
-pub(crate) fn blake3_of(file: &Path) -> anyhow::Result<String> {
+fn blake3_of(file: &Path) -> anyhow::Result<String> {
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(fs::File::open(file)?)?;
     Ok(hasher.finalize().to_string())

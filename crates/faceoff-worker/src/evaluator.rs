@@ -1,8 +1,8 @@
 use faceoff_runner::{
-    AgentEnvironment, EvaluationMeta, Observer, PlatformFault, ShardReport, ShardSpec, SmokeReport,
+    AgentEnvironment, Assembled, EvaluationMeta, Observer, PlatformFault, ShardReport, ShardSpec,
+    SmokeReport,
     bundle::{self, Bundle, BundleError, BundleLimits},
 };
-use faceoff_types::EvaluationResult;
 use std::path::{Path, PathBuf};
 
 /// What a slot does with its units. One implementation, the runner; tests put faults of ours in its
@@ -40,7 +40,7 @@ pub(crate) trait Evaluator: Send + Sync {
         meta: &EvaluationMeta,
         recordings: &[PathBuf],
         archive: &Path,
-    ) -> Result<EvaluationResult, PlatformFault>;
+    ) -> Result<Assembled, PlatformFault>;
 }
 
 /// The evaluator that `faceoff eval` runs, too.
@@ -82,7 +82,7 @@ impl Evaluator for Runner {
         meta: &EvaluationMeta,
         recordings: &[PathBuf],
         archive: &Path,
-    ) -> Result<EvaluationResult, PlatformFault> {
-        Ok(faceoff_runner::assemble(meta, recordings, archive)?.result)
+    ) -> Result<Assembled, PlatformFault> {
+        Ok(faceoff_runner::assemble(meta, recordings, archive)?)
     }
 }

@@ -1,7 +1,7 @@
 //! The three kinds of work, each from its order to what is to be reported.
 
 use crate::{
-    bundle_cache::{BundleCache, Unpacked, blake3_of},
+    bundle_cache::{BundleCache, Unpacked},
     cpus::SlotCpus,
     evaluator::Evaluator,
     lease::Progress,
@@ -156,14 +156,14 @@ impl Executor {
         let work = self.folder("dataset")?;
         let recordings = self.fetch_recordings(recordings, work.path())?;
         let archive = work.path().join("dataset.zip");
-        let result = self.evaluator.assemble(meta, &recordings, &archive)?;
+        let assembled = self.evaluator.assemble(meta, &recordings, &archive)?;
         self.server
             .store_dataset(dataset, &archive)
             .context("storing the dataset")?;
         Ok(WorkReport::Finalise {
             dataset: dataset.to_owned(),
-            blake3: blake3_of(&archive)?,
-            result: Box::new(result),
+            blake3: assembled.archive.blake3,
+            result: Box::new(assembled.result),
         })
     }
 

@@ -87,6 +87,8 @@ struct Finished {
     resamples: u32,
     ruleset: String,
     seed: Option<String>,
+    /// Of the dataset's archive.
+    dataset_blake3: Option<String>,
     finished_at: String,
     tasks: Vec<TaskFigures>,
     /// Evaluations that met the same episodes.
@@ -167,11 +169,16 @@ pub(super) async fn page(
         EvaluationStatus::Finished {
             finished_at,
             result,
+            dataset_blake3,
             ..
         } => {
             let summary = view.summary(&app).await?;
             let others = others(&app, &view).await?;
-            Some(Finished::of(result, *finished_at, &summary, others))
+            Some(Finished {
+                dataset_blake3: dataset_blake3.clone(),
+                others,
+                ..Finished::of(result, *finished_at, &summary)
+            })
         }
         _ => None,
     };
@@ -238,12 +245,7 @@ async fn others(app: &App, of: &EvaluationView) -> Result<Vec<Other>, PageProble
 }
 
 impl Finished {
-    fn of(
-        result: &ResultView,
-        finished_at: Timestamp,
-        summary: &EpisodeSummary,
-        others: Vec<Other>,
-    ) -> Self {
+    fn of(result: &ResultView, finished_at: Timestamp, summary: &EpisodeSummary) -> Self {
         Self {
             score: figures::one(result.score),
             penalty_points: figures::one(result.penalty_points),
@@ -261,7 +263,8 @@ impl Finished {
                 .iter()
                 .map(|(task, result)| TaskFigures::of(*task, result, summary))
                 .collect(),
-            others,
+            dataset_blake3: None,
+            others: Vec::new(),
             timing: result.timing.as_ref().map(TimingFigures::of),
         }
     }

@@ -67,6 +67,9 @@ pub enum EvaluationStatus {
         result: Box<ResultView>,
         /// Path of the recorded dataset on this server.
         dataset: String,
+        /// BLAKE3 of its archive, 64 hexadecimal digits; absent for datasets of older versions.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        dataset_blake3: Option<String>,
     },
     /// The agent broke the protocol or a limit too often; no score.
     AgentFailed {
@@ -244,6 +247,7 @@ impl EvaluationView {
             EvaluationState::Finished {
                 finished_at,
                 result,
+                dataset_blake3,
                 ..
             } => {
                 let seed = seeds.public(result.seed, evaluation.day);
@@ -251,6 +255,7 @@ impl EvaluationView {
                     finished_at,
                     result: Box::new(ResultView::new(*result, seed)),
                     dataset: format!("{}/dataset", paths::evaluation(evaluation.id)),
+                    dataset_blake3,
                 }
             }
             EvaluationState::AgentFailed { finished_at } => EvaluationStatus::AgentFailed {

@@ -46,6 +46,11 @@ async fn an_evaluation_is_followed_from_the_queue_to_the_dataset() {
     published["seed"] = json!(null); // until the dataset is handed out
     assert_eq!(finished["result"], published);
     assert_eq!(finished["dataset"], format!("{path}/dataset"));
+    let hash = blake3::hash(b"PK the recorded dataset").to_string();
+    assert_eq!(finished["dataset_blake3"], hash);
+    let id = finished["id"].as_str().unwrap();
+    let page = site.get(&format!("/evaluations/{id}"), None).await;
+    assert!(page.body.contains(&hash), "{}", page.body);
     let me = site.get("/api/v1/me", token).await.json(200);
     assert_eq!(me["turn"]["evaluation"], finished["id"]);
 

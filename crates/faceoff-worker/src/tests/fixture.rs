@@ -7,13 +7,14 @@ use crate::{
     service::{Intervals, WorkerConfig, run_with},
 };
 use faceoff_runner::{
-    AgentEnvironment, EvaluationMeta, Observer, PlatformFault, ShardReport, ShardSpec, SmokeReport,
-    TimeLimits,
+    AgentEnvironment, Assembled, EvaluationMeta, Observer, PlatformFault, ShardReport, ShardSpec,
+    SmokeReport, TimeLimits,
     bundle::{Bundle, BundleError, BundleLimits},
 };
 use faceoff_sandbox::{Isolation, Limits};
 use faceoff_store::*;
 use faceoff_types::*;
+use faceoff_wire::dataset::FileDigest;
 use jiff::{SignedDuration, Timestamp};
 use std::{
     collections::BTreeMap,
@@ -136,14 +137,21 @@ impl Evaluator for Scripted {
         meta: &EvaluationMeta,
         recordings: &[PathBuf],
         archive: &Path,
-    ) -> Result<EvaluationResult, PlatformFault> {
+    ) -> Result<Assembled, PlatformFault> {
         let parts = recordings
             .iter()
             .map(|folder| std::fs::read_to_string(folder.join("steps.parquet")).unwrap())
             .collect::<Vec<_>>();
-        std::fs::write(archive, parts.join("\n")).unwrap();
+        let bytes = parts.join("\n");
+        std::fs::write(archive, &bytes).unwrap();
         *self.assembled.lock().unwrap() = parts;
-        Ok(result(meta))
+        Ok(Assembled {
+            result: result(meta),
+            archive: FileDigest {
+                bytes: bytes.len() as u64,
+                blake3: blake3::hash(bytes.as_bytes()).to_string(),
+            },
+        })
     }
 }
 
