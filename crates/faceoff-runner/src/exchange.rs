@@ -187,10 +187,10 @@ impl Exchange {
 
     /// The agent's end of a pipe is closed: by exit, by a kill, or by itself.
     fn closed(&mut self) -> Trouble {
-        self.process
-            .diagnose_end(self.exit_grace)
-            .unwrap_or(AgentFaultKind::ClosedOutput)
-            .into()
+        match self.process.diagnose_end(self.exit_grace) {
+            Ok(end) => end.unwrap_or(AgentFaultKind::ClosedOutput).into(),
+            Err(ours) => ours.into(),
+        }
     }
 }
 

@@ -99,7 +99,7 @@ impl AgentProcess {
             }
             Ok(Written::TimedOut) => Err(WriteError::TimedOut),
             Ok(Written::Closed) => {
-                self.check_platform()?;
+                self.diagnose_end(END_PATIENCE)?;
                 Err(WriteError::Closed)
             }
             Err(source) => Err(SandboxError::io("cannot write to the agent", source).into()),
@@ -131,7 +131,7 @@ impl AgentProcess {
             self.next_look.after_a_longer_pause(Instant::now());
         };
         if matches!(outcome, ReadLine::Closed) {
-            self.check_platform()?;
+            self.diagnose_end(END_PATIENCE)?;
         }
         Ok(outcome)
     }
@@ -177,11 +177,15 @@ impl AgentProcess {
     }
 
     /// Why it ended, if it ends by itself within `wait`: exit, signal, or the limit that ended it.
-    /// `None` while it runs, after we have killed it, and when the end was a failure of ours.
-    pub fn diagnose_end(&mut self, wait: Duration) -> Option<AgentFaultKind> {
+    /// `None` while it runs and after we have killed it.
+    ///
+    /// # Errors
+    /// When the end was a failure of ours.
+    pub fn diagnose_end(&mut self, wait: Duration) -> Result<Option<AgentFaultKind>, SandboxError> {
         match self.observe_end(wait) {
-            Some(End::Agent(fault)) => Some(fault.clone()),
-            _ => None,
+            Some(End::Agent(fault)) => Ok(Some(fault.clone())),
+            Some(End::Platform(why)) => Err(SandboxError::other("the sandbox failed", why.clone())),
+            Some(End::Killed) | None => Ok(None),
         }
     }
 
@@ -246,14 +250,6 @@ impl AgentProcess {
         }
         let pending = self.lines.has_pending_output();
         Ok(!pending.context("cannot look at the agent's output")?)
-    }
-
-    /// After a closed pipe: was it the sandbox that failed?
-    fn check_platform(&mut self) -> Result<(), SandboxError> {
-        match self.observe_end(END_PATIENCE) {
-            Some(End::Platform(why)) => Err(SandboxError::other("the sandbox failed", why.clone())),
-            _ => Ok(()),
-        }
     }
 
     fn observe_end(&mut self, wait: Duration) -> Option<&End> {

@@ -36,7 +36,7 @@ fn a_daemon_does_not_outlive_the_agent_that_left_it() {
     let mut agent = subject.spawn();
     assert_eq!(expect_line(&mut agent), "ready");
     assert_eq!(
-        agent.diagnose_end(PATIENCE),
+        agent.diagnose_end(PATIENCE).unwrap(),
         Some(AgentFaultKind::Exited { code: 0 })
     );
     // The agent was its namespace's first process: nothing needs to be killed any more.

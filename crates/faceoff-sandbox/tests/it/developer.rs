@@ -61,7 +61,7 @@ fn its_end_is_told_apart_as_well() {
         .read_line(LINE_CAP, Instant::now() + PATIENCE)
         .unwrap();
     assert!(matches!(outcome, ReadLine::Closed));
-    assert_eq!(agent.diagnose_end(Duration::ZERO), None);
+    assert_eq!(agent.diagnose_end(Duration::ZERO).unwrap(), None);
     subject.finish(agent);
 }
 

@@ -61,7 +61,7 @@ fn an_agent_that_closes_its_output_and_stays_is_noticed() {
     let started = Instant::now();
     let outcome = agent.read_line(LINE_CAP, started + PATIENCE).unwrap();
     assert!(matches!(outcome, ReadLine::Closed), "{outcome:?}");
-    assert_eq!(agent.diagnose_end(std::time::Duration::ZERO), None);
+    assert_eq!(agent.diagnose_end(std::time::Duration::ZERO).unwrap(), None);
     subject.finish(agent);
 }
 
@@ -215,7 +215,11 @@ fn a_sandbox_that_cannot_be_set_up_is_ours() {
                 matches!(outcome, Err(_) | Ok(ReadLine::Closed)),
                 "{outcome:?}"
             );
-            assert_eq!(agent.diagnose_end(PATIENCE), None);
+            let late = agent.diagnose_end(PATIENCE);
+            assert!(
+                late.is_err(),
+                "a fault of ours is not the agent's: {late:?}"
+            );
             let why = agent
                 .finish(PATIENCE)
                 .expect_err("the sandbox failed")

@@ -125,6 +125,7 @@ impl Subject {
     pub fn end(&self, agent: &mut AgentProcess) -> AgentFaultKind {
         agent
             .diagnose_end(PATIENCE)
+            .unwrap()
             .unwrap_or_else(|| panic!("no end; {}", agent.stderr_tail()))
     }
 

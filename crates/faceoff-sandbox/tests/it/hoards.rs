@@ -52,7 +52,7 @@ fn a_child_that_bursts_takes_only_itself_down() {
     let mut agent = subject.spawn();
     assert_eq!(expect_line(&mut agent), "9 child");
     expect_echo(&mut agent, "still there");
-    assert_eq!(agent.diagnose_end(std::time::Duration::ZERO), None);
+    assert_eq!(agent.diagnose_end(std::time::Duration::ZERO).unwrap(), None);
     assert_eq!(agent.finish(PATIENCE).unwrap().exit, None);
     subject.assert_nothing_left();
 }

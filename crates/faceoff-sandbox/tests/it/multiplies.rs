@@ -45,7 +45,7 @@ fn an_agent_that_fails_for_want_of_processes_is_told_so() {
     let subject = Subject::new("multiplies", &["exit"]).limits(|limits| limits.pids = 10);
     let mut agent = subject.spawn();
     expect_line(&mut agent);
-    let end = agent.diagnose_end(PATIENCE);
+    let end = agent.diagnose_end(PATIENCE).unwrap();
     assert!(
         matches!(&end, Some(AgentFaultKind::LimitExceeded { limit, allowed, .. })
             if limit == "processes" && allowed == "10"),
