@@ -9,6 +9,7 @@
 //! database. It measures time around the agent's pipe, which is its job; all else that it computes
 //! follows from the seeds.
 
+mod budget;
 pub mod bundle;
 mod calibration;
 mod config;
@@ -26,9 +27,9 @@ mod wire_env;
 pub use config::AgentEnvironment;
 pub use faceoff_dataset::{Assembled, ShardReport, assemble};
 pub use faceoff_types::TimeLimits;
-pub use faceoff_wire::work::{EvaluationMeta, ShardSpec};
+pub use faceoff_wire::work::{EvaluationMeta, ShardSpec, SmokeSpec};
 pub use fault::{PlatformFault, Trouble};
 pub use host_watch::HostWatch;
 pub use session::Session;
 pub use shard::{Observer, run_shard, run_shard_watched};
-pub use smoke::{SMOKE_STEPS, SmokeReport, smoke};
+pub use smoke::{SMOKE_STEPS, SmokeDefect, SmokeReport, smoke};

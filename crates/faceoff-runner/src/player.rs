@@ -1,4 +1,5 @@
 use crate::{
+    budget::{EpisodeBudget, ResetBudget},
     bundle::Bundle,
     config::AgentEnvironment,
     fault::{PlatformFault, Trouble},
@@ -9,6 +10,7 @@ use crate::{
 };
 use faceoff_episode::{Arena, Course, Question, StepSink, TimeSum};
 use faceoff_types::{AgentFaultKind, EpisodeOutcome, Phase, Profile, Seed, Task};
+use std::time::Instant;
 
 /// Plays episodes of one task with one agent, which is restarted after a fault. An episode that the
 /// host's stalls cost the agent is played again.
@@ -20,6 +22,7 @@ pub(crate) struct Player<'a> {
     /// None before the first episode and after a fault.
     session: Option<Session>,
     log: Log,
+    resets: ResetBudget,
     watch: &'a dyn HostWatch,
     host_noise_reruns: u32,
 }
@@ -42,11 +45,13 @@ struct StartUpFault {
 type CourseTo<'a> = Course<&'a mut dyn StepSink>;
 
 impl<'a> Player<'a> {
-    /// Prepares the plant; the agent is started by the first episode.
+    /// Prepares the plant; the agent is started by the first episode. `episodes` are about to be
+    /// played, which bounds the time of their resets.
     pub fn new(
         bundle: &'a Bundle,
         env: &'a AgentEnvironment,
         task: Task,
+        episodes: u32,
         profile: Profile,
         seed: Seed,
         mismatch_seed: Seed,
@@ -59,6 +64,7 @@ impl<'a> Player<'a> {
             arena: Arena::new(profile, seed, mismatch_seed),
             session: None,
             log: Log::new(env.limits.stderr_tail_bytes),
+            resets: ResetBudget::new(&env.time, episodes),
             watch,
             host_noise_reruns: 0,
         }
@@ -206,15 +212,14 @@ impl<'a> Player<'a> {
 
     /// The conversation of one episode; trouble comes with what the agent was asked for.
     fn converse(
-        &self,
+        &mut self,
         session: &mut Session,
         episode: u32,
         course: &mut CourseTo<'_>,
         without_noise: &mut TimeSum,
         cancelled: &dyn Fn() -> bool,
     ) -> Result<EpisodeOutcome, (Phase, Trouble)> {
-        session
-            .reset(episode)
+        self.reset(session, episode)
             .map_err(|trouble| (Phase::Reset, trouble))?;
         self.steps(session, course, without_noise, cancelled)
             .and_then(|outcome| {
@@ -224,6 +229,16 @@ impl<'a> Player<'a> {
             .map_err(|trouble| (Phase::Step, trouble))
     }
 
+    /// Announces an episode; the wait for the answer counts also if none came.
+    fn reset(&mut self, session: &mut Session, episode: u32) -> Result<(), Trouble> {
+        let asked = Instant::now();
+        let answered = session.reset(episode);
+        let wait_s = asked.elapsed().as_secs_f64();
+        let within = self.resets.spend(wait_s);
+        answered?;
+        Ok(within?)
+    }
+
     fn steps(
         &self,
         session: &mut Session,
@@ -231,6 +246,7 @@ impl<'a> Player<'a> {
         without_noise: &mut TimeSum,
         cancelled: &dyn Fn() -> bool,
     ) -> Result<EpisodeOutcome, Trouble> {
+        let mut budget = EpisodeBudget::new(&self.env.time);
         loop {
             if cancelled() {
                 return Err(PlatformFault::Cancelled.into());
@@ -250,6 +266,7 @@ impl<'a> Player<'a> {
             if let Some(outcome) = course.answer(session.action(), answered) {
                 return Ok(outcome);
             }
+            budget.spend(wall_s)?;
         }
     }
 

@@ -62,6 +62,7 @@ pub fn run_shard_watched(
         bundle,
         env,
         spec.task,
+        spec.episodes.end.saturating_sub(spec.episodes.start),
         spec.profile,
         spec.seed,
         spec.mismatch_seed,

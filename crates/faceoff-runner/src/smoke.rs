@@ -2,60 +2,193 @@ use crate::{
     bundle::Bundle, config::AgentEnvironment, fault::PlatformFault, host_watch::StallWatch,
     log::Log, player::Player,
 };
-use faceoff_episode::Nowhere;
-use faceoff_types::{AgentFault, Profile, Seed, Task};
-use serde::{Deserialize, Serialize};
+use faceoff_episode::{EpisodeStart, RecordError, StepRow, StepSink};
+use faceoff_scoring::computation_time_penalty;
+use faceoff_sim::EPISODE_STEPS;
+use faceoff_types::{AgentFault, EpisodeOutcome, Profile, SmokeTiming, Task};
+use faceoff_wire::work::SmokeSpec;
+use std::fmt;
 
-/// Control steps of each smoke episode, at most.
-pub const SMOKE_STEPS: u32 = 50;
-
+/// Control steps of each task over which an agent's time is judged, at least (RULES).
+pub const SMOKE_STEPS: u32 = 250;
 /// What the smoke run of an upload found.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct SmokeReport {
-    /// The first fault, if there was one.
-    pub fault: Option<AgentFault>,
+    /// The first thing that was wrong, if anything was.
+    pub defect: Option<SmokeDefect>,
+    /// How long the answers took, for each task as far as it was played.
+    pub timing: Vec<SmokeTiming>,
     /// The end of the agent's standard error.
     pub log: String,
 }
 
-/// Does the agent start, answer and keep time? One short episode of each task, in the same sandbox
-/// and with the same limits as an evaluation; ends with the first fault.
-///
-/// The seed is fixed and public: a smoke run must tell the same about the same bundle, and nothing
-/// about the season.
+/// Why an upload is refused.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SmokeDefect {
+    /// The agent broke the protocol or a limit.
+    Fault(AgentFault),
+    /// It answers, but not in real time.
+    TooSlow {
+        /// How slowly.
+        timing: SmokeTiming,
+        /// What the mean may be, in seconds.
+        limit_s: f64,
+    },
+}
+
+impl fmt::Display for SmokeDefect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Fault(fault) => fault.fmt(f),
+            Self::TooSlow { timing, limit_s } => write!(
+                f,
+                "{}: too slow: {} answers took {:.1} ms in the mean, and {:.0} ms are allowed: the \
+                 robot asks in real time",
+                timing.task,
+                timing.steps,
+                1e3 * timing.mean_s,
+                1e3 * limit_s
+            ),
+        }
+    }
+}
+
+/// Does the agent start, answer and keep time? Episodes of each task like those of an evaluation,
+/// in the same sandbox and with the same limits, until at least [`SMOKE_STEPS`] control steps of it
+/// are played; ends with the first defect. Which episodes and how many follow from the order's seed,
+/// so that an agent cannot tell this run from one that counts.
 ///
 /// # Errors
 /// The platform's alone; the agent's fault is in the report. [`PlatformFault::Cancelled`] when
 /// `cancelled`, which is asked before each step, said so.
 pub fn smoke(
+    spec: &SmokeSpec,
     bundle: &Bundle,
     env: &AgentEnvironment,
     cancelled: &dyn Fn() -> bool,
 ) -> Result<SmokeReport, PlatformFault> {
     let watch = StallWatch::start(&env.agent_cpus)?;
-    let seed = Seed::from_number(0);
+    let mut timing = Vec::with_capacity(Task::ALL.len());
     let mut log = Log::new(env.limits.stderr_tail_bytes);
     for task in Task::ALL {
+        let part = Part::drawn(spec, task);
         let mut player = Player::new(
             bundle,
             env,
             task,
+            part.episodes,
             Profile::Evaluation,
-            seed,
-            seed.model_mismatch(),
+            spec.seed,
+            spec.mismatch_seed,
             &watch,
         );
-        let outcome = player.play(0, SMOKE_STEPS, &mut Nowhere, cancelled)?;
+        let mut answers = Answers::default();
+        let mut outcomes = Vec::new();
+        while answers.times_s.len() < part.steps as usize {
+            let episode = part.first_episode + outcomes.len() as u32;
+            let outcome = player.play(episode, EPISODE_STEPS, &mut answers, cancelled)?;
+            let faulty = outcome.fault.is_some();
+            outcomes.push(outcome);
+            if faulty {
+                break;
+            }
+        }
         log.add(&player.close()?, None);
-        if let Some(fault) = outcome.fault {
+        let summary = answers.summary(task, &outcomes);
+        let fault = outcomes.into_iter().find_map(|outcome| outcome.fault);
+        let defect = match fault {
+            Some(fault) => Some(SmokeDefect::Fault(fault)),
+            None if summary.mean_s > env.time.mean_s => Some(SmokeDefect::TooSlow {
+                timing: summary.clone(),
+                limit_s: env.time.mean_s,
+            }),
+            None => None,
+        };
+        timing.push(summary);
+        if defect.is_some() {
             return Ok(SmokeReport {
-                fault: Some(fault),
+                defect,
+                timing,
                 log: log.into_text(),
             });
         }
     }
     Ok(SmokeReport {
-        fault: None,
+        defect: None,
+        timing,
         log: log.into_text(),
     })
+}
+
+/// What is played of one task.
+struct Part {
+    /// Where a shard of an evaluation would begin.
+    first_episode: u32,
+    /// About as many as the steps need.
+    episodes: u32,
+    /// Episodes are begun until so many control steps are played.
+    steps: u32,
+}
+
+impl Part {
+    /// A beginning like that of a shard, since an agent is told the number of its episode.
+    const SHARD_EPISODES: u32 = 50;
+    const SHARDS: u32 = 20;
+
+    fn drawn(spec: &SmokeSpec, task: Task) -> Self {
+        let drawn = spec.seed.derive("smoke", task.as_str().as_bytes());
+        let [a, b, c, d, e, f, g, h, ..] = *drawn.as_bytes();
+        let shard = u32::from_le_bytes([a, b, c, d]) % Self::SHARDS;
+        let more = u32::from_le_bytes([e, f, g, h]) % SMOKE_STEPS;
+        Self {
+            first_episode: shard * Self::SHARD_EPISODES,
+            episodes: Self::SHARD_EPISODES,
+            steps: SMOKE_STEPS + more,
+        }
+    }
+}
+
+/// The times of all answers; of a try that is played again the last ones count.
+#[derive(Default)]
+struct Answers {
+    times_s: Vec<f64>,
+    /// How many belong to episodes that have ended.
+    ended: usize,
+}
+
+impl Answers {
+    fn summary(mut self, task: Task, outcomes: &[EpisodeOutcome]) -> SmokeTiming {
+        let mean_s = self.times_s.iter().sum::<f64>() / self.times_s.len().max(1) as f64;
+        self.times_s.sort_unstable_by(f64::total_cmp);
+        let rank = (self.times_s.len() * 99).div_ceil(100);
+        let points: f64 = outcomes
+            .iter()
+            .map(|outcome| computation_time_penalty(&outcome.computation_time))
+            .sum();
+        SmokeTiming {
+            task,
+            steps: self.times_s.len() as u32,
+            mean_s,
+            p99_s: rank.checked_sub(1).map_or(0.0, |at| self.times_s[at]),
+            max_s: self.times_s.last().copied().unwrap_or_default(),
+            points_per_episode: points / outcomes.len().max(1) as f64,
+        }
+    }
+}
+
+impl StepSink for Answers {
+    fn begin(&mut self, _: EpisodeStart<'_>) {
+        self.times_s.truncate(self.ended);
+    }
+
+    fn observe(&mut self, _: &[f64]) {}
+
+    fn step(&mut self, row: &StepRow<'_>) {
+        self.times_s.push(row.answered.computation_time_s);
+    }
+
+    fn end(&mut self, _: &EpisodeOutcome, _: u32) -> Result<(), RecordError> {
+        self.ended = self.times_s.len();
+        Ok(())
+    }
 }

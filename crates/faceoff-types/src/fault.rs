@@ -40,6 +40,15 @@ pub enum AgentFaultKind {
         /// The limit in seconds.
         limit_s: f64,
     },
+    /// Answers that came, each in time, but took too long in all.
+    TimeBudget {
+        /// Which answers: of an episode's steps, or of a shard's resets.
+        phase: Phase,
+        /// What they add up to, in seconds.
+        used_s: f64,
+        /// What is allowed, in seconds.
+        limit_s: f64,
+    },
     /// Standard output was closed while an answer was due.
     ClosedOutput,
     /// The process ended while an answer was due.
@@ -85,6 +94,21 @@ impl fmt::Display for AgentFaultKind {
             }
             Self::TimedOut { phase, limit_s } => {
                 write!(f, "no answer within the {phase} limit of {limit_s} s")
+            }
+            Self::TimeBudget {
+                phase,
+                used_s,
+                limit_s,
+            } => {
+                let all = match phase {
+                    Phase::Step => "the answers of this episode",
+                    Phase::Reset => "the resets of this shard",
+                    Phase::StartUp => "the start-ups",
+                };
+                write!(
+                    f,
+                    "time budget: {all} took {used_s:.2} s in all, and {limit_s:.2} s are allowed"
+                )
             }
             Self::ClosedOutput => f.write_str("the agent closed its standard output"),
             Self::Exited { code } => write!(f, "the agent exited with status {code}"),

@@ -42,7 +42,7 @@ pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult, Violation
 pub use ruleset::{FOULS_PER_POINT, GAME_WINDOWS, RULESET, WINDOW_STEPS};
 pub use seed::{ParseSeedError, Seed};
 pub use seed_label::{ParseSeedLabelError, SeedLabel};
-pub use smoke_outcome::SmokeOutcome;
+pub use smoke_outcome::{SmokeOutcome, SmokeTiming};
 pub use task::{MAX_EPISODES_PER_TASK, ParseTaskError, Task};
 pub use team_name::{InvalidTeamName, TeamName};
 pub use tier::Tier;

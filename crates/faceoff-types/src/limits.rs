@@ -83,6 +83,16 @@ pub struct TimeLimits {
     pub reset_s: f64,
     /// To answer one `step`.
     pub step_s: f64,
+    /// Mean of the answers of a smoke run, for each task.
+    pub mean_s: f64,
+    /// All answers of an episode: so many times the control time of its steps …
+    pub episode_control_times: f64,
+    /// … and this much more.
+    pub episode_extra_s: f64,
+    /// All resets of a shard: this much for each of its episodes …
+    pub reset_mean_s: f64,
+    /// … and this much more.
+    pub resets_extra_s: f64,
     /// To exit after `bye`, or once it has closed its output, before it is killed.
     pub bye_s: f64,
     /// How often an episode is played again because the host stalled, at most; then the last try
@@ -96,6 +106,11 @@ impl Default for TimeLimits {
             startup_s: 120.0,
             reset_s: 10.0,
             step_s: 1.0,
+            mean_s: 0.02,
+            episode_control_times: 2.0,
+            episode_extra_s: 2.0,
+            reset_mean_s: 0.2,
+            resets_extra_s: 30.0,
             bye_s: 5.0,
             host_noise_reruns: 2,
         }

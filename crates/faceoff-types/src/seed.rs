@@ -1,4 +1,4 @@
-use crate::Task;
+use crate::{SubmissionId, Task};
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize, de::Error as _};
 use std::{fmt, str::FromStr};
@@ -50,6 +50,12 @@ impl Seed {
     #[must_use]
     pub fn ablation(&self) -> Self {
         self.derive("ablation", &[])
+    }
+
+    /// Season secret → the seed of a submission's smoke run.
+    #[must_use]
+    pub fn smoke(&self, submission: SubmissionId) -> Self {
+        self.derive("smoke", submission.as_uuid().as_bytes())
     }
 
     /// Season secret (or a local seed) → the seed of the season's model mismatch.

@@ -47,6 +47,8 @@ pub enum Assignment {
         submission: SubmissionId,
         /// Not known to be a bundle at all.
         agent: AgentOrder,
+        /// What it is to play.
+        spec: SmokeSpec,
     },
     /// Play a range of episodes.
     Play {
@@ -79,6 +81,15 @@ pub struct AgentOrder {
     pub bundle: BundleRef,
     /// Enforced by whoever carries out the order.
     pub limits: AgentLimits,
+}
+
+/// What decides which episodes a smoke run plays, and how many.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SmokeSpec {
+    /// Drawn for the submission alone.
+    pub seed: Seed,
+    /// The seed of the season's model mismatch: by its robot, too, the run is like those that count.
+    pub mismatch_seed: Seed,
 }
 
 /// Which episodes to simulate, and how.

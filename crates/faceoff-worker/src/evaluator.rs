@@ -1,6 +1,6 @@
 use faceoff_runner::{
     AgentEnvironment, Assembled, EvaluationMeta, Observer, PlatformFault, ShardReport, ShardSpec,
-    SmokeReport,
+    SmokeReport, SmokeSpec,
     bundle::{self, Bundle, BundleError, BundleLimits},
 };
 use std::path::{Path, PathBuf};
@@ -19,6 +19,7 @@ pub(crate) trait Evaluator: Send + Sync {
     /// Does the agent start, answer and keep time?
     fn smoke(
         &self,
+        spec: &SmokeSpec,
         bundle: &Bundle,
         env: &AgentEnvironment,
         cancelled: &dyn Fn() -> bool,
@@ -59,11 +60,12 @@ impl Evaluator for Runner {
 
     fn smoke(
         &self,
+        spec: &SmokeSpec,
         bundle: &Bundle,
         env: &AgentEnvironment,
         cancelled: &dyn Fn() -> bool,
     ) -> Result<SmokeReport, PlatformFault> {
-        faceoff_runner::smoke(bundle, env, cancelled)
+        faceoff_runner::smoke(spec, bundle, env, cancelled)
     }
 
     fn play(

@@ -11,7 +11,9 @@ use anyhow::Context as _;
 use faceoff_runner::{AgentEnvironment, bundle::Bundle};
 use faceoff_sandbox::{Isolation, Runtime};
 use faceoff_types::{AgentLimits, SmokeOutcome};
-use faceoff_wire::work::{AgentOrder, Assignment, EvaluationMeta, ShardSpec, WorkReport};
+use faceoff_wire::work::{
+    AgentOrder, Assignment, EvaluationMeta, ShardSpec, SmokeSpec, WorkReport,
+};
 use std::{
     collections::BTreeMap,
     path::{Path, PathBuf},
@@ -56,7 +58,9 @@ impl Executor {
         progress: &Progress,
     ) -> anyhow::Result<WorkReport> {
         match assignment {
-            Assignment::Smoke { agent, .. } => self.smoke(agent, progress).map(WorkReport::Smoke),
+            Assignment::Smoke { agent, spec, .. } => {
+                self.smoke(agent, spec, progress).map(WorkReport::Smoke)
+            }
             Assignment::Play {
                 agent,
                 spec,
@@ -93,13 +97,19 @@ impl Executor {
     }
 
     /// Checks an uploaded bundle in the very sandbox and under the very limits of the real run.
-    fn smoke(&mut self, agent: &AgentOrder, progress: &Progress) -> anyhow::Result<SmokeOutcome> {
+    fn smoke(
+        &mut self,
+        agent: &AgentOrder,
+        spec: &SmokeSpec,
+        progress: &Progress,
+    ) -> anyhow::Result<SmokeOutcome> {
         let bundle = match self.bundle(agent)? {
             Unpacked::Bundle(bundle) => bundle,
             Unpacked::Invalid(reason) => {
                 return Ok(SmokeOutcome::Invalid {
                     agent_name: None,
                     reason,
+                    timing: Vec::new(),
                     log: String::new(),
                 });
             }
@@ -107,13 +117,18 @@ impl Executor {
         let environment = self.host.environment(&agent.limits);
         let smoke = self
             .evaluator
-            .smoke(&bundle, &environment, &|| progress.stopped())?;
-        let (agent_name, log) = (bundle.manifest.name, smoke.log);
-        Ok(match smoke.fault {
-            None => SmokeOutcome::Valid { agent_name, log },
-            Some(fault) => SmokeOutcome::Invalid {
+            .smoke(spec, &bundle, &environment, &|| progress.stopped())?;
+        let (agent_name, timing, log) = (bundle.manifest.name, smoke.timing, smoke.log);
+        Ok(match smoke.defect {
+            None => SmokeOutcome::Valid {
+                agent_name,
+                timing,
+                log,
+            },
+            Some(defect) => SmokeOutcome::Invalid {
                 agent_name: Some(agent_name),
-                reason: fault.to_string(),
+                reason: defect.to_string(),
+                timing,
                 log,
             },
         })

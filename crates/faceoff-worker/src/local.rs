@@ -7,7 +7,7 @@ use faceoff_store::{
 };
 use faceoff_types::{AgentLimits, BundleRef, Clock, EvaluationResult, RULESET};
 use faceoff_wire::work::{
-    AgentOrder, Assignment, EvaluationMeta, Lease, ShardSpec, WorkOrder, WorkReport,
+    AgentOrder, Assignment, EvaluationMeta, Lease, ShardSpec, SmokeSpec, WorkOrder, WorkReport,
 };
 use jiff::SignedDuration;
 use std::{path::Path, time::Duration};
@@ -49,9 +49,13 @@ impl LocalServer {
     fn order(&self, leased: Leased) -> WorkOrder {
         let Leased { claim, work } = leased;
         let assignment = match work {
-            Work::Smoke { submission } => Assignment::Smoke {
+            Work::Smoke { submission, seeds } => Assignment::Smoke {
                 submission: submission.id,
                 agent: self.agent(submission.bundle),
+                spec: SmokeSpec {
+                    seed: seeds.episodes,
+                    mismatch_seed: seeds.mismatch,
+                },
             },
             Work::Shard {
                 owner,

@@ -226,10 +226,15 @@ impl Config {
             ("reset_s", self.time.reset_s),
             ("step_s", self.time.step_s),
             ("bye_s", self.time.bye_s),
+            ("mean_s", self.time.mean_s),
+            ("episode_control_times", self.time.episode_control_times),
+            ("episode_extra_s", self.time.episode_extra_s),
+            ("reset_mean_s", self.time.reset_mean_s),
+            ("resets_extra_s", self.time.resets_extra_s),
         ] {
             ensure!(
                 seconds.is_finite() && seconds > 0.0 && seconds <= 3600.0,
-                "time.{name}: expected more than 0 and at most 3600 seconds, got {seconds}"
+                "time.{name}: expected more than 0 and at most 3600, got {seconds}"
             );
         }
         ensure!(

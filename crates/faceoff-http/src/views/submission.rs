@@ -2,7 +2,7 @@
 
 use crate::{app::AppState, problem::Problem};
 use faceoff_store::{Submission, SubmissionState};
-use faceoff_types::{SubmissionId, TeamId};
+use faceoff_types::{SmokeTiming, SubmissionId, TeamId};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -24,6 +24,9 @@ pub struct SubmissionView {
     pub created_at: Timestamp,
     /// The agent's own name, known once the bundle was unpacked.
     pub agent_name: Option<String>,
+    /// How long its answers took in the smoke run, for each task that was played.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub timing: Vec<SmokeTiming>,
     /// The smoke run's verdict.
     #[serde(flatten)]
     pub status: SubmissionStatus,
@@ -83,6 +86,7 @@ impl SubmissionView {
             blake3: submission.bundle.blake3,
             created_at: submission.created_at,
             agent_name: submission.agent_name,
+            timing: submission.timing,
             status: match submission.state {
                 SubmissionState::Validating => SubmissionStatus::Validating,
                 SubmissionState::Valid => SubmissionStatus::Valid { log },

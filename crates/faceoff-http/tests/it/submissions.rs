@@ -57,6 +57,7 @@ async fn an_upload_is_stored_hashed_and_queued() {
 
     let outcome = SmokeOutcome::Valid {
         agent_name: "striker 1.0".into(),
+        timing: Vec::new(),
         log: "model loaded\n".into(),
     };
     site.smoke(outcome).await;
@@ -81,6 +82,7 @@ async fn an_invalid_bundle_shows_its_reason_and_its_log() {
     let outcome = SmokeOutcome::Invalid {
         agent_name: None,
         reason: "no answer within the start-up limit of 120 s".into(),
+        timing: Vec::new(),
         log: "ImportError: torch\n".into(),
     };
     site.smoke(outcome).await;
@@ -203,6 +205,7 @@ async fn a_team_cannot_fill_the_queue_with_uploads() {
     assert_eq!(refused.header("retry-after"), "30");
     site.smoke(SmokeOutcome::Valid {
         agent_name: "a".into(),
+        timing: Vec::new(),
         log: String::new(),
     })
     .await;

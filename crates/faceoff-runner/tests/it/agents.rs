@@ -97,8 +97,12 @@ pub fn sandboxed() -> AgentEnvironment {
             reset_s: 600.0,
             step_s: 600.0,
             bye_s: 600.0,
+            mean_s: 600.0,
+            episode_extra_s: 600.0,
+            resets_extra_s: 600.0,
             // Tests of other things must not depend on what else the machine does.
             host_noise_reruns: 0,
+            ..TimeLimits::default()
         },
         isolation: Isolation::Sandboxed {
             given_up: Vec::new(),

@@ -1,13 +1,33 @@
 //! What agents do wrong, and the verdict on each.
 
 use crate::agents::{Agent, impatient, sandboxed};
-use faceoff_runner::{AgentEnvironment, PlatformFault, SmokeReport, smoke};
-use faceoff_types::{AgentFaultKind, Phase};
+use faceoff_runner::{
+    AgentEnvironment, PlatformFault, SMOKE_STEPS, SmokeDefect, SmokeReport, SmokeSpec, smoke,
+};
+use faceoff_types::{AgentFault, AgentFaultKind, Phase, Seed, Task};
+
+fn spec(number: u64) -> SmokeSpec {
+    let seed = Seed::from_number(number);
+    SmokeSpec {
+        seed,
+        mismatch_seed: seed.model_mismatch(),
+    }
+}
+
+fn report_in(agent: &Agent, env: &AgentEnvironment) -> SmokeReport {
+    smoke(&spec(0), &agent.bundle, env, &|| false).expect("the platform works")
+}
 
 fn verdict_in(agent: &Agent, env: &AgentEnvironment) -> (AgentFaultKind, SmokeReport) {
-    let report = smoke(&agent.bundle, env, &|| false).expect("the platform works");
-    let fault = report.fault.clone().expect("a fault");
-    (fault.fault, report)
+    let report = report_in(agent, env);
+    (fault(&report).fault, report)
+}
+
+fn fault(report: &SmokeReport) -> AgentFault {
+    match &report.defect {
+        Some(SmokeDefect::Fault(fault)) => fault.clone(),
+        other => panic!("expected a fault, got {other:?}"),
+    }
 }
 
 fn verdict(hooks: &str) -> (AgentFaultKind, SmokeReport) {
@@ -16,14 +36,84 @@ fn verdict(hooks: &str) -> (AgentFaultKind, SmokeReport) {
 
 #[test]
 fn a_behaving_agent_passes_the_smoke_run() {
-    let report = smoke(&Agent::behaving().bundle, &sandboxed(), &|| false).unwrap();
-    assert_eq!(
-        report,
-        SmokeReport {
-            fault: None,
-            log: "goodbye\n".repeat(3)
-        }
+    let report = report_in(&Agent::behaving(), &sandboxed());
+    assert_eq!(report.defect, None);
+    assert_eq!(report.log, "goodbye\n".repeat(3));
+    for (timing, task) in report.timing.iter().zip(Task::ALL) {
+        assert_eq!(timing.task, task);
+        assert!(timing.steps >= SMOKE_STEPS, "{timing:?}");
+        assert!(
+            0.0 < timing.mean_s && timing.p99_s <= timing.max_s,
+            "{timing:?}"
+        );
+    }
+    assert_eq!(report.timing.len(), 3);
+}
+
+#[test]
+fn smoke_runs_of_two_submissions_differ_in_length_and_episodes_and_those_of_one_do_not() {
+    let agent = Agent::with(
+        "def on_reset(episode): print('reset', episode, file=sys.stderr)\n\
+         def on_step(step, answer):\n    \
+         if step == 0: print(answer['action'][0][0], file=sys.stderr)\n    \
+         return json.dumps(answer)",
     );
+    let told = |number| {
+        let report = smoke(&spec(number), &agent.bundle, &sandboxed(), &|| false).unwrap();
+        assert_eq!(report.defect, None, "{}", report.log);
+        let steps: Vec<u32> = report.timing.iter().map(|timing| timing.steps).collect();
+        (steps, report.log)
+    };
+    let (steps, log) = told(1);
+    assert_eq!(told(1), (steps.clone(), log.clone()));
+    let (other_steps, other_log) = told(2);
+    assert_ne!(other_steps, steps);
+    assert_ne!(other_log, log);
+}
+
+#[test]
+fn an_agent_that_is_too_slow_in_the_mean_is_told_so() {
+    // Every answer is in time by its own limit; no machine is so fast that they take no time at all.
+    let mut env = sandboxed();
+    env.time.mean_s = 1e-9;
+    let report = report_in(&Agent::behaving(), &env);
+    let Some(defect @ SmokeDefect::TooSlow { timing, .. }) = &report.defect else {
+        panic!("{:?}", report.defect)
+    };
+    assert_eq!((timing.task, report.timing.len()), (Task::Hit, 1));
+    assert!(defect.to_string().contains("too slow"), "{defect}");
+}
+
+#[test]
+fn answers_that_take_too_long_in_all_are_a_fault_although_each_is_in_time() {
+    // Whatever the machine does besides: three answers cannot be had in less.
+    let mut env = sandboxed();
+    env.time.episode_extra_s = 0.5;
+    let slow = Agent::with("def on_step(step, answer): time.sleep(0.3); return json.dumps(answer)");
+    let (kind, report) = verdict_in(&slow, &env);
+    assert!(
+        matches!(kind, AgentFaultKind::TimeBudget { phase: Phase::Step, used_s, limit_s }
+            if used_s > limit_s && limit_s < 0.7),
+        "{kind:?}"
+    );
+    let step = fault(&report).step.expect("it is an episode's");
+    assert!((1..=2).contains(&step), "{step}");
+
+    let mut env = sandboxed();
+    (env.time.resets_extra_s, env.time.reset_mean_s) = (0.5, 1e-9);
+    let slow = Agent::with("def on_reset(episode): time.sleep(1.0)");
+    let (kind, report) = verdict_in(&slow, &env);
+    assert!(
+        matches!(
+            kind,
+            AgentFaultKind::TimeBudget {
+                phase: Phase::Reset,
+                ..
+            }
+        ),
+        "{kind:?}"
+    );
+    assert_eq!(fault(&report).step, None);
 }
 
 #[test]
@@ -34,6 +124,7 @@ fn a_smoke_run_stops_when_it_is_told_to() {
         asked.get() == 3
     };
     let stopped = smoke(
+        &spec(0),
         &Agent::behaving().bundle,
         &sandboxed(),
         &stop_at_the_third_step,
@@ -46,13 +137,13 @@ fn a_smoke_run_stops_when_it_is_told_to() {
 fn rubbish_is_quoted() {
     let (kind, report) = verdict("def on_step(step, answer): return 'Traceback: x'");
     assert!(matches!(kind, AgentFaultKind::NotJson { .. }), "{kind:?}");
-    let fault = report.fault.unwrap();
-    assert_eq!((fault.episode, fault.step), (Some(0), Some(0)));
+    let fault = fault(&report);
+    assert_eq!((fault.episode.is_some(), fault.step), (true, Some(0)));
     assert_eq!(fault.line.as_deref(), Some("Traceback: x"));
     assert!(
         report
             .log
-            .contains("[faceoff] hit, episode 0, step 0: the answer is not a JSON object")
+            .contains(", step 0: the answer is not a JSON object")
     );
 }
 
@@ -60,7 +151,7 @@ fn rubbish_is_quoted() {
 fn prints_between_the_lines_are_quoted() {
     let (kind, report) = verdict("say('loading the model')");
     assert!(matches!(kind, AgentFaultKind::NotJson { .. }), "{kind:?}");
-    let fault = report.fault.unwrap();
+    let fault = fault(&report);
     assert_eq!(
         (fault.episode, fault.line.as_deref()),
         (None, Some("loading the model"))
@@ -81,7 +172,7 @@ fn an_answer_before_the_question_is_a_fault() {
         expected.starts_with("no output before the next question"),
         "{expected}"
     );
-    assert!(report.fault.unwrap().line.unwrap().contains("\"step\": 1"));
+    assert!(fault(&report).line.unwrap().contains("\"step\": 1"));
 }
 
 #[test]
@@ -130,7 +221,7 @@ fn silence_times_out() {
             limit_s: 0.5
         }
     );
-    assert_eq!(report.fault.unwrap().step, Some(0));
+    assert_eq!(fault(&report).step, Some(0));
 }
 
 #[test]
@@ -159,7 +250,7 @@ fn a_line_without_end_is_too_long() {
             limit_bytes: 65_536
         }
     );
-    assert_eq!(report.fault.unwrap().line.unwrap().chars().count(), 400);
+    assert_eq!(fault(&report).line.unwrap().chars().count(), 400);
 }
 
 #[test]
@@ -181,8 +272,8 @@ fn exits_and_signals_are_told_apart() {
     assert_eq!(kind, AgentFaultKind::Signalled { signal: 11 });
     let (kind, report) = verdict("def on_reset(episode): sys.exit(0)");
     assert_eq!(kind, AgentFaultKind::Exited { code: 0 });
-    let fault = report.fault.unwrap();
-    assert_eq!((fault.episode, fault.step), (Some(0), None));
+    let fault = fault(&report);
+    assert_eq!((fault.episode.is_some(), fault.step), (true, None));
 }
 
 #[test]

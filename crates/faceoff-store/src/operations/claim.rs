@@ -43,6 +43,8 @@ pub enum Work {
     Smoke {
         /// What to check.
         submission: Submission,
+        /// Of the episodes that it plays, its own.
+        seeds: RunSeeds,
     },
     /// Play a range of episodes.
     Shard {
@@ -72,10 +74,10 @@ pub enum Work {
     },
 }
 
-/// The seeds of a run, derived from the season's secret, which stays in the store.
+/// The seeds of what is played, derived from the season's secret, which stays in the store.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RunSeeds {
-    /// Of the episodes: that of the day, or of ablations.
+    /// Of the episodes: that of the day, of ablations, or of a submission's smoke run.
     pub episodes: Seed,
     /// Of the season's model mismatch.
     pub mismatch: Seed,
@@ -132,7 +134,12 @@ async fn describe(tx: &mut Tx, unit: Uuid, label: &str) -> Result<Work> {
         Purpose::Smoke(id) => {
             tx.advanced(Subject::Submission(id));
             let submission = submissions::find(tx, id).await?;
-            Ok(Work::Smoke { submission })
+            let secret = season::read(tx).await?.secret;
+            let seeds = RunSeeds {
+                episodes: secret.smoke(id),
+                mismatch: secret.model_mismatch(),
+            };
+            Ok(Work::Smoke { submission, seeds })
         }
         Purpose::Shard { run: id, shard } => {
             let owner = runs::owner(tx, id).await?;

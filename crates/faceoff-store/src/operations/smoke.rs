@@ -25,16 +25,22 @@ impl Store {
                 return Err(other_work("smoke run", &purpose));
             };
             let event = match outcome {
-                SmokeOutcome::Valid { agent_name, log } => {
-                    submissions::set_valid(tx, id, &agent_name, &log).await?;
+                SmokeOutcome::Valid {
+                    agent_name,
+                    timing,
+                    log,
+                } => {
+                    submissions::set_valid(tx, id, &agent_name, &timing, &log).await?;
                     Event::SubmissionValid { agent_name }
                 }
                 SmokeOutcome::Invalid {
                     agent_name,
                     reason,
+                    timing,
                     log,
                 } => {
-                    submissions::set_invalid(tx, id, agent_name.as_deref(), &reason, &log).await?;
+                    submissions::set_invalid(tx, id, agent_name.as_deref(), &reason, &timing, &log)
+                        .await?;
                     Event::SubmissionInvalid { reason }
                 }
             };

@@ -1,8 +1,8 @@
 use crate::{
-    column::Instant,
+    column::{Instant, Json},
     error::{Result, StoreError},
 };
-use faceoff_types::{BundleRef, SubmissionId, TeamId};
+use faceoff_types::{BundleRef, SmokeTiming, SubmissionId, TeamId};
 use jiff::{Timestamp, civil::Date};
 use sqlx::{SqliteConnection, types::Text};
 
@@ -21,6 +21,8 @@ pub struct Submission {
     pub agent_name: Option<String>,
     /// How far its smoke run is.
     pub state: SubmissionState,
+    /// How long its answers took in the smoke run, for each task that was played.
+    pub timing: Vec<SmokeTiming>,
 }
 
 /// A submission's way through its smoke run. The agent's log is read by itself
@@ -62,6 +64,7 @@ struct SubmissionRow {
     agent_name: Option<String>,
     state: String,
     reason: Option<String>,
+    timing: Option<Json<Vec<SmokeTiming>>>,
 }
 
 impl TryFrom<SubmissionRow> for Submission {
@@ -92,6 +95,7 @@ impl TryFrom<SubmissionRow> for Submission {
             created_at: row.created_at.0,
             agent_name: row.agent_name,
             state,
+            timing: row.timing.map_or_else(Vec::new, |timing| timing.0),
         })
     }
 }
@@ -104,7 +108,8 @@ macro_rules! select_submissions {
             r#"SELECT s.id AS "id: Text<SubmissionId>", s.team_id AS "team_id: Text<TeamId>",
                       s.bundle_key, s.bundle_bytes AS "bundle_bytes: u64", s.bundle_blake3,
                       s.bundle_file_name, s.created_at AS "created_at: Instant",
-                      s.agent_name, s.state, s.reason
+                      s.agent_name, s.state, s.reason,
+                      s.timing AS "timing: Json<Vec<SmokeTiming>>"
                FROM submissions s "# + $tail
             $(, $argument)*
         )
@@ -212,12 +217,14 @@ pub(crate) async fn set_valid(
     connection: &mut SqliteConnection,
     id: SubmissionId,
     agent_name: &str,
+    timing: &[SmokeTiming],
     log: &str,
 ) -> Result<()> {
-    let id = Text(id);
+    let (id, timing) = (Text(id), Json(timing));
     sqlx::query!(
-        "UPDATE submissions SET state = 'valid', agent_name = ?, log = ? WHERE id = ?",
+        "UPDATE submissions SET state = 'valid', agent_name = ?, timing = ?, log = ? WHERE id = ?",
         agent_name,
+        timing,
         log,
         id,
     )
@@ -231,13 +238,16 @@ pub(crate) async fn set_invalid(
     id: SubmissionId,
     agent_name: Option<&str>,
     reason: &str,
+    timing: &[SmokeTiming],
     log: &str,
 ) -> Result<()> {
-    let id = Text(id);
+    let (id, timing) = (Text(id), Json(timing));
     sqlx::query!(
-        "UPDATE submissions SET state = 'invalid', agent_name = ?, reason = ?, log = ? WHERE id = ?",
+        "UPDATE submissions SET state = 'invalid', agent_name = ?, reason = ?, timing = ?, log = ?
+         WHERE id = ?",
         agent_name,
         reason,
+        timing,
         log,
         id,
     )

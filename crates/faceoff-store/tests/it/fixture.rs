@@ -73,6 +73,7 @@ impl Fixture {
         let (claim, submission) = self.claim_smoke().await;
         let outcome = SmokeOutcome::Valid {
             agent_name: "striker".into(),
+            timing: Vec::new(),
             log: "hello\n".into(),
         };
         self.store
@@ -100,7 +101,7 @@ impl Fixture {
         match self.claim().await {
             Some(Claimed {
                 claim,
-                work: Work::Smoke { submission },
+                work: Work::Smoke { submission, .. },
             }) => (claim, submission),
             other => panic!("expected a smoke run, claimed {other:?}"),
         }

@@ -58,9 +58,10 @@ async fn child() {
                 break;
             };
             match work {
-                Work::Smoke { submission } => {
+                Work::Smoke { submission, .. } => {
                     let outcome = SmokeOutcome::Valid {
                         agent_name: "a".into(),
+                        timing: Vec::new(),
                         log: String::new(),
                     };
                     store.commit_smoke(&claim, outcome, now).await.unwrap();

@@ -592,11 +592,12 @@ async fn work_goes_on_where_the_old_program_left_it() {
     let (mut smoke, mut shards, mut of_ablations) = (0, 0, 0);
     while let Some(Claimed { claim, work }) = f.claim().await {
         match work {
-            Work::Smoke { submission } => {
+            Work::Smoke { submission, .. } => {
                 smoke += 1;
                 assert!([id(1), id(2)].contains(&submission.id));
                 let outcome = SmokeOutcome::Valid {
                     agent_name: "a".into(),
+                    timing: Vec::new(),
                     log: String::new(),
                 };
                 let committed = f.store.commit_smoke(&claim, outcome, f.now).await;

@@ -135,6 +135,7 @@ async fn the_day_starts_the_newest_valid_submission_of_each_team_once() {
     let outcome = SmokeOutcome::Invalid {
         agent_name: None,
         reason: "no agent.toml".into(),
+        timing: Vec::new(),
         log: String::new(),
     };
     f.store.commit_smoke(&claim, outcome, f.now).await.unwrap();

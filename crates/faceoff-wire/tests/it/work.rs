@@ -115,11 +115,13 @@ fn every_report_round_trips() {
     let reports = [
         WorkReport::Smoke(SmokeOutcome::Valid {
             agent_name: "striker".into(),
+            timing: Vec::new(),
             log: "begun\n".into(),
         }),
         WorkReport::Smoke(SmokeOutcome::Invalid {
             agent_name: None,
             reason: "agent.toml is missing".into(),
+            timing: Vec::new(),
             log: String::new(),
         }),
         WorkReport::Play {

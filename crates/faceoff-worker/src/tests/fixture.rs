@@ -8,7 +8,7 @@ use crate::{
 };
 use faceoff_runner::{
     AgentEnvironment, Assembled, EvaluationMeta, Observer, PlatformFault, ShardReport, ShardSpec,
-    SmokeReport, TimeLimits,
+    SmokeReport, SmokeSpec, TimeLimits,
     bundle::{Bundle, BundleError, BundleLimits},
 };
 use faceoff_sandbox::{Isolation, Limits};
@@ -91,12 +91,14 @@ impl Evaluator for Scripted {
 
     fn smoke(
         &self,
+        _: &SmokeSpec,
         _: &Bundle,
         _: &AgentEnvironment,
         _: &dyn Fn() -> bool,
     ) -> Result<SmokeReport, PlatformFault> {
         Ok(SmokeReport {
-            fault: None,
+            defect: None,
+            timing: Vec::new(),
             log: "smoke\n".into(),
         })
     }
@@ -257,6 +259,7 @@ impl Server {
         let claim = claimed.expect("a smoke run is queued").claim;
         let outcome = SmokeOutcome::Valid {
             agent_name: "scripted".into(),
+            timing: Vec::new(),
             log: String::new(),
         };
         self.store
@@ -325,7 +328,7 @@ impl Server {
                     reset_s: 1.0,
                     step_s: 1.0,
                     bye_s: 1.0,
-                    host_noise_reruns: 0,
+                    ..TimeLimits::default()
                 },
                 isolation: Isolation::None,
                 runtimes: BTreeMap::new(),

@@ -28,6 +28,7 @@ async fn report(server: &Server, order: &WorkOrder) -> WorkReport {
     match &order.assignment {
         Assignment::Smoke { .. } => WorkReport::Smoke(SmokeOutcome::Valid {
             agent_name: "scripted".into(),
+            timing: Vec::new(),
             log: String::new(),
         }),
         Assignment::Play {

@@ -149,6 +149,7 @@ async fn the_schedule_starts_a_missed_day_once() {
         .unwrap();
     let outcome = SmokeOutcome::Valid {
         agent_name: "a".into(),
+        timing: Vec::new(),
         log: String::new(),
     };
     server

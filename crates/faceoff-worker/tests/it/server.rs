@@ -74,6 +74,9 @@ impl Server {
                     reset_s: 600.0,
                     step_s: 600.0,
                     bye_s: 600.0,
+                    mean_s: 600.0,
+                    episode_extra_s: 600.0,
+                    resets_extra_s: 600.0,
                     ..TimeLimits::default()
                 },
                 isolation: Isolation::Sandboxed {

@@ -99,6 +99,7 @@ async fn a_folder_is_packed_uploaded_and_followed() {
     assert!(matches!(work, Work::Smoke { .. }), "{work:?}");
     let outcome = SmokeOutcome::Valid {
         agent_name: "mine".into(),
+        timing: Vec::new(),
         log: "hello".into(),
     };
     site.store

@@ -8,6 +8,7 @@ use faceoff_http::views::{
     evaluation::{EvaluationStatus, EvaluationView},
     submission::{SubmissionStatus, SubmissionView},
 };
+use faceoff_types::SmokeTiming;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{path::PathBuf, time::Duration};
 
@@ -62,6 +63,9 @@ impl SubmitCommand {
 
         let submission = verdict(&client, submission).await?;
         let agent = submission.agent_name.as_deref().unwrap_or("the agent");
+        for timing in &submission.timing {
+            print_timing(timing);
+        }
         match submission.status {
             SubmissionStatus::Valid { log } => {
                 print_log(log.as_deref());
@@ -89,7 +93,8 @@ async fn verdict(
     client: &Client,
     mut submission: SubmissionView,
 ) -> anyhow::Result<SubmissionView> {
-    let spinner = ProgressBar::new_spinner().with_message("smoke run: does it start and answer?");
+    let spinner =
+        ProgressBar::new_spinner().with_message("smoke run: does it start, answer and keep time?");
     spinner.enable_steady_tick(Duration::from_millis(100));
     while submission.status == SubmissionStatus::Validating {
         tokio::time::sleep(POLL).await;
@@ -156,6 +161,18 @@ fn result(evaluation: EvaluationView) -> anyhow::Result<()> {
             bail!("the evaluation is not over")
         }
     }
+}
+
+fn print_timing(timing: &SmokeTiming) {
+    println!(
+        "{:<8} {} answers: mean {:.1} ms, 99 % within {:.1} ms, longest {:.1} ms; {:.1} penalty points per episode",
+        timing.task.as_str(),
+        timing.steps,
+        1e3 * timing.mean_s,
+        1e3 * timing.p99_s,
+        1e3 * timing.max_s,
+        timing.points_per_episode
+    );
 }
 
 fn print_log(log: Option<&str>) {
