@@ -7,6 +7,7 @@ mod demo;
 mod house;
 mod kills;
 mod privacy;
+mod real_time;
 mod upgrade;
 
 use faceoff_tests::{bundle, server::Server};

@@ -50,11 +50,15 @@ impl ResetBudget {
     }
 
     /// Counts an answer, or a wait for one that did not come.
+    pub fn spend(&mut self, wait_s: f64) {
+        self.used_s += wait_s;
+    }
+
+    /// Is there time for resets?
     ///
     /// # Errors
-    /// The agent has used up the time of all resets.
-    pub fn spend(&mut self, wait_s: f64) -> Result<(), AgentFaultKind> {
-        self.used_s += wait_s;
+    /// The agent has used up that of all.
+    pub fn check(&self) -> Result<(), AgentFaultKind> {
         within(Phase::Reset, self.used_s, self.limit_s)
     }
 }
@@ -94,10 +98,12 @@ mod tests {
     fn resets_share_a_budget_that_grows_with_the_shard() {
         let mut budget = ResetBudget::new(&TimeLimits::default(), 50);
         for _ in 0..4 {
-            assert_eq!(budget.spend(10.0), Ok(()));
+            budget.spend(10.0);
+            assert_eq!(budget.check(), Ok(()));
         }
+        budget.spend(0.5);
         assert_eq!(
-            budget.spend(0.5),
+            budget.check(),
             Err(AgentFaultKind::TimeBudget {
                 phase: Phase::Reset,
                 used_s: 40.5,

@@ -231,12 +231,12 @@ impl<'a> Player<'a> {
 
     /// Announces an episode; the wait for the answer counts also if none came.
     fn reset(&mut self, session: &mut Session, episode: u32) -> Result<(), Trouble> {
+        self.resets.check()?;
         let asked = Instant::now();
         let answered = session.reset(episode);
-        let wait_s = asked.elapsed().as_secs_f64();
-        let within = self.resets.spend(wait_s);
+        self.resets.spend(asked.elapsed().as_secs_f64());
         answered?;
-        Ok(within?)
+        Ok(self.resets.check()?)
     }
 
     fn steps(

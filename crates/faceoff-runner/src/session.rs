@@ -79,9 +79,9 @@ impl Session {
     ///
     /// # Errors
     /// The agent's fault or the platform's.
-    pub fn reset(&mut self, episode: u32) -> Result<Answered, Trouble> {
+    pub fn reset(&mut self, episode: u32) -> Result<(), Trouble> {
         self.send_reset(episode)?;
-        self.wait()
+        self.wait().map(drop)
     }
 
     /// Asks for the action of a step and waits for it.

@@ -1,0 +1,112 @@
+//! Agents that would hold a slot for hours, or that behave only while they are looked at.
+
+use crate::{CONFIG, Team};
+use faceoff_tests::{
+    bundle::{python_agent, python_bundle},
+    server::Server,
+};
+use serde_json::Value;
+
+/// The rules' own limits: an agent that sleeps breaks them on every machine.
+const REAL_LIMITS: &str = "[workers]\nslots = 1\n";
+
+fn reason(verdict: &Value) -> &str {
+    verdict["reason"].as_str().unwrap_or_default()
+}
+
+#[test]
+fn an_agent_slower_than_real_time_is_refused_however_it_spreads_its_slowness() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), REAL_LIMITS);
+    let team = Team::create(&server, "Slow");
+    for (name, on_step, words) in [
+        // each answer within its own limit of 1 s
+        (
+            "each-step",
+            "time.sleep(0.9); say(hold)",
+            &["time budget"][..],
+        ),
+        // a slowness that an episode's budget allows
+        (
+            "a-little",
+            "time.sleep(0.025); say(hold)",
+            &["too slow", "time budget"],
+        ),
+        // in time for as long as a short check would look
+        (
+            "later",
+            "if message['step'] >= 60: time.sleep(0.9)\nsay(hold)",
+            &["time budget"],
+        ),
+        // in time where a check of one task would look: `prepare` starts with the puck at rest
+        (
+            "one-task",
+            "if message['step'] == 0: lazy = len(message['obs']) == 20 and abs(message['obs'][3]) < 0.6\n\
+             if lazy: time.sleep(0.9)\nsay(hold)",
+            &["prepare", "time budget"],
+        ),
+    ] {
+        let folder = python_bundle(scratch.path(), name, &python_agent(on_step));
+        let verdict = team.submit(&server, &folder);
+        assert_eq!(verdict["state"], "invalid", "{name}: {verdict:#}");
+        assert!(
+            words.iter().any(|word| reason(&verdict).contains(word)),
+            "{name}: {verdict:#}"
+        );
+    }
+}
+
+#[test]
+fn resets_have_a_budget_in_all() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let config = "[workers]\nslots = 1\n[time]\nresets_extra_s = 1.0\nreset_mean_s = 0.001\n";
+    let server = Server::start(&scratch.path().join("data"), config);
+    let team = Team::create(&server, "Dawdler");
+    let source = python_agent("say(hold)").replace(
+        "held = None\n        say",
+        "held = None\n        time.sleep(0.6)\n        say",
+    );
+    assert!(source.contains("sleep"));
+    let folder = python_bundle(scratch.path(), "dawdles", &source);
+    let verdict = team.submit(&server, &folder);
+    assert_eq!(verdict["state"], "invalid", "{verdict:#}");
+    assert!(
+        reason(&verdict).contains("time budget: the resets"),
+        "{verdict:#}"
+    );
+}
+
+#[test]
+fn a_smoke_run_is_another_one_for_each_upload_and_tells_the_time_that_answers_took() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    let team = Team::create(&server, "Curious");
+    // What could give a run away: episode numbers, initial states, and how long it is.
+    let source = python_agent(
+        "if message['step'] == 0: sys.stderr.write(f\"{message['obs'][:3]}\\n\")\nsay(hold)",
+    );
+    let folder = python_bundle(scratch.path(), "curious", &source);
+    let seen: Vec<Value> = (0..3).map(|_| team.submit(&server, &folder)).collect();
+    for verdict in &seen {
+        assert_eq!(verdict["state"], "valid", "{verdict:#}");
+        let timing = verdict["timing"].as_array().expect("a smoke run is timed");
+        let tasks: Vec<&Value> = timing.iter().map(|timing| &timing["task"]).collect();
+        assert_eq!(tasks, ["hit", "defend", "prepare"]);
+        for timing in timing {
+            assert!(timing["steps"].as_u64() >= Some(250), "{timing:#}");
+            assert!(timing["mean_s"].as_f64() > Some(0.0), "{timing:#}");
+        }
+    }
+    for (index, verdict) in seen.iter().enumerate() {
+        let log = verdict["log"].as_str().expect("a valid agent's log");
+        let starts: Vec<&str> = log.lines().collect();
+        assert!(starts.len() >= 3, "{log}");
+        for other in &seen[..index] {
+            let other = other["log"].as_str().expect("a valid agent's log");
+            assert!(
+                starts.iter().all(|start| !other.contains(start)),
+                "{log}\n{other}"
+            );
+        }
+    }
+}
