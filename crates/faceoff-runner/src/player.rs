@@ -9,7 +9,7 @@ use crate::{
     session::Session,
 };
 use faceoff_episode::{Arena, Course, Question, StepSink, TimeSum};
-use faceoff_types::{AgentFaultKind, EpisodeOutcome, Phase, Profile, Seed, Task};
+use faceoff_types::{AgentFaultKind, EpisodeOutcome, Phase, Task};
 use std::time::Instant;
 
 /// Plays episodes of one task with one agent, which is restarted after a fault. An episode that the
@@ -45,23 +45,21 @@ struct StartUpFault {
 type CourseTo<'a> = Course<&'a mut dyn StepSink>;
 
 impl<'a> Player<'a> {
-    /// Prepares the plant; the agent is started by the first episode. `episodes` are about to be
-    /// played, which bounds the time of their resets.
+    /// The agent is started by the first episode. `episodes` are about to be played, which bounds the
+    /// time of their resets.
     pub fn new(
         bundle: &'a Bundle,
         env: &'a AgentEnvironment,
         task: Task,
         episodes: u32,
-        profile: Profile,
-        seed: Seed,
-        mismatch_seed: Seed,
+        arena: Arena,
         watch: &'a dyn HostWatch,
     ) -> Self {
         Self {
             bundle,
             env,
             task,
-            arena: Arena::new(profile, seed, mismatch_seed),
+            arena,
             session: None,
             log: Log::new(env.limits.stderr_tail_bytes),
             resets: ResetBudget::new(&env.time, episodes),

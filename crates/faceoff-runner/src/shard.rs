@@ -7,6 +7,7 @@ use crate::{
     player::Player,
 };
 use faceoff_dataset::{Recorder, ShardFolder, ShardReport};
+use faceoff_episode::Arena;
 use faceoff_sandbox::affinity::PinnedElsewhere;
 use faceoff_types::{EpisodeOutcome, SlotTiming};
 use faceoff_wire::work::ShardSpec;
@@ -63,9 +64,7 @@ pub fn run_shard_watched(
         env,
         spec.task,
         spec.episodes.end.saturating_sub(spec.episodes.start),
-        spec.profile,
-        spec.seed,
-        spec.mismatch_seed,
+        Arena::new(spec.profile, spec.seed, spec.mismatch_seed),
         watch,
     );
     let played = play(spec, &mut player, &mut recorder, observer, &mut calibration);

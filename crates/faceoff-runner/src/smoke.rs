@@ -2,7 +2,7 @@ use crate::{
     bundle::Bundle, config::AgentEnvironment, fault::PlatformFault, host_watch::StallWatch,
     log::Log, player::Player,
 };
-use faceoff_episode::{EpisodeStart, RecordError, StepRow, StepSink};
+use faceoff_episode::{Arena, EpisodeStart, RecordError, StepRow, StepSink};
 use faceoff_scoring::computation_time_penalty;
 use faceoff_sim::EPISODE_STEPS;
 use faceoff_types::{AgentFault, EpisodeOutcome, Profile, SmokeTiming, Task};
@@ -68,20 +68,12 @@ pub fn smoke(
     cancelled: &dyn Fn() -> bool,
 ) -> Result<SmokeReport, PlatformFault> {
     let watch = StallWatch::start(&env.agent_cpus)?;
+    let arena = Arena::new(Profile::Evaluation, spec.seed, spec.mismatch_seed);
     let mut timing = Vec::with_capacity(Task::ALL.len());
     let mut log = Log::new(env.limits.stderr_tail_bytes);
     for task in Task::ALL {
         let part = Part::drawn(spec, task);
-        let mut player = Player::new(
-            bundle,
-            env,
-            task,
-            part.episodes,
-            Profile::Evaluation,
-            spec.seed,
-            spec.mismatch_seed,
-            &watch,
-        );
+        let mut player = Player::new(bundle, env, task, part.episodes, arena.clone(), &watch);
         let mut answers = Answers::default();
         let mut outcomes = Vec::new();
         while answers.times_s.len() < part.steps as usize {
