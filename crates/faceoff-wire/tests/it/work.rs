@@ -75,6 +75,10 @@ fn every_order_round_trips() {
     let smoke = Assignment::Smoke {
         submission: SubmissionId::new(),
         agent: agent(),
+        spec: SmokeSpec {
+            seed: Seed::from_number(3),
+            mismatch_seed: Seed::from_number(4),
+        },
     };
     for assignment in [smoke, shard(Some("recordings/a")), shard(None), finalise] {
         travels(&order(assignment));
