@@ -118,12 +118,22 @@ fn a_bundle_that_is_no_bundle_names_what_is_missing() {
 #[test]
 fn an_agent_that_breaks_half_way_fails_its_evaluation_with_every_fault_named() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let config = format!("{CONFIG}\n").replace("[workers]", "max_faults = 2\n[workers]");
+    let config = CONFIG
+        .replace(
+            "episodes_per_task = 4",
+            "episodes_per_task = 60\ntasks = [\"defend\"]",
+        )
+        .replace(
+            "episodes_per_shard = 2",
+            "episodes_per_shard = 60\nmax_faults = 2",
+        );
     let server = Server::start(&scratch.path().join("data"), &config);
     let team = Team::create(&server, "Half way");
-    // Good for longer than a smoke run looks.
+    // Good for more episodes than a smoke run, of at most 500 control steps and the rest of an episode, holds.
     let source = python_agent(
-        "if message['step'] == 120: sys.stderr.write('enough\\n'); sys.exit(9)\nsay(hold)",
+        "begun = globals().get('begun', 0) + (message['step'] == 0)\n\
+         if begun > 15 and message['step'] == 12: sys.stderr.write('enough\\n'); sys.exit(9)\n\
+         say(hold)",
     );
     let folder = python_bundle(scratch.path(), "half-way", &source);
     let submission = team.submit(&server, &folder);
@@ -136,7 +146,7 @@ fn an_agent_that_breaks_half_way_fails_its_evaluation_with_every_fault_named() {
         .expect("a failed evaluation names its faults");
     assert!(faults.len() > 2, "{done:#}");
     for fault in faults {
-        assert_eq!(fault["step"], 120);
+        assert_eq!(fault["step"], 12);
         assert!(
             fault["message"]
                 .as_str()
