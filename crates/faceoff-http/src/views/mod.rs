@@ -12,4 +12,5 @@ pub mod evaluation;
 pub mod me;
 pub mod season;
 pub mod submission;
+pub mod task;
 pub mod team;

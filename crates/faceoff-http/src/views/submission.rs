@@ -24,6 +24,8 @@ pub struct SubmissionView {
     pub created_at: Timestamp,
     /// The agent's own name, known once the bundle was unpacked.
     pub agent_name: Option<String>,
+    /// Is it what its team enters at the next cut?
+    pub active: bool,
     /// The smoke run's verdict.
     #[serde(flatten)]
     pub status: SubmissionStatus,
@@ -83,6 +85,7 @@ impl SubmissionView {
             blake3: submission.bundle.blake3,
             created_at: submission.created_at,
             agent_name: submission.agent_name,
+            active: submission.active,
             status: match submission.state {
                 SubmissionState::Validating => SubmissionStatus::Validating,
                 SubmissionState::Valid => SubmissionStatus::Valid { log },

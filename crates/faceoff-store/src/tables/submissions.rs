@@ -3,7 +3,7 @@ use crate::{
     error::{Result, StoreError},
 };
 use faceoff_types::{BundleRef, SubmissionId, TeamId};
-use jiff::{Timestamp, civil::Date};
+use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
 /// One uploaded agent.
@@ -21,6 +21,8 @@ pub struct Submission {
     pub agent_name: Option<String>,
     /// How far its smoke run is.
     pub state: SubmissionState,
+    /// Is it what its team enters at the next cut?
+    pub active: bool,
 }
 
 /// A submission's way through its smoke run. The agent's log is read by itself
@@ -62,6 +64,7 @@ struct SubmissionRow {
     agent_name: Option<String>,
     state: String,
     reason: Option<String>,
+    active: bool,
 }
 
 impl TryFrom<SubmissionRow> for Submission {
@@ -92,6 +95,7 @@ impl TryFrom<SubmissionRow> for Submission {
             created_at: row.created_at.0,
             agent_name: row.agent_name,
             state,
+            active: row.active,
         })
     }
 }
@@ -104,7 +108,10 @@ macro_rules! select_submissions {
             r#"SELECT s.id AS "id: Text<SubmissionId>", s.team_id AS "team_id: Text<TeamId>",
                       s.bundle_key, s.bundle_bytes AS "bundle_bytes: u64", s.bundle_blake3,
                       s.bundle_file_name, s.created_at AS "created_at: Instant",
-                      s.agent_name, s.state, s.reason
+                      s.agent_name, s.state, s.reason,
+                      EXISTS (SELECT 1 FROM active_submissions a
+                              WHERE a.team_id = s.team_id AND a.submission_id = s.id)
+                      AS "active!: bool"
                FROM submissions s "# + $tail
             $(, $argument)*
         )
@@ -140,25 +147,10 @@ pub(crate) async fn of_team(
     .collect()
 }
 
-/// The newest valid submission of each team whose turn of `day` is free, earliest first; of those
-/// uploaded before `released_at`, when the day's seed became known.
-pub(crate) async fn awaiting_turn(
-    connection: &mut SqliteConnection,
-    day: Date,
-    released_at: Option<Timestamp>,
-) -> Result<Vec<Submission>> {
-    let (day, released_at) = (Text(day), Instant(released_at.unwrap_or(Timestamp::MAX)));
+/// What each team has active, earliest upload first.
+pub(crate) async fn active(connection: &mut SqliteConnection) -> Result<Vec<Submission>> {
     select_submissions!(
-        "WHERE s.state = 'valid' AND s.created_at < ?1
-           AND NOT EXISTS (SELECT 1 FROM submissions n
-                           WHERE n.team_id = s.team_id AND n.state = 'valid'
-                             AND n.created_at < ?1 AND (n.created_at, n.id) > (s.created_at, s.id))
-           AND NOT EXISTS (SELECT 1 FROM evaluations e
-                           WHERE e.team_id = s.team_id AND e.day = ?2
-                             AND e.state NOT IN ('platform_failed', 'cancelled'))
-         ORDER BY s.created_at, s.id",
-        released_at,
-        day
+        "WHERE s.id IN (SELECT submission_id FROM active_submissions) ORDER BY s.created_at, s.id"
     )
     .fetch_all(connection)
     .await?
