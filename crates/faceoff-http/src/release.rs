@@ -10,10 +10,7 @@ use faceoff_store::{Evaluation, EvaluationState};
 ///
 /// # Errors
 /// `NotYet`, with how many.
-pub(crate) async fn check_released(
-    app: &AppState,
-    evaluation: &Evaluation,
-) -> Result<(), Problem> {
+pub(crate) async fn check_released(app: &AppState, evaluation: &Evaluation) -> Result<(), Problem> {
     if evaluation.released_at.is_some() {
         return Ok(());
     }

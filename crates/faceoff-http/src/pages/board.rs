@@ -175,10 +175,10 @@ async fn under_way(app: &App, today: civil::Date) -> Result<Vec<UnderWay>, PageP
             EvaluationStatus::Queued => "Queued",
             EvaluationStatus::Running => "Running",
             EvaluationStatus::Finalising => "Computing the score",
-            EvaluationStatus::AgentFailed { .. } => "The agent failed; its team sees why when the day is released",
-            EvaluationStatus::PlatformFailed { .. } => {
-                "Stopped by our fault; to be played again"
+            EvaluationStatus::AgentFailed { .. } => {
+                "The agent failed; its team sees why when the day is released"
             }
+            EvaluationStatus::PlatformFailed { .. } => "Stopped by our fault; to be played again",
             EvaluationStatus::Cancelled { .. } => "Cancelled by the organiser",
         };
         let moving = !evaluation.status.is_final();

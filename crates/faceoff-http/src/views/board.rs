@@ -7,9 +7,7 @@ use faceoff_scoring::{
     rank_groups, task_board,
 };
 use faceoff_store::BoardRecord;
-use faceoff_types::{
-    EvaluationId, Profile, RULESET, Seed, Task, TeamId, TeamName, Tier,
-};
+use faceoff_types::{EvaluationId, Profile, RULESET, Seed, Task, TeamId, TeamName, Tier};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -5,8 +5,8 @@ use crate::{app::AppState, paths, problem::Problem};
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::{Evaluation, EvaluationState};
 use faceoff_types::{
-    AgentFault, EvaluationId, EvaluationResult, Profile, Seed, SlotTiming, SubmissionId, Task, TeamId,
-    TeamName, Tier,
+    AgentFault, EvaluationId, EvaluationResult, Profile, Seed, SlotTiming, SubmissionId, Task,
+    TeamId, TeamName, Tier,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};

@@ -139,7 +139,10 @@ async fn until_the_day_is_released_the_boards_tell_score_and_points_only() {
         let rows = board["rows"].as_array().unwrap();
         assert_eq!(rows.len(), TEAMS.len());
         for row in rows {
-            assert_eq!((&row["seed"], &row["released_at"]), (&json!(null), &json!(null)));
+            assert_eq!(
+                (&row["seed"], &row["released_at"]),
+                (&json!(null), &json!(null))
+            );
             let hit = &row["tasks"]["hit"];
             assert_eq!(hit["success_ci95"].as_array().unwrap().len(), 2);
             for detail in details {
@@ -151,9 +154,16 @@ async fn until_the_day_is_released_the_boards_tell_score_and_points_only() {
     for (row, (tier, name)) in board["rows"].as_array().unwrap().iter().zip(ORDER) {
         assert_eq!((&row["tier"], &row["team"]), (&json!(tier), &json!(name)));
     }
-    let evaluation = format!("/evaluations/{}", board["rows"][0]["evaluation"].as_str().unwrap());
+    let evaluation = format!(
+        "/evaluations/{}",
+        board["rows"][0]["evaluation"].as_str().unwrap()
+    );
     let html = page(&site, &evaluation).await;
-    assert_eq!(texts(&html, "table caption").len(), 1, "no violations, no times");
+    assert_eq!(
+        texts(&html, "table caption").len(),
+        1,
+        "no violations, no times"
+    );
     assert!(texts(&html, ".facts").join(" ").contains("held back"));
     let tasks = page(&site, "/tasks/hit").await;
     assert_eq!(texts(&tasks, "td.none").len(), TEAMS.len());

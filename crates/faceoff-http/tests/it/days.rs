@@ -16,7 +16,12 @@ async fn a_day_starts_once_with_what_is_active_and_names_who_is_left_out() {
         .await
         .json(200);
     assert_eq!(day["day"], "2026-03-01");
-    for (evaluation, name) in day["created"].as_array().unwrap().iter().zip(["Alpha", "Beta"]) {
+    for (evaluation, name) in day["created"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip(["Alpha", "Beta"])
+    {
         assert_eq!(evaluation["team_name"], name);
         assert_eq!(evaluation["episodes_per_task"], 8);
         assert_eq!(evaluation["profile"], "ideal");
@@ -35,10 +40,17 @@ async fn a_day_starts_once_with_what_is_active_and_names_who_is_left_out() {
         let problem = again.problem(
             409,
             "day-has-cut",
-            &["2026-03-01 10:00:00 UTC", "nothing was started", "2026-03-02"],
+            &[
+                "2026-03-01 10:00:00 UTC",
+                "nothing was started",
+                "2026-03-02",
+            ],
         );
         assert_eq!(problem["day"], "2026-03-01");
-        assert_eq!(problem["next_cut"], json!({ "day": "2026-03-02", "at": null }));
+        assert_eq!(
+            problem["next_cut"],
+            json!({ "day": "2026-03-02", "at": null })
+        );
     }
     let today = site.get("/api/v1/evaluations", Some(ADMIN)).await.json(200);
     assert_eq!(today.as_array().unwrap().len(), 2);
@@ -80,7 +92,11 @@ async fn a_day_without_anything_to_play_keeps_its_cut() {
     let team = site.team("Alpha").await;
     site.post("/api/v1/days", Some(ADMIN), &json!({}))
         .await
-        .problem(409, "conflict", &["no team has a valid submission", "still has its cut"]);
+        .problem(
+            409,
+            "conflict",
+            &["no team has a valid submission", "still has its cut"],
+        );
     let season = site.get("/api/v1/season", None).await.json(200);
     assert_eq!(season["days"], json!([]));
     site.valid_submission(&team, "a").await;

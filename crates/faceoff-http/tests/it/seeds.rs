@@ -149,7 +149,11 @@ async fn faults_log_and_comparison_come_out_with_the_day() {
 async fn two_that_are_finished_are_not_compared_while_a_third_plays() {
     let site = Site::start().await;
     let mut paths = Vec::new();
-    let teams = [site.team("A").await, site.team("B").await, site.team("C").await];
+    let teams = [
+        site.team("A").await,
+        site.team("B").await,
+        site.team("C").await,
+    ];
     let mut submissions = Vec::new();
     for team in &teams {
         submissions.push(site.valid_submission(team, "agent").await);
@@ -160,7 +164,11 @@ async fn two_that_are_finished_are_not_compared_while_a_third_plays() {
     for _ in 0..2 {
         site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
     }
-    let compare = format!("{}/compare/{}", paths[0], paths[1].rsplit('/').next().unwrap());
+    let compare = format!(
+        "{}/compare/{}",
+        paths[0],
+        paths[1].rsplit('/').next().unwrap()
+    );
     site.get(&compare, None)
         .await
         .problem(409, "not-yet", &["1 evaluations of 2026-03-01"]);

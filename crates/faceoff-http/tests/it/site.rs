@@ -292,7 +292,11 @@ impl Site {
     /// team's evaluation, which plays this submission.
     pub async fn evaluate(&self, team: &TestTeam, submission: &str) -> String {
         let plan = &self.config.plan;
-        match self.store.start_day(Actor::Organiser, plan, self.now()).await {
+        match self
+            .store
+            .start_day(Actor::Organiser, plan, self.now())
+            .await
+        {
             Ok(_) | Err(StoreError::DayHasCut { .. }) => {}
             Err(error) => panic!("{error}"),
         }

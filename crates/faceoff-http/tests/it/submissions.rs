@@ -130,7 +130,9 @@ async fn the_newest_valid_upload_is_active_until_the_team_chooses() {
     assert!(active().await.ends_with(&waiting));
 
     site.later(1);
-    let chosen = site.post(&format!("{first}/activate"), token, &json!({})).await;
+    let chosen = site
+        .post(&format!("{first}/activate"), token, &json!({}))
+        .await;
     assert_eq!(chosen.json(200)["active"], true);
     assert_eq!(active().await, first);
     let evaluation = site.evaluate(&team, &first).await;
@@ -269,13 +271,9 @@ async fn another_teams_submission_looks_like_none() {
         .await;
     foreign.problem(404, "not-found", &["submission"]);
     assert_eq!(foreign.body, missing.body);
-    site.post(
-        &format!("{path}/activate"),
-        Some(&other.token),
-        &json!({}),
-    )
-    .await
-    .problem(404, "not-found", &[]);
+    site.post(&format!("{path}/activate"), Some(&other.token), &json!({}))
+        .await
+        .problem(404, "not-found", &[]);
     assert_eq!(
         site.get("/api/v1/submissions", Some(&other.token))
             .await

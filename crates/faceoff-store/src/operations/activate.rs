@@ -49,6 +49,7 @@ impl Store {
         id: SubmissionId,
         now: Timestamp,
     ) -> Result<Submission> {
-        self.write(actor, now, async |tx| activate(tx, id).await).await
+        self.write(actor, now, async |tx| activate(tx, id).await)
+            .await
     }
 }

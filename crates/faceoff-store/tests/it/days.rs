@@ -27,9 +27,15 @@ async fn a_day_has_one_cut() {
     f.ready_team("Beta").await;
     let again = f.store.start_day(Actor::Organiser, &plan(), f.now).await;
     assert_eq!(had_its_cut(again), date(2026, 3, 1));
-    assert_eq!(f.store.evaluations_on(date(2026, 3, 1)).await.unwrap(), [evaluation]);
+    assert_eq!(
+        f.store.evaluations_on(date(2026, 3, 1)).await.unwrap(),
+        [evaluation]
+    );
     let day = f.store.newest_day().await.unwrap().unwrap();
-    assert_eq!((day.date, day.cut_at, day.released_at), (date(2026, 3, 1), cut_at, None));
+    assert_eq!(
+        (day.date, day.cut_at, day.released_at),
+        (date(2026, 3, 1), cut_at, None)
+    );
     // but the next day comes a millisecond later
     f.now = "2026-03-02T00:00:00Z".parse().unwrap();
     let next = f.evaluate(second.id, &plan()).await;
@@ -71,7 +77,10 @@ async fn a_day_that_nobody_can_play_keeps_its_cut_unless_it_is_the_schedules() {
     let mut f = Fixture::new().await;
     let team = f.team("Alpha").await;
     let refused = f.store.start_day(Actor::Organiser, &plan(), f.now).await;
-    assert!(matches!(refused, Err(StoreError::Conflict(_))), "{refused:?}");
+    assert!(
+        matches!(refused, Err(StoreError::Conflict(_))),
+        "{refused:?}"
+    );
     assert_eq!(f.store.newest_day().await.unwrap(), None);
     let started = f.store.start_scheduled_day(&plan(), f.now).await;
     assert_eq!(started.unwrap(), Some(Vec::new()));
@@ -119,7 +128,10 @@ async fn an_upload_takes_its_place_when_it_is_valid_unless_a_newer_one_or_a_choi
     let (claim, uploaded_before) = f.claim_smoke().await;
     f.later(1);
     let choose = |id| f.store.activate_submission(Actor::Team(team.id), id, f.now);
-    assert!(matches!(choose(uploaded_before.id).await, Err(StoreError::Conflict(_))));
+    assert!(matches!(
+        choose(uploaded_before.id).await,
+        Err(StoreError::Conflict(_))
+    ));
     assert!(choose(old.id).await.unwrap().active);
     f.store.commit_smoke(&claim, valid(), f.now).await.unwrap();
     assert_eq!(active(&f, &team).await, old.id);
@@ -148,7 +160,10 @@ async fn a_choice_after_the_cut_is_one_for_the_next() {
         .activate_submission(Actor::Team(team.id), first.id, f.now);
     choice.await.unwrap();
     f.finish_next().await;
-    assert_eq!(f.store.evaluation(today.id).await.unwrap().submission, second.id);
+    assert_eq!(
+        f.store.evaluation(today.id).await.unwrap().submission,
+        second.id
+    );
     f.later(86_400);
     assert_eq!(f.evaluate(first.id, &small()).await.submission, first.id);
 }

@@ -486,7 +486,10 @@ async fn every_old_row_is_there_and_says_what_it_said() {
     };
     assert_eq!(
         f.store.days().await.unwrap(),
-        [(day(days[1], None), 0), (day(days[0], Some(finished_at)), 1)]
+        [
+            (day(days[1], None), 0),
+            (day(days[0], Some(finished_at)), 1)
+        ]
     );
     assert_eq!(f.store.season().await.unwrap().name, "Old season");
     for number in [11, 18] {
@@ -655,9 +658,15 @@ async fn work_goes_on_where_the_old_program_left_it() {
     assert!(matches!(ablation.state, AblationState::Finished { .. }));
     assert_eq!(f.store.board().await.unwrap().len(), 4);
     // its last evaluation released the day, which has had its cut
-    assert_eq!(f.store.newest_day().await.unwrap().unwrap().released_at, Some(f.now));
+    assert_eq!(
+        f.store.newest_day().await.unwrap().unwrap().released_at,
+        Some(f.now)
+    );
     let again = f.store.start_day(Actor::Organiser, &plan(), f.now).await;
-    assert!(matches!(again, Err(StoreError::DayHasCut { .. })), "{again:?}");
+    assert!(
+        matches!(again, Err(StoreError::DayHasCut { .. })),
+        "{again:?}"
+    );
     let rerun = f.store.rerun_evaluation(Actor::Organiser, id(1600), f.now);
     assert_eq!(rerun.await.unwrap().submission, id(16));
     // recordings: old ones go a day after their evaluation's end, as new ones do

@@ -242,7 +242,10 @@ async fn our_faults_cost_a_pause_and_after_some_the_evaluation_is_played_again()
     f.later(i64::from(RERUN_PAUSES_S[0]));
     let (_, run, first) = f.claim_shard().await;
     assert_ne!(run.id, evaluation.run);
-    assert_eq!((run.plan, run.seed), (plan(), SeedLabel::Day(evaluation.day)));
+    assert_eq!(
+        (run.plan, run.seed),
+        (plan(), SeedLabel::Day(evaluation.day))
+    );
     assert_eq!((first.task, first.first_episode), (Task::Hit, 0));
 }
 

@@ -4,9 +4,7 @@ use faceoff_types::EvaluationId;
 use jiff::civil::date;
 
 async fn rerun(f: &Fixture, id: EvaluationId) -> Result<Evaluation, StoreError> {
-    f.store
-        .rerun_evaluation(Actor::Organiser, id, f.now)
-        .await
+    f.store.rerun_evaluation(Actor::Organiser, id, f.now).await
 }
 
 async fn released_at(f: &Fixture) -> Option<jiff::Timestamp> {
@@ -24,7 +22,14 @@ async fn a_day_is_released_by_the_end_of_its_last_evaluation() {
     }
     assert_eq!(f.finish_next().await, evaluations[0]);
     assert_eq!(released_at(&f).await, None);
-    assert_eq!(f.store.evaluation(evaluations[0]).await.unwrap().released_at, None);
+    assert_eq!(
+        f.store
+            .evaluation(evaluations[0])
+            .await
+            .unwrap()
+            .released_at,
+        None
+    );
     f.later(86_400);
     assert_eq!(released_at(&f).await, None, "a run that outlasts its day");
     assert_eq!(f.finish_next().await, evaluations[1]);
@@ -60,7 +65,9 @@ async fn the_agents_own_end_and_the_organisers_release_the_day_as_well() {
     let (claim, _, shard) = f.claim_shard().await;
     f.play(&claim, &shard, 1).await;
     assert_eq!(released_at(&f).await, None);
-    let stop = f.store.cancel_evaluation(Actor::Organiser, stopped, "rain", f.now);
+    let stop = f
+        .store
+        .cancel_evaluation(Actor::Organiser, stopped, "rain", f.now);
     stop.await.unwrap();
     assert_eq!(released_at(&f).await, Some(f.now));
 }
@@ -88,7 +95,10 @@ async fn what_we_broke_is_played_again_before_the_release_and_only_so_often() {
     assert_eq!(all.len(), 3);
     assert_eq!(broken, [all[2].id, all[1].id]);
     assert_eq!(first.id, all[2].id);
-    assert_eq!((all[1].rerun_of, all[0].rerun_of), (Some(all[2].id), Some(all[1].id)));
+    assert_eq!(
+        (all[1].rerun_of, all[0].rerun_of),
+        (Some(all[2].id), Some(all[1].id))
+    );
     let secret = f.store.season().await.unwrap().secret;
     for evaluation in &all {
         assert_eq!(evaluation.submission, submission.id);
@@ -96,7 +106,11 @@ async fn what_we_broke_is_played_again_before_the_release_and_only_so_often() {
     }
     let Some(Claimed {
         claim,
-        work: Work::Shard { seeds, bundle: plays, .. },
+        work: Work::Shard {
+            seeds,
+            bundle: plays,
+            ..
+        },
     }) = f.claim().await
     else {
         panic!("the last try is queued")
@@ -146,7 +160,10 @@ async fn after_the_release_only_the_cuts_submission_plays_the_day_again() {
     assert_eq!((again.submission, again.day), (submission.id, stopped.day));
     assert_eq!(again.rerun_of, Some(stopped.id));
     let twice = rerun(&f, stopped.id).await;
-    assert!(matches!(twice, Err(StoreError::Conflict(_))), "one at a time");
+    assert!(
+        matches!(twice, Err(StoreError::Conflict(_))),
+        "one at a time"
+    );
     // Broken after the release, it is the organiser's to have played again.
     assert_eq!(f.break_next().await, again.id);
     f.later(3600);
@@ -155,7 +172,10 @@ async fn after_the_release_only_the_cuts_submission_plays_the_day_again() {
     assert_eq!(again.submission, submission.id);
     f.finish_next().await;
     let twice = rerun(&f, stopped.id).await;
-    assert!(matches!(twice, Err(StoreError::Conflict(_))), "it has its score");
+    assert!(
+        matches!(twice, Err(StoreError::Conflict(_))),
+        "it has its score"
+    );
     // The new one plays another day, on other episodes.
     f.later(86_400);
     let next = f.evaluate(best_of_n.id, &small()).await;

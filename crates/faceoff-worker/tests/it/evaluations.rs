@@ -1,6 +1,7 @@
 use crate::server::Server;
 use faceoff_store::*;
 use faceoff_types::*;
+use jiff::Timestamp;
 
 pub fn plan(episodes_per_shard: u32) -> RunPlan {
     RunPlan {
@@ -21,8 +22,12 @@ pub fn without_times(mut outcomes: Vec<EpisodeOutcome>) -> Vec<EpisodeOutcome> {
 }
 
 /// Plays a day of two teams to its end; the outcomes of each.
-async fn play_day(server: &Server, episodes_per_shard: u32) -> Vec<Vec<EpisodeOutcome>> {
-    let evaluations = server.start_day(&plan(episodes_per_shard)).await;
+async fn play_day(
+    server: &Server,
+    episodes_per_shard: u32,
+    now: Timestamp,
+) -> Vec<Vec<EpisodeOutcome>> {
+    let evaluations = server.start_day(&plan(episodes_per_shard), now).await;
     assert_eq!(evaluations.len(), 2);
     let worker = server.work(2);
     let mut outcomes = Vec::new();
@@ -73,9 +78,10 @@ async fn two_teams_meet_the_same_episodes_however_the_work_is_shared_out() {
     // two servers with one past
     let copy = server.copy().await;
     let server = Server::at(server.path()).await;
-    let apart = play_day(&server, 1).await;
+    let now = Timestamp::now();
+    let apart = play_day(&server, 1, now).await;
     assert_eq!(apart[0], apart[1]);
-    assert_eq!(play_day(&copy, 2).await, apart);
+    assert_eq!(play_day(&copy, 2, now).await, apart);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -94,7 +100,7 @@ async fn an_agent_that_breaks_off_is_told_why() {
     // well in its smoke run, but not later: the faults of all shards add up
     let late = server.upload("Late", "FAULTY_FROM = \"1\"").await;
     assert!(matches!(server.settled(late).await, SubmissionState::Valid));
-    let evaluation = server.start_day(&plan(1)).await.remove(0);
+    let evaluation = server.start_day(&plan(1), Timestamp::now()).await.remove(0);
     assert_eq!(evaluation.submission, late);
     let state = server.over(evaluation.id).await;
     assert!(
@@ -121,7 +127,7 @@ async fn an_evaluation_outlives_its_workers() {
         SubmissionState::Valid
     ));
     worker.stop().await;
-    let evaluation = server.start_day(&plan(1)).await.remove(0);
+    let evaluation = server.start_day(&plan(1), Timestamp::now()).await.remove(0);
     let (id, run) = (evaluation.id, evaluation.run);
     for committed in 1..4 {
         let worker = server.work(1);

@@ -5,6 +5,7 @@ use crate::{
     server::Server,
 };
 use faceoff_store::*;
+use jiff::Timestamp;
 use std::{
     io::{BufRead as _, BufReader, Write as _},
     path::Path,
@@ -47,7 +48,7 @@ async fn a_killed_evaluation_ends_as_an_undisturbed_one() {
             SubmissionState::Valid
         ));
     }
-    let started = server.start_day(&plan(1)).await;
+    let started = server.start_day(&plan(1), Timestamp::now()).await;
     let [calm, troubled] = &started[..] else {
         panic!("two teams play: {started:?}")
     };

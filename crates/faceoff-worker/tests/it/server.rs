@@ -125,11 +125,9 @@ impl Server {
     }
 
     /// The cut, with this plan; the evaluations in the order of the uploads.
-    pub async fn start_day(&self, plan: &RunPlan) -> Vec<Evaluation> {
-        self.store
-            .start_day(Actor::Organiser, plan, Timestamp::now())
-            .await
-            .unwrap()
+    pub async fn start_day(&self, plan: &RunPlan, now: Timestamp) -> Vec<Evaluation> {
+        let started = self.store.start_day(Actor::Organiser, plan, now);
+        started.await.unwrap()
     }
 
     /// A copy in a folder of its own; nothing works on this one.
@@ -137,7 +135,10 @@ impl Server {
         self.store.close().await;
         let folder = tempfile::tempdir().unwrap();
         let (from, to) = (self.path().join("data"), folder.path().join("data"));
-        let copied = std::process::Command::new("cp").arg("-a").args([from, to]).status();
+        let copied = std::process::Command::new("cp")
+            .arg("-a")
+            .args([from, to])
+            .status();
         assert!(copied.unwrap().success());
         Self {
             _guard: Some(folder),

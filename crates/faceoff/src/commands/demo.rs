@@ -340,7 +340,9 @@ async fn follow(
     }
     // The last one's end released the day: all of it is told now.
     ensure!(
-        ended.iter().any(|evaluation| evaluation.released_at.is_some()),
+        ended
+            .iter()
+            .any(|evaluation| evaluation.released_at.is_some()),
         "every evaluation has ended, and the day is not released"
     );
     Ok(ended)
