@@ -11,7 +11,7 @@ use reqwest::{Method, blocking::Response};
 use serde_json::{Value, json};
 use std::{
     fs,
-    io::{Cursor, Read as _},
+    io::Cursor,
     path::{Path, PathBuf},
 };
 
@@ -74,12 +74,8 @@ fn manifest(server: &Server, evaluation: &str, token: &str) -> Value {
     assert_eq!(answer.status(), 200, "the dataset of {evaluation}");
     let bytes = answer.bytes().expect("the download completes");
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).expect("a dataset is a zip");
-    let mut text = String::new();
-    archive
-        .by_name("manifest.json")
-        .and_then(|mut file| Ok(file.read_to_string(&mut text)?))
-        .expect("a dataset has a manifest");
-    serde_json::from_str(&text).expect("it is JSON")
+    let file = archive.by_name("manifest.json");
+    serde_json::from_reader(file.expect("a dataset has a manifest")).expect("it is JSON")
 }
 
 fn activate(server: &Server, team: &Team, submission: &Value) -> Response {

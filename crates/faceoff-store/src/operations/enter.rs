@@ -1,3 +1,5 @@
+//! One evaluation of a day: what every cut and every re-run is made of.
+
 use crate::{
     error::Result,
     event::{Event, Subject},

@@ -15,8 +15,8 @@ use jiff::Timestamp;
 
 impl Store {
     /// Stores the score, the dataset's artifact key with the BLAKE3 of its archive (64 hexadecimal
-    /// digits), and the end in one transaction, with the
-    /// release of the day if this was its last evaluation. Idempotent, as [`Store::commit_shard`] is. After
+    /// digits), and the end in one transaction, with the release of the day if this was its last
+    /// evaluation. Idempotent, as [`Store::commit_shard`] is. After
     /// [`StoreError::Database`](crate::StoreError::Database) the dataset may be the evaluation's: leave it.
     pub async fn finish_evaluation(
         &self,
