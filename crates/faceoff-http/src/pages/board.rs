@@ -178,7 +178,7 @@ async fn under_way(app: &App, today: civil::Date) -> Result<Vec<UnderWay>, PageP
             EvaluationStatus::AgentFailed { .. } => {
                 "The agent failed; its team sees why when the day is released"
             }
-            EvaluationStatus::PlatformFailed { .. } => "Stopped by our fault; to be played again",
+            EvaluationStatus::PlatformFailed { .. } => "Stopped by our fault",
             EvaluationStatus::Cancelled { .. } => "Cancelled by the organiser",
         };
         let moving = !evaluation.status.is_final();

@@ -224,8 +224,8 @@ const fn in_words(status: &EvaluationStatus) -> &'static str {
              Its team sees the faults and the log when the day is released."
         }
         EvaluationStatus::PlatformFailed { .. } => {
-            "It was stopped by a fault of this server, not of the agent. The same agent is to play the same \
-             episodes again."
+            "It was stopped by a fault of this server, not of the agent. The same agent plays the same episodes \
+             again, unless the fault stays."
         }
         EvaluationStatus::Cancelled { .. } => "The organiser cancelled it.",
     }
