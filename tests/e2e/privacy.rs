@@ -2,7 +2,7 @@
 
 use crate::{CONFIG, Team};
 use faceoff_tests::{repository, server::Server};
-use serde_json::{Value, json};
+use serde_json::Value;
 
 /// Asserts a problem+json error with this status whose detail says what to do.
 fn assert_problem(answer: reqwest::blocking::Response, status: u16) {

@@ -140,9 +140,10 @@ impl Server {
             .args([from, to])
             .status();
         assert!(copied.unwrap().success());
+        let copy = Self::at(folder.path()).await;
         Self {
             _guard: Some(folder),
-            ..Self::at(folder.path()).await
+            ..copy
         }
     }
 
