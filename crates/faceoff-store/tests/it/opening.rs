@@ -91,7 +91,7 @@ async fn damaged_work_does_not_hold_up_the_others() {
     let f = Fixture::new().await;
     let alpha = f.ready_team("Alpha").await;
     let beta = f.ready_team("Beta").await;
-    f.evaluate(alpha.id, &plan()).await;
+    let sound = f.evaluate(beta.id, &plan()).await;
     vandalise(
         &f,
         "UPDATE runs SET profile = 'dream' WHERE id = (SELECT run_id FROM contestants c
@@ -99,7 +99,6 @@ async fn damaged_work_does_not_hold_up_the_others() {
              WHERE t.name = 'Alpha')",
     )
     .await;
-    let sound = f.evaluate(beta.id, &plan()).await;
     let (_, run, _) = f.claim_shard().await;
     assert_eq!(run.id, sound.run);
     vandalise(
