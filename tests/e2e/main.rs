@@ -3,6 +3,7 @@
 mod bad_agents;
 mod browser;
 mod crash;
+mod cut;
 mod demo;
 mod house;
 mod kills;
@@ -72,20 +73,10 @@ impl Team {
         )
     }
 
-    /// Uses today's turn and returns the evaluation's path.
+    /// Starts the day, on which this is active, and returns the evaluation's path.
     fn evaluate(&self, server: &Server, submission: &Value) -> String {
-        let id = submission["id"].as_str().expect("a submission has an id");
-        let answer = server.post(
-            &format!("/api/v1/submissions/{id}/evaluations"),
-            &self.token,
-            &json!({}),
-        );
-        assert_eq!(answer.status(), 201, "starting an evaluation");
-        let answer: Value = answer.json().expect("the API speaks JSON");
-        format!(
-            "/api/v1/evaluations/{}",
-            answer["id"].as_str().expect("an evaluation has an id")
-        )
+        let day = start_day(server);
+        path_of(&day, submission)
     }
 
     fn finished(&self, server: &Server, evaluation: &str) -> Value {
@@ -94,6 +85,26 @@ impl Team {
                 .contains(&answer["state"].as_str().unwrap_or_default())
         })
     }
+}
+
+/// The organiser starts the day.
+fn start_day(server: &Server) -> Value {
+    let answer = server.post("/api/v1/days", &server.admin_token, &json!({}));
+    assert_eq!(answer.status(), 200, "starting the day");
+    answer.json().expect("the API speaks JSON")
+}
+
+/// The path of the evaluation in which a submission plays a day.
+fn path_of(day: &Value, submission: &Value) -> String {
+    let created = day["created"].as_array().expect("a day has evaluations");
+    let of_submission = created
+        .iter()
+        .find(|evaluation| evaluation["submission"] == submission["id"]);
+    let id = &of_submission.expect("it was active at the cut")["id"];
+    format!(
+        "/api/v1/evaluations/{}",
+        id.as_str().expect("an evaluation has an id")
+    )
 }
 
 /// A result without what no run can repeat: computation times and the points that follow from them.

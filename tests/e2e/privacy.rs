@@ -2,7 +2,7 @@
 
 use crate::{CONFIG, Team};
 use faceoff_tests::{repository, server::Server};
-use serde_json::{Value, json};
+use serde_json::Value;
 
 /// Asserts a problem+json error with this status whose detail says what to do.
 fn assert_problem(answer: reqwest::blocking::Response, status: u16) {
@@ -23,7 +23,7 @@ fn assert_problem(answer: reqwest::blocking::Response, status: u16) {
 }
 
 #[test]
-fn a_dataset_is_for_its_team_and_a_turn_is_used_once() {
+fn a_dataset_is_for_its_team() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let owner = Team::create(&server, "Owner");
@@ -44,23 +44,6 @@ fn a_dataset_is_for_its_team_and_a_turn_is_used_once() {
         submission["id"].as_str().expect("a submission has an id")
     );
     assert_problem(server.get(&path, Some(&other.token)), 404);
-
-    // The day's turn is used: by the evaluation, or after a midnight by what the new day started.
-    let day: Value = server
-        .post("/api/v1/days", &server.admin_token, &json!({}))
-        .json()
-        .expect("the API speaks JSON");
-    if day["day"] == done["day"] {
-        assert_eq!(
-            day["created"],
-            json!([]),
-            "the day gives nobody a second turn: {day:#}"
-        );
-    }
-    assert_problem(
-        server.post(&format!("{path}/evaluations"), &owner.token, &json!({})),
-        409,
-    );
 
     // Ids that are none, and ids of nothing.
     assert_problem(

@@ -86,7 +86,7 @@ fn a_data_folder_of_the_first_release_continues_where_it_was_cut_off() {
     let server = Server::start(&data_dir, CONFIG);
     let admin = server.admin_token.clone();
 
-    // What was over is what it was; the day's seed is public by now.
+    // What was over is what it was. The first day is released; of the second some is under way.
     for over in [
         "day one Alpha",
         "day one Beta",
@@ -96,6 +96,11 @@ fn a_data_folder_of_the_first_release_continues_where_it_was_cut_off() {
         let mut found = get(&server, &told.path("evaluations", over), &admin);
         if let Some(seed) = found.pointer_mut("/result/seed") {
             assert!(seed.take().is_string(), "{over}");
+        }
+        let fields = found.as_object_mut().expect("an answer is an object");
+        let released_at = fields.remove("released_at").expect("it is told");
+        if over.starts_with("day one") {
+            assert!(released_at.is_string(), "{over}");
         }
         assert_eq!(&found, told.answer(over), "{over}");
     }
@@ -140,6 +145,23 @@ fn a_data_folder_of_the_first_release_continues_where_it_was_cut_off() {
     );
     assert_eq!(ablation["state"], "finished", "{ablation:#}");
     assert_eq!(ablation["tasks"]["hit"].as_array().map(Vec::len), Some(6));
+
+    // The last end of the second day released it, and nothing was played twice.
+    let season = get(&server, "/api/v1/season", &admin);
+    let days = season["days"].as_array().expect("a season has its days");
+    assert_eq!(days.len(), 2, "{season:#}");
+    for day in days {
+        assert!(
+            day["released_at"].is_string() && day["seed"].is_string(),
+            "{day:#}"
+        );
+    }
+    let second_day = get(&server, "/api/v1/evaluations?day=2026-11-19", &admin);
+    assert_eq!(
+        second_day.as_array().map(Vec::len),
+        Some(4),
+        "{second_day:#}"
+    );
 
     // Episodes of two versions, one dataset: simulated again, they are what was recorded.
     for name in ["day one Alpha", "day two Alpha"] {

@@ -1,7 +1,10 @@
 //! A real `faceoff serve` as a child process.
 
 use crate::program;
-use reqwest::blocking::{Client, Response};
+use reqwest::{
+    Method,
+    blocking::{Client, RequestBuilder, Response},
+};
 use serde_json::Value;
 use std::{
     fs,
@@ -137,6 +140,13 @@ impl Server {
             request = request.bearer_auth(token);
         }
         request.send().expect("the server answers")
+    }
+
+    /// A request of any kind, to be sent by the caller.
+    #[must_use]
+    pub fn request(&self, method: Method, path: &str, token: &str) -> RequestBuilder {
+        let url = format!("{}{path}", self.url);
+        self.client.request(method, url).bearer_auth(token)
     }
 
     /// `POST` of a JSON body.

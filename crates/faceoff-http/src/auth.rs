@@ -9,7 +9,7 @@ use axum::{
     extract::FromRequestParts,
     http::{HeaderMap, header, request::Parts},
 };
-use faceoff_store::{Actor, StoreError, Team};
+use faceoff_store::{StoreError, Team};
 use faceoff_types::TeamId;
 
 /// A caller with a valid token.
@@ -20,14 +20,6 @@ pub(crate) enum Caller {
 }
 
 impl Caller {
-    /// As the events name the caller.
-    pub(crate) const fn actor(&self) -> Actor {
-        match self {
-            Self::Organiser => Actor::Organiser,
-            Self::Team(team) => Actor::Team(team.id),
-        }
-    }
-
     /// What was `found`, if it is of the caller's `team`; another team's looks like none at all.
     pub(crate) fn visible<T>(
         &self,

@@ -12,7 +12,7 @@ pub struct NewTeam {
     pub name: String,
 }
 
-/// How today's evaluation shall differ from the configuration. All fields may be left out.
+/// How today's evaluations shall differ from the configuration. All fields may be left out.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct StartDay {

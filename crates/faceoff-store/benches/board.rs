@@ -84,6 +84,13 @@ async fn fill(folder: &Path) {
             let day = date(2026, 1, 1)
                 .saturating_add(day_number.days())
                 .to_string();
+            if team_number == 0 {
+                sqlx::query("INSERT INTO days VALUES (?, 0, 0)")
+                    .bind(&day)
+                    .execute(&mut *tx)
+                    .await
+                    .unwrap();
+            }
             let (run, unit) = (RunId::new().to_string(), Uuid::now_v7().to_string());
             sqlx::query(
                 r#"INSERT INTO runs VALUES (?, 'evaluation', ?, '["hit","defend","prepare"]', 1000, 50, 10,
@@ -114,7 +121,7 @@ async fn fill(folder: &Path) {
             let scored = result(40.0 + team_number as f64 / 10.0);
             sqlx::query(
                 "INSERT INTO evaluations VALUES (?, ?, ?, ?, ?, ?, 'finished', ?, NULL, 'datasets/x.zip',
-                                                 'x', ?)",
+                                                 'x', ?, NULL)",
             )
             .bind(EvaluationId::new().to_string())
             .bind(&submission)

@@ -9,26 +9,13 @@ pub enum StoreError {
     /// Names that differ only in case count as the same.
     #[error("a team named {0:?} exists already")]
     TeamNameTaken(String),
-    /// The team's turn of that UTC day is used.
-    #[error("this team was evaluated on {day} already; the next turn is on {next}")]
-    AlreadyEvaluated {
-        /// The day whose turn is used.
+    /// The day has had its cut, and has no other.
+    #[error("{day} had its cut at {cut_at}")]
+    DayHasCut {
+        /// The day, or a later one.
         day: Date,
-        /// The first day with a free turn.
-        next: Date,
-    },
-    /// The day's episodes are known, and the submission was uploaded after that.
-    #[error(
-        "the seed of {day} was released at {released_at}, before this submission was uploaded; it can \
-         play from {next} on"
-    )]
-    DayReleased {
-        /// The day.
-        day: Date,
-        /// When the first dataset of the day was handed out.
-        released_at: Timestamp,
-        /// The next day, whose seed is secret.
-        next: Date,
+        /// When it started.
+        cut_at: Timestamp,
     },
     /// The season is over: nothing more is uploaded or evaluated.
     #[error("the season was closed at {closed_at}")]

@@ -132,16 +132,21 @@ pub enum Event {
         /// What failed.
         reason: String,
     },
-    /// A team's turn of a day was taken.
+    /// It is what its team enters at the next cut: the newest that is valid, or the team's choice.
+    SubmissionActivated,
+    /// A submission is to play a day.
     EvaluationQueued {
-        /// Whose turn.
+        /// Whose it is.
         team: TeamId,
         /// What plays.
         submission: SubmissionId,
-        /// The UTC day of the turn.
+        /// The UTC day.
         day: Date,
         /// What is played.
         run: RunId,
+        /// The evaluation that is played again.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        rerun_of: Option<EvaluationId>,
     },
     /// Its first shard was claimed.
     EvaluationBegun,
@@ -156,12 +161,12 @@ pub enum Event {
     },
     /// Too many agent faults; no score.
     EvaluationAgentFailed,
-    /// Our fault; the turn was given back.
+    /// Our fault, given up.
     EvaluationPlatformFailed {
         /// What went wrong.
         reason: String,
     },
-    /// Stopped by hand; the turn was given back.
+    /// Stopped by hand.
     EvaluationCancelled {
         /// As it was told to the team.
         reason: String,
@@ -204,12 +209,13 @@ pub enum Event {
         /// What failed.
         reason: String,
     },
-    /// The evaluations of a day were queued, each with an event of its own.
+    /// The cut of a day: its evaluations were queued, each with an event of its own.
     DayStarted {
         /// How many.
         evaluations: u32,
     },
-    /// The first dataset that carries the day's seed was handed out.
+    /// The day's seed is public: its last evaluation has ended (before there were cuts: its first
+    /// dataset was handed out).
     DayReleased,
     /// The season has another name.
     SeasonNamed {

@@ -38,7 +38,7 @@ pub use operations::{
     claim::{Claimed, MAX_LEASES, RunSeeds, Work},
     commit::Committed,
     give_back::MAX_ATTEMPTS,
-    release_day::DaySeed,
+    rerun::RERUN_PAUSES_S,
     runs::RunOwner,
     tidy::RECORDINGS_KEPT,
 };
@@ -47,6 +47,7 @@ pub use reads::{board::BoardRecord, runs::RunFaults};
 pub use store::Store;
 pub use tables::{
     ablations::{Ablation, AblationState},
+    days::Day,
     evaluations::{Evaluation, EvaluationState},
     plan::RunPlan,
     runs::Run,

@@ -169,7 +169,13 @@ impl Client {
         .await
     }
 
-    /// Organiser: stops an evaluation and gives the turn back.
+    /// Organiser: plays an evaluation again that was cancelled or failed by the server's fault.
+    pub async fn rerun(&self, id: EvaluationId) -> anyhow::Result<EvaluationView> {
+        let request = self.request(Method::POST, &format!("/evaluations/{id}/rerun"));
+        read(self.send(request).await?).await
+    }
+
+    /// Organiser: stops an evaluation.
     pub async fn cancel(&self, id: EvaluationId, reason: &str) -> anyhow::Result<EvaluationView> {
         let request = self
             .request(Method::POST, &format!("/evaluations/{id}/cancel"))
@@ -179,7 +185,7 @@ impl Client {
         read(self.send(request).await?).await
     }
 
-    /// Team: who we are and whether today's turn is free.
+    /// Team: who we are, what plays for us today, and what we enter next.
     pub async fn me(&self) -> anyhow::Result<MeView> {
         self.get("/me").await
     }
@@ -229,9 +235,9 @@ impl Client {
         self.get(&format!("/submissions/{id}")).await
     }
 
-    /// Team or organiser: uses the team's turn of today for a submission.
-    pub async fn evaluate(&self, id: SubmissionId) -> anyhow::Result<EvaluationView> {
-        let request = self.request(Method::POST, &format!("/submissions/{id}/evaluations"));
+    /// Team: chooses the submission that plays at the next cut.
+    pub async fn activate(&self, id: SubmissionId) -> anyhow::Result<SubmissionView> {
+        let request = self.request(Method::POST, &format!("/submissions/{id}/activate"));
         read(self.send(request).await?).await
     }
 

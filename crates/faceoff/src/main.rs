@@ -35,6 +35,8 @@ enum Command {
     Sim(commands::sim::SimCommand),
     /// Upload a bundle and follow its validation.
     Submit(commands::submit::SubmitCommand),
+    /// Choose which submission plays at the next cut.
+    Activate(commands::activate::ActivateCommand),
     /// Organise a running competition.
     Admin(commands::admin::AdminCommand),
     /// Check what this host offers and what is missing.
@@ -52,6 +54,7 @@ fn main() -> ExitCode {
         Command::Score(command) => command.run(),
         Command::Sim(command) => command.run(),
         Command::Submit(command) => command.run(),
+        Command::Activate(command) => command.run(),
         Command::Admin(command) => command.run(),
         Command::Doctor(command) => command.run(),
     };

@@ -12,7 +12,7 @@ use faceoff_types::EvaluationId;
     responses(
         (status = 200, body = ComparisonView),
         (status = 404),
-        (status = 409, description = "not the same episodes (“field” says what differs), or not finished"),
+        (status = 409, description = "not the same episodes (“field” says what differs), not finished, or of a day that is not released"),
     )
 )]
 pub(crate) async fn compare(

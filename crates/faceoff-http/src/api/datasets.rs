@@ -5,6 +5,7 @@ use crate::{
     auth::Caller,
     extract::PathParam,
     problem::{Problem, ProblemKind},
+    release::check_released,
 };
 use axum::{
     body::Body,
@@ -18,8 +19,7 @@ use jiff::civil::Date;
 
 /// The recorded dataset, a zip archive; for its team and the organiser.
 ///
-/// It carries the day's seed. So it is handed out once no evaluation of the day is under way, and the
-/// first one handed out ends the day for what is uploaded after it.
+/// It carries the day's seed. So it comes out when the day is released, with all others of the day.
 #[utoipa::path(
     get, path = "/evaluations/{id}/dataset", tag = "team",
     security(("team" = []), ("organiser" = [])),
@@ -27,7 +27,7 @@ use jiff::civil::Date;
     responses(
         (status = 200, body = Vec<u8>, content_type = "application/zip"),
         (status = 404),
-        (status = 409, description = "not finished yet, or failed, or other evaluations of its day are under way"),
+        (status = 409, description = "not finished yet, or failed, or its day is not released"),
     )
 )]
 pub(crate) async fn dataset(
@@ -39,7 +39,7 @@ pub(crate) async fn dataset(
     let evaluation = caller.visible("evaluation", found, |evaluation| evaluation.team)?;
     let why_not = match &evaluation.state {
         EvaluationState::Finished { dataset, .. } => {
-            app.release_day(caller.actor(), evaluation.day).await?;
+            check_released(&app, &evaluation).await?;
             // A dataset that a finished evaluation names must be there: without it, we lost it.
             let (bytes, stream) = app
                 .store
@@ -65,11 +65,12 @@ pub(crate) async fn dataset(
             "the evaluation is not finished; follow it until its state is “finished”"
         }
         EvaluationState::AgentFailed { .. } => {
-            "the agent failed too often, so there is no dataset; its faults and log are in \
-             GET /api/v1/evaluations/ID"
+            "the agent failed too often, so there is no dataset; once the day is released its faults and \
+             log are in GET /api/v1/evaluations/ID"
         }
         EvaluationState::PlatformFailed { .. } => {
-            "the evaluation failed by our fault and has no dataset; the day's turn was given back"
+            "the evaluation failed by our fault and has no dataset; GET /api/v1/evaluations lists the one \
+             that plays it again"
         }
         EvaluationState::Cancelled { .. } => "the evaluation was cancelled and has no dataset",
     };

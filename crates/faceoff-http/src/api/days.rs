@@ -1,23 +1,27 @@
-//! The day's evaluation of all teams, started by the organiser.
+//! The day's cut, by the organiser.
 
 use super::episodes::checked_episodes;
 use crate::{
-    app::App, auth::Organiser, extract::OptionalJson, problem::Problem, requests::StartDay,
-    views::day::DayView,
+    app::{App, AppState},
+    auth::Organiser,
+    extract::OptionalJson,
+    problem::{Problem, ProblemKind},
+    requests::StartDay,
+    views::day::{DayView, NextCut},
 };
 use axum::{Json, extract::State};
-use faceoff_store::Actor;
-use jiff::tz::TimeZone;
+use faceoff_store::{Actor, StoreError};
+use jiff::{Timestamp, civil::Date, tz::TimeZone};
 
-/// Starts today's evaluation of each team's newest valid submission.
+/// Starts the day: what each team has active now plays it, nothing else.
 ///
-/// Asking again is harmless: only teams whose turn is free get an evaluation.
+/// A day has one cut, by the schedule or by this request. A second one starts nothing.
 #[utoipa::path(
     post, path = "/days", tag = "organiser", security(("organiser" = [])),
     request_body(content = Option<StartDay>, content_type = "application/json"),
     responses(
         (status = 200, body = DayView),
-        (status = 409, description = "the season is closed"),
+        (status = 409, description = "the day has had its cut (“next_cut” says when the next one is), no team has a valid submission, or the season is closed"),
         (status = 422),
     )
 )]
@@ -32,10 +36,27 @@ pub(crate) async fn start_day(
     }
     plan.profile = wanted.profile.unwrap_or(plan.profile);
     let now = app.config.clock.now();
-    let created = app.store.start_day(Actor::Organiser, &plan, now).await?;
-    let created = created.iter().map(|evaluation| evaluation.id).collect();
-    let view = DayView::of(&app, now.to_zoned(TimeZone::UTC).date(), created).await?;
-    let (day, created, existing) = (view.day, view.created.len(), view.existing.len());
-    tracing::info!(%day, created, existing, "day started");
+    match app.store.start_day(Actor::Organiser, &plan, now).await {
+        Ok(created) => tracing::info!(evaluations = created.len(), "the day was started"),
+        Err(StoreError::DayHasCut { day, cut_at }) => {
+            return Err(had_its_cut(&app, day, cut_at).await?);
+        }
+        Err(error) => return Err(error.into()),
+    }
+    let view = DayView::of(&app, now.to_zoned(TimeZone::UTC).date()).await?;
     Ok(Json(view))
+}
+
+async fn had_its_cut(app: &AppState, day: Date, cut_at: Timestamp) -> Result<Problem, Problem> {
+    let next = NextCut::of(app).await?;
+    let detail = format!(
+        "{day} had its cut at {}, and a day has one; nothing was started. What the teams have active at the \
+         next cut plays the next day: {next}",
+        cut_at.strftime("%Y-%m-%d %H:%M:%S UTC")
+    );
+    let next = serde_json::to_value(next).map_err(Problem::internal)?;
+    Ok(Problem::new(ProblemKind::DayHasCut, detail)
+        .with("day", day.to_string())
+        .with("cut_at", cut_at.to_string())
+        .with("next_cut", next))
 }

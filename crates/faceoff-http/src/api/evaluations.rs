@@ -1,14 +1,20 @@
-//! Evaluations: following them, and stopping them.
+//! Evaluations: following them, stopping them, and playing them again.
 
 use crate::{
     app::App,
     auth::{Caller, Organiser},
     extract::{Json as Body, PathParam, QueryParams},
+    paths,
     problem::Problem,
     requests::Cancellation,
     views::evaluation::EvaluationView,
 };
-use axum::{Json, extract::State};
+use axum::{
+    Json,
+    extract::State,
+    http::{StatusCode, header},
+    response::{AppendHeaders, IntoResponse},
+};
 use faceoff_store::Actor;
 use faceoff_types::EvaluationId;
 use jiff::civil::Date;
@@ -50,7 +56,8 @@ pub(crate) async fn list_evaluations(
     Ok(Json(evaluations))
 }
 
-/// One evaluation: state, progress, and once it is over the result or the faults with the log.
+/// One evaluation: state, progress, score and points; once its day is released also the whole result, or the
+/// faults with the log.
 #[utoipa::path(
     get, path = "/evaluations/{id}", tag = "team", security(("team" = []), ("organiser" = [])),
     params(("id" = EvaluationId, Path)),
@@ -66,7 +73,8 @@ pub(crate) async fn evaluation(
     EvaluationView::of(&app, evaluation).await.map(Json)
 }
 
-/// Stops an evaluation that is not over and gives the team's turn of the day back.
+/// Stops an evaluation that is not over. It can be played again (`rerun`). If it was the last of its day,
+/// that is released.
 #[utoipa::path(
     post, path = "/evaluations/{id}/cancel", tag = "organiser", security(("organiser" = [])),
     params(("id" = EvaluationId, Path)), request_body = Cancellation,
@@ -93,4 +101,31 @@ pub(crate) async fn cancel_evaluation(
         .await?;
     tracing::info!(evaluation = %id, reason, "evaluation cancelled");
     EvaluationView::find(&app, id).await.map(Json)
+}
+
+/// Plays an evaluation again that was cancelled, or failed by our fault: the submission that was active at
+/// the day's cut, on the same episodes, before the day's release or after it.
+#[utoipa::path(
+    post, path = "/evaluations/{id}/rerun", tag = "organiser", security(("organiser" = [])),
+    params(("id" = EvaluationId, Path)),
+    responses(
+        (status = 201, body = EvaluationView, description = "the evaluation that plays it again"),
+        (status = 404),
+        (status = 409, description = "it ended otherwise, the team has another evaluation of the day that counts, or the season is closed"),
+    )
+)]
+pub(crate) async fn rerun_evaluation(
+    _: Organiser,
+    State(app): State<App>,
+    PathParam(id): PathParam<EvaluationId>,
+) -> Result<impl IntoResponse, Problem> {
+    let now = app.config.clock.now();
+    let rerun = app
+        .store
+        .rerun_evaluation(Actor::Organiser, id, now)
+        .await?;
+    tracing::info!(evaluation = %id, rerun = %rerun.id, "an evaluation is played again");
+    let view = EvaluationView::of(&app, rerun).await?;
+    let location = [(header::LOCATION, paths::evaluation(view.id))];
+    Ok((StatusCode::CREATED, AppendHeaders(location), Json(view)))
 }

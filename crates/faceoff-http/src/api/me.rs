@@ -1,9 +1,9 @@
-//! The calling team: who it is and what it may do today.
+//! The calling team: who it is, what plays for it today and what it enters next.
 
 use crate::{app::App, auth::TeamCaller, problem::Problem, views::me::MeView};
 use axum::{Json, extract::State};
 
-/// The calling team and its turn of today.
+/// The calling team, what plays for it today, and what it enters at the next cut.
 #[utoipa::path(
     get, path = "/me", tag = "team", security(("team" = [])), responses((status = 200, body = MeView))
 )]

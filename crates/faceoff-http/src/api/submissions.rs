@@ -1,19 +1,14 @@
-//! Submissions: following an agent's smoke run, using the day's turn for it.
+//! Submissions: following an agent's smoke run, choosing what plays.
 
 use crate::{
     app::App,
     auth::{Caller, TeamCaller},
     extract::PathParam,
-    paths,
-    problem::Problem,
-    views::{evaluation::EvaluationView, submission::SubmissionView},
+    problem::{Problem, ProblemKind},
+    views::submission::SubmissionView,
 };
-use axum::{
-    Json,
-    extract::State,
-    http::{StatusCode, header},
-    response::{AppendHeaders, IntoResponse},
-};
+use axum::{Json, extract::State};
+use faceoff_store::Actor;
 use faceoff_types::SubmissionId;
 
 /// The calling team's submissions, newest first.
@@ -44,30 +39,44 @@ pub(crate) async fn submission(
     SubmissionView::of(&app, submission).await.map(Json)
 }
 
-/// Uses the team's turn of today for this submission.
+/// Chooses the submission that the team enters at the next cut, until a later upload turns valid.
+///
+/// A day that had its cut goes on with what was active then.
 #[utoipa::path(
-    post, path = "/submissions/{id}/evaluations", tag = "team",
-    security(("team" = []), ("organiser" = [])),
+    post, path = "/submissions/{id}/activate", tag = "team", security(("team" = [])),
     params(("id" = SubmissionId, Path)),
     responses(
-        (status = 201, body = EvaluationView),
+        (status = 200, body = SubmissionView),
         (status = 404),
-        (status = 409, description = "the turn is used, the submission is not valid or came after the release of the day's seed, or the season is closed"),
+        (status = 409, description = "it is not valid (yet), or the season is closed"),
     )
 )]
-pub(crate) async fn evaluate_submission(
-    caller: Caller,
+pub(crate) async fn activate_submission(
+    TeamCaller(team): TeamCaller,
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,
-) -> Result<impl IntoResponse, Problem> {
+) -> Result<Json<SubmissionView>, Problem> {
+    let (actor, name) = (Actor::Team(team.id), team.name.clone());
     let found = app.store.submission(id).await;
-    caller.visible("submission", found, |submission| submission.team)?;
-    let evaluation = app
-        .store
-        .create_evaluation(caller.actor(), id, &app.config.plan, app.config.clock.now())
-        .await?;
-    let view = EvaluationView::of(&app, evaluation).await?;
-    tracing::info!(team = %view.team_name, evaluation = %view.id, "evaluation queued");
-    let location = [(header::LOCATION, paths::evaluation(view.id))];
-    Ok((StatusCode::CREATED, AppendHeaders(location), Json(view)))
+    Caller::Team(team).visible("submission", found, |submission| submission.team)?;
+    let now = app.config.clock.now();
+    let submission = app.store.activate_submission(actor, id, now).await?;
+    tracing::info!(team = %name, submission = %id, "submission activated");
+    SubmissionView::of(&app, submission).await.map(Json)
+}
+
+/// Gone: nobody starts the evaluation of a single submission.
+#[utoipa::path(
+    post, path = "/submissions/{id}/evaluations", tag = "team",
+    params(("id" = String, Path)),
+    responses((status = 410, description = "always; the detail says what there is instead"))
+)]
+pub(crate) async fn evaluate_submission() -> Problem {
+    Problem::new(
+        ProblemKind::Gone,
+        "evaluations are no longer started one by one: whoever plays later could know more of the day's \
+         episodes. A day has one cut, by the schedule or the organiser, and what a team has active then \
+         plays: by itself its newest valid submission, or the one it chooses with POST \
+         /api/v1/submissions/ID/activate. GET /api/v1/me says which is active, and when the next cut is",
+    )
 }

@@ -12,11 +12,12 @@ use crate::{
         board::{BoardRow, BoardView},
         evaluation::{EvaluationStatus, EvaluationView, Progress},
         season::SeasonHead,
+        task::TaskView,
     },
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
-use faceoff_types::{EvaluationId, Task, TaskResult, Tier, ViolationCounts};
+use faceoff_types::{EvaluationId, Task, Tier, ViolationCounts};
 use figures::Rate;
 use jiff::civil;
 
@@ -174,10 +175,10 @@ async fn under_way(app: &App, today: civil::Date) -> Result<Vec<UnderWay>, PageP
             EvaluationStatus::Queued => "Queued",
             EvaluationStatus::Running => "Running",
             EvaluationStatus::Finalising => "Computing the score",
-            EvaluationStatus::AgentFailed { .. } => "The agent failed; its team sees why",
-            EvaluationStatus::PlatformFailed { .. } => {
-                "Stopped by our fault; the turn was given back"
+            EvaluationStatus::AgentFailed { .. } => {
+                "The agent failed; its team sees why when the day is released"
             }
+            EvaluationStatus::PlatformFailed { .. } => "Stopped by our fault",
             EvaluationStatus::Cancelled { .. } => "Cancelled by the organiser",
         };
         let moving = !evaluation.status.is_final();
@@ -196,24 +197,37 @@ struct TaskRow {
     rate: Rate,
     penalty_points: String,
     per_episode: String,
+    details: Option<TaskDetails>,
+}
+
+/// What is told of a row once its day is released.
+struct TaskDetails {
     violations: ViolationCounts,
     mean_ms: String,
     p99_ms: String,
     max_ms: String,
 }
 
+impl TaskDetails {
+    fn of(result: &TaskView) -> Option<Self> {
+        let time = result.computation_time_s?;
+        Some(Self {
+            violations: result.violations?,
+            mean_ms: figures::milliseconds(time.mean),
+            p99_ms: figures::milliseconds(time.p99),
+            max_ms: figures::milliseconds(time.max),
+        })
+    }
+}
+
 impl TaskRow {
-    fn of(row: &BoardRow, result: &TaskResult, common_setting: Option<&String>) -> Self {
-        let time = result.computation_time_s;
+    fn of(row: &BoardRow, result: &TaskView, common_setting: Option<&String>) -> Self {
         Self {
             who: Who::of(row, common_setting),
             rate: Rate::of(result),
             penalty_points: figures::one(result.penalty_points),
             per_episode: figures::per_episode(result.penalty_points, result.episodes),
-            violations: result.violations,
-            mean_ms: figures::milliseconds(time.mean),
-            p99_ms: figures::milliseconds(time.p99),
-            max_ms: figures::milliseconds(time.max),
+            details: TaskDetails::of(result),
         }
     }
 }

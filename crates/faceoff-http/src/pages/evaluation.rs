@@ -14,12 +14,13 @@ use crate::{
         evaluation::{EvaluationStatus, EvaluationView, Progress, ResultView},
         season::SeasonHead,
         submission::SubmissionView,
+        task::TaskView,
     },
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
 use faceoff_scoring::{EpisodeSummary, TIER_CHANGE_RESAMPLES};
-use faceoff_types::{EvaluationId, Profile, RoundTrips, SlotTiming, Task, TaskResult};
+use faceoff_types::{EvaluationId, Profile, RoundTrips, SlotTiming, Task};
 use figures::Rate;
 use jiff::{Timestamp, civil};
 
@@ -35,6 +36,11 @@ struct TaskFigures {
     tier_title: &'static str,
     tier_sign: &'static str,
     tier_change: String,
+    details: Option<TaskDetails>,
+}
+
+/// What is told of a task once its day is released.
+struct TaskDetails {
     steps: u64,
     ee: String,
     link: String,
@@ -47,10 +53,7 @@ struct TaskFigures {
 }
 
 impl TaskFigures {
-    fn of(task: Task, result: &TaskResult, summary: &EpisodeSummary) -> Self {
-        let violations = result.violations;
-        let count = |violations| figures::share(violations, result.episodes);
-        let time = result.computation_time_s;
+    fn of(task: Task, result: &TaskView, summary: &EpisodeSummary) -> Self {
         Self {
             task,
             rate: Rate::of(result),
@@ -62,7 +65,17 @@ impl TaskFigures {
             tier_title: result.tier.title(),
             tier_sign: figures::tier_sign(result.tier),
             tier_change: figures::chance(summary.tier_change_of(Some(task))),
-            steps: result.steps,
+            details: TaskDetails::of(result),
+        }
+    }
+}
+
+impl TaskDetails {
+    fn of(result: &TaskView) -> Option<Self> {
+        let count = |violations| figures::share(violations, result.episodes);
+        let (violations, time) = (result.violations?, result.computation_time_s?);
+        Some(Self {
+            steps: result.steps?,
             ee: count(violations.ee),
             link: count(violations.link),
             joint_pos: count(violations.joint_pos),
@@ -71,7 +84,7 @@ impl TaskFigures {
             mean_ms: figures::milliseconds(time.mean),
             p99_ms: figures::milliseconds(time.p99),
             max_ms: figures::milliseconds(time.max),
-        }
+        })
     }
 }
 
@@ -173,7 +186,10 @@ pub(super) async fn page(
             ..
         } => {
             let summary = view.summary(&app).await?;
-            let others = others(&app, &view).await?;
+            let others = match view.released_at {
+                Some(_) => others(&app, &view).await?,
+                None => Vec::new(),
+            };
             Some(Finished {
                 dataset_blake3: dataset_blake3.clone(),
                 others,
@@ -205,10 +221,11 @@ const fn in_words(status: &EvaluationStatus) -> &'static str {
         EvaluationStatus::Finished { .. } => "",
         EvaluationStatus::AgentFailed { .. } => {
             "The agent broke the protocol or a limit too often and was stopped; there is no score. \
-             Its team sees the faults and the log."
+             Its team sees the faults and the log when the day is released."
         }
         EvaluationStatus::PlatformFailed { .. } => {
-            "It was stopped by a fault of this server, not of the agent. The team's turn was given back."
+            "It was stopped by a fault of this server, not of the agent. The same agent plays the same episodes \
+             again, unless the fault stays."
         }
         EvaluationStatus::Cancelled { .. } => "The organiser cancelled it.",
     }

@@ -1,7 +1,8 @@
 //! Numbers as the pages write them. The pages' units are stated in the tables' heads.
 
+use crate::views::task::TaskView;
 use faceoff_scoring::TIER_CHANGE_RESAMPLES;
-use faceoff_types::{TaskResult, Tier};
+use faceoff_types::Tier;
 
 /// A success rate with its interval.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,7 +19,7 @@ pub(super) struct Rate {
 }
 
 impl Rate {
-    pub(super) fn of(result: &TaskResult) -> Self {
+    pub(super) fn of(result: &TaskView) -> Self {
         let [low, high] = result
             .success_ci95
             .map(|bound| 100.0 * bound.clamp(0.0, 1.0));

@@ -97,7 +97,7 @@ impl Problem {
 #[schema(as = Problem)]
 pub(crate) struct ProblemBody<'a> {
     /// Kind of the problem, explained at that place of the server.
-    #[schema(example = "/problems#already-evaluated")]
+    #[schema(example = "/problems#day-has-cut")]
     r#type: String,
     /// The kind in a few words.
     title: &'a str,

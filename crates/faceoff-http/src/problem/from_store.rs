@@ -15,30 +15,9 @@ impl From<StoreError> for Problem {
                      for it with POST /api/v1/teams/ID/token"
                 ),
             ),
-            StoreError::AlreadyEvaluated { day, next } => Self::new(
-                ProblemKind::AlreadyEvaluated,
-                format!(
-                    "this team's evaluation of {day} exists already, and a team is evaluated once per \
-                     UTC day; the next turn is on {next}, from 00:00 UTC"
-                ),
-            )
-            .with("day", day.to_string())
-            .with("next_turn", next.to_string()),
-            StoreError::DayReleased {
-                day,
-                released_at,
-                next,
-            } => Self::new(
-                ProblemKind::DayReleased,
-                format!(
-                    "the seed of {day} is known since {}, when the first dataset of the day was handed \
-                     out, and this submission was uploaded after that; it can play from {next}, 00:00 \
-                     UTC. A submission that was uploaded before can still play {day}",
-                    released_at.strftime("%H:%M:%S UTC")
-                ),
-            )
-            .with("day", day.to_string())
-            .with("next_turn", next.to_string()),
+            error @ StoreError::DayHasCut { .. } => {
+                Self::new(ProblemKind::DayHasCut, error.to_string())
+            }
             StoreError::SeasonClosed { closed_at } => Self::new(
                 ProblemKind::SeasonClosed,
                 format!(

@@ -54,15 +54,12 @@ kinds! {
     TeamNameTaken "team-name-taken" CONFLICT
         "The name is taken"
         "Another team has this name. Choose another one, or ask for a new token for the existing team."
-    AlreadyEvaluated "already-evaluated" CONFLICT
-        "Today's turn is used"
-        "A team is evaluated once per UTC day. “next_turn” is the next day it can be."
-    DayReleased "day-released" CONFLICT
-        "Too late for today's episodes"
-        "A dataset of today was handed out, and with it the seed of today's episodes. What was uploaded after that plays from “next_turn” on."
+    DayHasCut "day-has-cut" CONFLICT
+        "The day has had its cut"
+        "A day starts once: what each team has active then plays it. What is active at the next cut plays the next day; “next_cut” says when that is."
     NotYet "not-yet" CONFLICT
         "Not yet"
-        "A dataset carries the seed of its day. It is handed out once no evaluation of that day is queued or running."
+        "Datasets and comparisons tell of the day's episodes. They come out for everybody at once, when the last evaluation of the day has ended."
     SeasonClosed "season-closed" CONFLICT
         "The season is over"
         "The season's secret is published, so nothing more is uploaded or evaluated. Results and datasets stay."
@@ -72,6 +69,9 @@ kinds! {
     Conflict "conflict" CONFLICT
         "Not possible in this state"
         "The detail says which state the thing is in and what it waits for."
+    Gone "gone" GONE
+        "No longer offered"
+        "The server no longer does this. The detail says why, and what there is instead."
     TooManyPending "too-many-pending" TOO_MANY_REQUESTS
         "Too many uploads are waiting"
         "Several uploads of the team are not validated yet. Wait until one has its verdict."

@@ -1,14 +1,13 @@
 //! Who stands where, and how sure that is.
 
-use crate::{app::AppState, problem::Problem, seeds::DaySeeds, summaries::RunSummaries};
+use super::task::TaskView;
+use crate::{app::AppState, problem::Problem, summaries::RunSummaries};
 use faceoff_scoring::{
     BoardEntry, Played, RankedEntry, SIGNIFICANCE, TIER_CHANGE_RESAMPLES, overall_board,
     rank_groups, task_board,
 };
 use faceoff_store::BoardRecord;
-use faceoff_types::{
-    EvaluationId, Profile, RULESET, Seed, Task, TaskResult, TeamId, TeamName, Tier,
-};
+use faceoff_types::{EvaluationId, Profile, RULESET, Seed, Task, TeamId, TeamName, Tier};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -65,11 +64,12 @@ pub struct BoardRow {
     pub score: f64,
     /// Overall penalty points: the maximum over the tasks.
     pub penalty_points: f64,
-    /// The seed of the day's evaluations; null while teams that have not used their turn must not know
-    /// their episodes.
+    /// When the day's last evaluation had ended, and all of the day came out; null until then.
+    pub released_at: Option<Timestamp>,
+    /// The seed of the day's evaluations; null until the day is released.
     pub seed: Option<Seed>,
     /// Results by task: hit, defend, prepare.
-    pub tasks: BTreeMap<Task, TaskResult>,
+    pub tasks: BTreeMap<Task, TaskView>,
 }
 
 impl BoardView {
@@ -78,9 +78,6 @@ impl BoardView {
         let records = app.store.board().await?;
         let runs: Vec<_> = records.iter().map(|record| record.run).collect();
         let summaries = app.summaries.of(&runs).await?;
-        let seeds = app
-            .day_seeds(records.iter().map(|record| record.day).collect())
-            .await?;
         let mismatch_seed = app.store.season().await?.secret.model_mismatch();
 
         let entries = records.into_iter().map(|record| BoardEntry {
@@ -99,7 +96,7 @@ impl BoardView {
         let rows = ranked.into_iter().zip(groups).map(|(ranked, rank_group)| {
             let summary = played(&ranked.entry.key, &summaries, mismatch_seed)?.summary;
             let tier_change_probability = summary.tier_change_of(task);
-            Ok(row(ranked, rank_group, tier_change_probability, &seeds))
+            Ok(row(ranked, rank_group, tier_change_probability))
         });
         Ok(Self {
             ruleset: RULESET.to_owned(),
@@ -134,10 +131,10 @@ fn row(
     ranked: RankedEntry<BoardRecord>,
     rank_group: u32,
     tier_change_probability: f64,
-    seeds: &DaySeeds,
 ) -> BoardRow {
     let RankedEntry { rank, tier, entry } = ranked;
     let (record, result) = (entry.key, entry.result);
+    let released = record.released_at.is_some();
     BoardRow {
         rank,
         rank_group,
@@ -153,7 +150,12 @@ fn row(
         profile: result.profile,
         score: result.score,
         penalty_points: result.penalty_points,
-        seed: seeds.public(result.seed, record.day),
-        tasks: result.tasks,
+        released_at: record.released_at,
+        seed: released.then_some(result.seed),
+        tasks: result
+            .tasks
+            .iter()
+            .map(|(task, result)| (*task, TaskView::new(result, released)))
+            .collect(),
     }
 }

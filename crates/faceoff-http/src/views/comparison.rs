@@ -3,6 +3,7 @@
 use crate::{
     app::AppState,
     problem::{Problem, ProblemKind},
+    release::check_released,
 };
 use faceoff_scoring::{Comparison, EpisodeSummary, OverallComparison, Played, TaskComparison};
 use faceoff_store::{Evaluation, EvaluationState, StoreError};
@@ -99,7 +100,7 @@ impl ComparisonView {
     /// Compares two finished evaluations.
     ///
     /// # Errors
-    /// `NotFound`, `Conflict` while one has no result, `NotPaired` when they did not play the same episodes.
+    /// `NotFound`, `Conflict` while one has no result, `NotYet` before their day is released, `NotPaired` when they did not play the same episodes.
     pub(crate) async fn of(app: &AppState, [a, b]: [EvaluationId; 2]) -> Result<Self, Problem> {
         let (a, b) = (Side::load(app, a).await?, Side::load(app, b).await?);
         let not_paired = |field: &str, detail: String| {
@@ -116,6 +117,7 @@ impl ComparisonView {
                 format!("day: the first evaluation is of {day_a}, the second of {day_b}"),
             ));
         }
+        check_released(app, &a.evaluation).await?;
         // that of the season, which both share
         let mismatch_seed = app.store.season().await?.secret.model_mismatch();
         let Comparison { tasks, overall } = a

@@ -1,11 +1,12 @@
 //! An evaluation on its way to a score or a failure.
 
-use crate::{app::AppState, paths, problem::Problem, seeds::DaySeeds};
+use super::task::TaskView;
+use crate::{app::AppState, paths, problem::Problem};
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::{Evaluation, EvaluationState};
 use faceoff_types::{
     AgentFault, EvaluationId, EvaluationResult, Profile, Seed, SlotTiming, SubmissionId, Task,
-    TaskResult, TeamId, TeamName, Tier,
+    TeamId, TeamName, Tier,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
@@ -23,8 +24,14 @@ pub struct EvaluationView {
     pub team: TeamId,
     /// As the board shows it.
     pub team_name: TeamName,
-    /// The UTC day whose turn it uses.
+    /// The UTC day whose episodes it plays.
     pub day: Date,
+    /// When the day's last evaluation had ended, and all of the day came out; null until then.
+    pub released_at: Option<Timestamp>,
+    /// The evaluation that it plays again, one that was cancelled or failed by our fault; absent
+    /// otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rerun_of: Option<EvaluationId>,
     /// The perturbations.
     pub profile: Profile,
     /// In the order of play.
@@ -75,14 +82,15 @@ pub enum EvaluationStatus {
     AgentFailed {
         /// When the last of its faults was stored.
         finished_at: Timestamp,
-        /// What the agent did; absent in lists.
+        /// What the agent did; absent in lists, and until the day is released.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         faults: Option<Vec<FaultView>>,
-        /// Last part of the agent's standard error; absent in lists.
+        /// Last part of the agent's standard error; absent in lists, and until the day is released.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         log: Option<String>,
     },
-    /// Our fault; the day's turn was given back.
+    /// Our fault. It is played again, with the same submission on the same episodes: twice by itself,
+    /// then if the organiser wants it.
     PlatformFailed {
         /// When we gave it up.
         finished_at: Timestamp,
@@ -106,40 +114,44 @@ impl EvaluationStatus {
     }
 }
 
-/// The score of one evaluation; laid out as `results.json` of the dataset.
+/// The score of one evaluation; laid out as `results.json` of the dataset, of which only score and points
+/// are told until the day is released.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct ResultView {
     /// The rules that it was scored by.
     pub ruleset: String,
     /// The perturbations.
     pub profile: Profile,
-    /// The seed of the day's evaluations, 64 hexadecimal digits; null while teams that have not used
-    /// their turn must not know their episodes.
+    /// The seed of the day's evaluations, 64 hexadecimal digits; null until the day is released.
     pub seed: Option<Seed>,
     /// By task: hit, defend, prepare.
-    pub tasks: BTreeMap<Task, TaskResult>,
+    pub tasks: BTreeMap<Task, TaskView>,
     /// Overall score in percent.
     pub score: f64,
     /// Penalty points: the maximum over the tasks.
     pub penalty_points: f64,
     /// The worst of the tasks' tiers.
     pub tier: Tier,
-    /// The slots' noise floor and re-runs; absent in results of older versions.
+    /// The slots' noise floor and re-runs; absent until the day is released, and in results of older
+    /// versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub timing: Option<SlotTiming>,
 }
 
 impl ResultView {
-    fn new(result: EvaluationResult, seed: Option<Seed>) -> Self {
+    fn new(result: EvaluationResult, released: bool) -> Self {
+        let tasks = result.tasks.iter();
         Self {
             ruleset: result.ruleset,
             profile: result.profile,
-            seed,
-            tasks: result.tasks,
+            seed: released.then_some(result.seed),
+            tasks: tasks
+                .map(|(task, result)| (*task, TaskView::new(result, released)))
+                .collect(),
             score: result.score,
             penalty_points: result.penalty_points,
             tier: result.tier,
-            timing: result.timing,
+            timing: result.timing.filter(|_| released),
         }
     }
 }
@@ -176,13 +188,14 @@ impl EvaluationView {
         Self::of(app, app.store.evaluation(id).await?).await
     }
 
-    /// With faults and log, if it failed by them.
+    /// With faults and log, if it failed by them and its day is released.
     pub(crate) async fn of(app: &AppState, evaluation: Evaluation) -> Result<Self, Problem> {
         let team = app.store.team(evaluation.team).await?;
-        let seeds = app.day_seeds([evaluation.day].into()).await?;
         let run = evaluation.run;
-        let mut view = Self::new(evaluation, team.name, &seeds);
-        if let EvaluationStatus::AgentFailed { faults, log, .. } = &mut view.status {
+        let mut view = Self::new(evaluation, team.name);
+        if let EvaluationStatus::AgentFailed { faults, log, .. } = &mut view.status
+            && view.released_at.is_some()
+        {
             let of_run = app.store.run_faults(run).await?;
             *faults = Some(of_run.faults.into_iter().map(FaultView::from).collect());
             *log = Some(of_run.log);
@@ -216,12 +229,10 @@ impl EvaluationView {
         let teams = app.store.teams().await?;
         let names: BTreeMap<TeamId, TeamName> =
             teams.into_iter().map(|team| (team.id, team.name)).collect();
-        let days = evaluations.iter().map(|evaluation| evaluation.day);
-        let seeds = app.day_seeds(days.collect()).await?;
         evaluations
             .into_iter()
             .map(|evaluation| match names.get(&evaluation.team) {
-                Some(name) => Ok(Self::new(evaluation, name.clone(), &seeds)),
+                Some(name) => Ok(Self::new(evaluation, name.clone())),
                 None => Err(Problem::internal(format_args!(
                     "evaluation {} has no team",
                     evaluation.id
@@ -230,7 +241,8 @@ impl EvaluationView {
             .collect()
     }
 
-    fn new(evaluation: Evaluation, team_name: TeamName, seeds: &DaySeeds) -> Self {
+    fn new(evaluation: Evaluation, team_name: TeamName) -> Self {
+        let released = evaluation.released_at.is_some();
         let episodes_total = evaluation.plan.episodes_total();
         let episodes_done = match &evaluation.state {
             EvaluationState::Running { episodes_done, .. } => *episodes_done,
@@ -249,15 +261,12 @@ impl EvaluationView {
                 result,
                 dataset_blake3,
                 ..
-            } => {
-                let seed = seeds.public(result.seed, evaluation.day);
-                EvaluationStatus::Finished {
-                    finished_at,
-                    result: Box::new(ResultView::new(*result, seed)),
-                    dataset: format!("{}/dataset", paths::evaluation(evaluation.id)),
-                    dataset_blake3,
-                }
-            }
+            } => EvaluationStatus::Finished {
+                finished_at,
+                result: Box::new(ResultView::new(*result, released)),
+                dataset: format!("{}/dataset", paths::evaluation(evaluation.id)),
+                dataset_blake3,
+            },
             EvaluationState::AgentFailed { finished_at } => EvaluationStatus::AgentFailed {
                 finished_at,
                 faults: None,
@@ -284,6 +293,8 @@ impl EvaluationView {
             team: evaluation.team,
             team_name,
             day: evaluation.day,
+            released_at: evaluation.released_at,
+            rerun_of: evaluation.rerun_of,
             profile: evaluation.plan.profile,
             tasks: evaluation.plan.tasks,
             episodes_per_task: evaluation.plan.episodes_per_task,

@@ -1,47 +1,59 @@
-//! What a team may do today.
+//! How a team stands today.
 
-use super::team::TeamView;
+use super::{day::NextCut, team::TeamView};
 use crate::{app::AppState, problem::Problem};
-use faceoff_store::Team;
-use faceoff_types::EvaluationId;
+use faceoff_store::{EvaluationState, Team};
+use faceoff_types::{EvaluationId, SubmissionId};
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// The calling team: who it is and what it may do today.
+/// The calling team: who it is, what plays for it today and what it enters next.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct MeView {
     /// Whose token the caller has.
     pub team: TeamView,
     /// Today's.
     pub turn: TurnView,
+    /// What it enters at the next cut; null while it has no valid submission.
+    pub active_submission: Option<SubmissionId>,
+    /// When that is; null once the season is closed.
+    pub next_cut: Option<NextCut>,
     /// Largest packed bundle that the server takes, in bytes.
     pub max_bundle_bytes: u64,
 }
 
-/// A team's turn of a UTC day.
+/// What plays for a team on a UTC day.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TurnView {
     /// In UTC.
     pub day: Date,
-    /// The evaluation that used the turn; null while it is free. One that failed by our fault or was
-    /// cancelled gives the turn back.
+    /// The evaluation that counts; null before the day's cut, if the team had nothing active then, and
+    /// if it was cancelled or failed by our fault and is not played again.
     pub evaluation: Option<EvaluationId>,
 }
 
 impl MeView {
     pub(crate) async fn of(app: &AppState, team: Team) -> Result<Self, Problem> {
         let day = app.config.clock.today();
-        let evaluation = app
-            .store
-            .evaluations_of(team.id)
-            .await?
-            .into_iter()
-            .find(|evaluation| evaluation.day == day && evaluation.state.takes_turn())
+        let counts = |state: &EvaluationState| {
+            !matches!(
+                state,
+                EvaluationState::PlatformFailed { .. } | EvaluationState::Cancelled { .. }
+            )
+        };
+        let evaluations = app.store.evaluations_of(team.id).await?;
+        let evaluation = evaluations
+            .iter()
+            .find(|evaluation| evaluation.day == day && counts(&evaluation.state))
             .map(|evaluation| evaluation.id);
+        let submissions = app.store.submissions_of(team.id).await?;
+        let active = submissions.iter().find(|submission| submission.active);
         Ok(Self {
             team: team.into(),
             turn: TurnView { day, evaluation },
+            active_submission: active.map(|submission| submission.id),
+            next_cut: NextCut::unless_closed(app).await?,
             max_bundle_bytes: app.config.max_bundle_bytes,
         })
     }

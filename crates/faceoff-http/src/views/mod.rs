@@ -1,8 +1,8 @@
 //! What can be known of a resource, and how it is made from the store and the scoring: one file per
 //! resource. API and pages show these very types, and the command line's client reads them.
 //!
-//! Nothing here is decided by who asks, except the seeds, which follow one rule for everybody: whether a
-//! caller may see a thing at all is the API's to check.
+//! Nothing here is decided by who asks: what may be told of a day's episodes follows from its release, the
+//! same for everybody; whether a caller may see a thing at all is the API's to check.
 
 pub mod ablation;
 pub mod board;
@@ -12,4 +12,5 @@ pub mod evaluation;
 pub mod me;
 pub mod season;
 pub mod submission;
+pub mod task;
 pub mod team;

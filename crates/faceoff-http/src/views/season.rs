@@ -1,5 +1,6 @@
 //! The season's commitment, and what may be known of its seeds.
 
+use super::day::NextCut;
 use crate::{app::AppState, problem::Problem};
 use faceoff_types::{RULESET, Seed};
 use jiff::{
@@ -33,7 +34,9 @@ pub struct SeasonView {
     /// UTC time of the daily evaluation; null when the organiser starts it by hand.
     #[schema(value_type = Option<String>, example = "00:00:00")]
     pub daily_at: Option<Time>,
-    /// The days that have evaluations, the newest first.
+    /// When the next day starts, with what each team has active then; null once the season is closed.
+    pub next_cut: Option<NextCut>,
+    /// The days that had their cut, the newest first.
     pub days: Vec<SeasonDay>,
 }
 
@@ -42,9 +45,13 @@ pub struct SeasonView {
 pub struct SeasonDay {
     /// In UTC.
     pub day: Date,
+    /// When it started; what each team had active then plays it.
+    pub cut_at: Timestamp,
+    /// When its last evaluation had ended and all of it came out; null before.
+    pub released_at: Option<Timestamp>,
     /// Its finished evaluations.
     pub finished: u32,
-    /// The seed of its evaluations; null while somebody must not know it.
+    /// The seed of its evaluations; null until it is released.
     pub seed: Option<Seed>,
 }
 
@@ -52,9 +59,6 @@ impl SeasonView {
     pub(crate) async fn now(app: &AppState) -> Result<Self, Problem> {
         let season = app.store.season().await?;
         let days = app.store.days().await?;
-        let seeds = app
-            .day_seeds(days.iter().map(|(day, _)| *day).collect())
-            .await?;
         let revealed = |seed: Seed| season.closed_at.map(|_| seed);
         Ok(Self {
             ruleset: RULESET.to_owned(),
@@ -64,12 +68,15 @@ impl SeasonView {
             mismatch_seed: revealed(season.secret.model_mismatch()),
             today: app.config.clock.today(),
             daily_at: app.config.daily_at,
+            next_cut: NextCut::unless_closed(app).await?,
             days: days
                 .into_iter()
                 .map(|(day, finished)| SeasonDay {
-                    day,
+                    day: day.date,
+                    cut_at: day.cut_at,
+                    released_at: day.released_at,
                     finished,
-                    seed: seeds.public(season.secret.day(day), day),
+                    seed: day.released_at.map(|_| season.secret.day(day.date)),
                 })
                 .collect(),
             name: season.name,

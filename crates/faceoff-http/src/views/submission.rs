@@ -27,6 +27,8 @@ pub struct SubmissionView {
     /// How long its answers took in the smoke run, for each task that was played.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub timing: Vec<SmokeTiming>,
+    /// Is it what its team enters at the next cut?
+    pub active: bool,
     /// The smoke run's verdict.
     #[serde(flatten)]
     pub status: SubmissionStatus,
@@ -87,6 +89,7 @@ impl SubmissionView {
             created_at: submission.created_at,
             agent_name: submission.agent_name,
             timing: submission.timing,
+            active: submission.active,
             status: match submission.state {
                 SubmissionState::Validating => SubmissionStatus::Validating,
                 SubmissionState::Valid => SubmissionStatus::Valid { log },

@@ -34,17 +34,18 @@ fn texts(html: &Html, selector: &str) -> Vec<String> {
 }
 
 /// Five teams of the paper's qualifying table, in another order than the board's.
+const TEAMS: [(&str, [f64; 3], f64); 5] = [
+    ("RL3_polimi", [0.227, 0.616, 0.362], 920.0),
+    ("Kalash Jain", [0.0, 0.195, 0.083], 0.0),
+    ("Reckless", [0.9, 0.9, 0.9], 1500.5),
+    ("AiRLIHockey", [0.549, 0.845, 0.903], 327.5),
+    ("AeroTron", [0.332, 0.232, 0.665], 594.0),
+];
+
 async fn competition() -> Site {
     let site = Site::start().await;
-    for (name, rates, points) in [
-        ("RL3_polimi", [0.227, 0.616, 0.362], 920.0),
-        ("Kalash Jain", [0.0, 0.195, 0.083], 0.0),
-        ("Reckless", [0.9, 0.9, 0.9], 1500.5),
-        ("AiRLIHockey", [0.549, 0.845, 0.903], 327.5),
-        ("AeroTron", [0.332, 0.232, 0.665], 594.0),
-    ] {
-        site.ranked_team(name, &result(rates, points)).await;
-    }
+    let teams = TEAMS.map(|(name, rates, points)| (name, result(rates, points)));
+    site.ranked_teams(&teams).await;
     site
 }
 
@@ -119,33 +120,64 @@ async fn the_board_shows_tiers_in_order_with_rates_intervals_points_and_score() 
 }
 
 #[tokio::test]
-async fn the_api_board_has_the_same_order_and_hides_the_seed_of_the_day() {
-    let site = competition().await;
+async fn until_the_day_is_released_the_boards_tell_score_and_points_only() {
+    let site = Site::start().await;
+    for (name, ..) in TEAMS {
+        let team = site.team(name).await;
+        site.valid_submission(&team, name).await;
+    }
+    let late = site.team("Late").await;
+    let submission = site.valid_submission(&late, "late").await;
+    let straggler = site.evaluate(&late, &submission).await;
+    for (_, rates, points) in TEAMS {
+        site.finish(&result(rates, points)).await;
+    }
+    let seed = faceoff_types::Seed::from_number(7).to_string();
+    let details = ["violations", "steps", "computation_time_s"];
+    for path in ["/api/v1/board", "/api/v1/board/hit"] {
+        let board = site.get(path, None).await.json(200);
+        let rows = board["rows"].as_array().unwrap();
+        assert_eq!(rows.len(), TEAMS.len());
+        for row in rows {
+            assert_eq!(
+                (&row["seed"], &row["released_at"]),
+                (&json!(null), &json!(null))
+            );
+            let hit = &row["tasks"]["hit"];
+            assert_eq!(hit["success_ci95"].as_array().unwrap().len(), 2);
+            for detail in details {
+                assert_eq!(hit[detail], json!(null), "{detail}");
+            }
+        }
+    }
     let board = site.get("/api/v1/board", None).await.json(200);
-    let rows = board["rows"].as_array().unwrap();
-    for (row, (tier, name)) in rows.iter().zip(ORDER) {
+    for (row, (tier, name)) in board["rows"].as_array().unwrap().iter().zip(ORDER) {
         assert_eq!((&row["tier"], &row["team"]), (&json!(tier), &json!(name)));
     }
-    assert_eq!(rows.len(), ORDER.len());
-    assert_eq!(
-        rows[0]["tasks"]["hit"]["success_ci95"]
-            .as_array()
-            .unwrap()
-            .len(),
-        2
+    let evaluation = format!(
+        "/evaluations/{}",
+        board["rows"][0]["evaluation"].as_str().unwrap()
     );
+    let html = page(&site, &evaluation).await;
     assert_eq!(
-        rows[0]["seed"],
-        json!(null),
-        "teams with a free turn would know their episodes"
+        texts(&html, "table caption").len(),
+        1,
+        "no violations, no times"
     );
-    let evaluation = format!("/evaluations/{}", rows[0]["evaluation"].as_str().unwrap());
-    let seed = faceoff_types::Seed::from_number(7).to_string();
+    assert!(texts(&html, ".facts").join(" ").contains("held back"));
+    let tasks = page(&site, "/tasks/hit").await;
+    assert_eq!(texts(&tasks, "td.none").len(), TEAMS.len());
     assert!(!site.get(&evaluation, None).await.body.contains(&seed));
-    site.next_day();
+
+    // The last one ends, and all of it is there, whoever asks.
+    site.finish(&result([0.1, 0.1, 0.1], 10.0)).await;
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(board["rows"][0]["seed"], seed);
-    assert!(site.get(&evaluation, None).await.body.contains(&seed));
+    assert_eq!(board["rows"][0]["tasks"]["hit"]["violations"]["ee"], 7);
+    for path in [evaluation, straggler.replace("/api/v1", "")] {
+        assert!(site.get(&path, None).await.body.contains(&seed));
+    }
+    assert_eq!(texts(&page(&site, "/tasks/hit").await, "td.none").len(), 0);
 }
 
 #[tokio::test]

@@ -1,11 +1,11 @@
 //! How quick the boards are with many teams. Not run by itself:
 //! `cargo nextest run --release -p faceoff-http --run-ignored only board_load --no-capture`
 
-use crate::site::{Site, outcome};
+use crate::site::{Played, Site, outcome};
 use faceoff_types::{EpisodeOutcome, Task, Violations};
 use std::time::Instant;
 
-const TEAMS: u64 = 50;
+const TEAMS: usize = 50;
 const EPISODES: u32 = 1000;
 
 /// The same pseudo-random number below 1000 for the same episode.
@@ -23,9 +23,8 @@ fn draw(team: u64, task: Task, episode: u32, what: u8) -> u64 {
 #[expect(clippy::print_stdout, reason = "a measurement tells what it measured")]
 async fn boards_of_fifty_teams() {
     let site = Site::start().await;
-    for team in 0..TEAMS {
-        let name = format!("Team {team}");
-        site.played_team(&name, EPISODES, |task, episode| EpisodeOutcome {
+    let played = |team: u64| {
+        move |task: Task, episode: u32| EpisodeOutcome {
             success: draw(team, task, episode, 0) < 200 + 12 * team,
             violations: Violations {
                 ee: draw(team, task, episode, 1) < 4 * team,
@@ -33,9 +32,13 @@ async fn boards_of_fifty_teams() {
                 ..Violations::default()
             },
             ..outcome(task, episode, false)
-        })
-        .await;
-    }
+        }
+    };
+    let names: [String; TEAMS] = std::array::from_fn(|team| format!("Team {team}"));
+    let agents: [_; TEAMS] = std::array::from_fn(|team| played(team as u64));
+    let teams: [(&str, Played<'_>); TEAMS] =
+        std::array::from_fn(|team| (names[team].as_str(), &agents[team] as Played<'_>));
+    site.played_day(EPISODES, teams).await;
     for round in ["first, summaries are made", "second"] {
         for path in ["/api/v1/board", "/", "/tasks/hit", "/api/v1/board/prepare"] {
             let started = Instant::now();

@@ -1,4 +1,4 @@
-use crate::site::{Site, outcome};
+use crate::site::{Played, Site, outcome};
 use faceoff_types::{EpisodeOutcome, EvaluationId, Task, Violations};
 use serde_json::json;
 
@@ -21,18 +21,10 @@ fn compare(a: EvaluationId, b: EvaluationId) -> String {
 #[tokio::test]
 async fn two_evaluations_of_a_day_are_compared_episode_by_episode() {
     let site = Site::start().await;
-    let a = site
-        .played_team("Alpha", 100, |task, e| played(task, e, e < 60, false))
-        .await;
-    let b = site
-        .played_team("Beta", 100, |task, e| {
-            played(
-                task,
-                e,
-                if task == Task::Hit { e < 40 } else { e < 60 },
-                false,
-            )
-        })
+    let alpha = |task, e| played(task, e, e < 60, false);
+    let beta = |task, e| played(task, e, e < if task == Task::Hit { 40 } else { 60 }, false);
+    let [a, b] = site
+        .played_day(100, [("Alpha", &alpha), ("Beta", &beta)])
         .await;
     let view = site.get(&compare(a, b), None).await.json(200);
     assert_eq!(
@@ -75,19 +67,16 @@ async fn two_evaluations_of_a_day_are_compared_episode_by_episode() {
 async fn what_does_not_pair_is_refused_by_field() {
     let site = Site::start().await;
     let fair = |task, e| played(task, e, e % 2 == 0, false);
-    let a = site.played_team("Alpha", 10, fair).await;
-    let shorter = site.played_team("Shorter", 8, fair).await;
+    let [a] = site.played_day(10, [("Alpha", &fair)]).await;
     site.next_day();
-    let tomorrow = site.played_team("Tomorrow", 10, fair).await;
+    let [tomorrow] = site.played_day(10, [("Tomorrow", &fair)]).await;
+    site.next_day();
     let queued = {
         let team = site.team("Queued").await;
         let submission = site.valid_submission(&team, "q").await;
         let path = site.evaluate(&team, &submission).await;
         path.rsplit('/').next().unwrap().parse().unwrap()
     };
-    let refused = site.get(&compare(a, shorter), None).await;
-    let problem = refused.problem(409, "not-paired", &["10 of hit", "8"]);
-    assert_eq!(problem["field"], "episodes");
     let refused = site.get(&compare(a, tomorrow), None).await;
     let problem = refused.problem(409, "not-paired", &["2026-03-01", "2026-03-02"]);
     assert_eq!(problem["field"], "day");
@@ -113,24 +102,20 @@ async fn the_boards_group_teams_that_the_episodes_cannot_tell_apart() {
     let site = Site::start().await;
     // Of 200 episodes per task: 150, 146, 100 solved; the last team is close to the first, but its
     // tier is another, by luck: 36 broken episodes cost 108 of 100 points.
-    let best = site
-        .played_team("Best", 200, |task, e| played(task, e, e < 150, false))
-        .await;
-    site.played_team("Close", 200, |task, e| {
-        played(
-            task,
-            e,
-            (if task == Task::Prepare { 3 } else { 2 }..150).contains(&e),
-            false,
-        )
-    })
-    .await;
-    site.played_team("Behind", 200, |task, e| played(task, e, e < 100, false))
-        .await;
-    site.played_team("Careless", 200, |task, e| {
-        played(task, e, e < 150, task == Task::Hit && e < 36)
-    })
-    .await;
+    let best = |task, e| played(task, e, e < 150, false);
+    let close = |task, e| {
+        let solved = if task == Task::Prepare { 3 } else { 2 }..150;
+        played(task, e, solved.contains(&e), false)
+    };
+    let behind = |task, e| played(task, e, e < 100, false);
+    let careless = |task, e| played(task, e, e < 150, task == Task::Hit && e < 36);
+    let teams: [(&str, Played<'_>); 4] = [
+        ("Best", &best),
+        ("Close", &close),
+        ("Behind", &behind),
+        ("Careless", &careless),
+    ];
+    let [best, ..] = site.played_day(200, teams).await;
     for path in ["/api/v1/board", "/api/v1/board/hit"] {
         let board = site.get(path, None).await.json(200);
         assert_eq!(board["significance"], 0.05);

@@ -3,38 +3,55 @@ use reqwest::Method;
 use serde_json::json;
 
 #[tokio::test]
-async fn starting_the_day_is_idempotent_and_names_who_is_left_out() {
+async fn a_day_starts_once_with_what_is_active_and_names_who_is_left_out() {
     let site = Site::start().await;
     let (alpha, beta) = (site.team("Alpha").await, site.team("Beta").await);
-    site.team("Gamma").await;
-    let early = site.valid_submission(&alpha, "a").await;
-    site.valid_submission(&beta, "b").await;
-    site.evaluate(&alpha, &early).await;
-
+    let gamma = site.team("Gamma").await;
+    for (team, agent) in [(&alpha, "a"), (&beta, "b")] {
+        site.valid_submission(team, agent).await;
+    }
     let body = json!({ "episodes_per_task": 8, "profile": "ideal" });
     let day = site
         .post("/api/v1/days", Some(ADMIN), &body)
         .await
         .json(200);
     assert_eq!(day["day"], "2026-03-01");
-    assert_eq!(day["created"][0]["team_name"], "Beta");
-    assert_eq!(day["created"][0]["episodes_per_task"], 8);
-    assert_eq!(day["created"][0]["profile"], "ideal");
-    assert_eq!(day["existing"][0]["team_name"], "Alpha");
-    assert_eq!(
-        day["existing"][0]["episodes_per_task"], 4,
-        "what runs already stays as it is"
-    );
+    for (evaluation, name) in day["created"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip(["Alpha", "Beta"])
+    {
+        assert_eq!(evaluation["team_name"], name);
+        assert_eq!(evaluation["episodes_per_task"], 8);
+        assert_eq!(evaluation["profile"], "ideal");
+    }
     assert_eq!(day["without_submission"][0]["name"], "Gamma");
 
-    let again = site
-        .request(Method::POST, "/api/v1/days", Some(ADMIN))
-        .send()
-        .await
-        .unwrap();
-    let again = Answer::of(again).await.json(200);
-    assert_eq!(again["created"], json!([]), "a body may be left out");
-    assert_eq!(again["existing"].as_array().unwrap().len(), 2);
+    // However often, with whatever body, and whoever has something to play now.
+    site.valid_submission(&gamma, "g").await;
+    site.later(3600);
+    for again in [Some(&body), None] {
+        let mut request = site.request(Method::POST, "/api/v1/days", Some(ADMIN));
+        if let Some(body) = again {
+            request = request.json(body);
+        }
+        let again = Answer::of(request.send().await.unwrap()).await;
+        let problem = again.problem(
+            409,
+            "day-has-cut",
+            &[
+                "2026-03-01 10:00:00 UTC",
+                "nothing was started",
+                "2026-03-02",
+            ],
+        );
+        assert_eq!(problem["day"], "2026-03-01");
+        assert_eq!(
+            problem["next_cut"],
+            json!({ "day": "2026-03-02", "at": null })
+        );
+    }
     let today = site.get("/api/v1/evaluations", Some(ADMIN)).await.json(200);
     assert_eq!(today.as_array().unwrap().len(), 2);
     let before = site
@@ -42,6 +59,50 @@ async fn starting_the_day_is_idempotent_and_names_who_is_left_out() {
         .await
         .json(200);
     assert_eq!(before, json!([]));
+    site.next_day();
+    let next = site.post("/api/v1/days", Some(ADMIN), &json!({})).await;
+    assert_eq!(next.json(200)["created"].as_array().unwrap().len(), 3);
+}
+
+#[tokio::test]
+async fn the_next_cut_is_the_schedules_where_there_is_one() {
+    let site = Site::start_daily("12:00").await;
+    let team = site.team("Alpha").await;
+    site.valid_submission(&team, "a").await;
+    let next_cut = async || {
+        let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
+        let season = site.get("/api/v1/season", None).await.json(200);
+        assert_eq!(me["next_cut"], season["next_cut"]);
+        me["next_cut"]["at"].clone()
+    };
+    assert_eq!(next_cut().await, "2026-03-01T12:00:00Z");
+    // By hand, before the schedule would: the schedule's cut is the next day's.
+    site.post("/api/v1/days", Some(ADMIN), &json!({}))
+        .await
+        .json(200);
+    assert_eq!(next_cut().await, "2026-03-02T12:00:00Z");
+    site.post("/api/v1/days", Some(ADMIN), &json!({}))
+        .await
+        .problem(409, "day-has-cut", &["2026-03-02 at 12:00 UTC"]);
+}
+
+#[tokio::test]
+async fn a_day_without_anything_to_play_keeps_its_cut() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    site.post("/api/v1/days", Some(ADMIN), &json!({}))
+        .await
+        .problem(
+            409,
+            "conflict",
+            &["no team has a valid submission", "still has its cut"],
+        );
+    let season = site.get("/api/v1/season", None).await.json(200);
+    assert_eq!(season["days"], json!([]));
+    site.valid_submission(&team, "a").await;
+    site.post("/api/v1/days", Some(ADMIN), &json!({}))
+        .await
+        .json(200);
 }
 
 #[tokio::test]

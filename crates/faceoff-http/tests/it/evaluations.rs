@@ -42,9 +42,9 @@ async fn an_evaluation_is_followed_from_the_queue_to_the_dataset() {
         finished["progress"],
         json!({ "episodes_done": 12, "episodes_total": 12 })
     );
-    let mut published = serde_json::to_value(&score).unwrap();
-    published["seed"] = json!(null); // until the dataset is handed out
-    assert_eq!(finished["result"], published);
+    let published = serde_json::to_value(&score).unwrap();
+    assert_eq!(finished["result"], published, "it was the day's last");
+    assert_eq!(finished["released_at"], "2026-03-01T10:00:00Z");
     assert_eq!(finished["dataset"], format!("{path}/dataset"));
     let hash = blake3::hash(b"PK the recorded dataset").to_string();
     assert_eq!(finished["dataset_blake3"], hash);
@@ -66,21 +66,26 @@ async fn an_evaluation_is_followed_from_the_queue_to_the_dataset() {
 }
 
 #[tokio::test]
-async fn a_second_run_on_the_same_day_is_refused_with_the_next_turn() {
+async fn nobody_starts_a_single_evaluation() {
     let site = Site::start().await;
-    let team = site.team("Alpha").await;
+    let (team, other) = (site.team("Alpha").await, site.team("Beta").await);
     let submission = site.valid_submission(&team, "striker").await;
+    let start = format!("{submission}/evaluations");
+    let missing = "/api/v1/submissions/none/evaluations".to_owned();
+    for path in [&start, &missing] {
+        for token in [&*team.token, &other.token, ADMIN, "fo_team_wrong"] {
+            site.post(path, Some(token), &json!({})).await.problem(
+                410,
+                "gone",
+                &["one cut", "/activate"],
+            );
+        }
+    }
+    assert_eq!(
+        site.get("/api/v1/evaluations", Some(ADMIN)).await.json(200),
+        json!([])
+    );
     site.evaluate(&team, &submission).await;
-    let again = format!("{submission}/evaluations");
-    let problem = site
-        .post(&again, Some(&team.token), &json!({}))
-        .await
-        .problem(
-            409,
-            "already-evaluated",
-            &["2026-03-01", "once per UTC day", "2026-03-02"],
-        );
-    assert_eq!(problem["next_turn"], "2026-03-02");
     site.next_day();
     site.evaluate(&team, &submission).await;
     let own = site
@@ -93,25 +98,6 @@ async fn a_second_run_on_the_same_day_is_refused_with_the_next_turn() {
         .await
         .json(200);
     assert_eq!(first.as_array().unwrap().len(), 1);
-}
-
-#[tokio::test]
-async fn a_submission_still_in_its_smoke_run_is_told_to_wait() {
-    let site = Site::start().await;
-    let team = site.team("Alpha").await;
-    let id = text(
-        &site
-            .upload(&team.token, crate::site::GZIP.to_vec())
-            .await
-            .json(201)["id"],
-    );
-    site.post(
-        &format!("/api/v1/submissions/{id}/evaluations"),
-        Some(&team.token),
-        &json!({}),
-    )
-    .await
-    .problem(409, "conflict", &["wait"]);
 }
 
 #[tokio::test]
@@ -142,7 +128,7 @@ async fn an_agent_that_failed_sees_every_fault_and_its_log() {
     let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
     assert_eq!(
         me["turn"]["evaluation"], failed["id"],
-        "the agent's own failure uses the turn"
+        "the agent's own failure counts"
     );
 
     let page = site.get(&path.replace("/api/v1", ""), None).await;
@@ -152,7 +138,7 @@ async fn an_agent_that_failed_sees_every_fault_and_its_log() {
 }
 
 #[tokio::test]
-async fn a_cancelled_evaluation_tells_why_and_gives_the_turn_back() {
+async fn a_cancelled_evaluation_tells_why_and_is_played_again_when_the_organiser_says_so() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
     let submission = site.valid_submission(&team, "striker").await;
@@ -174,7 +160,30 @@ async fn a_cancelled_evaluation_tells_why_and_gives_the_turn_back() {
         .problem(409, "conflict", &["over already"]);
     let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
     assert_eq!(me["turn"]["evaluation"], json!(null));
-    site.evaluate(&team, &submission).await;
+
+    let rerun = format!("{path}/rerun");
+    site.post(&rerun, Some(&team.token), &json!({}))
+        .await
+        .problem(403, "forbidden", &[]);
+    let again = site.post(&rerun, Some(ADMIN), &json!({})).await;
+    let again_path = again.header("location").to_owned();
+    let again = again.json(201);
+    assert_eq!(again["rerun_of"], cancelled["id"]);
+    for field in ["submission", "day", "episodes_per_task", "profile"] {
+        assert_eq!(again[field], cancelled[field], "{field}");
+    }
+    for path in [&rerun, &format!("{again_path}/rerun")] {
+        site.post(path, Some(ADMIN), &json!({}))
+            .await
+            .problem(409, "conflict", &[]);
+    }
+    let missing = "/api/v1/evaluations/01890000-0000-7000-8000-000000000000/rerun";
+    site.post(missing, Some(ADMIN), &json!({}))
+        .await
+        .problem(404, "not-found", &[]);
+    site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
+    let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
+    assert_eq!(me["turn"]["evaluation"], again["id"]);
 }
 
 #[tokio::test]

@@ -46,6 +46,9 @@ async fn closing_the_season_reveals_the_secret_and_ends_it_for_good() {
     };
     assert_eq!(season["days"][0]["day"], "2026-03-01");
     assert_eq!(season["days"][0]["finished"], 1);
+    assert_eq!(season["days"][0]["cut_at"], "2026-03-01T10:00:00Z");
+    assert_eq!(season["days"][0]["released_at"], "2026-03-01T10:00:00Z");
+    assert_eq!(season["next_cut"], json!(null));
     assert_eq!(season["days"][0]["seed"], child("day", "2026-03-01"));
     assert_eq!(season["mismatch_seed"], child("model_mismatch", ""));
 
@@ -60,8 +63,8 @@ async fn closing_the_season_reveals_the_secret_and_ends_it_for_good() {
         .await
         .problem(409, "season-closed", &over);
     site.next_day();
-    let again = format!("{submission}/evaluations");
-    site.post(&again, Some(&team.token), &json!({}))
+    let choice = format!("{submission}/activate");
+    site.post(&choice, Some(&team.token), &json!({}))
         .await
         .problem(409, "season-closed", &over);
     // What was reached stays.
@@ -78,8 +81,11 @@ async fn closing_the_season_reveals_the_secret_and_ends_it_for_good() {
 #[tokio::test]
 async fn the_seasons_page_tells_a_sceptic_how_to_check() {
     let site = Site::start().await;
-    site.ranked_team("Alpha", &result([0.5, 0.6, 0.7], 100.0))
-        .await;
+    let (early, late) = (site.team("Early").await, site.team("Late").await);
+    let submission = site.valid_submission(&early, "e").await;
+    site.valid_submission(&late, "l").await;
+    site.evaluate(&early, &submission).await;
+    site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
     let season: Value = site.get("/api/v1/season", None).await.json(200);
     let commitment = text(&season["commitment"]);
     let page = |body: &str| {
@@ -100,6 +106,7 @@ async fn the_seasons_page_tells_a_sceptic_how_to_check() {
     ] {
         assert!(open.body.contains(part), "{part:?} is not in {}", open.body);
     }
+    site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
     site.post(CLOSE, Some(ADMIN), &json!({ "confirm": "Test season" }))
         .await
         .json(200);

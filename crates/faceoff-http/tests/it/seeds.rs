@@ -1,6 +1,7 @@
 //! Nobody learns a day's seed while it could help: the one rule, over HTTP.
 
 use crate::site::{ADMIN, Site, TestTeam, result};
+use reqwest::Method;
 use serde_json::{Value, json};
 
 /// Everything that a visitor or the team itself can read.
@@ -27,16 +28,33 @@ async fn shown(site: &Site, team: &TestTeam, evaluation: &str) -> String {
     all
 }
 
+/// Asks for a dataset in every way; the statuses.
+async fn asked_for(site: &Site, dataset: &str, token: &str) -> [u16; 3] {
+    let ask = async |method: Method, range: bool| {
+        let mut request = site.request(method, dataset, Some(token));
+        if range {
+            request = request.header("range", "bytes=0-0");
+        }
+        request.send().await.unwrap().status().as_u16()
+    };
+    [
+        ask(Method::HEAD, false).await,
+        ask(Method::GET, false).await,
+        ask(Method::GET, true).await,
+    ]
+}
+
 #[tokio::test]
-async fn a_team_that_finishes_early_learns_no_seed_while_others_play() {
+async fn a_team_that_finishes_early_learns_nothing_of_the_episodes_while_others_play() {
     let site = Site::start().await;
-    let (first, second) = (site.team("First").await, site.team("Second").await);
+    let teams = [site.team("First").await, site.team("Second").await];
     let submissions = [
-        site.valid_submission(&first, "f").await,
-        site.valid_submission(&second, "s").await,
+        site.valid_submission(&teams[0], "f").await,
+        site.valid_submission(&teams[1], "s").await,
     ];
-    let early = site.evaluate(&first, &submissions[0]).await;
-    let other = site.evaluate(&second, &submissions[1]).await;
+    let [first, second] = &teams;
+    let early = site.evaluate(first, &submissions[0]).await;
+    let other = site.evaluate(second, &submissions[1]).await;
     let secret = site.store.season().await.unwrap().secret;
     let today = jiff::civil::date(2026, 3, 1);
     let seed = secret.day(today);
@@ -52,80 +70,115 @@ async fn a_team_that_finishes_early_learns_no_seed_while_others_play() {
             let problem = refused.problem(409, "not-yet", &["1 evaluations of 2026-03-01"]);
             assert_eq!(problem["under_way"], 1);
             assert_eq!(refused.header("retry-after"), "30");
+            assert_eq!(asked_for(&site, &dataset, token).await, [409; 3]);
         }
-        assert!(
-            !shown(&site, &first, &early)
-                .await
-                .contains(&seed.to_string())
-        );
+        let shown = shown(&site, first, &early).await;
+        for part in [
+            seed.to_string().as_str(),
+            "computation_time_s",
+            "violations\"",
+            "host_noise_reruns",
+        ] {
+            assert!(!shown.contains(part), "{part}");
+        }
         let (claim, ..) = site.claim_shard().await;
         site.store.release(&claim, site.now()).await.unwrap();
     }
     site.finish(&score).await;
-    // Looking at pages releases nothing: a dataset does.
-    assert!(
-        !shown(&site, &first, &early)
-            .await
-            .contains(&seed.to_string())
-    );
-    assert_eq!(site.get(&dataset, Some(&first.token)).await.status, 200);
+    // Released by its end, not by a request.
     let finished = site.get(&early, Some(&first.token)).await.json(200);
     assert_eq!(finished["result"]["seed"], seed.to_string());
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(board["rows"][0]["seed"], seed.to_string());
+    assert_eq!(asked_for(&site, &dataset, &first.token).await, [200; 3]);
+    let compare = format!("{early}/compare/{}", other.rsplit('/').next().unwrap());
+    assert_eq!(site.get(&compare, None).await.status, 200);
 
-    // An agent that is uploaded now could know the episodes.
+    // What is uploaded now could know the episodes: it plays the next day, with other seeds.
     let late = site.team("Late").await;
     let submission = site.valid_submission(&late, "l").await;
-    let evaluations = format!("{submission}/evaluations");
-    let problem = site
-        .post(&evaluations, Some(&late.token), &json!({}))
+    site.post("/api/v1/days", Some(ADMIN), &json!({}))
         .await
-        .problem(
-            409,
-            "day-released",
-            &["2026-03-01", "10:00:00 UTC", "2026-03-02"],
-        );
-    assert_eq!(problem["next_turn"], "2026-03-02");
-    let day = site
-        .post("/api/v1/days", Some(ADMIN), &json!({}))
-        .await
-        .json(200);
-    assert_eq!(day["created"], json!([]));
-    assert_eq!(day["without_submission"][0]["name"], "Late");
-
+        .problem(409, "day-has-cut", &["2026-03-02"]);
     site.next_day();
     site.evaluate(&late, &submission).await;
     let tomorrow = secret.day(today.tomorrow().unwrap()).to_string();
-    assert!(!shown(&site, &first, &early).await.contains(&tomorrow));
+    assert!(!shown(&site, first, &early).await.contains(&tomorrow));
     // Yesterday's dataset stays free while today's evaluations run.
-    assert_eq!(site.get(&dataset, Some(&first.token)).await.status, 200);
-    let _ = other;
+    assert_eq!(asked_for(&site, &dataset, &first.token).await, [200; 3]);
 }
 
 #[tokio::test]
-async fn what_was_uploaded_before_the_release_still_has_its_turn() {
+async fn faults_log_and_comparison_come_out_with_the_day() {
     let site = Site::start().await;
-    let (first, second) = (site.team("First").await, site.team("Second").await);
-    let submission = site.valid_submission(&first, "f").await;
-    // The clock of the test stands still: one second between upload and release.
-    let waiting = site.valid_submission(&second, "s").await;
-    let early = site.evaluate(&first, &submission).await;
+    let mut paths = Vec::new();
+    let teams = [
+        site.team("Failing").await,
+        site.team("Early").await,
+        site.team("Late").await,
+    ];
+    let mut submissions = Vec::new();
+    for team in &teams {
+        submissions.push(site.valid_submission(team, "agent").await);
+    }
+    for (team, submission) in teams.iter().zip(&submissions) {
+        paths.push(site.evaluate(team, submission).await);
+    }
+    let [failing, early, late] = &paths[..] else {
+        panic!("three evaluations")
+    };
+    site.play_shards(2).await;
     site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
-    site.later(1);
-    let dataset = format!("{early}/dataset");
-    assert_eq!(site.get(&dataset, Some(&first.token)).await.status, 200);
-    site.later(1);
-    let path = site.evaluate(&second, &waiting).await;
-    // What is released is released.
-    assert_eq!(site.get(&dataset, Some(&first.token)).await.status, 200);
+    let compare = format!("{early}/compare/{}", late.rsplit('/').next().unwrap());
+    for token in [&*teams[0].token, ADMIN] {
+        let failed = site.get(failing, Some(token)).await;
+        assert!(!failed.body.contains("log of hit") && !failed.body.contains("\"act\""));
+        let failed = failed.json(200);
+        assert_eq!(failed["state"], "agent_failed");
+        assert_eq!(failed["released_at"], json!(null));
+        assert!(failed.get("faults").is_none() && failed.get("log").is_none());
+    }
     site.finish(&result([0.1, 0.1, 0.1], 0.0)).await;
-    assert_eq!(
-        site.get(&format!("{path}/dataset"), Some(&second.token))
-            .await
-            .status,
-        200
+    let failed = site.get(failing, Some(&teams[0].token)).await.json(200);
+    assert_eq!(failed["faults"][0]["line"], "{\"type\":\"act\"}");
+    assert!(failed["log"].as_str().unwrap().contains("log of hit"));
+    assert_eq!(site.get(&compare, None).await.status, 200);
+}
+
+#[tokio::test]
+async fn two_that_are_finished_are_not_compared_while_a_third_plays() {
+    let site = Site::start().await;
+    let mut paths = Vec::new();
+    let teams = [
+        site.team("A").await,
+        site.team("B").await,
+        site.team("C").await,
+    ];
+    let mut submissions = Vec::new();
+    for team in &teams {
+        submissions.push(site.valid_submission(team, "agent").await);
+    }
+    for (team, submission) in teams.iter().zip(&submissions) {
+        paths.push(site.evaluate(team, submission).await);
+    }
+    for _ in 0..2 {
+        site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
+    }
+    let compare = format!(
+        "{}/compare/{}",
+        paths[0],
+        paths[1].rsplit('/').next().unwrap()
     );
+    site.get(&compare, None)
+        .await
+        .problem(409, "not-yet", &["1 evaluations of 2026-03-01"]);
+    let page = site.get(&paths[0].replace("/api/v1", ""), None).await;
+    assert!(!page.body.contains("/compare/"), "{}", page.body);
+    // The organiser gives up on the third: that is the end of the day.
+    let cancel = format!("{}/cancel", paths[2]);
+    let reason = json!({ "reason": "it hangs" });
+    site.post(&cancel, Some(ADMIN), &reason).await.json(200);
+    assert_eq!(site.get(&compare, None).await.status, 200);
 }
 
 #[tokio::test]

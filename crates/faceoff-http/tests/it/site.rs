@@ -8,6 +8,7 @@ use jiff::{SignedDuration, Timestamp};
 use reqwest::{Method, RequestBuilder, Response, StatusCode};
 use serde_json::{Value, json};
 use std::{
+    collections::BTreeMap,
     sync::{Arc, Mutex},
     time::Duration,
 };
@@ -109,7 +110,16 @@ impl Site {
         Self::start_with(patient()).await
     }
 
+    /// With a schedule, as far as the web side shows it.
+    pub async fn start_daily(at: &str) -> Self {
+        Self::configured(patient(), Some(at.parse().unwrap())).await
+    }
+
     pub async fn start_with(limits: HttpLimits) -> Self {
+        Self::configured(limits, None).await
+    }
+
+    async fn configured(limits: HttpLimits, daily_at: Option<jiff::civil::Time>) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let upload_dir = folder.path().join("uploads");
         std::fs::create_dir(&upload_dir).unwrap();
@@ -132,7 +142,7 @@ impl Site {
             },
             admin_token_hash: hash_token(ADMIN),
             upload_dir,
-            daily_at: None,
+            daily_at,
             clock: Clock::new(move || *clock.lock().unwrap()),
             limits,
         };
@@ -279,14 +289,22 @@ impl Site {
         self.publish(&claim, evaluation, result).await;
     }
 
-    /// Uses the team's turn of today; the evaluation's path in the API.
+    /// Starts the day with what all teams have active, unless that was done; the path in the API of the
+    /// team's evaluation, which plays this submission.
     pub async fn evaluate(&self, team: &TestTeam, submission: &str) -> String {
-        let path = format!("{submission}/evaluations");
-        let evaluation = self
-            .post(&path, Some(&team.token), &json!({}))
+        let plan = &self.config.plan;
+        match self
+            .store
+            .start_day(Actor::Organiser, plan, self.now())
             .await
-            .json(201);
-        format!("/api/v1/evaluations/{}", text(&evaluation["id"]))
+        {
+            Ok(_) | Err(StoreError::DayHasCut { .. }) => {}
+            Err(error) => panic!("{error}"),
+        }
+        let of_team = self.store.evaluations_of(team.id.parse().unwrap()).await;
+        let newest = &of_team.unwrap()[0];
+        assert!(submission.ends_with(&newest.submission.to_string()));
+        format!("/api/v1/evaluations/{}", newest.id)
     }
 
     /// Plays the evaluation that comes next, episode by episode as `played` says, and scores it by the
@@ -358,39 +376,52 @@ impl Site {
             .unwrap();
     }
 
-    /// A team whose agent played `episodes` of each task as `played` says; the evaluation's id.
-    pub async fn played_team(
+    /// A day of `episodes` of each task on which these new teams' agents played as the functions say, and
+    /// those of older teams as the first one; the new teams' evaluations.
+    pub async fn played_day<const N: usize>(
         &self,
-        name: &str,
         episodes: u32,
-        played: impl Fn(Task, u32) -> EpisodeOutcome,
-    ) -> EvaluationId {
-        let team = self.team(name).await;
-        let submission = self.valid_submission(&team, name).await;
-        let submission = submission.rsplit('/').next().unwrap().parse().unwrap();
+        teams: [(&str, Played<'_>); N],
+    ) -> [EvaluationId; N] {
+        for (name, _) in &teams {
+            let team = self.team(name).await;
+            self.valid_submission(&team, name).await;
+        }
         let plan = RunPlan {
-            profile: Profile::Evaluation,
-            tasks: Task::ALL.to_vec(),
             episodes_per_task: episodes,
             episodes_per_shard: 50,
             max_faults: 0,
+            ..self.config.plan.clone()
         };
-        self.store
-            .create_evaluation(Actor::Organiser, submission, &plan, self.now())
-            .await
-            .unwrap();
-        self.finish_as(played).await
+        let started = self.store.start_day(Actor::Organiser, &plan, self.now());
+        let started = started.await.unwrap();
+        let mut by_name = BTreeMap::new();
+        for evaluation in &started {
+            let name = self.store.team(evaluation.team).await.unwrap().name;
+            let of_team = teams.iter().find(|(new, _)| *new == name.as_str());
+            let (_, played) = of_team.unwrap_or(&teams[0]);
+            assert_eq!(self.finish_as(played).await, evaluation.id);
+            by_name.insert(name.to_string(), evaluation.id);
+        }
+        teams.map(|(name, _)| by_name[name])
     }
 
-    /// A team on the board.
-    pub async fn ranked_team(&self, name: &str, result: &EvaluationResult) -> TestTeam {
-        let team = self.team(name).await;
-        let submission = self.valid_submission(&team, &format!("{name}-agent")).await;
-        self.evaluate(&team, &submission).await;
-        self.finish(result).await;
-        team
+    /// A day of new teams with these scores.
+    pub async fn ranked_teams(&self, teams: &[(&str, EvaluationResult)]) {
+        for (name, _) in teams {
+            let team = self.team(name).await;
+            self.valid_submission(&team, &format!("{name}-agent")).await;
+        }
+        let started = self.post("/api/v1/days", Some(ADMIN), &json!({})).await;
+        started.json(200);
+        for (_, result) in teams {
+            self.finish(result).await;
+        }
     }
 }
+
+/// How an agent played.
+pub type Played<'a> = &'a dyn Fn(Task, u32) -> EpisodeOutcome;
 
 async fn serve(store: &Store, config: &HttpConfig) -> (String, JoinHandle<()>) {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();

@@ -94,13 +94,61 @@ async fn an_invalid_bundle_shows_its_reason_and_its_log() {
         "no answer within the start-up limit of 120 s"
     );
     assert_eq!(submission["log"], "ImportError: torch\n");
-    site.post(
-        &format!("{path}/evaluations"),
-        Some(&team.token),
-        &json!({}),
-    )
-    .await
-    .problem(409, "conflict", &["invalid", "upload"]);
+    site.post(&format!("{path}/activate"), Some(&team.token), &json!({}))
+        .await
+        .problem(409, "conflict", &["invalid", "upload"]);
+}
+
+#[tokio::test]
+async fn the_newest_valid_upload_is_active_until_the_team_chooses() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let token = Some(team.token.as_str());
+    let active = async || {
+        let list = site.get("/api/v1/submissions", token).await.json(200);
+        let list = list.as_array().unwrap().clone();
+        let active: Vec<_> = list.iter().filter(|one| one["active"] == true).collect();
+        let [one] = active[..] else {
+            panic!("one is active: {list:#?}")
+        };
+        let me = site.get("/api/v1/me", token).await.json(200);
+        assert_eq!(me["active_submission"], one["id"]);
+        format!("/api/v1/submissions/{}", text(&one["id"]))
+    };
+    let first = site.valid_submission(&team, "first").await;
+    assert_eq!(active().await, first);
+    site.later(1);
+    let waiting = text(&site.upload(&team.token, GZIP.to_vec()).await.json(201)["id"]);
+    let activate = format!("/api/v1/submissions/{waiting}/activate");
+    site.post(&activate, token, &json!({}))
+        .await
+        .problem(409, "conflict", &["wait"]);
+    assert_eq!(active().await, first);
+    let outcome = SmokeOutcome::Valid {
+        agent_name: "second".into(),
+        log: String::new(),
+    };
+    site.smoke(outcome).await;
+    assert!(active().await.ends_with(&waiting));
+
+    site.later(1);
+    let chosen = site
+        .post(&format!("{first}/activate"), token, &json!({}))
+        .await;
+    assert_eq!(chosen.json(200)["active"], true);
+    assert_eq!(active().await, first);
+    let evaluation = site.evaluate(&team, &first).await;
+    // A choice after the cut is one for the next.
+    site.later(1);
+    site.post(&activate, token, &json!({})).await.json(200);
+    let playing = site.get(&evaluation, token).await.json(200);
+    assert!(first.ends_with(&text(&playing["submission"])));
+    site.later(1);
+    let third = site.valid_submission(&team, "third").await;
+    assert_eq!(active().await, third);
+    site.post(&format!("{first}/activate"), Some(ADMIN), &json!({}))
+        .await
+        .problem(403, "forbidden", &[]);
 }
 
 #[tokio::test]
@@ -226,13 +274,9 @@ async fn another_teams_submission_looks_like_none() {
         .await;
     foreign.problem(404, "not-found", &["submission"]);
     assert_eq!(foreign.body, missing.body);
-    site.post(
-        &format!("{path}/evaluations"),
-        Some(&other.token),
-        &json!({}),
-    )
-    .await
-    .problem(404, "not-found", &[]);
+    site.post(&format!("{path}/activate"), Some(&other.token), &json!({}))
+        .await
+        .problem(404, "not-found", &[]);
     assert_eq!(
         site.get("/api/v1/submissions", Some(&other.token))
             .await

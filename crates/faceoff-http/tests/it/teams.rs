@@ -36,6 +36,8 @@ async fn the_token_opens_the_teams_own_page() {
         me["turn"],
         json!({ "day": "2026-03-01", "evaluation": null })
     );
+    assert_eq!(me["active_submission"], json!(null));
+    assert_eq!(me["next_cut"], json!({ "day": "2026-03-01", "at": null }));
     assert_eq!(me["max_bundle_bytes"], crate::site::MAX_BUNDLE);
 }
 

@@ -10,8 +10,8 @@ use faceoff_types::EvaluationId;
 use jiff::Timestamp;
 
 impl Store {
-    /// Stops an evaluation that is not over and gives the day's turn back. Workers that play its
-    /// shards learn of it at their next heartbeat.
+    /// Stops an evaluation that is not over. Workers that play its shards learn of it at their next
+    /// heartbeat. If it was the last of its day, that is released.
     pub async fn cancel_evaluation(
         &self,
         actor: Actor,

@@ -1,10 +1,10 @@
 //! What it means for their owners that runs begin and end, and what else ends an evaluation.
 
 use crate::{
-    error::Result,
+    error::{Result, StoreError},
     event::{Event, Subject},
     operations::{
-        purpose,
+        purpose, release_day, rerun,
         runs::{self, RunOwner},
     },
     queue,
@@ -79,7 +79,8 @@ async fn queue_finalisation(tx: &mut Tx, id: EvaluationId) -> Result<()> {
     Ok(())
 }
 
-/// Ends an evaluation without a score, whether its run was over or not.
+/// Ends an evaluation without a score, whether its run was over or not. What we broke is played again,
+/// a bounded number of times.
 pub(crate) async fn fail_evaluation(
     tx: &mut Tx,
     id: EvaluationId,
@@ -101,7 +102,21 @@ pub(crate) async fn fail_evaluation(
         },
     };
     tx.record(Subject::Evaluation(id), event);
-    Ok(())
+    if let Failure::Platform(_) = failure {
+        unless_damaged(id, rerun::after_our_fault(tx, id).await)?;
+    }
+    unless_damaged(id, release_day::if_over(tx, id).await)
+}
+
+/// What is damaged is not played again and ends no day, but it must end: it would hold up the queue.
+fn unless_damaged(id: EvaluationId, done: Result<()>) -> Result<()> {
+    match done {
+        Err(StoreError::Damaged(what)) => {
+            tracing::error!(evaluation = %id, what, "a damaged evaluation has ended");
+            Ok(())
+        }
+        done => done,
+    }
 }
 
 async fn finish_ablation_if_played(tx: &mut Tx, id: AblationId) -> Result<()> {

@@ -4,6 +4,7 @@ use crate::{
     operations::{
         commit::{Committed, other_work},
         purpose::Purpose,
+        release_day,
     },
     queue::Claim,
     store::Store,
@@ -14,7 +15,8 @@ use jiff::Timestamp;
 
 impl Store {
     /// Stores the score, the dataset's artifact key with the BLAKE3 of its archive (64 hexadecimal
-    /// digits), and the end in one transaction. Idempotent, as [`Store::commit_shard`] is. After
+    /// digits), and the end in one transaction, with the release of the day if this was its last
+    /// evaluation. Idempotent, as [`Store::commit_shard`] is. After
     /// [`StoreError::Database`](crate::StoreError::Database) the dataset may be the evaluation's: leave it.
     pub async fn finish_evaluation(
         &self,
@@ -34,7 +36,7 @@ impl Store {
                 dataset_blake3: dataset_blake3.to_owned(),
             };
             tx.record(Subject::Evaluation(id), event);
-            Ok(())
+            release_day::if_over(tx, id).await
         })
         .await
     }

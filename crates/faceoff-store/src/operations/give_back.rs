@@ -63,9 +63,9 @@ pub(crate) async fn give_up(tx: &mut Tx, unit: Uuid, label: &str, reason: &str) 
 impl Store {
     /// Our fault: the unit goes back to the queue after a growing pause. After [`MAX_ATTEMPTS`]
     /// failures the evaluation ends as
-    /// [`PlatformFailed`](crate::EvaluationState::PlatformFailed) and the team's turn is given back;
-    /// a smoke run ends as [`ValidationError`](crate::SubmissionState::ValidationError), an ablation
-    /// without a result. Of a lost lease nothing is recorded.
+    /// [`PlatformFailed`](crate::EvaluationState::PlatformFailed) and is played again, for some times
+    /// ([`RERUN_PAUSES_S`](crate::RERUN_PAUSES_S)); a smoke run ends as
+    /// [`ValidationError`](crate::SubmissionState::ValidationError), an ablation without a result. Of a lost lease nothing is recorded.
     pub async fn release_failed(&self, claim: &Claim, reason: &str, now: Timestamp) -> Result<()> {
         let actor = Actor::Worker(claim.worker.clone());
         self.write(actor, now, async |tx| {

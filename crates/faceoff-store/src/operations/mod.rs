@@ -1,16 +1,19 @@
 //! What people and workers do: transactions over the tables and the queue, each with its events.
 
+mod activate;
 pub(crate) mod cancel;
 pub(crate) mod claim;
 pub(crate) mod commit;
 pub(crate) mod ends;
+mod enter;
 mod finish;
 pub(crate) mod give_back;
 mod heartbeat;
 mod open;
 mod order_ablation;
 pub(crate) mod purpose;
-pub(crate) mod release_day;
+mod release_day;
+pub(crate) mod rerun;
 pub(crate) mod runs;
 mod season;
 pub(crate) mod smoke;

@@ -34,6 +34,7 @@ impl Kind {
         NewUnit {
             kind: self.label(),
             urgency,
+            rest_s: 0,
         }
     }
 }

@@ -7,13 +7,17 @@ use crate::{
     },
     queue::Claim,
     store::Store,
-    tables::submissions,
+    tables::{
+        active_submissions,
+        submissions::{self, Submission},
+    },
 };
 use faceoff_types::SmokeOutcome;
 use jiff::Timestamp;
 
 impl Store {
-    /// Stores what a smoke run found. Idempotent, as [`Store::commit_shard`] is.
+    /// Stores what a smoke run found. The newest upload that is valid becomes its team's active one,
+    /// unless the team has chosen one since it was uploaded. Idempotent, as [`Store::commit_shard`] is.
     pub async fn commit_smoke(
         &self,
         claim: &Claim,
@@ -24,14 +28,21 @@ impl Store {
             let Purpose::Smoke(id) = purpose else {
                 return Err(other_work("smoke run", &purpose));
             };
-            let event = match outcome {
+            let subject = Subject::Submission(id);
+            match outcome {
                 SmokeOutcome::Valid {
                     agent_name,
                     timing,
                     log,
                 } => {
                     submissions::set_valid(tx, id, &agent_name, &timing, &log).await?;
-                    Event::SubmissionValid { agent_name }
+                    tx.record(subject, Event::SubmissionValid { agent_name });
+                    let Submission {
+                        team, created_at, ..
+                    } = submissions::find(tx, id).await?;
+                    if active_submissions::put_newest(tx, team, id, created_at).await? {
+                        tx.record(subject, Event::SubmissionActivated);
+                    }
                 }
                 SmokeOutcome::Invalid {
                     agent_name,
@@ -41,10 +52,9 @@ impl Store {
                 } => {
                     submissions::set_invalid(tx, id, agent_name.as_deref(), &reason, &timing, &log)
                         .await?;
-                    Event::SubmissionInvalid { reason }
+                    tx.record(subject, Event::SubmissionInvalid { reason });
                 }
-            };
-            tx.record(Subject::Submission(id), event);
+            }
             Ok(())
         })
         .await

@@ -9,18 +9,20 @@ pub(crate) struct NewUnit {
     pub(crate) kind: &'static str,
     /// The smaller is claimed first; among equals the one queued first.
     pub(crate) urgency: u32,
+    /// How long it rests before it can be claimed, seconds.
+    pub(crate) rest_s: u32,
 }
 
-/// Queues a unit, claimable at once.
+/// Queues a unit, claimable after its rest.
 pub(crate) async fn insert(tx: &mut Tx, unit: NewUnit) -> Result<Uuid> {
     let id = Uuid::now_v7();
-    let (id_text, now) = (Text(id), Instant(tx.now));
+    let (id_text, from) = (Text(id), Instant(after(tx.now, unit.rest_s)));
     sqlx::query!(
         "INSERT INTO units (id, kind, urgency, state, claimable_at) VALUES (?, ?, ?, 'queued', ?)",
         id_text,
         unit.kind,
         unit.urgency,
-        now,
+        from,
     )
     .execute(&mut **tx)
     .await?;

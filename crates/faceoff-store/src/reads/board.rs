@@ -25,6 +25,8 @@ pub struct BoardRecord {
     pub run: RunId,
     /// The UTC day of the evaluation.
     pub day: Date,
+    /// When the day was released; `None` before.
+    pub released_at: Option<Timestamp>,
     /// When it was scored.
     pub finished_at: Timestamp,
     /// The score.
@@ -41,12 +43,14 @@ impl Store {
                       s.id AS "submission: Text<SubmissionId>",
                       s.created_at AS "submitted_at: Instant", s.agent_name,
                       e.id AS "evaluation: Text<EvaluationId>", e.run_id AS "run: Text<RunId>",
-                      e.day AS "day: Text<Date>", e.finished_at AS "finished_at!: Instant",
+                      e.day AS "day: Text<Date>", d.released_at AS "released_at: Instant",
+                      e.finished_at AS "finished_at!: Instant",
                       e.result AS "result!: Json<EvaluationResult>"
                FROM teams t
                JOIN evaluations e ON e.rowid = (SELECT n.rowid FROM evaluations n
                                                 WHERE n.team_id = t.id AND n.state = 'finished'
                                                 ORDER BY n.day DESC LIMIT 1)
+               LEFT JOIN days d ON d.day = e.day
                JOIN submissions s ON s.id = e.submission_id
                ORDER BY t.name"#
         )
@@ -66,6 +70,7 @@ impl Store {
                 evaluation: row.evaluation.0,
                 run: row.run.0,
                 day: row.day.0,
+                released_at: row.released_at.map(|at| at.0),
                 finished_at: row.finished_at.0,
                 result: row.result.0,
             })

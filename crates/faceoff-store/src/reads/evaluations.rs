@@ -56,9 +56,4 @@ impl Store {
         let rows = evaluations::on_day(&mut tx, day).await?;
         with_progress(&mut tx, rows).await
     }
-
-    /// The days that have evaluations, the newest first, each with how many of them are finished.
-    pub async fn days(&self) -> Result<Vec<(Date, u32)>> {
-        evaluations::days(&mut *self.database.read.acquire().await?).await
-    }
 }

@@ -2,6 +2,7 @@
 
 pub(crate) mod ablations;
 pub(crate) mod board;
+mod days;
 pub(crate) mod evaluations;
 mod events;
 pub(crate) mod progress;

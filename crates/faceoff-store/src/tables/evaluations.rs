@@ -7,17 +7,21 @@ use faceoff_types::{EvaluationId, EvaluationResult, Profile, RunId, SubmissionId
 use jiff::{Timestamp, civil::Date};
 use sqlx::{SqliteConnection, types::Text};
 
-/// A submission's run that counts: it takes its team's turn of a day and is scored.
+/// A submission's run that counts: its team's of a day.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluation {
     /// Part of its URLs.
     pub id: EvaluationId,
     /// What is evaluated.
     pub submission: SubmissionId,
-    /// Whose turn it takes.
+    /// Whose it is.
     pub team: TeamId,
-    /// The UTC day whose turn and seed it takes.
+    /// The UTC day whose seed it takes.
     pub day: Date,
+    /// When the day was released; `None` while nothing may be told of its episodes.
+    pub released_at: Option<Timestamp>,
+    /// The evaluation that it plays again: one that we broke, or that was cancelled.
+    pub rerun_of: Option<EvaluationId>,
     /// Its episodes and shards.
     pub run: RunId,
     /// What the run plays.
@@ -59,14 +63,14 @@ pub enum EvaluationState {
         /// When the fault was committed that was one too many.
         finished_at: Timestamp,
     },
-    /// Our fault; the day's turn was given back.
+    /// Our fault; the day does not count for the team unless it is played again.
     PlatformFailed {
         /// When it was given up.
         finished_at: Timestamp,
         /// What went wrong.
         reason: String,
     },
-    /// Stopped by an organiser; the day's turn was given back.
+    /// Stopped by an organiser, who may have it played again.
     Cancelled {
         /// When it was stopped.
         finished_at: Timestamp,
@@ -81,12 +85,6 @@ impl EvaluationState {
     pub const fn is_over(&self) -> bool {
         !matches!(self, Self::Queued | Self::Running { .. } | Self::Finalising)
     }
-
-    /// Does it use up its team's turn of the day?
-    #[must_use]
-    pub const fn takes_turn(&self) -> bool {
-        !matches!(self, Self::PlatformFailed { .. } | Self::Cancelled { .. })
-    }
 }
 
 /// An evaluation with its run, without the run's progress.
@@ -95,6 +93,8 @@ pub(crate) struct EvaluationRow {
     submission_id: Text<SubmissionId>,
     team_id: Text<TeamId>,
     day: Text<Date>,
+    released_at: Option<Instant>,
+    rerun_of: Option<Text<EvaluationId>>,
     run_id: Text<RunId>,
     profile: Text<Profile>,
     tasks: Json<Vec<Task>>,
@@ -176,6 +176,8 @@ impl EvaluationRow {
             submission: self.submission_id.0,
             team: self.team_id.0,
             day: self.day.0,
+            released_at: self.released_at.map(|at| at.0),
+            rerun_of: self.rerun_of.map(|id| id.0),
             run: self.run_id.0,
             plan,
             created_at: self.created_at.0,
@@ -192,7 +194,8 @@ macro_rules! select_evaluations {
             r#"SELECT e.id AS "id: Text<EvaluationId>",
                       e.submission_id AS "submission_id: Text<SubmissionId>",
                       e.team_id AS "team_id: Text<TeamId>", e.day AS "day: Text<Date>",
-                      e.run_id AS "run_id: Text<RunId>", r.profile AS "profile: Text<Profile>",
+                      d.released_at AS "released_at: Instant",
+                      e.rerun_of AS "rerun_of: Text<EvaluationId>", e.run_id AS "run_id: Text<RunId>", r.profile AS "profile: Text<Profile>",
                       r.tasks AS "tasks: Json<Vec<Task>>",
                       r.episodes_per_task AS "episodes_per_task: u32",
                       r.episodes_per_shard AS "episodes_per_shard: u32",
@@ -201,7 +204,7 @@ macro_rules! select_evaluations {
                       e.finished_at AS "finished_at: Instant",
                       e.result AS "result: Json<EvaluationResult>", e.dataset, e.dataset_blake3,
                       e.reason
-               FROM evaluations e JOIN runs r ON r.id = e.run_id "# + $tail
+               FROM evaluations e JOIN runs r ON r.id = e.run_id LEFT JOIN days d ON d.day = e.day "# + $tail
             $(, $argument)*
         )
     };
@@ -273,42 +276,91 @@ pub(crate) async fn run_of(connection: &mut SqliteConnection, id: EvaluationId) 
     .ok_or(StoreError::NotFound("evaluation"))
 }
 
-/// An evaluation to be queued.
-pub(crate) struct NewEvaluation {
+/// What an evaluation is, whatever became of it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Entry {
     pub(crate) id: EvaluationId,
     pub(crate) submission: SubmissionId,
     pub(crate) team: TeamId,
     pub(crate) day: Date,
     pub(crate) run: RunId,
+    pub(crate) rerun_of: Option<EvaluationId>,
 }
 
-/// Takes the team's turn of the day; [`StoreError::AlreadyEvaluated`] if that is used.
+pub(crate) async fn entry(connection: &mut SqliteConnection, id: EvaluationId) -> Result<Entry> {
+    let id_text = Text(id);
+    let row = sqlx::query!(
+        r#"SELECT submission_id AS "submission: Text<SubmissionId>", team_id AS "team: Text<TeamId>",
+                  day AS "day: Text<Date>", run_id AS "run: Text<RunId>",
+                  rerun_of AS "rerun_of: Text<EvaluationId>"
+           FROM evaluations WHERE id = ?"#,
+        id_text
+    )
+    .fetch_optional(connection)
+    .await?
+    .ok_or(StoreError::NotFound("evaluation"))?;
+    Ok(Entry {
+        id,
+        submission: row.submission.0,
+        team: row.team.0,
+        day: row.day.0,
+        run: row.run.0,
+        rerun_of: row.rerun_of.map(|id| id.0),
+    })
+}
+
+/// Adds an evaluation that nobody has begun; [`StoreError::Conflict`] if the team has one of the day
+/// that counts.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
-    new: &NewEvaluation,
+    new: &Entry,
     now: Timestamp,
 ) -> Result<()> {
     let (id, submission, team) = (Text(new.id), Text(new.submission), Text(new.team));
     let (day, run, now) = (Text(new.day), Text(new.run), Instant(now));
+    let rerun_of = new.rerun_of.map(Text);
     sqlx::query!(
-        "INSERT INTO evaluations (id, submission_id, team_id, day, run_id, created_at, state)
-         VALUES (?, ?, ?, ?, ?, ?, 'open')",
+        "INSERT INTO evaluations (id, submission_id, team_id, day, run_id, created_at, state, rerun_of)
+         VALUES (?, ?, ?, ?, ?, ?, 'open', ?)",
         id,
         submission,
         team,
         day,
         run,
         now,
+        rerun_of,
     )
     .execute(connection)
     .await
-    .map_err(|error| match new.day.tomorrow() {
-        Ok(next) if StoreError::is_duplicate(&error, "evaluations.day") => {
-            StoreError::AlreadyEvaluated { day: new.day, next }
+    .map_err(|error| {
+        if StoreError::is_duplicate(&error, "evaluations.day") {
+            StoreError::Conflict(format!(
+                "the team has another evaluation of {} that counts, or that is under way",
+                new.day
+            ))
+        } else {
+            error.into()
         }
-        _ => error.into(),
     })?;
     Ok(())
+}
+
+/// How many evaluations of a team and day ended by our fault.
+pub(crate) async fn count_broken(
+    connection: &mut SqliteConnection,
+    team: TeamId,
+    day: Date,
+) -> Result<usize> {
+    let (team, day) = (Text(team), Text(day));
+    let count = sqlx::query_scalar!(
+        r#"SELECT COUNT(*) AS "count!: u32" FROM evaluations
+           WHERE team_id = ? AND day = ? AND state = 'platform_failed'"#,
+        team,
+        day,
+    )
+    .fetch_one(connection)
+    .await?;
+    Ok(usize::try_from(count).unwrap_or(usize::MAX))
 }
 
 pub(crate) async fn set_finished(
@@ -382,18 +434,4 @@ pub(crate) async fn count_open(
     )
     .fetch_one(connection)
     .await?)
-}
-
-/// The days that have evaluations, the newest first, each with how many of them are finished.
-pub(crate) async fn days(connection: &mut SqliteConnection) -> Result<Vec<(Date, u32)>> {
-    let days = sqlx::query!(
-        r#"SELECT day AS "day: Text<Date>", SUM(state = 'finished') AS "finished!: u32"
-           FROM evaluations GROUP BY day ORDER BY day DESC"#
-    )
-    .fetch_all(connection)
-    .await?;
-    Ok(days
-        .into_iter()
-        .map(|row| (row.day.0, row.finished))
-        .collect())
 }

@@ -2,12 +2,13 @@
 //! changes with it, is the operations' business.
 
 pub(crate) mod ablations;
+pub(crate) mod active_submissions;
+pub(crate) mod days;
 pub(crate) mod episode_summaries;
 pub(crate) mod evaluations;
 pub(crate) mod events;
 pub(crate) mod finalisations;
 pub(crate) mod plan;
-pub(crate) mod released_days;
 pub(crate) mod runs;
 pub(crate) mod season;
 pub(crate) mod shards;

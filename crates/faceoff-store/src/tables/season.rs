@@ -3,8 +3,8 @@ use crate::{
     error::{Result, StoreError},
 };
 use faceoff_types::Seed;
-use jiff::{Timestamp, civil::Date};
-use sqlx::{SqliteConnection, types::Text};
+use jiff::Timestamp;
+use sqlx::SqliteConnection;
 
 /// The season: one per data folder.
 #[derive(Debug, Clone)]
@@ -61,31 +61,6 @@ pub(crate) async fn close(connection: &mut SqliteConnection, now: Timestamp) -> 
         .execute(connection)
         .await?;
     Ok(())
-}
-
-/// The last UTC day that the daily schedule has started; `None` before the first.
-pub(crate) async fn last_scheduled_day(connection: &mut SqliteConnection) -> Result<Option<Date>> {
-    let day = sqlx::query_scalar!(r#"SELECT last_scheduled_day AS "day: Text<Date>" FROM season"#)
-        .fetch_one(connection)
-        .await?;
-    Ok(day.map(|day| day.0))
-}
-
-/// Notes that the schedule starts `day`; false if it has started that day or a later one before.
-pub(crate) async fn note_scheduled_day(
-    connection: &mut SqliteConnection,
-    day: Date,
-) -> Result<bool> {
-    let day = Text(day);
-    // ISO dates sort as text
-    let noted = sqlx::query!(
-        "UPDATE season SET last_scheduled_day = ?1
-         WHERE last_scheduled_day IS NULL OR last_scheduled_day < ?1",
-        day,
-    )
-    .execute(connection)
-    .await?;
-    Ok(noted.rows_affected() > 0)
 }
 
 /// Gives a new data folder its season, with a secret from the operating system's generator.

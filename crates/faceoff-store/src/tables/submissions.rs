@@ -3,7 +3,7 @@ use crate::{
     error::{Result, StoreError},
 };
 use faceoff_types::{BundleRef, SmokeTiming, SubmissionId, TeamId};
-use jiff::{Timestamp, civil::Date};
+use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
 /// One uploaded agent.
@@ -23,6 +23,8 @@ pub struct Submission {
     pub state: SubmissionState,
     /// How long its answers took in the smoke run, for each task that was played.
     pub timing: Vec<SmokeTiming>,
+    /// Is it what its team enters at the next cut?
+    pub active: bool,
 }
 
 /// A submission's way through its smoke run. The agent's log is read by itself
@@ -65,6 +67,7 @@ struct SubmissionRow {
     state: String,
     reason: Option<String>,
     timing: Option<Json<Vec<SmokeTiming>>>,
+    active: bool,
 }
 
 impl TryFrom<SubmissionRow> for Submission {
@@ -96,6 +99,7 @@ impl TryFrom<SubmissionRow> for Submission {
             agent_name: row.agent_name,
             state,
             timing: row.timing.map_or_else(Vec::new, |timing| timing.0),
+            active: row.active,
         })
     }
 }
@@ -109,7 +113,10 @@ macro_rules! select_submissions {
                       s.bundle_key, s.bundle_bytes AS "bundle_bytes: u64", s.bundle_blake3,
                       s.bundle_file_name, s.created_at AS "created_at: Instant",
                       s.agent_name, s.state, s.reason,
-                      s.timing AS "timing: Json<Vec<SmokeTiming>>"
+                      s.timing AS "timing: Json<Vec<SmokeTiming>>",
+                      EXISTS (SELECT 1 FROM active_submissions a
+                              WHERE a.team_id = s.team_id AND a.submission_id = s.id)
+                      AS "active!: bool"
                FROM submissions s "# + $tail
             $(, $argument)*
         )
@@ -145,25 +152,10 @@ pub(crate) async fn of_team(
     .collect()
 }
 
-/// The newest valid submission of each team whose turn of `day` is free, earliest first; of those
-/// uploaded before `released_at`, when the day's seed became known.
-pub(crate) async fn awaiting_turn(
-    connection: &mut SqliteConnection,
-    day: Date,
-    released_at: Option<Timestamp>,
-) -> Result<Vec<Submission>> {
-    let (day, released_at) = (Text(day), Instant(released_at.unwrap_or(Timestamp::MAX)));
+/// What each team has active, earliest upload first.
+pub(crate) async fn active(connection: &mut SqliteConnection) -> Result<Vec<Submission>> {
     select_submissions!(
-        "WHERE s.state = 'valid' AND s.created_at < ?1
-           AND NOT EXISTS (SELECT 1 FROM submissions n
-                           WHERE n.team_id = s.team_id AND n.state = 'valid'
-                             AND n.created_at < ?1 AND (n.created_at, n.id) > (s.created_at, s.id))
-           AND NOT EXISTS (SELECT 1 FROM evaluations e
-                           WHERE e.team_id = s.team_id AND e.day = ?2
-                             AND e.state NOT IN ('platform_failed', 'cancelled'))
-         ORDER BY s.created_at, s.id",
-        released_at,
-        day
+        "WHERE s.id IN (SELECT submission_id FROM active_submissions) ORDER BY s.created_at, s.id"
     )
     .fetch_all(connection)
     .await?

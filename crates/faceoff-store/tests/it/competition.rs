@@ -11,12 +11,18 @@ async fn a_submission_travels_from_upload_to_board() {
     let submission = f.upload(&team).await;
     assert_eq!(submission.state, SubmissionState::Validating);
     assert_eq!(submission.bundle, bundle());
-    let error = f
-        .store
-        .create_evaluation(Actor::Organiser, submission.id, &plan(), f.now)
-        .await
-        .unwrap_err();
-    assert!(matches!(error, StoreError::Conflict(_)), "{error}");
+    for error in [
+        f.store
+            .activate_submission(Actor::Team(team.id), submission.id, f.now)
+            .await
+            .unwrap_err(),
+        f.store
+            .start_day(Actor::Organiser, &plan(), f.now)
+            .await
+            .unwrap_err(),
+    ] {
+        assert!(matches!(error, StoreError::Conflict(_)), "{error}");
+    }
 
     let valid = f.validate().await;
     assert_eq!(valid.agent_name.as_deref(), Some("striker"));

@@ -46,7 +46,9 @@ async fn a_submissions_way_to_the_board_is_recorded_step_by_step() {
             "team_created",
             "submission_uploaded",
             "submission_valid",
+            "submission_activated",
             "evaluation_queued",
+            "day_started",
             "evaluation_begun",
             "shard_committed",
             "unit_given_back",
@@ -54,17 +56,17 @@ async fn a_submissions_way_to_the_board_is_recorded_step_by_step() {
         ]
     );
     let team = Subject::Team(submission.team);
-    assert_eq!((records[0].subject, records[7].subject), (team, team));
+    assert_eq!((records[0].subject, records[9].subject), (team, team));
     assert_eq!(records[1].actor, Actor::Team(submission.team));
     assert_eq!(records[1].subject, Subject::Submission(submission.id));
     let slot = Actor::Worker("slot 0".into());
-    for record in &records[4..7] {
+    for record in &records[6..9] {
         assert_eq!(record.actor, slot);
         assert_eq!(record.subject, Subject::Evaluation(evaluation.id));
         assert_eq!(record.at, f.now);
     }
     assert_eq!(
-        records[5].event,
+        records[7].event,
         Event::ShardCommitted {
             run: evaluation.run,
             shard: shard.id,
@@ -75,7 +77,7 @@ async fn a_submissions_way_to_the_board_is_recorded_step_by_step() {
         }
     );
     assert_eq!(
-        records[6].event,
+        records[8].event,
         Event::UnitGivenBack {
             unit: claim.unit,
             failures: 1,
@@ -83,8 +85,8 @@ async fn a_submissions_way_to_the_board_is_recorded_step_by_step() {
         }
     );
     // read on from where one was
-    let later = f.store.events_after(records[4].id, 2).await.unwrap();
-    assert_eq!(later, records[5..7]);
+    let later = f.store.events_after(records[6].id, 2).await.unwrap();
+    assert_eq!(later, records[7..9]);
 }
 
 #[tokio::test]
@@ -126,13 +128,6 @@ async fn every_end_is_recorded() {
             }
         }
     }
-    let today = "2026-03-02".parse().unwrap();
-    f.store
-        .start_day(Actor::Organiser, &small, f.now)
-        .await
-        .unwrap();
-    let released = f.store.release_day(Actor::Team(alpha.team), today, f.now);
-    assert_eq!(released.await.unwrap(), DaySeed::Public, "it is over");
     let seen: BTreeSet<_> = kinds(&recorded(&f).await).into_iter().collect();
     for kind in [
         "evaluation_finalising",
@@ -141,6 +136,7 @@ async fn every_end_is_recorded() {
         "evaluation_cancelled",
         "evaluation_platform_failed",
         "day_started",
+        "day_released",
     ] {
         assert!(seen.contains(kind), "{kind} is not in {seen:?}");
     }
@@ -150,16 +146,21 @@ async fn every_end_is_recorded() {
 async fn what_fails_changes_nothing_and_tells_nobody() {
     let f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
-    f.evaluate(submission.id, &plan()).await;
+    let evaluation = f.evaluate(submission.id, &plan()).await;
+    let stop = f
+        .store
+        .cancel_evaluation(Actor::Organiser, evaluation.id, "rain", f.now);
+    stop.await.unwrap();
+    let rerun = || {
+        f.store
+            .rerun_evaluation(Actor::Organiser, evaluation.id, f.now)
+    };
+    rerun().await.unwrap();
     let before = recorded(&f).await;
     let (mut events, mut signal) = (f.store.events(), f.store.work_signal());
     signal.mark_unchanged();
     // it fails after a run was cut and queued
-    let again = f
-        .store
-        .create_evaluation(Actor::Organiser, submission.id, &plan(), f.now)
-        .await;
-    assert!(matches!(again, Err(StoreError::AlreadyEvaluated { .. })));
+    assert!(matches!(rerun().await, Err(StoreError::Conflict(_))));
     assert_eq!(recorded(&f).await, before);
     assert!(events.try_recv().is_err());
     assert!(!signal.has_changed().unwrap());

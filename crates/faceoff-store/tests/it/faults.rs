@@ -66,11 +66,11 @@ async fn one_fault_more_ends_the_evaluation_without_a_score() {
     assert!(f.store.board().await.unwrap().is_empty());
     let again = f
         .store
-        .create_evaluation(Actor::Organiser, submission.id, &plan(), f.now)
+        .rerun_evaluation(Actor::Organiser, evaluation.id, f.now)
         .await;
     assert!(
-        matches!(again, Err(StoreError::AlreadyEvaluated { .. })),
-        "its own fault costs the turn"
+        matches!(again, Err(StoreError::Conflict(_))),
+        "its own fault counts"
     );
 }
 

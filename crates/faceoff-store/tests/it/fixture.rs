@@ -90,11 +90,57 @@ impl Fixture {
         self.validate().await
     }
 
+    /// Starts the day with what all teams have active, unless that was done; the submission's evaluation.
     pub async fn evaluate(&self, submission: SubmissionId, plan: &RunPlan) -> Evaluation {
-        self.store
-            .create_evaluation(Actor::Organiser, submission, plan, self.now)
-            .await
-            .unwrap()
+        match self.store.start_day(Actor::Organiser, plan, self.now).await {
+            Ok(_) | Err(StoreError::DayHasCut { .. }) => {}
+            Err(error) => panic!("{error}"),
+        }
+        let today = self.now.to_zoned(jiff::tz::TimeZone::UTC).date();
+        let of_day = self.store.evaluations_on(today).await.unwrap();
+        let found = of_day.into_iter().rfind(|one| one.submission == submission);
+        found.expect("it was active at the cut")
+    }
+
+    /// Plays what comes next in the queue until an evaluation is scored.
+    pub async fn finish_next(&self) -> EvaluationId {
+        loop {
+            let Claimed { claim, work } = self.claim().await.expect("work is queued");
+            match work {
+                Work::Shard { shard, .. } => {
+                    self.play(&claim, &shard, 0).await;
+                }
+                Work::Finalise { evaluation, .. } => {
+                    self.finish(&claim, 1.0, "d").await;
+                    return evaluation;
+                }
+                Work::Smoke { .. } => panic!("expected a shard or a finalisation"),
+            }
+        }
+    }
+
+    /// Our fault, as often as it takes to end an evaluation of one shard; its id.
+    pub async fn break_next(&mut self) -> EvaluationId {
+        let mut broken = None;
+        for _ in 0..MAX_ATTEMPTS {
+            let Some(Claimed { claim, work }) = self.claim().await else {
+                panic!("work is queued")
+            };
+            let Work::Shard {
+                owner: RunOwner::Evaluation(id),
+                ..
+            } = work
+            else {
+                panic!("expected a shard of an evaluation, claimed {work:?}")
+            };
+            assert_eq!(*broken.get_or_insert(id), id);
+            let failed = self.store.release_failed(&claim, "disk full", self.now);
+            failed.await.unwrap();
+            if !self.state(id).await.is_over() {
+                self.later(60);
+            }
+        }
+        broken.expect("it was claimed")
     }
 
     pub async fn claim_smoke(&self) -> (Claim, Submission) {
@@ -187,6 +233,15 @@ pub fn plan() -> RunPlan {
         episodes_per_task: 4,
         episodes_per_shard: 2,
         max_faults: 3,
+    }
+}
+
+/// One shard of one episode.
+pub fn small() -> RunPlan {
+    RunPlan {
+        tasks: vec![Task::Hit],
+        episodes_per_task: 1,
+        ..plan()
     }
 }
 

@@ -22,7 +22,11 @@ async fn child() {
     };
     let folder = Path::new(&folder);
     let store = Store::open(folder).await.unwrap();
+    // a day of its own for each round, and leases of earlier lives are over
     let mut now: jiff::Timestamp = "2026-03-01T10:00:00Z".parse().unwrap();
+    if let Some(newest) = store.newest_day().await.unwrap() {
+        now = now.max(newest.cut_at);
+    }
     let file = tempfile::NamedTempFile::new().unwrap();
     // longer than one write, so that a kill can hit its middle
     std::fs::write(file.path(), vec![b'x'; 300_000]).unwrap();
@@ -51,7 +55,7 @@ async fn child() {
             episodes_per_shard: 1,
             ..plan()
         };
-        now += jiff::SignedDuration::from_secs(3600); // leases of earlier lives are over
+        now += jiff::SignedDuration::from_hours(24);
         loop {
             let Some(Claimed { claim, work }) = store.claim("child", LEASE_S, now).await.unwrap()
             else {
@@ -66,10 +70,15 @@ async fn child() {
                     };
                     store.commit_smoke(&claim, outcome, now).await.unwrap();
                     tell(format!("valid {}", submission.id));
-                    let evaluation = store
-                        .create_evaluation(Actor::Organiser, submission.id, &small, now)
-                        .await;
-                    tell(format!("evaluation {}", evaluation.unwrap().id));
+                    match store.start_day(Actor::Organiser, &small, now).await {
+                        Ok(started) => {
+                            for evaluation in started {
+                                tell(format!("evaluation {}", evaluation.id));
+                            }
+                        }
+                        Err(StoreError::DayHasCut { .. }) => {}
+                        Err(error) => panic!("{error}"),
+                    }
                 }
                 Work::Shard { run, shard, .. } => {
                     let mut commit = commit(&shard, 0);
@@ -190,6 +199,12 @@ async fn check_consistency(folder: &Path, store: &Store) {
         ("a finished evaluation whose finalisation is open",
          "SELECT COUNT(*) FROM evaluations e JOIN finalisations f ON f.evaluation_id = e.id
               JOIN units u ON u.id = f.unit_id WHERE (e.state = 'finished') <> (u.state = 'done')"),
+        ("a day that is over and not released, or released and not over",
+         "SELECT COUNT(*) FROM days d WHERE (d.released_at IS NULL)
+              <> EXISTS (SELECT 1 FROM evaluations e WHERE e.day = d.day AND e.state = 'open')"),
+        ("a valid submission of a team that has none active",
+         "SELECT COUNT(*) FROM submissions s WHERE s.state = 'valid'
+              AND NOT EXISTS (SELECT 1 FROM active_submissions a WHERE a.team_id = s.team_id)"),
         ("a change without its event",
          "SELECT (SELECT COUNT(*) FROM submissions) + (SELECT COUNT(*) FROM evaluations)
                + (SELECT COUNT(*) FROM shards WHERE committed_at IS NOT NULL)

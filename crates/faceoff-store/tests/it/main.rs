@@ -4,6 +4,7 @@
 mod ablations;
 mod artifacts;
 mod competition;
+mod days;
 mod events;
 mod faults;
 mod fixture;
@@ -16,4 +17,3 @@ mod queries;
 mod queue;
 mod releases;
 mod teams;
-mod turns;

@@ -478,12 +478,24 @@ async fn every_old_row_is_there_and_says_what_it_said() {
     );
 
     let days = [date(2026, 2, 28), date(2026, 3, 1)];
-    let seeds = f.store.day_seeds(days.into(), f.now).await.unwrap();
-    assert_eq!(seeds[&days[0]], DaySeed::Public);
-    assert_eq!(seeds[&days[1]], DaySeed::Secret { under_way: 3 });
-    assert_eq!(f.store.days().await.unwrap(), [(days[1], 0), (days[0], 1)]);
+    // each began with its first evaluation; one is released, of the other three are under way
+    let day = |date, released_at| Day {
+        date,
+        cut_at: finished_at,
+        released_at,
+    };
+    assert_eq!(
+        f.store.days().await.unwrap(),
+        [
+            (day(days[1], None), 0),
+            (day(days[0], Some(finished_at)), 1)
+        ]
+    );
     assert_eq!(f.store.season().await.unwrap().name, "Old season");
-    assert_eq!(f.store.last_scheduled_day().await.unwrap(), Some(days[1]));
+    for number in [11, 18] {
+        assert!(submission(number).await.active, "the newest valid one");
+    }
+    assert!(!submission(3).await.active);
 }
 
 #[tokio::test]
@@ -646,12 +658,23 @@ async fn work_goes_on_where_the_old_program_left_it() {
     let ablation = f.store.newest_ablation(id(11)).await.unwrap().unwrap();
     assert!(matches!(ablation.state, AblationState::Finished { .. }));
     assert_eq!(f.store.board().await.unwrap().len(), 4);
-    // turns: those that we broke or the organiser stopped are free
-    let started = f.store.start_day(Actor::Organiser, &plan(), f.now).await;
-    let teams: Vec<_> = started.unwrap().iter().map(|e| e.team).collect();
-    let free: Vec<TeamId> = [1, 2, 14, 16, 17, 18].map(id).to_vec();
-    assert_eq!(teams, free);
+    // its last evaluation released the day, which has had its cut
+    assert_eq!(
+        f.store.newest_day().await.unwrap().unwrap().released_at,
+        Some(f.now)
+    );
+    let again = f.store.start_day(Actor::Organiser, &plan(), f.now).await;
+    assert!(
+        matches!(again, Err(StoreError::DayHasCut { .. })),
+        "{again:?}"
+    );
+    let rerun = f.store.rerun_evaluation(Actor::Organiser, id(1600), f.now);
+    assert_eq!(rerun.await.unwrap().submission, id(16));
     // recordings: old ones go a day after their evaluation's end, as new ones do
     f.later(86_400);
     assert_eq!(f.store.remove_old_recordings(f.now).await.unwrap(), 7);
+    let started = f.store.start_day(Actor::Organiser, &plan(), f.now).await;
+    let teams: Vec<_> = started.unwrap().iter().map(|e| e.team).collect();
+    let valid: Vec<TeamId> = [1, 2, 11, 12, 13, 14, 15, 16, 17, 18].map(id).to_vec();
+    assert_eq!(teams, valid);
 }

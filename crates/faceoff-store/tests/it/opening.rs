@@ -91,9 +91,14 @@ async fn damaged_work_does_not_hold_up_the_others() {
     let f = Fixture::new().await;
     let alpha = f.ready_team("Alpha").await;
     let beta = f.ready_team("Beta").await;
-    f.evaluate(alpha.id, &plan()).await;
-    vandalise(&f, "UPDATE runs SET profile = 'dream'").await;
     let sound = f.evaluate(beta.id, &plan()).await;
+    vandalise(
+        &f,
+        "UPDATE runs SET profile = 'dream' WHERE id = (SELECT run_id FROM contestants c
+             JOIN submissions s ON s.id = c.submission_id JOIN teams t ON t.id = s.team_id
+             WHERE t.name = 'Alpha')",
+    )
+    .await;
     let (_, run, _) = f.claim_shard().await;
     assert_eq!(run.id, sound.run);
     vandalise(
@@ -107,6 +112,7 @@ async fn damaged_work_does_not_hold_up_the_others() {
         matches!(state, EvaluationState::PlatformFailed { .. }),
         "{state:?}"
     );
+    assert_eq!(evaluations.len(), 1, "and is not played again");
 }
 
 #[tokio::test]

@@ -2,7 +2,7 @@
 
 use crate::fixture::*;
 use faceoff_store::*;
-use faceoff_types::Task;
+use faceoff_types::{SeedLabel, Task};
 use std::collections::HashSet;
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
@@ -196,7 +196,7 @@ async fn a_unit_given_back_at_a_shutdown_is_free_at_once_and_has_lost_nothing() 
 }
 
 #[tokio::test]
-async fn our_faults_cost_a_pause_and_after_some_the_turn_is_given_back() {
+async fn our_faults_cost_a_pause_and_after_some_the_evaluation_is_played_again() {
     let mut f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
     let evaluation = f.evaluate(submission.id, &plan()).await;
@@ -238,13 +238,19 @@ async fn our_faults_cost_a_pause_and_after_some_the_turn_is_given_back() {
     for claim in &open {
         assert!(!f.store.heartbeat(claim, 0, LEASE_S, f.now).await.unwrap());
     }
-    f.later(60);
-    assert!(f.claim().await.is_none());
-    f.evaluate(submission.id, &plan()).await;
+    assert!(f.claim().await.is_none(), "what we broke rests");
+    f.later(i64::from(RERUN_PAUSES_S[0]));
+    let (_, run, first) = f.claim_shard().await;
+    assert_ne!(run.id, evaluation.run);
+    assert_eq!(
+        (run.plan, run.seed),
+        (plan(), SeedLabel::Day(evaluation.day))
+    );
+    assert_eq!((first.task, first.first_episode), (Task::Hit, 0));
 }
 
 #[tokio::test]
-async fn a_finalisation_that_we_cannot_do_gives_the_turn_back() {
+async fn what_we_cannot_score_is_played_again() {
     let mut f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
     let small = RunPlan {
@@ -268,7 +274,8 @@ async fn a_finalisation_that_we_cannot_do_gives_the_turn_back() {
         f.state(evaluation.id).await,
         EvaluationState::PlatformFailed { .. }
     ));
-    f.evaluate(submission.id, &small).await;
+    let (_, run, _) = f.claim_shard().await;
+    assert_ne!(run.id, evaluation.run);
 }
 
 #[tokio::test]

@@ -1,134 +1,185 @@
 use crate::fixture::*;
 use faceoff_store::*;
+use faceoff_types::EvaluationId;
 use jiff::civil::date;
 
-/// Plays the evaluation that comes next to its end.
-async fn finish(site: &Fixture) {
-    loop {
-        let Claimed { claim, work } = site.claim().await.unwrap();
-        match work {
-            Work::Shard { shard, .. } => {
-                site.play(&claim, &shard, 0).await;
-            }
-            Work::Finalise { .. } => {
-                site.finish(&claim, 1.0, "d").await;
-                return;
-            }
-            Work::Smoke { .. } => panic!("expected a shard or a finalisation"),
-        }
-    }
+async fn rerun(f: &Fixture, id: EvaluationId) -> Result<Evaluation, StoreError> {
+    f.store.rerun_evaluation(Actor::Organiser, id, f.now).await
+}
+
+async fn released_at(f: &Fixture) -> Option<jiff::Timestamp> {
+    let newest = f.store.newest_day().await.unwrap();
+    newest.expect("the day had its cut").released_at
 }
 
 #[tokio::test]
-async fn a_days_seed_stays_until_nothing_of_the_day_is_under_way() {
-    let mut site = Fixture::new().await;
-    let day = date(2026, 3, 1);
-    let (alpha, beta) = (
-        site.ready_team("alpha").await,
-        site.ready_team("beta").await,
+async fn a_day_is_released_by_the_end_of_its_last_evaluation() {
+    let mut f = Fixture::new().await;
+    let submissions = [f.ready_team("alpha").await, f.ready_team("beta").await];
+    let mut evaluations = Vec::new();
+    for submission in &submissions {
+        evaluations.push(f.evaluate(submission.id, &plan()).await.id);
+    }
+    assert_eq!(f.finish_next().await, evaluations[0]);
+    assert_eq!(released_at(&f).await, None);
+    assert_eq!(
+        f.store
+            .evaluation(evaluations[0])
+            .await
+            .unwrap()
+            .released_at,
+        None
     );
-    let seeds = |site: &Fixture| {
-        let (store, now) = (site.store.clone(), site.now);
-        async move { store.day_seeds([day].into(), now).await.unwrap()[&day] }
+    f.later(86_400);
+    assert_eq!(released_at(&f).await, None, "a run that outlasts its day");
+    assert_eq!(f.finish_next().await, evaluations[1]);
+    let end = f.now;
+    f.later(60);
+    assert_eq!(released_at(&f).await, Some(end));
+    for id in evaluations {
+        assert_eq!(f.store.evaluation(id).await.unwrap().released_at, Some(end));
+    }
+    for record in f.store.board().await.unwrap() {
+        assert_eq!(record.released_at, Some(end));
+    }
+    let events = f.store.events_after(0, 1000).await.unwrap();
+    let released: Vec<_> = events
+        .iter()
+        .filter(|record| record.event == Event::DayReleased)
+        .collect();
+    assert_eq!(released.len(), 1);
+    assert_eq!(released[0].subject, Subject::Day(date(2026, 3, 1)));
+}
+
+#[tokio::test]
+async fn the_agents_own_end_and_the_organisers_release_the_day_as_well() {
+    let f = Fixture::new().await;
+    let failing = f.ready_team("failing").await;
+    let stopped = f.ready_team("stopped").await;
+    let strict = RunPlan {
+        max_faults: 0,
+        ..small()
     };
-    assert_eq!(seeds(&site).await, DaySeed::Releasable);
-    for submission in [&alpha, &beta] {
-        site.evaluate(submission.id, &plan()).await;
-    }
-    finish(&site).await;
-    let secret = DaySeed::Secret { under_way: 1 };
-    assert_eq!(seeds(&site).await, secret);
-    assert_eq!(
-        site.store
-            .release_day(Actor::Organiser, day, site.now)
-            .await
-            .unwrap(),
-        secret
-    );
-    site.later(86_400);
-    assert_eq!(seeds(&site).await, secret, "a run that outlasts its day");
-    finish(&site).await;
-    assert_eq!(seeds(&site).await, DaySeed::Public, "the day is over");
-    assert_eq!(site.store.days().await.unwrap(), [(day, 2)]);
+    f.evaluate(failing.id, &strict).await;
+    let stopped = f.evaluate(stopped.id, &strict).await.id;
+    let (claim, _, shard) = f.claim_shard().await;
+    f.play(&claim, &shard, 1).await;
+    assert_eq!(released_at(&f).await, None);
+    let stop = f
+        .store
+        .cancel_evaluation(Actor::Organiser, stopped, "rain", f.now);
+    stop.await.unwrap();
+    assert_eq!(released_at(&f).await, Some(f.now));
 }
 
 #[tokio::test]
-async fn after_the_release_only_what_was_uploaded_before_plays_the_day() {
-    let mut site = Fixture::new().await;
-    let day = date(2026, 3, 1);
-    let (alpha, early) = (
-        site.ready_team("alpha").await,
-        site.ready_team("early").await,
-    );
-    let slow = site.team("slow").await;
-    site.later(60);
-    site.evaluate(alpha.id, &plan()).await;
-    finish(&site).await;
-    site.later(60);
+async fn what_we_broke_is_played_again_before_the_release_and_only_so_often() {
+    let mut f = Fixture::new().await;
+    let submission = f.ready_team("alpha").await;
+    let first = f.evaluate(submission.id, &small()).await;
+    // A newer upload and a choice change nothing: the cut's submission plays.
+    f.later(1);
+    let team = f.store.team(submission.team).await.unwrap();
+    f.upload(&team).await;
+    f.validate().await;
+    let mut broken = Vec::new();
+    for pause_s in RERUN_PAUSES_S {
+        broken.push(f.break_next().await);
+        assert_eq!(released_at(&f).await, None);
+        assert!(f.claim().await.is_none(), "it rests");
+        f.later(i64::from(pause_s) - 1);
+        assert!(f.claim().await.is_none(), "for {pause_s} s");
+        f.later(1);
+    }
+    let all = f.store.evaluations_of(team.id).await.unwrap();
+    assert_eq!(all.len(), 3);
+    assert_eq!(broken, [all[2].id, all[1].id]);
+    assert_eq!(first.id, all[2].id);
     assert_eq!(
-        site.store
-            .release_day(Actor::Organiser, day, site.now)
-            .await
-            .unwrap(),
-        DaySeed::Public
+        (all[1].rerun_of, all[0].rerun_of),
+        (Some(all[2].id), Some(all[1].id))
     );
-    let released_at = site.now;
-    site.later(60);
-    // Seen by everybody from now on; a later request does not move the instant.
-    site.store
-        .release_day(Actor::Organiser, day, site.now)
-        .await
-        .unwrap();
-    site.upload(&slow).await;
-    let late = site.validate().await;
-    let refused = site
-        .store
-        .create_evaluation(Actor::Organiser, late.id, &plan(), site.now)
-        .await
-        .unwrap_err();
-    let StoreError::DayReleased {
-        day: of,
-        released_at: at,
-        next,
-    } = refused
+    let secret = f.store.season().await.unwrap().secret;
+    for evaluation in &all {
+        assert_eq!(evaluation.submission, submission.id);
+        assert_eq!((evaluation.day, &evaluation.plan), (first.day, &first.plan));
+    }
+    let Some(Claimed {
+        claim,
+        work: Work::Shard {
+            seeds,
+            bundle: plays,
+            ..
+        },
+    }) = f.claim().await
     else {
-        panic!("{refused}")
+        panic!("the last try is queued")
     };
-    assert_eq!((of, at, next), (day, released_at, date(2026, 3, 2)));
-    // Nothing of the refused one stays behind.
-    assert_eq!(site.store.evaluations_of(slow.id).await.unwrap(), []);
-    assert!(site.claim().await.is_none());
+    assert_eq!(seeds.episodes, secret.day(first.day));
+    assert_eq!(plays, bundle());
+    f.store.release(&claim, f.now).await.unwrap();
 
-    // Another upload of the early team is passed over for the one before the release.
-    site.store
-        .create_submission(Actor::Organiser, early.team, bundle(), site.now)
-        .await
-        .unwrap();
-    site.validate().await;
-    let started = site
+    // The last try fails too: the day ends all the same.
+    assert_eq!(f.break_next().await, all[0].id);
+    assert_eq!(released_at(&f).await, Some(f.now));
+    f.later(86_400);
+    assert!(f.claim().await.is_none());
+    assert_eq!(f.store.evaluations_of(team.id).await.unwrap().len(), 3);
+}
+
+#[tokio::test]
+async fn a_try_that_succeeds_releases_the_day() {
+    let mut f = Fixture::new().await;
+    let submission = f.ready_team("alpha").await;
+    f.evaluate(submission.id, &small()).await;
+    let broken = f.break_next().await;
+    f.later(i64::from(RERUN_PAUSES_S[0]));
+    let finished = f.finish_next().await;
+    let finished = f.store.evaluation(finished).await.unwrap();
+    assert_eq!(finished.rerun_of, Some(broken));
+    assert_eq!(finished.released_at, Some(f.now));
+    assert_eq!(f.store.board().await.unwrap()[0].evaluation, finished.id);
+}
+
+#[tokio::test]
+async fn after_the_release_only_the_cuts_submission_plays_the_day_again() {
+    let mut f = Fixture::new().await;
+    let submission = f.ready_team("alpha").await;
+    let stopped = f.evaluate(submission.id, &small()).await;
+    let stop = f
         .store
-        .start_day(Actor::Organiser, &plan(), site.now)
-        .await
-        .unwrap();
-    assert_eq!(started.len(), 1);
-    assert_eq!(started[0].submission, early.id);
-    assert_eq!(
-        site.store.day_seeds([day].into(), site.now).await.unwrap()[&day],
-        DaySeed::Public,
-        "what is known stays known"
-    );
-    let again = site
-        .store
-        .create_evaluation(Actor::Organiser, alpha.id, &plan(), site.now)
-        .await
-        .unwrap_err();
+        .cancel_evaluation(Actor::Organiser, stopped.id, "wrong runtime", f.now);
+    stop.await.unwrap();
+    assert_eq!(released_at(&f).await, Some(f.now));
+    f.later(1);
+    let team = f.store.team(submission.team).await.unwrap();
+    f.upload(&team).await;
+    let best_of_n = f.validate().await;
+    assert!(best_of_n.active);
+    let again = rerun(&f, stopped.id).await.unwrap();
+    assert_eq!((again.submission, again.day), (submission.id, stopped.day));
+    assert_eq!(again.rerun_of, Some(stopped.id));
+    let twice = rerun(&f, stopped.id).await;
     assert!(
-        matches!(again, StoreError::AlreadyEvaluated { .. }),
-        "{again}"
+        matches!(twice, Err(StoreError::Conflict(_))),
+        "one at a time"
     );
-
-    site.later(86_400);
-    site.evaluate(late.id, &plan()).await;
+    // Broken after the release, it is the organiser's to have played again.
+    assert_eq!(f.break_next().await, again.id);
+    f.later(3600);
+    assert!(f.claim().await.is_none());
+    let again = rerun(&f, again.id).await.unwrap();
+    assert_eq!(again.submission, submission.id);
+    f.finish_next().await;
+    let twice = rerun(&f, stopped.id).await;
+    assert!(
+        matches!(twice, Err(StoreError::Conflict(_))),
+        "it has its score"
+    );
+    // The new one plays another day, on other episodes.
+    f.later(86_400);
+    let next = f.evaluate(best_of_n.id, &small()).await;
+    assert_ne!(next.day, stopped.day);
 }
 
 #[tokio::test]
@@ -175,10 +226,14 @@ async fn a_closed_season_takes_nothing_more_and_stays_closed() {
             .create_submission(Actor::Organiser, submission.team, bundle(), site.now);
     closed(upload.await.unwrap_err());
     let plan = plan();
-    let evaluation = site
+    let rerun = site
         .store
-        .create_evaluation(Actor::Organiser, submission.id, &plan, site.now);
-    closed(evaluation.await.unwrap_err());
+        .rerun_evaluation(Actor::Organiser, evaluation.id, site.now);
+    closed(rerun.await.unwrap_err());
+    let choice = site
+        .store
+        .activate_submission(Actor::Organiser, submission.id, site.now);
+    closed(choice.await.unwrap_err());
     closed(
         site.store
             .start_day(Actor::Organiser, &plan, site.now)
@@ -195,14 +250,6 @@ async fn a_closed_season_takes_nothing_more_and_stays_closed() {
             .await
             .unwrap(),
         None
-    );
-    let today = date(2026, 3, 1);
-    assert_eq!(
-        site.store
-            .day_seeds([today].into(), site.now)
-            .await
-            .unwrap()[&today],
-        DaySeed::Public
     );
 }
 

@@ -88,14 +88,21 @@ async fn unknown_ids_are_not_found() {
         .await;
     assert!(matches!(upload, Err(StoreError::NotFound("team"))));
     let submission = uuid::Uuid::now_v7().into();
-    let created = f
+    let active = f
         .store
-        .create_evaluation(Actor::Organiser, submission, &plan(), f.now)
+        .activate_submission(Actor::Organiser, submission, f.now)
         .await;
-    assert!(matches!(created, Err(StoreError::NotFound("submission"))));
+    assert!(matches!(active, Err(StoreError::NotFound("submission"))));
     let evaluation = uuid::Uuid::now_v7().into();
     assert!(matches!(
         f.store.evaluation(evaluation).await,
+        Err(StoreError::NotFound("evaluation"))
+    ));
+    let rerun = f
+        .store
+        .rerun_evaluation(Actor::Organiser, evaluation, f.now);
+    assert!(matches!(
+        rerun.await,
         Err(StoreError::NotFound("evaluation"))
     ));
 }

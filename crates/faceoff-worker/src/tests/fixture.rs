@@ -273,11 +273,13 @@ impl Server {
             episodes_per_shard: 2,
             max_faults: 10,
         };
-        self.store
-            .create_evaluation(Actor::Organiser, submission.id, &plan, self.now())
+        let started = self
+            .store
+            .start_day(Actor::Organiser, &plan, self.now())
             .await
-            .unwrap()
-            .id
+            .unwrap();
+        assert_eq!(started[0].submission, submission.id);
+        started[0].id
     }
 
     /// What its slots would work for.

@@ -21,25 +21,15 @@ pub fn without_times(mut outcomes: Vec<EpisodeOutcome>) -> Vec<EpisodeOutcome> {
     outcomes
 }
 
-#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-async fn two_teams_meet_the_same_episodes_however_the_work_is_shared_out() {
-    let server = Server::new().await;
+/// Plays a day of two teams to its end; the outcomes of each.
+async fn play_day(
+    server: &Server,
+    episodes_per_shard: u32,
+    now: Timestamp,
+) -> Vec<Vec<EpisodeOutcome>> {
+    let evaluations = server.start_day(&plan(episodes_per_shard), now).await;
+    assert_eq!(evaluations.len(), 2);
     let worker = server.work(2);
-    let mut evaluations = Vec::new();
-    for (team, episodes_per_shard) in [("Alpha", 1), ("Beta", 2)] {
-        let submission = server.upload(team, "").await;
-        let state = server.settled(submission).await;
-        assert_eq!(state, SubmissionState::Valid);
-        let log = server.store.submission_log(submission).await.unwrap();
-        assert!(log.unwrap().contains("an agent's log"));
-        let now = Timestamp::now();
-        let evaluation = server
-            .store
-            .create_evaluation(Actor::Organiser, submission, &plan(episodes_per_shard), now)
-            .await
-            .unwrap();
-        evaluations.push(evaluation);
-    }
     let mut outcomes = Vec::new();
     for evaluation in evaluations {
         let state = server.over(evaluation.id).await;
@@ -68,9 +58,30 @@ async fn two_teams_meet_the_same_episodes_however_the_work_is_shared_out() {
             server.store.outcomes(evaluation.run).await.unwrap(),
         ));
     }
-    assert_eq!(outcomes[0], outcomes[1]);
     assert_eq!(server.store.board().await.unwrap().len(), 2);
     worker.stop().await;
+    outcomes
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn two_teams_meet_the_same_episodes_however_the_work_is_shared_out() {
+    let server = Server::new().await;
+    let worker = server.work(2);
+    for team in ["Alpha", "Beta"] {
+        let submission = server.upload(team, "").await;
+        let state = server.settled(submission).await;
+        assert_eq!(state, SubmissionState::Valid);
+        let log = server.store.submission_log(submission).await.unwrap();
+        assert!(log.unwrap().contains("an agent's log"));
+    }
+    worker.stop().await;
+    // two servers with one past
+    let copy = server.copy().await;
+    let server = Server::at(server.path()).await;
+    let now = Timestamp::now();
+    let apart = play_day(&server, 1, now).await;
+    assert_eq!(apart[0], apart[1]);
+    assert_eq!(play_day(&copy, 2, now).await, apart);
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -89,12 +100,8 @@ async fn an_agent_that_breaks_off_is_told_why() {
     // well in its smoke run, but not later: the faults of all shards add up
     let late = server.upload("Late", "FAULTY_FROM = \"1\"").await;
     assert!(matches!(server.settled(late).await, SubmissionState::Valid));
-    let now = Timestamp::now();
-    let evaluation = server
-        .store
-        .create_evaluation(Actor::Organiser, late, &plan(1), now)
-        .await
-        .unwrap();
+    let evaluation = server.start_day(&plan(1), Timestamp::now()).await.remove(0);
+    assert_eq!(evaluation.submission, late);
     let state = server.over(evaluation.id).await;
     assert!(
         matches!(state, EvaluationState::AgentFailed { .. }),
@@ -120,12 +127,7 @@ async fn an_evaluation_outlives_its_workers() {
         SubmissionState::Valid
     ));
     worker.stop().await;
-    let now = Timestamp::now();
-    let evaluation = server
-        .store
-        .create_evaluation(Actor::Organiser, submission, &plan(1), now)
-        .await
-        .unwrap();
+    let evaluation = server.start_day(&plan(1), Timestamp::now()).await.remove(0);
     let (id, run) = (evaluation.id, evaluation.run);
     for committed in 1..4 {
         let worker = server.work(1);

@@ -41,33 +41,25 @@ async fn child() {
 async fn a_killed_evaluation_ends_as_an_undisturbed_one() {
     let server = Server::new().await;
     let worker = server.work(1);
-    let mut submissions = Vec::new();
     for team in ["Calm", "Troubled"] {
         let submission = server.upload(team, "").await;
         assert!(matches!(
             server.settled(submission).await,
             SubmissionState::Valid
         ));
-        submissions.push(submission);
     }
-    let now = Timestamp::now();
-    let calm = server
-        .store
-        .create_evaluation(Actor::Organiser, submissions[0], &plan(1), now)
-        .await
-        .unwrap();
+    let started = server.start_day(&plan(1), Timestamp::now()).await;
+    let [calm, troubled] = &started[..] else {
+        panic!("two teams play: {started:?}")
+    };
     let finished = server.over(calm.id).await;
     assert!(
         matches!(finished, EvaluationState::Finished { .. }),
         "{finished:?}"
     );
+    // the other's is hardly begun
     worker.stop().await;
 
-    let troubled = server
-        .store
-        .create_evaluation(Actor::Organiser, submissions[1], &plan(1), now)
-        .await
-        .unwrap();
     for events_to_live in [1, 2, 3, 1, 4, 2] {
         let mut child = Command::new(std::env::current_exe().unwrap())
             .args(["--exact", "kill::child", "--ignored", "--nocapture"])

@@ -127,6 +127,29 @@ impl Server {
             .id
     }
 
+    /// The cut, with this plan; the evaluations in the order of the uploads.
+    pub async fn start_day(&self, plan: &RunPlan, now: Timestamp) -> Vec<Evaluation> {
+        let started = self.store.start_day(Actor::Organiser, plan, now);
+        started.await.unwrap()
+    }
+
+    /// A copy in a folder of its own; nothing works on this one.
+    pub async fn copy(&self) -> Self {
+        self.store.close().await;
+        let folder = tempfile::tempdir().unwrap();
+        let (from, to) = (self.path().join("data"), folder.path().join("data"));
+        let copied = std::process::Command::new("cp")
+            .arg("-a")
+            .args([from, to])
+            .status();
+        assert!(copied.unwrap().success());
+        let copy = Self::at(folder.path()).await;
+        Self {
+            _guard: Some(folder),
+            ..copy
+        }
+    }
+
     /// The smoke run's verdict.
     pub async fn settled(&self, id: SubmissionId) -> SubmissionState {
         let mut events = self.store.events();

@@ -113,6 +113,15 @@ async fn a_folder_is_packed_uploaded_and_followed() {
             log: Some("hello".into())
         }
     );
+    assert!(valid.active);
+    assert_eq!(client.activate(uploaded.id).await.unwrap(), valid);
+    let me = client.me().await.unwrap();
+    assert_eq!(me.active_submission, Some(uploaded.id));
+    let first_cut = me.next_cut.expect("the season is open");
+    assert_eq!(
+        first_cut.to_string(),
+        "2026-03-01 (UTC) or later, when the organiser starts the day"
+    );
 
     let day = site.organiser.start_day(Some(1)).await.unwrap();
     assert_eq!(day.created.len(), 1);
@@ -135,6 +144,10 @@ async fn a_folder_is_packed_uploaded_and_followed() {
     assert!(!dataset.exists());
     let cancelled = site.organiser.cancel(id, "enough").await.unwrap();
     assert!(cancelled.status.is_final());
+    let again = site.organiser.start_day(None).await.unwrap_err();
+    assert!(again.to_string().contains("2026-03-02"), "{again}");
+    let rerun = site.organiser.rerun(id).await.unwrap();
+    assert_eq!((rerun.rerun_of, rerun.submission), (Some(id), uploaded.id));
 }
 
 #[tokio::test]

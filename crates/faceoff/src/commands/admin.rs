@@ -58,7 +58,7 @@ enum Action {
         /// The team's name or id
         team: String,
     },
-    /// Start today's evaluation of each team that has not had it; asking again is harmless
+    /// Start the day: what each team has active now plays it. A day starts once
     StartDay {
         /// Episodes of each task [default: the server's configuration]
         #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_EPISODES_PER_TASK)))]
@@ -67,7 +67,12 @@ enum Action {
         #[arg(long)]
         profile: Option<Profile>,
     },
-    /// Stop an evaluation that is not over and give the team's turn back
+    /// Play an evaluation again that was cancelled or failed by the server's fault: same agent, same episodes
+    Rerun {
+        /// The evaluation's id
+        evaluation: EvaluationId,
+    },
+    /// Stop an evaluation that is not over
     Cancel {
         /// The evaluation's id
         evaluation: EvaluationId,
@@ -148,13 +153,8 @@ impl AdminCommand {
                     })
                     .await?;
                 print(self.json, &day, || {
-                    let mut lines = vec![format!(
-                        "{}: {} started, {} there before",
-                        day.day,
-                        day.created.len(),
-                        day.existing.len()
-                    )];
-                    lines.extend(day.created.iter().chain(&day.existing).map(line));
+                    let mut lines = vec![format!("{}: {} started", day.day, day.created.len())];
+                    lines.extend(day.created.iter().map(line));
                     lines.extend(
                         day.without_submission
                             .iter()
@@ -162,6 +162,10 @@ impl AdminCommand {
                     );
                     lines.join("\n")
                 })
+            }
+            Action::Rerun { evaluation } => {
+                let rerun = client.rerun(evaluation).await?;
+                print(self.json, &rerun, || line(&rerun))
             }
             Action::Cancel { evaluation, reason } => {
                 let cancelled = client.cancel(evaluation, &reason).await?;
@@ -288,17 +292,8 @@ fn line(evaluation: &EvaluationView) -> String {
             result.penalty_points,
             result.tier.title().to_lowercase()
         ),
-        EvaluationStatus::AgentFailed { faults, .. } => format!(
-            "the agent failed: {}",
-            faults
-                .iter()
-                .flatten()
-                .next()
-                .map_or("no fault is recorded", |fault| fault.message.as_str())
-        ),
-        EvaluationStatus::PlatformFailed { reason, .. } => {
-            format!("our fault: {reason}; the turn was given back")
-        }
+        EvaluationStatus::AgentFailed { .. } => "the agent failed".to_owned(),
+        EvaluationStatus::PlatformFailed { reason, .. } => format!("our fault: {reason}"),
         EvaluationStatus::Cancelled { reason, .. } => format!("cancelled: {reason}"),
     };
     format!("{:<40} {}  {state}", evaluation.team_name, evaluation.id)

@@ -338,5 +338,12 @@ async fn follow(
         }
         tokio::time::sleep(POLL).await;
     }
+    // The last one's end released the day: all of it is told now.
+    ensure!(
+        ended
+            .iter()
+            .any(|evaluation| evaluation.released_at.is_some()),
+        "every evaluation has ended, and the day is not released"
+    );
     Ok(ended)
 }

@@ -1,5 +1,6 @@
 //! One file per subcommand.
 
+pub mod activate;
 pub mod admin;
 pub mod compare;
 pub mod dataset;

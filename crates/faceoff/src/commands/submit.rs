@@ -5,10 +5,10 @@ use crate::client::Client;
 use anyhow::{Context, bail};
 use clap::Args;
 use faceoff_http::views::{
-    evaluation::{EvaluationStatus, EvaluationView},
+    me::MeView,
     submission::{SubmissionStatus, SubmissionView},
 };
-use faceoff_types::SmokeTiming;
+use faceoff_types::{SmokeTiming, SubmissionId};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{path::PathBuf, time::Duration};
 
@@ -31,9 +31,6 @@ pub struct SubmitCommand {
     /// The team's token
     #[arg(long, env = "FACEOFF_TOKEN", hide_env_values = true)]
     token: String,
-    /// Also use today's turn, and follow the evaluation until its result
-    #[arg(long)]
-    evaluate: bool,
 }
 
 impl SubmitCommand {
@@ -70,22 +67,32 @@ impl SubmitCommand {
             SubmissionStatus::Valid { log } => {
                 print_log(log.as_deref());
                 println!("valid: {agent} starts, answers and keeps time");
+                println!("{}", next_cut(&client.me().await?, submission.id));
+                Ok(())
             }
             SubmissionStatus::Invalid { reason, log } => {
                 print_log(log.as_deref());
-                bail!("invalid: {reason}");
+                bail!("invalid: {reason}")
             }
             SubmissionStatus::ValidationError { reason } => {
                 bail!("the server failed to check the bundle ({reason}); submit it again")
             }
             SubmissionStatus::Validating => bail!("the server gave no verdict"),
         }
-        if self.evaluate {
-            let evaluation = client.evaluate(submission.id).await?;
-            println!("evaluation {} is queued", evaluation.id);
-            result(follow(&client, evaluation).await?)?;
+    }
+}
+
+/// When a submission of the team's plays.
+pub(super) fn next_cut(me: &MeView, submission: SubmissionId) -> String {
+    match (me.next_cut, me.active_submission) {
+        (None, _) => "the season is closed: nothing more is evaluated".to_owned(),
+        (Some(cut), Some(active)) if active == submission => {
+            format!("it is active and plays at the next cut: {cut}")
         }
-        Ok(())
+        (Some(cut), _) => format!(
+            "another submission is active and plays at the next cut ({cut}); to choose this one: faceoff \
+             activate {submission}"
+        ),
     }
 }
 
@@ -102,65 +109,6 @@ async fn verdict(
     }
     spinner.finish_and_clear();
     Ok(submission)
-}
-
-async fn follow(client: &Client, mut evaluation: EvaluationView) -> anyhow::Result<EvaluationView> {
-    let bar = ProgressBar::new(evaluation.progress.episodes_total.into()).with_style(
-        ProgressStyle::with_template("evaluating {bar:40} {pos}/{len} episodes {eta}")?,
-    );
-    while !evaluation.status.is_final() {
-        tokio::time::sleep(POLL).await;
-        evaluation = client.evaluation(evaluation.id).await?;
-        bar.set_position(evaluation.progress.episodes_done.into());
-    }
-    bar.finish_and_clear();
-    Ok(evaluation)
-}
-
-fn result(evaluation: EvaluationView) -> anyhow::Result<()> {
-    match evaluation.status {
-        EvaluationStatus::Finished {
-            result, dataset, ..
-        } => {
-            for (task, result) in &result.tasks {
-                let [low, high] = result.success_ci95.map(|bound| 100.0 * bound);
-                println!(
-                    "{task:<8} {:>5.1} % success ({low:.1} to {high:.1}), {:.1} penalty points",
-                    100.0 * result.success_rate,
-                    result.penalty_points
-                );
-            }
-            println!(
-                "score {:.1}, {:.1} penalty points: {}",
-                result.score,
-                result.penalty_points,
-                result.tier.title().to_lowercase()
-            );
-            println!("dataset: GET {dataset} with your token");
-            Ok(())
-        }
-        EvaluationStatus::AgentFailed { faults, log, .. } => {
-            print_log(log.as_deref());
-            for fault in faults.iter().flatten() {
-                let place = match (fault.episode, fault.step) {
-                    (Some(episode), Some(step)) => format!("episode {episode}, step {step}"),
-                    (Some(episode), None) => format!("episode {episode}, reset"),
-                    (None, _) => "start-up".to_owned(),
-                };
-                println!("{}, {place}: {}", fault.task, fault.message);
-            }
-            bail!("the agent failed too often; there is no score")
-        }
-        EvaluationStatus::PlatformFailed { reason, .. } => {
-            bail!("the server failed ({reason}); today's turn was given back")
-        }
-        EvaluationStatus::Cancelled { reason, .. } => {
-            bail!("the evaluation was cancelled: {reason}")
-        }
-        EvaluationStatus::Queued | EvaluationStatus::Running | EvaluationStatus::Finalising => {
-            bail!("the evaluation is not over")
-        }
-    }
 }
 
 fn print_timing(timing: &SmokeTiming) {

@@ -1,63 +1,56 @@
-//! One evaluation per team and UTC day, and what gives a turn back.
+//! A day has one cut: what each team has active then plays it.
 
 use crate::fixture::*;
 use faceoff_store::*;
-use faceoff_types::SmokeOutcome;
+use faceoff_types::{SmokeOutcome, SubmissionId};
 use jiff::civil::date;
 
-fn used(result: Result<Evaluation, StoreError>) -> (jiff::civil::Date, jiff::civil::Date) {
+fn had_its_cut<T: std::fmt::Debug>(result: Result<T, StoreError>) -> jiff::civil::Date {
     match result {
-        Err(StoreError::AlreadyEvaluated { day, next }) => (day, next),
-        other => panic!("expected a used turn, got {other:?}"),
+        Err(StoreError::DayHasCut { day, .. }) => day,
+        other => panic!("expected that the day had its cut, got {other:?}"),
     }
 }
 
 #[tokio::test]
-async fn a_team_has_one_turn_per_utc_day() {
+async fn a_day_has_one_cut() {
     let mut f = Fixture::new().await;
     let first = f.ready_team("Alpha").await;
+    f.now = "2026-03-01T23:59:59.998Z".parse().unwrap();
+    let cut_at = f.now;
+    let evaluation = f.evaluate(first.id, &plan()).await;
+    // neither the same nor a new submission, nor another team's, gets a second one
     f.now = "2026-03-01T23:59:59.999Z".parse().unwrap();
-    f.evaluate(first.id, &plan()).await;
-    // neither the same nor a new submission gets a second turn
-    assert_eq!(
-        used(
-            f.store
-                .create_evaluation(Actor::Organiser, first.id, &plan(), f.now)
-                .await
-        ),
-        (date(2026, 3, 1), date(2026, 3, 2))
-    );
-    f.later(0);
     let team = f.store.team(first.team).await.unwrap();
     f.upload(&team).await;
     let second = f.validate().await;
-    used(
-        f.store
-            .create_evaluation(Actor::Organiser, second.id, &plan(), f.now)
-            .await,
+    f.ready_team("Beta").await;
+    let again = f.store.start_day(Actor::Organiser, &plan(), f.now).await;
+    assert_eq!(had_its_cut(again), date(2026, 3, 1));
+    assert_eq!(
+        f.store.evaluations_on(date(2026, 3, 1)).await.unwrap(),
+        [evaluation]
     );
-    assert!(
-        f.store
-            .start_day(Actor::Organiser, &plan(), f.now)
-            .await
-            .unwrap()
-            .is_empty()
+    let day = f.store.newest_day().await.unwrap().unwrap();
+    assert_eq!(
+        (day.date, day.cut_at, day.released_at),
+        (date(2026, 3, 1), cut_at, None)
     );
     // but the next day comes a millisecond later
     f.now = "2026-03-02T00:00:00Z".parse().unwrap();
     let next = f.evaluate(second.id, &plan()).await;
     assert_eq!(next.day, date(2026, 3, 2));
-    assert_eq!(f.store.evaluations_of(team.id).await.unwrap().len(), 2);
-    assert_eq!(
-        f.store.evaluations_on(date(2026, 3, 2)).await.unwrap(),
-        vec![next]
-    );
+    assert_eq!(f.store.evaluations_on(next.day).await.unwrap().len(), 2);
+    // and a clock that was set back starts nothing
+    f.now = "2026-02-27T00:00:00Z".parse().unwrap();
+    let again = f.store.start_day(Actor::Organiser, &plan(), f.now).await;
+    assert_eq!(had_its_cut(again), date(2026, 3, 2));
 }
 
 #[tokio::test]
-async fn of_many_at_once_one_takes_the_turn() {
+async fn of_many_at_once_one_makes_the_cut() {
     let f = Fixture::new().await;
-    let submission = f.ready_team("Alpha").await;
+    f.ready_team("Alpha").await;
     let other = f.reopen().await;
     let attempts = (0..20).map(|index| {
         let store = if index % 2 == 0 {
@@ -65,26 +58,118 @@ async fn of_many_at_once_one_takes_the_turn() {
         } else {
             other.clone()
         };
-        let (id, now) = (submission.id, f.now);
-        tokio::spawn(async move {
-            store
-                .create_evaluation(Actor::Organiser, id, &plan(), now)
-                .await
-        })
+        let now = f.now;
+        tokio::spawn(async move { store.start_day(Actor::Organiser, &plan(), now).await })
     });
-    let mut created = 0;
+    let mut cuts = 0;
     for attempt in attempts.collect::<Vec<_>>() {
         match attempt.await.unwrap() {
-            Ok(_) => created += 1,
-            Err(StoreError::AlreadyEvaluated { .. }) => {}
+            Ok(started) => cuts += started.len(),
+            Err(StoreError::DayHasCut { .. }) => {}
             Err(error) => panic!("{error}"),
         }
     }
-    assert_eq!(created, 1);
+    assert_eq!(cuts, 1);
 }
 
 #[tokio::test]
-async fn a_cancelled_run_gives_the_turn_back_and_loses_its_workers() {
+async fn a_day_that_nobody_can_play_keeps_its_cut_unless_it_is_the_schedules() {
+    let mut f = Fixture::new().await;
+    let team = f.team("Alpha").await;
+    let refused = f.store.start_day(Actor::Organiser, &plan(), f.now).await;
+    assert!(
+        matches!(refused, Err(StoreError::Conflict(_))),
+        "{refused:?}"
+    );
+    assert_eq!(f.store.newest_day().await.unwrap(), None);
+    let started = f.store.start_scheduled_day(&plan(), f.now).await;
+    assert_eq!(started.unwrap(), Some(Vec::new()));
+    let day = f.store.newest_day().await.unwrap().unwrap();
+    assert_eq!(day.released_at, Some(f.now), "there is nothing to wait for");
+    // who comes later plays the next day
+    f.upload(&team).await;
+    let submission = f.validate().await;
+    had_its_cut(f.store.start_day(Actor::Organiser, &plan(), f.now).await);
+    f.later(86_400);
+    f.evaluate(submission.id, &plan()).await;
+}
+
+async fn active(f: &Fixture, team: &Team) -> SubmissionId {
+    let of_team = f.store.submissions_of(team.id).await.unwrap();
+    let active: Vec<_> = of_team.iter().filter(|one| one.active).collect();
+    assert_eq!(active.len(), 1, "{of_team:?}");
+    active[0].id
+}
+
+#[tokio::test]
+async fn an_upload_takes_its_place_when_it_is_valid_unless_a_newer_one_or_a_choice_has() {
+    let mut f = Fixture::new().await;
+    let old = f.ready_team("Alpha").await;
+    let team = f.store.team(old.team).await.unwrap();
+    // Two uploads, the newer of which is valid first.
+    f.later(1);
+    let slow = f.upload(&team).await;
+    let (slow_claim, _) = f.claim_smoke().await;
+    f.later(1);
+    f.upload(&team).await;
+    let quick = f.validate().await;
+    assert!(quick.active);
+    let valid = || SmokeOutcome::Valid {
+        agent_name: "late".into(),
+        log: String::new(),
+    };
+    let late = f.store.commit_smoke(&slow_claim, valid(), f.now).await;
+    assert_eq!(late.unwrap(), Committed::Now);
+    assert_eq!(active(&f, &team).await, quick.id, "a newer one is active");
+
+    // A choice stays against what was uploaded before it.
+    f.later(1);
+    f.upload(&team).await;
+    let (claim, uploaded_before) = f.claim_smoke().await;
+    f.later(1);
+    let choose = |id| f.store.activate_submission(Actor::Team(team.id), id, f.now);
+    assert!(matches!(
+        choose(uploaded_before.id).await,
+        Err(StoreError::Conflict(_))
+    ));
+    assert!(choose(old.id).await.unwrap().active);
+    f.store.commit_smoke(&claim, valid(), f.now).await.unwrap();
+    assert_eq!(active(&f, &team).await, old.id);
+    choose(slow.id).await.unwrap();
+    assert_eq!(active(&f, &team).await, slow.id);
+    // What comes later takes its place.
+    f.later(1);
+    f.upload(&team).await;
+    let newest = f.validate().await;
+    assert_eq!(active(&f, &team).await, newest.id);
+    assert_eq!(f.evaluate(newest.id, &plan()).await.submission, newest.id);
+}
+
+#[tokio::test]
+async fn a_choice_after_the_cut_is_one_for_the_next() {
+    let mut f = Fixture::new().await;
+    let first = f.ready_team("Alpha").await;
+    let team = f.store.team(first.team).await.unwrap();
+    f.later(1);
+    f.upload(&team).await;
+    let second = f.validate().await;
+    let today = f.evaluate(second.id, &small()).await;
+    f.later(1);
+    let choice = f
+        .store
+        .activate_submission(Actor::Team(team.id), first.id, f.now);
+    choice.await.unwrap();
+    f.finish_next().await;
+    assert_eq!(
+        f.store.evaluation(today.id).await.unwrap().submission,
+        second.id
+    );
+    f.later(86_400);
+    assert_eq!(f.evaluate(first.id, &small()).await.submission, first.id);
+}
+
+#[tokio::test]
+async fn a_cancelled_run_loses_its_workers_and_can_be_played_again() {
     let f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;
     let evaluation = f.evaluate(submission.id, &plan()).await;
@@ -113,18 +198,15 @@ async fn a_cancelled_run_gives_the_turn_back_and_loses_its_workers() {
         .cancel_evaluation(Actor::Organiser, evaluation.id, "", f.now)
         .await;
     assert!(matches!(again, Err(StoreError::Conflict(_))));
-    assert_eq!(
-        f.store
-            .start_day(Actor::Organiser, &plan(), f.now)
-            .await
-            .unwrap()
-            .len(),
-        1
-    );
+    assert!(f.claim().await.is_none(), "not by itself");
+    let again = f
+        .store
+        .rerun_evaluation(Actor::Organiser, evaluation.id, f.now);
+    assert_eq!(again.await.unwrap().submission, submission.id);
 }
 
 #[tokio::test]
-async fn the_day_starts_the_newest_valid_submission_of_each_team_once() {
+async fn the_cut_takes_the_newest_valid_submission_of_each_team() {
     let mut f = Fixture::new().await;
     let alpha = f.ready_team("Alpha").await;
     let beta = f.ready_team("Beta").await;
@@ -156,13 +238,6 @@ async fn the_day_starts_the_newest_valid_submission_of_each_team_once() {
         [beta.id, newer.id],
         "earliest submission first"
     );
-    assert!(
-        f.store
-            .start_day(Actor::Organiser, &plan(), f.now)
-            .await
-            .unwrap()
-            .is_empty()
-    );
     assert!(f.store.evaluations_of(silent.id).await.unwrap().is_empty());
     assert!(f.store.evaluations_of(broken.id).await.unwrap().is_empty());
 }
@@ -171,7 +246,6 @@ async fn the_day_starts_the_newest_valid_submission_of_each_team_once() {
 async fn the_schedule_starts_a_day_once_whoever_asks() {
     let mut f = Fixture::new().await;
     f.ready_team("Alpha").await;
-    assert_eq!(f.store.last_scheduled_day().await.unwrap(), None);
     let started = f
         .store
         .start_scheduled_day(&plan(), f.now)
@@ -187,10 +261,7 @@ async fn the_schedule_starts_a_day_once_whoever_asks() {
             .unwrap()
             .is_none()
     );
-    assert_eq!(
-        other.last_scheduled_day().await.unwrap(),
-        Some(date(2026, 3, 1))
-    );
+    had_its_cut(other.start_day(Actor::Organiser, &plan(), f.now).await);
     f.later(86_400);
     assert_eq!(
         other
@@ -237,14 +308,10 @@ async fn an_empty_plan_is_refused() {
     for plan in bad {
         let error = f
             .store
-            .create_evaluation(Actor::Organiser, submission.id, &plan, f.now)
-            .await
-            .unwrap_err();
-        assert!(matches!(error, StoreError::Conflict(_)), "{error}");
-        f.store
             .start_day(Actor::Organiser, &plan, f.now)
             .await
             .unwrap_err();
+        assert!(matches!(error, StoreError::Conflict(_)), "{error}");
     }
     assert!(
         f.store

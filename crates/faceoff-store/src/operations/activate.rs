@@ -1,0 +1,55 @@
+use crate::{
+    error::{Result, StoreError},
+    event::{Actor, Event, Subject},
+    store::Store,
+    tables::{
+        active_submissions, season,
+        submissions::{self, Submission, SubmissionState},
+    },
+    write::Tx,
+};
+use faceoff_types::SubmissionId;
+use jiff::Timestamp;
+
+/// Refuses a submission that cannot be evaluated, with what to do about it.
+fn check_valid(submission: &Submission) -> Result<()> {
+    Err(StoreError::Conflict(match &submission.state {
+        SubmissionState::Valid => return Ok(()),
+        SubmissionState::Validating => {
+            "the submission's smoke run is not over: wait until it is valid".into()
+        }
+        SubmissionState::Invalid { reason } => {
+            format!("the submission is invalid ({reason}): upload a corrected one")
+        }
+        SubmissionState::ValidationError { .. } => {
+            "the submission could not be checked, by our fault: upload it again".into()
+        }
+    }))
+}
+
+async fn activate(tx: &mut Tx, id: SubmissionId) -> Result<Submission> {
+    season::check_open(tx).await?;
+    let submission = submissions::find(tx, id).await?;
+    check_valid(&submission)?;
+    let now = tx.now;
+    active_submissions::choose(tx, submission.team, id, now).await?;
+    if !submission.active {
+        tx.record(Subject::Submission(id), Event::SubmissionActivated);
+    }
+    submissions::find(tx, id).await
+}
+
+impl Store {
+    /// Chooses what a team enters at the next cut, and at those after it, until a later upload turns
+    /// valid. A day that had its cut goes on with what was active then. [`StoreError::Conflict`] if the
+    /// submission is not valid (yet); [`StoreError::SeasonClosed`] once the season is over.
+    pub async fn activate_submission(
+        &self,
+        actor: Actor,
+        id: SubmissionId,
+        now: Timestamp,
+    ) -> Result<Submission> {
+        self.write(actor, now, async |tx| activate(tx, id).await)
+            .await
+    }
+}

@@ -1,0 +1,77 @@
+//! The same submission on the same day's episodes once more: what we broke by itself, and what an
+//! organiser asks for. What plays stays what was active at the cut.
+
+use crate::{
+    error::{Result, StoreError},
+    event::Actor,
+    operations::enter::{Entrant, enter},
+    reads,
+    store::Store,
+    tables::{
+        days,
+        evaluations::{self, Entry, Evaluation, EvaluationState},
+        runs, season,
+    },
+    write::Tx,
+};
+use faceoff_types::EvaluationId;
+use jiff::Timestamp;
+
+/// How long what we broke rests before it is played again by itself, seconds: the first time, the second
+/// time, and then no more. So a day ends whatever is broken.
+pub const RERUN_PAUSES_S: [u32; 2] = [60, 600];
+
+async fn again(tx: &mut Tx, broken: Entry, rest_s: u32) -> Result<EvaluationId> {
+    let entrant = Entrant {
+        submission: broken.submission,
+        team: broken.team,
+        rerun_of: Some(broken.id),
+    };
+    let plan = runs::find(tx, broken.run).await?.plan;
+    enter(tx, entrant, broken.day, &plan, rest_s).await
+}
+
+/// Queues what has just ended by our fault again: unless its day is released, or this was tried often
+/// enough.
+pub(crate) async fn after_our_fault(tx: &mut Tx, id: EvaluationId) -> Result<()> {
+    let broken = evaluations::entry(tx, id).await?;
+    if days::is_released(tx, broken.day).await? {
+        return Ok(());
+    }
+    let times = evaluations::count_broken(tx, broken.team, broken.day).await?;
+    if let Some(rest_s) = RERUN_PAUSES_S.get(times.saturating_sub(1)) {
+        again(tx, broken, *rest_s).await?;
+    }
+    Ok(())
+}
+
+impl Store {
+    /// Plays an evaluation again that was cancelled or that we broke: what was active at the cut, on the
+    /// same episodes, whether the day is released or not. [`StoreError::Conflict`] if it ended otherwise,
+    /// or the team has another one of the day that counts; [`StoreError::SeasonClosed`] once the season
+    /// is over.
+    pub async fn rerun_evaluation(
+        &self,
+        actor: Actor,
+        id: EvaluationId,
+        now: Timestamp,
+    ) -> Result<Evaluation> {
+        self.write(actor, now, async |tx| {
+            season::check_open(tx).await?;
+            match reads::evaluations::find(tx, id).await?.state {
+                EvaluationState::PlatformFailed { .. } | EvaluationState::Cancelled { .. } => {}
+                _ => {
+                    return Err(StoreError::Conflict(
+                        "only an evaluation that was cancelled, or that failed by our fault, is played \
+                         again"
+                            .into(),
+                    ));
+                }
+            }
+            let broken = evaluations::entry(tx, id).await?;
+            let id = again(tx, broken, 0).await?;
+            reads::evaluations::find(tx, id).await
+        })
+        .await
+    }
+}

@@ -1,0 +1,18 @@
+use crate::{
+    error::Result,
+    store::Store,
+    tables::days::{self, Day},
+};
+
+impl Store {
+    /// All days that had their cut, the newest first, each with how many of its evaluations are
+    /// finished.
+    pub async fn days(&self) -> Result<Vec<(Day, u32)>> {
+        days::all(&mut *self.database.read.acquire().await?).await
+    }
+
+    /// The last day that had its cut.
+    pub async fn newest_day(&self) -> Result<Option<Day>> {
+        days::newest(&mut *self.database.read.acquire().await?).await
+    }
+}
