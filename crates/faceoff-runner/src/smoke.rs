@@ -1,6 +1,6 @@
 use crate::{
-    bundle::Bundle, config::AgentEnvironment, fault::PlatformFault, host_watch::StallWatch,
-    log::Log, player::Player,
+    bundle::Bundle, config::AgentEnvironment, fault::PlatformFault, host_watch::Counters, log::Log,
+    player::Player,
 };
 use faceoff_episode::Nowhere;
 use faceoff_types::{AgentFault, Profile, Seed, Task};
@@ -32,7 +32,6 @@ pub fn smoke(
     env: &AgentEnvironment,
     cancelled: &dyn Fn() -> bool,
 ) -> Result<SmokeReport, PlatformFault> {
-    let watch = StallWatch::start(&env.agent_cpus)?;
     let seed = Seed::from_number(0);
     let mut log = Log::new(env.limits.stderr_tail_bytes);
     for task in Task::ALL {
@@ -43,7 +42,8 @@ pub fn smoke(
             Profile::Evaluation,
             seed,
             seed.model_mismatch(),
-            &watch,
+            1,
+            &Counters,
         );
         let outcome = player.play(0, SMOKE_STEPS, &mut Nowhere, cancelled)?;
         log.add(&player.close()?, None);

@@ -99,6 +99,7 @@ pub fn sandboxed() -> AgentEnvironment {
             bye_s: 600.0,
             // Tests of other things must not depend on what else the machine does.
             host_noise_reruns: 0,
+            ..TimeLimits::default()
         },
         isolation: Isolation::Sandboxed {
             given_up: Vec::new(),

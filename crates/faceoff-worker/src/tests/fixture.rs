@@ -326,6 +326,7 @@ impl Server {
                     step_s: 1.0,
                     bye_s: 1.0,
                     host_noise_reruns: 0,
+                    ..TimeLimits::default()
                 },
                 isolation: Isolation::None,
                 runtimes: BTreeMap::new(),
