@@ -159,7 +159,7 @@ impl Bubblewrap {
         ]);
         line.fd("--json-status-fd", status);
         for path in mount_order(&spec.runtime.read_only_paths) {
-            line.read_only(&path, &path)?;
+            line.read_only(&spec.runtime.source(&path), &path)?;
         }
         line.args(["--proc", "/proc", "--dev", "/dev"]);
         line.hide_counters();
@@ -284,7 +284,7 @@ fn is_there(path: &str) -> bool {
 }
 
 /// Parents before what is inside them, and nothing that an earlier mount shows already.
-fn mount_order(paths: &[PathBuf]) -> Vec<PathBuf> {
+pub(crate) fn mount_order(paths: &[PathBuf]) -> Vec<PathBuf> {
     let mut sorted = paths.to_vec();
     sorted.sort();
     sorted.dedup();

@@ -27,7 +27,7 @@ def say(answer):
 
 def think():
     """The next question does not come although it is due: it does not fit."""
-    if WHO == "a reader thread":
+    if WHO == "sleeps":
         time.sleep(0.3)
     else:
         until = time.monotonic() + 0.3
@@ -91,9 +91,9 @@ fn without_filter() -> AgentEnvironment {
 #[test]
 fn a_question_that_does_not_fit_is_on_the_agents_time() {
     for (env, who) in [
-        (without_filter(), "a computation"),
-        (without_filter(), "a reader thread"),
-        (unconfined(), "a computation"),
+        (without_filter(), "computes"),
+        (without_filter(), "sleeps"),
+        (unconfined(), "computes"),
     ] {
         let out = tempfile::tempdir().unwrap();
         let agent = leaves_unread(true, who);
