@@ -1,7 +1,7 @@
 """Looks for a notice board: a way to leave a mark where another agent finds it (x86-64).
 
 `notice_board.py MARK FILE` makes each call on FILE, which agents share, and reports its error name, or `ok`
-with what it told. `notice_board.py MARK FILE hold` then keeps what it got and echoes lines.
+with what it told. `notice_board.py MARK FILE hold` then leaves what it can, keeps it and echoes lines; with `leave` it ends.
 """
 import ctypes
 import errno
@@ -108,7 +108,7 @@ calls = {
 }
 answers = {name: ask() for name, ask in calls.items()}
 print(json.dumps(answers), flush=True)
-if "hold" in sys.argv:
+if "hold" in sys.argv or "leave" in sys.argv:
     # Whatever can be left is left: objects of the kernel, files, a lock, a file that was read.
     made = [
         libc.shmget(0x5EED, 4096, 0o1666), libc.semget(0x5EED, 1, 0o1666), libc.msgget(0x5EED, 0o1666),
@@ -117,6 +117,6 @@ if "hold" in sys.argv:
     ]
     os.pread(board, size, 0)
     print("held" if min(made) >= 0 else f"only {made}", flush=True)
-    for line in sys.stdin:
+    for line in sys.stdin if "hold" in sys.argv else ():
         sys.stdout.write(line)
         sys.stdout.flush()

@@ -6,6 +6,7 @@ mod crash;
 mod demo;
 mod house;
 mod kills;
+mod luck;
 mod privacy;
 mod upgrade;
 
