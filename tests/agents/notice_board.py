@@ -9,10 +9,13 @@ import fcntl
 import json
 import mmap
 import os
+import signal
 import struct
 import sys
 
 path = sys.argv[2]
+# What some of the notices are, where nothing refuses them.
+signal.signal(signal.SIGIO, signal.SIG_IGN)
 libc = ctypes.CDLL(None, use_errno=True)
 libc.syscall.restype = ctypes.c_long
 board = os.open(path, os.O_RDONLY)

@@ -84,8 +84,9 @@ def spawned():
 def shared():
     block = multiprocessing.shared_memory.SharedMemory(create=True, size=1 << 20)
     block.buf[5] = 42
-    assert multiprocessing.shared_memory.SharedMemory(block.name).buf[5] == 42
-    block.close(), block.unlink()
+    again = multiprocessing.shared_memory.SharedMemory(block.name)
+    assert again.buf[5] == 42
+    again.close(), block.close(), block.unlink()
     with multiprocessing.Manager() as manager:
         numbers = manager.list([1, 2])
         numbers.append(3)
