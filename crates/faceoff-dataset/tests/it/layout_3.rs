@@ -1,4 +1,4 @@
-//! What commit 6bc65e4 left: its archives do not tell what the host took, and verify all the same.
+//! What commit d418cdf left: its archives do not tell what the host took, and verify all the same.
 
 use crate::{
     played::{fixture, table},
