@@ -46,6 +46,8 @@ struct StartUpFault {
     kind: AgentFaultKind,
     line: Option<String>,
     stderr: String,
+    /// Did the host keep it from starting in time?
+    ended_by_host: bool,
 }
 
 /// An episode under way, wherever it is recorded.
@@ -145,12 +147,17 @@ impl<'a> Player<'a> {
             Course::begin(&self.arena, self.task, episode, interpolation, sink).at_most(max_steps);
         let mut session = match session {
             Ok(session) => session,
-            Err(StartUpFault { kind, line, stderr }) => {
+            Err(StartUpFault {
+                kind,
+                line,
+                stderr,
+                ended_by_host,
+            }) => {
                 let outcome = course.failed(Phase::StartUp, kind, line);
                 self.note(&stderr, &outcome);
                 return Ok(Try {
                     outcome,
-                    ended_by_host: false,
+                    ended_by_host,
                 });
             }
         };
@@ -196,18 +203,19 @@ impl<'a> Player<'a> {
     }
 
     fn start(&self) -> Result<Result<Session<'a>, StartUpFault>, PlatformFault> {
-        match Session::start_watched(self.bundle, self.env, self.task.into(), self.watch) {
-            Ok(session) => Ok(Ok(session)),
-            Err((Trouble::Platform(fault), _)) => Err(fault),
-            Err((Trouble::Host { fault: kind }, stderr)) => Ok(Err(StartUpFault {
-                kind,
-                line: None,
-                stderr,
-            })),
-            Err((Trouble::Agent { fault: kind, line }, stderr)) => {
-                Ok(Err(StartUpFault { kind, line, stderr }))
-            }
-        }
+        let started = Session::start_watched(self.bundle, self.env, self.task.into(), self.watch);
+        let (kind, line, stderr, ended_by_host) = match started {
+            Ok(session) => return Ok(Ok(session)),
+            Err((Trouble::Platform(fault), _)) => return Err(fault),
+            Err((Trouble::Host { fault }, stderr)) => (fault, None, stderr, true),
+            Err((Trouble::Agent { fault, line }, stderr)) => (fault, line, stderr, false),
+        };
+        Ok(Err(StartUpFault {
+            kind,
+            line,
+            stderr,
+            ended_by_host,
+        }))
     }
 
     /// The conversation of one episode; trouble comes with what the agent was asked for.

@@ -106,7 +106,9 @@ mod tests {
                 output_name,
             } = Channel::new(kind).unwrap();
             assert_eq!(output_name.starts_with("pipe:["), kind == Kind::Pipes);
-            let question: Vec<u8> = (0..3 * ROOM_BYTES).map(|i| b'a' + (i % 23) as u8).collect();
+            let question: Vec<u8> = (0..16 * ROOM_BYTES)
+                .map(|i| b'a' + (i % 23) as u8)
+                .collect();
             lines.send(&question).unwrap().unwrap();
             lines.send(b"\n").unwrap().unwrap();
             assert!(!lines.is_all_sent());

@@ -238,7 +238,7 @@ mod tests {
     #[test]
     fn only_what_ran_beside_the_agent_counts_and_never_more_than_the_time() {
         let begun = Instant::now();
-        let taken = |agent, all, ticks: &[Ticks], wall| {
+        let taken = |agent: u64, all: u64, ticks: &[Ticks], wall: u64| {
             let still = vec![Ticks::default(); ticks.len()];
             let from = reading(begun, 500, 700, &still);
             let to = reading(begun + MS(wall), 500 + agent, 700 + all, ticks);

@@ -58,15 +58,11 @@ pub(super) fn reader<R: ChunkReader + 'static>(
     columns: Option<&[String]>,
 ) -> Result<ParquetRecordBatchReaderBuilder<R>, DatasetError> {
     let found = metadata.schema();
-    let mut expected = Schema::clone(StepRows::new(Task::Hit).schema());
-    if lacks_host_time(found) {
-        let fields = expected.fields().iter();
-        expected = fields
-            .filter(|field| field.name() != HOST_TIME)
-            .cloned()
-            .collect::<Vec<_>>()
-            .into();
-    }
+    let lacks_host_time = lacks_host_time(found);
+    let rows = StepRows::new(Task::Hit);
+    let fields = rows.schema().fields().iter();
+    let fields = fields.filter(|field| !lacks_host_time || field.name() != HOST_TIME);
+    let expected = Schema::new(fields.cloned().collect::<Vec<_>>());
     has_columns(STEPS_FILE, found, &expected)?;
     if found.fields().len() != expected.fields().len() {
         return Err(DatasetError::Unreadable(format!(
