@@ -1,7 +1,7 @@
 """Looks for a notice board: a way to leave a mark where another agent finds it (x86-64).
 
-`notice_board.py MARK FILE` makes each call on FILE, which agents share, and reports its error name, or `ok`
-with what it told. `notice_board.py MARK FILE hold` then leaves what it can, keeps it and echoes lines; with `leave` it ends.
+`notice_board.py MARK FILE` makes each call on FILE, which agents share (`library`: one of Python's), and
+reports its error name, or `ok` with what it told. `notice_board.py MARK FILE hold` then leaves what it can, keeps it and echoes lines; with `leave` it ends.
 """
 import ctypes
 import errno
@@ -13,7 +13,7 @@ import signal
 import struct
 import sys
 
-path = sys.argv[2]
+path = os.__file__ if sys.argv[2] == "library" else sys.argv[2]
 # What some of the notices are, where nothing refuses them.
 signal.signal(signal.SIGIO, signal.SIG_IGN)
 libc = ctypes.CDLL(None, use_errno=True)

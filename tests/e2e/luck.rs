@@ -77,7 +77,7 @@ fn what_one_teams_agent_leaves_another_teams_agent_does_not_find() {
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     // Locks, leases, hints, notices, advice, reads without waiting, counters, terminals, objects of the
     // kernel, files: each on a file that both see. The first leaves what it can, the second looks.
-    let board = "/etc/ld.so.cache";
+    let board = "library";
     let [before, after] = ["leave", "look"].map(|what| {
         let arguments = ["mark", board, what];
         let folder = reporting(scratch.path(), what, "notice_board.py", &arguments);

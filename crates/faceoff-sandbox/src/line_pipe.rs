@@ -129,10 +129,11 @@ impl LinePipe {
             if !wait_for_any(&mut self.awaited(), deadline)? {
                 return Ok(ReadLine::TimedOut);
             }
-            if !self.is_all_sent() && self.send_rest()? == Err(Closed) {
+            if !self.fill()? {
                 return Ok(ReadLine::Closed);
             }
-            if !self.fill()? {
+            // A line that was there before the rest is handed out before: it answers something else.
+            if !self.is_all_sent() && !self.holds_line() && self.send_rest()? == Err(Closed) {
                 return Ok(ReadLine::Closed);
             }
             // A dribbling agent always has something to read: the deadline holds all the same.

@@ -12,8 +12,8 @@ use std::{
     time::{Duration, SystemTime},
 };
 
-/// Of the host's, shown to each agent with its runtime.
-const SHARED: &str = "/etc/ld.so.cache";
+/// A file of Python's library, which each agent is shown.
+const SHARED: &str = "library";
 
 type Answers = BTreeMap<String, String>;
 
