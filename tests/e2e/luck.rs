@@ -88,7 +88,7 @@ fn what_one_teams_agent_leaves_another_teams_agent_does_not_find() {
         ("flock", "ENOSYS"),
         ("lock_is_asked_for", "EINVAL"),
         ("open_file_lock", "EINVAL"),
-        ("read_if_in_memory", "EOPNOTSUPP"),
+        ("read_if_in_memory", "ENOTSUP"),
         ("mincore", "ENOSYS"),
         ("cachestat", "ENOSYS"),
         ("inotify_init1", "ENOSYS"),

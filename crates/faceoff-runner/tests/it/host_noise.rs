@@ -269,7 +269,7 @@ const STORMS: [(&str, &str); 6] = [
     ),
     (
         "memory up to the limit",
-        "for _ in range(2): hoard = bytearray(150 << 20); hoard[::4096] = bytes(len(hoard[::4096]))",
+        "for _ in range(2): hoard = bytearray(90 << 20); hoard[::4096] = bytes(len(hoard[::4096]))",
     ),
 ];
 

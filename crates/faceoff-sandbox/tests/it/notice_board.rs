@@ -51,7 +51,7 @@ const REFUSED: [(&str, &[&str]); 6] = [
         ],
     ),
     (
-        "EOPNOTSUPP",
+        "ENOTSUP",
         &["read_if_in_memory", "read_and_drop", "read_high_priority"],
     ),
     ("EPERM", &["fanotify_init", "keys", "kcmp"]),
