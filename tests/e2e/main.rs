@@ -7,6 +7,7 @@ mod cut;
 mod demo;
 mod house;
 mod kills;
+mod luck;
 mod privacy;
 mod real_time;
 mod upgrade;

@@ -49,6 +49,7 @@ fn record(spec: &ShardSpec, out: &Path) {
                 action: &[state.q, state.dq].concat(),
                 answered: Answered {
                     computation_time_s: 1e-3,
+                    host_time_s: 0.0,
                     cpu_time_s: Some(5e-4),
                 },
                 state: &state,

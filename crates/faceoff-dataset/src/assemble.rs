@@ -60,7 +60,7 @@ pub fn assemble(
     let scored = score(
         meta.profile,
         meta.seed,
-        Layout::Three,
+        Layout::Four,
         played(&shards)?,
         calibration.worst(),
     );
@@ -205,7 +205,7 @@ fn played(shards: &[ShardRecording]) -> Result<BTreeMap<Task, Tally>, RecordingE
     }
     let mut played: BTreeMap<Task, Tally> = steps
         .iter()
-        .map(|(task, steps)| (*task, Tally::new(*steps, Layout::Three)))
+        .map(|(task, steps)| (*task, Tally::new(*steps, Layout::Four)))
         .collect();
     for shard in shards {
         if let Some(tally) = played.get_mut(&shard.spec.task) {

@@ -22,6 +22,7 @@ use crate::{
         ARCHIVE_FILE, CALIBRATION_FILE, EPISODES_FILE, LOG_FILE, MANIFEST_FILE, RESULTS_FILE,
         STEPS_FILE, VIOLATIONS_FILE,
     },
+    table::HOST_TIME,
 };
 use arrow_array::RecordBatch;
 use container::Container;
@@ -194,7 +195,13 @@ impl Dataset {
     /// # Errors
     /// [`DatasetError::Unreadable`] if the table is not one of control steps.
     pub fn steps(&self) -> Result<StepTable, DatasetError> {
-        StepTable::open(self.table(STEPS_FILE)?)
+        let table = StepTable::open(self.table(STEPS_FILE)?)?;
+        if self.layout == Layout::Four && !table.tells_host_time() {
+            return Err(DatasetError::Unreadable(format!(
+                "{STEPS_FILE} has no column {HOST_TIME}"
+            )));
+        }
+        Ok(table)
     }
 
     /// The control steps of one episode, of all columns or of the named ones, in the file's order of

@@ -56,7 +56,7 @@ pub(crate) struct StepDigests {
 impl StepDigests {
     /// Adds an answered step: the action's numbers as little-endian doubles; the computation time and
     /// the CPU time in nanoseconds as little-endian 64-bit integers, −1 for a CPU time that is not
-    /// known.
+    /// known, then, if the host took some of the time, −2 and that time.
     pub fn add(&mut self, action: &[f64], answered: &Answered) {
         for number in action {
             self.actions.update(&number.to_le_bytes());
@@ -65,6 +65,12 @@ impl StepDigests {
         self.times
             .update(&nanoseconds(answered.computation_time_s).to_le_bytes());
         self.times.update(&cpu_time_ns.to_le_bytes());
+        let host_time_ns = nanoseconds(answered.host_time_s);
+        if host_time_ns != 0 {
+            // No computation time is negative: this cannot be taken for the next step's.
+            self.times.update(&(-2_i64).to_le_bytes());
+            self.times.update(&host_time_ns.to_le_bytes());
+        }
     }
 
     /// Both hashes, of the actions and of the times.

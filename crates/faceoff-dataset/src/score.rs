@@ -3,26 +3,29 @@
 use crate::{
     dataset::{FileRange, Layout, StepTable},
     error::{DatasetError, RecordingError},
-    table::CONSTRAINTS,
+    table::{CONSTRAINTS, HOST_TIME},
     times::seconds,
 };
 use arrow_array::{
-    RecordBatch,
+    Array, RecordBatch,
     cast::AsArray,
     types::{Float64Type, Int64Type, UInt32Type},
 };
+use faceoff_episode::Answered;
 use faceoff_scoring::StepTimes;
 use faceoff_types::{
     ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationResult, Profile, Seed, SlotTiming, Task,
 };
-use faceoff_wire::dataset::{ConstraintViolation, SlowEpisode, TaskViolations, ViolationsFile};
+use faceoff_wire::dataset::{
+    ConstraintViolation, SlowEpisode, SlowStep, TaskViolations, ViolationsFile,
+};
 use serde::Serialize;
 use std::{collections::BTreeMap, path::Path};
 
 /// What scoring needs of one answered step.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Measured {
-    pub time_s: f64,
+    pub answered: Answered,
     /// Joint position, joint velocity, end effector, link height; violated when above 0.
     pub constraints: [f64; 4],
 }
@@ -34,6 +37,8 @@ pub(crate) struct Tally {
     times: Times,
     /// In the order of [`Measured::constraints`].
     violations: [Vec<ConstraintViolation>; 4],
+    /// The slowest answer of each episode, by what counts of it; `None` in layouts that do not tell.
+    slowest: Option<BTreeMap<u32, (f64, SlowStep)>>,
 }
 
 #[derive(Debug)]
@@ -50,9 +55,10 @@ impl Tally {
             outcomes: Vec::new(),
             times: match layout {
                 Layout::Two => Times::FromTheShortestOn(Vec::new()),
-                Layout::Three => Times::InOrderOfPlay(StepTimes::of(steps)),
+                Layout::Three | Layout::Four => Times::InOrderOfPlay(StepTimes::of(steps)),
             },
             violations: Default::default(),
+            slowest: (layout == Layout::Four).then(BTreeMap::new),
         }
     }
 
@@ -61,9 +67,27 @@ impl Tally {
     }
 
     pub fn add_step(&mut self, episode: u32, step: u32, measured: &Measured) {
+        let Answered {
+            computation_time_s,
+            host_time_s,
+            cpu_time_s,
+        } = measured.answered;
         match &mut self.times {
-            Times::InOrderOfPlay(times) => times.add(measured.time_s),
-            Times::FromTheShortestOn(times) => times.push(measured.time_s),
+            Times::InOrderOfPlay(times) => times.add(computation_time_s),
+            Times::FromTheShortestOn(times) => times.push(computation_time_s),
+        }
+        if let Some(slowest) = &mut self.slowest
+            && slowest
+                .get(&episode)
+                .is_none_or(|(before_s, _)| computation_time_s > *before_s)
+        {
+            let slow = SlowStep {
+                step,
+                wall_s: computation_time_s + host_time_s,
+                host_s: host_time_s,
+                cpu_s: cpu_time_s,
+            };
+            slowest.insert(episode, (computation_time_s, slow));
         }
         for (found, value) in self.violations.iter_mut().zip(measured.constraints) {
             if value.is_nan() || value <= 0.0 {
@@ -86,7 +110,14 @@ impl Tally {
 
     /// Adds the steps of a shard's table.
     pub fn add_table(&mut self, path: &Path) -> Result<(), RecordingError> {
-        let names = ["episode", "step", "computation_time_ns"].into_iter();
+        let names = [
+            "episode",
+            "step",
+            "computation_time_ns",
+            HOST_TIME,
+            "cpu_time_ns",
+        ]
+        .into_iter();
         let names: Vec<String> = names.chain(CONSTRAINTS).map(str::to_owned).collect();
         let read = |error: DatasetError| match error {
             DatasetError::Io(error) => RecordingError::Io(error),
@@ -103,11 +134,18 @@ impl Tally {
     fn add_batch(&mut self, batch: &RecordBatch) {
         let episodes = batch["episode"].as_primitive::<UInt32Type>();
         let steps = batch["step"].as_primitive::<UInt32Type>();
-        let times = batch["computation_time_ns"].as_primitive::<Int64Type>();
+        let [times, host_times, cpu_times] = ["computation_time_ns", HOST_TIME, "cpu_time_ns"]
+            .map(|name| batch[name].as_primitive::<Int64Type>());
         let constraints = CONSTRAINTS.map(|name| batch[name].as_primitive::<Float64Type>());
         for row in 0..batch.num_rows() {
             let measured = Measured {
-                time_s: seconds(times.value(row)),
+                answered: Answered {
+                    computation_time_s: seconds(times.value(row)),
+                    host_time_s: seconds(host_times.value(row)),
+                    cpu_time_s: cpu_times
+                        .is_valid(row)
+                        .then(|| seconds(cpu_times.value(row))),
+                },
                 constraints: constraints.map(|column| column.value(row)),
             };
             self.add_step(episodes.value(row), steps.value(row), &measured);
@@ -159,7 +197,12 @@ pub(crate) fn score(
         let times = tally.times.finish();
         tasks.insert(task, faceoff_scoring::score_task(&tally.outcomes, &times));
         let [joint_pos, joint_vel, ee, link] = tally.violations;
-        let computation_time = tally.outcomes.iter().filter_map(slow_episode).collect();
+        let slowest = tally.slowest.unwrap_or_default();
+        let computation_time = tally
+            .outcomes
+            .iter()
+            .filter_map(|outcome| slow_episode(outcome, &slowest))
+            .collect();
         violations.tasks.insert(
             task,
             TaskViolations {
@@ -184,7 +227,10 @@ pub(crate) fn json_file<T: Serialize>(value: &T) -> serde_json::Result<Vec<u8>> 
 }
 
 /// The episode as `violations.json` lists it, if it has penalty points for computation time.
-fn slow_episode(outcome: &EpisodeOutcome) -> Option<SlowEpisode> {
+fn slow_episode(
+    outcome: &EpisodeOutcome,
+    slowest: &BTreeMap<u32, (f64, SlowStep)>,
+) -> Option<SlowEpisode> {
     // The rule lives in the scoring crate: the points are what an instant agent would not have.
     let instant = EpisodeOutcome {
         computation_time: ComputationTime::default(),
@@ -200,5 +246,6 @@ fn slow_episode(outcome: &EpisodeOutcome) -> Option<SlowEpisode> {
         mean_s,
         max_s,
         points,
+        slowest: slowest.get(&outcome.episode).map(|(_, slow)| *slow),
     })
 }

@@ -23,10 +23,11 @@ const REPORT_FILE: &str = "report.json";
 /// Written last: a folder with this file is complete.
 const SHARD_FILE: &str = "shard.json";
 /// Name and version of a shard folder's layout; private to the platform.
-const SHARD_SCHEMA: &str = "faceoff-shard/3";
-/// The layout before, whose tables split integers by bytes and have no index of pages. An evaluation
-/// that was under way when the program was replaced has such shards.
-const OLD_SHARD_SCHEMA: &str = "faceoff-shard/2";
+const SHARD_SCHEMA: &str = "faceoff-shard/4";
+/// The layouts before: 2, whose tables split integers by bytes and have no index of pages, and 3, whose
+/// steps do not tell the host's time. An evaluation that was under way when the program was replaced has
+/// such shards.
+const OLD_SHARD_SCHEMAS: [&str; 2] = ["faceoff-shard/2", "faceoff-shard/3"];
 
 /// The files that `shard.json` lists.
 const FILES: [&str; 4] = [STEPS_FILE, EPISODES_FILE, LOG_FILE, REPORT_FILE];
@@ -138,10 +139,11 @@ impl ShardRecording {
         let shard: ShardFile = serde_json::from_slice(&text).map_err(|e| unread(SHARD_FILE)(&e))?;
         let part = match &*shard.schema {
             SHARD_SCHEMA => ShardTable::Ready,
-            OLD_SHARD_SCHEMA => ShardTable::Old,
+            old if OLD_SHARD_SCHEMAS.contains(&old) => ShardTable::Old,
             other => {
                 return Err(damaged(format!(
-                    "its layout is {other}; this version joins {OLD_SHARD_SCHEMA} and {SHARD_SCHEMA}"
+                    "its layout is {other}; this version joins {} and {SHARD_SCHEMA}",
+                    OLD_SHARD_SCHEMAS.join(", ")
                 )));
             }
         };

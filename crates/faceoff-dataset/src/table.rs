@@ -8,5 +8,5 @@ mod writer;
 
 pub(crate) use episodes::EpisodeRows;
 pub(crate) use join::{ShardTable, join};
-pub(crate) use steps::{CONSTRAINTS, StepRows};
+pub(crate) use steps::{CONSTRAINTS, HOST_TIME, StepRows, without_host_time};
 pub(crate) use writer::TableWriter;

@@ -19,7 +19,11 @@ use faceoff_types::{
 /// let mut course = Course::begin(&arena, Task::Hit, 0, Some(Interpolation::Linear), Nowhere);
 /// let outcome = loop {
 ///     let joint_positions = course.question()?.observation[6..13].to_vec();
-///     let answered = Answered { computation_time_s: 0.001, cpu_time_s: None };
+///     let answered = Answered {
+///         computation_time_s: 0.001,
+///         host_time_s: 0.0,
+///         cpu_time_s: None,
+///     };
 ///     if let Some(outcome) = course.answer(&joint_positions, answered) {
 ///         break outcome;
 ///     }

@@ -6,9 +6,11 @@ use faceoff_types::{EpisodeOutcome, Interpolation, Seed};
 /// The measurements of one answered step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Answered {
-    /// Wall time from the last byte of the question written to the last byte of the answer read,
-    /// in seconds.
+    /// What counts: wall time from the first attempt to write the question to the last byte of the answer
+    /// read, less what the host took, in seconds.
     pub computation_time_s: f64,
+    /// What the host took of the wall time, in seconds.
+    pub host_time_s: f64,
     /// CPU time that the agent's process tree used meanwhile, in seconds, where the host tells.
     pub cpu_time_s: Option<f64>,
 }

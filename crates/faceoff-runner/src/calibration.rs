@@ -64,7 +64,7 @@ impl CalibrationAgent {
             return Ok(());
         };
         for _ in 0..count {
-            // As for an agent: from the write of the last byte to the last byte read.
+            // As for an agent: from the first attempt to write to the last byte read.
             let asked = Instant::now();
             to_agent
                 .write_all(&self.question)

@@ -1,42 +1,49 @@
 //! The agent's process and single questions to it: a line is sent, a line comes back in time or does
-//! not. What the lines mean is the session's business.
+//! not, and whose doing that is. What the lines mean is the session's business.
 
 use crate::{
     bundle::Bundle,
     config::AgentEnvironment,
     fault::{PlatformFault, Trouble},
+    host_watch::{Evidence, HostWatch, Over, Wait},
 };
-use faceoff_sandbox::{AgentProcess, ReadLine, SpawnError, SpawnSpec, WriteError};
+use faceoff_sandbox::{AgentProcess, ReadLine, SpawnError, SpawnSpec, WriteError, affinity};
 use faceoff_types::{AgentFaultKind, Phase, TimeLimits};
 use faceoff_wire::{MAX_LINE_BYTES, Message, answer, quote_line};
 use std::time::{Duration, Instant};
 
 /// The running process.
 #[derive(Debug)]
-pub(crate) struct Exchange {
+pub(crate) struct Exchange<'w> {
     process: AgentProcess,
-    /// The message being written; its memory is reused.
+    watch: &'w dyn HostWatch,
+    /// Does the agent keep to CPUs that the calling thread keeps off?
+    apart: bool,
+    /// The message being sent; its memory is reused.
     line: Vec<u8>,
+    /// CPU time of the whole process tree at its last answer, in seconds, where the host tells.
+    cpu_time_s: Option<f64>,
     /// How long it may take to exit once it has closed its output, so that its status can be told.
     exit_grace: Duration,
 }
 
-/// A question that was written and waits for its answer.
-#[derive(Debug, Clone, Copy)]
+/// A question that waits for its answer.
+#[derive(Debug, Clone)]
 pub(crate) struct Sent {
     phase: Phase,
     limit_s: f64,
-    /// When its last byte was written.
-    pub at: Instant,
-    /// When the limit has passed.
-    pub deadline: Instant,
+    wait: Wait,
 }
 
 /// The line that came back.
 pub(crate) struct Answer {
     pub bytes: Vec<u8>,
-    /// When its last byte had been read.
-    pub at: Instant,
+    /// From the first attempt to write the question to the answer's last byte.
+    pub wall: Duration,
+    /// What the host took of that.
+    pub host: Duration,
+    /// CPU time of the process tree since its answer before, in seconds, where the host tells.
+    pub cpu_time_s: Option<f64>,
 }
 
 impl Answer {
@@ -49,9 +56,13 @@ impl Answer {
     }
 }
 
-impl Exchange {
+impl<'w> Exchange<'w> {
     /// Starts the bundle's command.
-    pub fn start(bundle: &Bundle, env: &AgentEnvironment) -> Result<Self, Trouble> {
+    pub fn start(
+        bundle: &Bundle,
+        env: &AgentEnvironment,
+        watch: &'w dyn HostWatch,
+    ) -> Result<Self, Trouble> {
         let manifest = &bundle.manifest;
         let Some(runtime) = env.runtimes.get(&manifest.runtime) else {
             let offered: Vec<&str> = env.runtimes.keys().map(String::as_str).collect();
@@ -75,91 +86,149 @@ impl Exchange {
             SpawnError::Agent(fault) => fault.into(),
             SpawnError::Platform(error) => Trouble::from(error),
         })?;
+        let apart = !env.agent_cpus.is_empty()
+            && affinity::allowed()
+                .is_ok_and(|own| own.iter().all(|cpu| !env.agent_cpus.contains(cpu)));
         Ok(Self {
+            cpu_time_s: process.cpu_time_s(),
             process,
+            watch,
+            apart,
             line: Vec::with_capacity(4096),
             exit_grace: TimeLimits::duration(env.time.bye_s),
         })
     }
 
-    /// Writes a question; it and its answer have `limit_s` from `from` on.
+    /// Asks a question without waiting; to write it and to be answered share one limit of `limit_s`, which
+    /// runs from `limit_from` on, or from now.
     pub fn send(
         &mut self,
         message: &Message<'_>,
         phase: Phase,
         limit_s: f64,
-        from: Instant,
+        limit_from: Option<Instant>,
     ) -> Result<Sent, Trouble> {
-        let deadline = from + TimeLimits::duration(limit_s);
-        // During start-up anything counts as an answer: the agent runs before `hello` is written.
+        // During start-up anything counts as an answer: the agent runs before `hello` is sent.
         if phase != Phase::StartUp && self.process.has_pending_output()? {
             return Err(self.early(phase));
         }
         message.write_line(&mut self.line);
-        match self.process.write_line(&self.line, deadline) {
+        match self.process.send_line(&self.line) {
             Ok(at) => Ok(Sent {
                 phase,
                 limit_s,
-                at,
-                deadline,
+                wait: Wait::begin(at, limit_from.unwrap_or(at), TimeLimits::duration(limit_s)),
             }),
             Err(WriteError::Closed) => Err(self.closed()),
-            Err(WriteError::TimedOut) => Err(AgentFaultKind::TimedOut { phase, limit_s }.into()),
             Err(WriteError::Platform(error)) => Err(error.into()),
         }
     }
 
-    /// Waits for the answer until `until`, which may have passed, or until its deadline; `None` if it
+    /// Waits for the answer until `until`, which may have passed, or until its limit is over; `None` if it
     /// may still come.
-    pub fn poll(&mut self, sent: &Sent, until: Instant) -> Result<Option<Answer>, Trouble> {
-        let Sent {
-            phase,
-            limit_s,
-            deadline,
-            ..
-        } = *sent;
-        let read = self
-            .process
-            .read_line(MAX_LINE_BYTES, until.min(deadline))?;
-        match read {
-            ReadLine::Line { bytes, at } => Ok(Some(Answer { bytes, at })),
-            ReadLine::TooLong { head } => Err(too_long(&head)),
-            ReadLine::TimedOut if until < deadline => Ok(None),
-            ReadLine::TimedOut => Err(AgentFaultKind::TimedOut { phase, limit_s }.into()),
-            ReadLine::Closed => Err(self.closed()),
+    pub fn poll(&mut self, sent: &mut Sent, until: Instant) -> Result<Option<Answer>, Trouble> {
+        loop {
+            let stop = until.min(sent.wait.wake);
+            match self.process.read_line(MAX_LINE_BYTES, stop)? {
+                // It cannot know yet what it is asked.
+                ReadLine::Line { bytes, .. }
+                    if sent.phase != Phase::StartUp && !self.process.has_taken_all() =>
+                {
+                    return Err(unasked(sent.phase, &bytes));
+                }
+                ReadLine::Line { bytes, at } => return Ok(Some(self.answer(sent, bytes, at))),
+                ReadLine::TooLong { head } => return Err(too_long(&head)),
+                ReadLine::Closed => return Err(self.closed()),
+                ReadLine::TimedOut => self.look(sent)?,
+            }
+            if until <= stop {
+                return Ok(None);
+            }
         }
     }
 
     /// Waits for the answer.
-    pub fn wait(&mut self, sent: &Sent) -> Result<Answer, Trouble> {
+    pub fn wait(&mut self, sent: &mut Sent) -> Result<Answer, Trouble> {
         loop {
-            if let Some(answer) = self.poll(sent, sent.deadline)? {
+            let until = Instant::now() + TimeLimits::LONGEST;
+            if let Some(answer) = self.poll(sent, until)? {
                 return Ok(answer);
             }
         }
     }
 
-    /// Waits until one of several agents has written something, until its silence is to be looked
-    /// into, or until `until`.
-    pub fn wait_for_any(exchanges: &[&Self], until: Instant) -> Result<(), PlatformFault> {
-        let processes: Vec<&AgentProcess> = exchanges.iter().map(|one| &one.process).collect();
+    /// Waits until one of several agents has something for [`Self::poll`], which is due at `until` in any
+    /// case.
+    pub fn wait_for_any(asked: &[(&Self, &Sent)], until: Instant) -> Result<(), PlatformFault> {
+        let processes: Vec<&AgentProcess> = asked.iter().map(|(one, _)| &one.process).collect();
+        let until = asked
+            .iter()
+            .fold(until, |until, (_, sent)| until.min(sent.wait.wake));
         Ok(AgentProcess::wait_for_any(&processes, until)?)
     }
 
-    /// Writes a message that is not answered. An agent that no longer listens meets its fault at the
-    /// next question.
-    pub fn tell(&mut self, message: &Message<'_>, limit_s: f64) -> Result<(), PlatformFault> {
+    /// Sends a message that is not answered, without waiting. What the agent leaves no room for costs it
+    /// time at the next question; if it no longer listens, it meets its fault there.
+    pub fn tell(&mut self, message: &Message<'_>) -> Result<(), PlatformFault> {
         message.write_line(&mut self.line);
-        let deadline = Instant::now() + TimeLimits::duration(limit_s);
-        match self.process.write_line(&self.line, deadline) {
-            Ok(_) | Err(WriteError::Closed | WriteError::TimedOut) => Ok(()),
+        match self.process.send_line(&self.line) {
+            Ok(_) | Err(WriteError::Closed) => Ok(()),
             Err(WriteError::Platform(error)) => Err(error.into()),
         }
     }
 
-    /// CPU time of the whole process tree so far, in seconds, where the host tells.
-    pub fn cpu_time_s(&self) -> Option<f64> {
-        self.process.cpu_time_s()
+    fn answer(&mut self, sent: &Sent, bytes: Vec<u8>, at: Instant) -> Answer {
+        let cpu_time_s = self.process.cpu_time_s();
+        let used_s = used_s(self.cpu_time_s, cpu_time_s);
+        self.cpu_time_s = cpu_time_s;
+        Answer {
+            bytes,
+            wall: at.saturating_duration_since(sent.wait.asked),
+            host: self.taken_by_host(sent, at, used_s),
+            cpu_time_s: used_s,
+        }
+    }
+
+    /// Nothing has come when the evaluator wanted to be woken.
+    fn look(&self, sent: &mut Sent) -> Result<(), Trouble> {
+        let (now, wait) = (Instant::now(), &mut sent.wait);
+        if now >= wait.deadline {
+            let used_s = used_s(self.cpu_time_s, self.process.cpu_time_s());
+            let taken = self.taken_by_host(sent, now, used_s);
+            let fault = AgentFaultKind::TimedOut {
+                phase: sent.phase,
+                limit_s: sent.limit_s,
+            };
+            return match sent.wait.extend(now, taken) {
+                Over::No => Ok(()),
+                Over::ByTheAgent => Err(fault.into()),
+                Over::ByTheHost => Err(Trouble::Host { fault }),
+            };
+        }
+        if wait.is_newly_late(now) {
+            wait.became_late(self.process.read_cpus());
+        }
+        if now >= wait.wake {
+            wait.sleep_on(Instant::now());
+        }
+        Ok(())
+    }
+
+    fn taken_by_host(&self, sent: &Sent, now: Instant, agent_ran_s: Option<f64>) -> Duration {
+        if !sent.wait.is_late(now) {
+            return Duration::ZERO;
+        }
+        let others_ran = match sent.wait.first_reading() {
+            Some(begun) => self.process.taken_from_it_since(begun),
+            None => self.process.read_cpus().map(|_| Duration::ZERO),
+        };
+        let evidence = Evidence {
+            now,
+            others_ran,
+            agent_ran: agent_ran_s.map(TimeLimits::duration),
+            apart: self.apart,
+        };
+        sent.wait.taken(self.watch, evidence)
     }
 
     /// Gives the agent `grace` to exit, then kills it; returns the end of its standard error.
@@ -169,16 +238,9 @@ impl Exchange {
 
     /// The agent has written before it was asked, or has closed its output.
     fn early(&mut self, phase: Phase) -> Trouble {
-        let fault = AgentFaultKind::WrongMessage {
-            expected: format!("no output before the next question ({phase})"),
-            got: "a line that was not asked for".to_owned(),
-        };
         match self.process.read_line(MAX_LINE_BYTES, Instant::now()) {
-            Ok(ReadLine::Line { bytes, .. }) => Trouble::Agent {
-                fault,
-                line: Some(quote_line(&bytes)),
-            },
-            Ok(ReadLine::TimedOut) => fault.into(),
+            Ok(ReadLine::Line { bytes, .. }) => unasked(phase, &bytes),
+            Ok(ReadLine::TimedOut) => unasked_for(phase).into(),
             Ok(ReadLine::TooLong { head }) => too_long(&head),
             Ok(ReadLine::Closed) => self.closed(),
             Err(error) => error.into(),
@@ -199,4 +261,23 @@ fn too_long(head: &[u8]) -> Trouble {
         fault: answer::too_long(),
         line: Some(quote_line(head)),
     }
+}
+
+fn unasked_for(phase: Phase) -> AgentFaultKind {
+    AgentFaultKind::WrongMessage {
+        expected: format!("no output before the next question ({phase})"),
+        got: "a line that was not asked for".to_owned(),
+    }
+}
+
+fn unasked(phase: Phase, line: &[u8]) -> Trouble {
+    Trouble::Agent {
+        fault: unasked_for(phase),
+        line: Some(quote_line(line)),
+    }
+}
+
+/// What was used between two looks at a clock, in seconds.
+fn used_s(before_s: Option<f64>, now_s: Option<f64>) -> Option<f64> {
+    Some((now_s? - before_s?).max(0.0))
 }

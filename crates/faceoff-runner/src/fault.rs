@@ -13,6 +13,12 @@ pub enum Trouble {
         /// The offending line, cut, where there was one.
         line: Option<String>,
     },
+    /// No answer came within a hard limit that was extended by what the host took, and the host explains
+    /// it.
+    Host {
+        /// What it is if the try is not played again.
+        fault: AgentFaultKind,
+    },
     /// The platform failed.
     Platform(PlatformFault),
 }

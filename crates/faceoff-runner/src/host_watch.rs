@@ -1,297 +1,225 @@
-//! Was the host itself asleep? A thread on each CPU that matters wakes every few milliseconds and
-//! looks how late it is. When it is late, no ordinary process on that CPU was served either: the
-//! virtual machine was held up, a process of higher priority took the CPU, or this service was
-//! stopped. An agent that sleeps or waits delays nobody, so that leaves no trace here.
+//! What did the host take of the time of an answer? Only what the kernel's counters prove, and only of
+//! answers that are late: to look costs some ten microseconds, so it is not done before.
 
-use crate::fault::PlatformFault;
-use faceoff_sandbox::affinity::pin_current_thread;
-use std::{
-    collections::VecDeque,
-    sync::{
-        Arc, Mutex, PoisonError,
-        atomic::{AtomicBool, AtomicU64, Ordering},
-    },
-    thread::{self, JoinHandle},
-    time::{Duration, Instant},
-};
+use faceoff_sandbox::CpuReading;
+use std::time::{Duration, Instant};
 
-/// How often a watched CPU is asked for a sign of life: often enough for a limit of 20 ms, seldom
-/// enough (250 wake-ups a second) not to be felt.
-const BEAT: Duration = Duration::from_millis(4);
-/// A beat that is late by no more than this is ordinary scheduling, no stall.
-const TOLERANCE: Duration = Duration::from_millis(4);
-/// Stalls that are remembered; older ones concern no step that is still open.
-const REMEMBERED: usize = 1024;
+/// An answer that takes longer is looked after. Half of the lowest limit that costs points, and as long as
+/// the kernel's counters may lag behind: what they tell later was then within the wait.
+pub(crate) const FIRST_LOOK: Duration = Duration::from_millis(10);
+/// How often the evaluator wakes while an answer is late, so that its own lateness can be told.
+pub(crate) const NEXT_LOOK: Duration = Duration::from_millis(5);
+/// An evaluator that wakes late by no more than this was not held up.
+const ORDINARY_LATENESS: Duration = Duration::from_millis(1);
+/// A hard limit is extended by the host's share up to this many times itself; then the host explains
+/// the missing answer.
+const LONGEST_EXTENSION: u32 = 4;
 
-/// Tells whether the host stalled.
-pub trait HostWatch: Sync {
-    /// For how much of the time between two instants a CPU of agent or simulator did nothing, in
-    /// seconds.
-    fn stalled_s(&self, from: Instant, to: Instant) -> f64;
+/// Judges the evidence of what the host took; tests put others in its place.
+pub trait HostWatch: std::fmt::Debug + Sync {
+    /// How much of the wait from `asked` to `now` the host took, given what the kernel's counters prove;
+    /// `None` where there are none.
+    fn taken(&self, asked: Instant, now: Instant, proven: Option<Duration>) -> Duration;
+}
 
-    /// The longest stall so far, in seconds.
-    fn longest_stall_s(&self) -> f64 {
-        0.0
+/// Nothing but what is proven.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Counters;
+
+impl HostWatch for Counters {
+    fn taken(&self, _: Instant, _: Instant, proven: Option<Duration>) -> Duration {
+        proven.unwrap_or_default()
     }
 }
 
-/// Threads that watch the agent's CPUs, one each, and one for those of the calling thread. They end
-/// with it.
-#[derive(Debug)]
-pub(crate) struct StallWatch {
-    shared: Arc<Shared>,
-    watchers: Vec<JoinHandle<()>>,
+/// One wait for an answer, as far as the host is concerned.
+#[derive(Debug, Clone)]
+pub(crate) struct Wait {
+    /// From when on the time counts.
+    pub asked: Instant,
+    limit: Duration,
+    /// The answer is late, and this is what the counters said first.
+    late: Option<Option<CpuReading>>,
+    /// When the evaluator wants to be woken.
+    pub wake: Instant,
+    /// When the limit is over, as extended so far.
+    pub deadline: Instant,
 }
 
-#[derive(Debug)]
-struct Shared {
-    begun: Instant,
-    stop: AtomicBool,
-    stalls: Mutex<VecDeque<(Instant, Instant)>>,
-    longest_ns: AtomicU64,
-    /// The last sign of life of each watcher, in nanoseconds after `begun`.
-    last_beat_ns: Vec<AtomicU64>,
+/// What the counters say of a wait so far.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Evidence {
+    pub now: Instant,
+    /// That others ran on the agent's CPUs; `None` where the host does not tell.
+    pub others_ran: Option<Duration>,
+    /// That the agent itself ran, since its last answer.
+    pub agent_ran: Option<Duration>,
+    /// Are the evaluator's CPUs none of the agent's?
+    pub apart: bool,
 }
 
-impl StallWatch {
-    /// Starts to watch. The thread for the simulator inherits the CPUs of the calling thread.
-    ///
-    /// # Errors
-    /// When a thread cannot be started.
-    pub fn start(agent_cpus: &[usize]) -> Result<Self, PlatformFault> {
-        let mut places: Vec<Option<usize>> = agent_cpus.iter().copied().map(Some).collect();
-        places.push(None);
-        let begun = Instant::now();
-        let mut watch = Self {
-            shared: Arc::new(Shared {
-                begun,
-                stop: AtomicBool::new(false),
-                stalls: Mutex::default(),
-                longest_ns: AtomicU64::new(0),
-                last_beat_ns: places.iter().map(|_| AtomicU64::new(0)).collect(),
-            }),
-            watchers: Vec::with_capacity(places.len()),
+impl Wait {
+    /// The wait for an answer to what was asked at `asked`, whose limit runs from `limit_from` on.
+    pub fn begin(asked: Instant, limit_from: Instant, limit: Duration) -> Self {
+        let deadline = limit_from + limit;
+        Self {
+            asked,
+            limit: deadline.saturating_duration_since(asked),
+            late: None,
+            wake: (asked + FIRST_LOOK).min(deadline),
+            deadline,
+        }
+    }
+
+    /// Has the answer taken so long that the host is looked at, or did the evaluator wake late?
+    pub fn is_late(&self, now: Instant) -> bool {
+        self.late.is_some() || now > self.wake + ORDINARY_LATENESS
+    }
+
+    /// Is this the first time that the answer is found to be late?
+    pub fn is_newly_late(&self, now: Instant) -> bool {
+        self.late.is_none() && now >= self.wake
+    }
+
+    /// The counters when the answer was found to be late.
+    pub fn became_late(&mut self, reading: Option<CpuReading>) {
+        self.late = Some(reading);
+    }
+
+    /// What the counters said when the answer was found to be late.
+    pub fn first_reading(&self) -> Option<&CpuReading> {
+        self.late.as_ref()?.as_ref()
+    }
+
+    /// The evaluator woke for nothing: when to wake next.
+    pub fn sleep_on(&mut self, now: Instant) {
+        self.wake = (now + NEXT_LOOK).min(self.deadline);
+    }
+
+    /// How much of the wait until now the host took.
+    pub fn taken(&self, watch: &dyn HostWatch, evidence: Evidence) -> Duration {
+        let Evidence {
+            now,
+            others_ran,
+            agent_ran,
+            apart,
+        } = evidence;
+        let wall = now.saturating_duration_since(self.asked);
+        // An answer that lay there when the evaluator woke late may have come at any time since it wanted
+        // to; its CPUs being out of the agent's reach, that it did not wake is nobody's fault here.
+        let overslept = now.saturating_duration_since(self.wake);
+        let overslept = match others_ran {
+            Some(_) if apart && overslept > ORDINARY_LATENESS => overslept,
+            _ => Duration::ZERO,
         };
-        for (index, cpu) in places.into_iter().enumerate() {
-            let shared = Arc::clone(&watch.shared);
-            let watcher = thread::Builder::new()
-                .name("host-watch".to_owned())
-                .spawn(move || {
-                    if let Some(cpu) = cpu {
-                        pin(cpu);
-                    }
-                    shared.watch(index);
-                })
-                .map_err(PlatformFault::io("starting a thread that watches the host"))?;
-            watch.watchers.push(watcher);
+        let proven = others_ran
+            .map(|others| others + overslept)
+            // Whatever the rest says: while it ran, it was not kept from running.
+            .map(|proven| proven.min(wall.saturating_sub(agent_ran.unwrap_or(wall))));
+        watch.taken(self.asked, now, proven).min(wall)
+    }
+
+    /// The limit is over: extends it by what the host took, unless it is over all the same.
+    pub fn extend(&mut self, now: Instant, taken: Duration) -> Over {
+        let own = now
+            .saturating_duration_since(self.asked)
+            .saturating_sub(taken);
+        if own >= self.limit {
+            return Over::ByTheAgent;
         }
-        Ok(watch)
-    }
-}
-
-impl HostWatch for StallWatch {
-    fn stalled_s(&self, from: Instant, to: Instant) -> f64 {
-        self.shared.stalled(from, to, Instant::now()).as_secs_f64()
-    }
-
-    fn longest_stall_s(&self) -> f64 {
-        self.shared.longest(Instant::now()).as_secs_f64()
-    }
-}
-
-impl Drop for StallWatch {
-    fn drop(&mut self) {
-        self.shared.stop.store(true, Ordering::Relaxed);
-        for watcher in &self.watchers {
-            watcher.thread().unpark();
+        let last = self.asked + self.limit * (1 + LONGEST_EXTENSION);
+        if now >= last {
+            return Over::ByTheHost;
         }
-        for watcher in self.watchers.drain(..) {
-            if watcher.join().is_err() {
-                tracing::error!("a thread that watched the host panicked");
-            }
-        }
+        self.deadline = (now + (self.limit - own)).min(last);
+        self.sleep_on(now);
+        Over::No
     }
 }
 
-impl Shared {
-    fn watch(&self, index: usize) {
-        let mut last = Instant::now();
-        self.beat(index, last);
-        while !self.stop.load(Ordering::Relaxed) {
-            thread::park_timeout(BEAT);
-            let now = Instant::now();
-            self.woke(index, last, now);
-            last = now;
-        }
-    }
-
-    /// A watcher woke at `now`; the last time was `last`.
-    fn woke(&self, index: usize, last: Instant, now: Instant) {
-        if is_stall(last, now) {
-            let mut stalls = self.stalls.lock().unwrap_or_else(PoisonError::into_inner);
-            if stalls.len() == REMEMBERED {
-                stalls.pop_front();
-            }
-            stalls.push_back((last, now));
-            self.longest_ns
-                .fetch_max(nanoseconds(now - last), Ordering::Relaxed);
-        }
-        self.beat(index, now);
-    }
-
-    fn beat(&self, index: usize, now: Instant) {
-        let since = nanoseconds(now.saturating_duration_since(self.begun));
-        self.last_beat_ns[index].store(since, Ordering::Release);
-    }
-
-    /// How much of `from` to `to` lies within stalls, those included that go on until `now`.
-    fn stalled(&self, from: Instant, to: Instant, now: Instant) -> Duration {
-        // A watcher notes a stall before it beats: looked at in the other order, none is missed.
-        let mut spans: Vec<_> = self.going_on(now).collect();
-        spans.extend(
-            self.stalls
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .iter(),
-        );
-        covered(spans, from, to)
-    }
-
-    /// The longest stall until `now`.
-    fn longest(&self, now: Instant) -> Duration {
-        let going_on = self.going_on(now).map(|(from, to)| to - from).max();
-        let over = Duration::from_nanos(self.longest_ns.load(Ordering::Relaxed));
-        over.max(going_on.unwrap_or_default())
-    }
-
-    /// Stalls that are not over `now`, of which their watchers know nothing yet.
-    fn going_on(&self, now: Instant) -> impl Iterator<Item = (Instant, Instant)> {
-        self.last_beat_ns
-            .iter()
-            .map(|beat| self.begun + Duration::from_nanos(beat.load(Ordering::Acquire)))
-            .filter(move |beat| is_stall(*beat, now))
-            .map(move |beat| (beat, now))
-    }
-}
-
-fn nanoseconds(duration: Duration) -> u64 {
-    u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
-}
-
-fn is_stall(last: Instant, now: Instant) -> bool {
-    now.saturating_duration_since(last) > BEAT + TOLERANCE
-}
-
-/// How much of `from` to `to` the spans cover together; they may overlap.
-fn covered(mut spans: Vec<(Instant, Instant)>, from: Instant, to: Instant) -> Duration {
-    spans.sort_unstable();
-    let mut covered = Duration::ZERO;
-    let mut reached = from;
-    for (start, end) in spans {
-        let (start, end) = (start.max(reached), end.min(to));
-        if start < end {
-            covered += end - start;
-            reached = end;
-        }
-    }
-    covered
-}
-
-/// Best effort: an unpinned watcher sees only stalls of the whole machine, and blames the host less.
-fn pin(cpu: usize) {
-    if let Err(error) = pin_current_thread(&[cpu]) {
-        tracing::warn!(%error, cpu, "the thread that watches a CPU cannot be pinned to it");
-    }
+/// Whose doing is it that a limit is over?
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Over {
+    No,
+    ByTheAgent,
+    ByTheHost,
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn spans_that_overlap_count_once_and_only_within_the_question() {
-        let at = |ms| Instant::now() + Duration::from_secs(1) + Duration::from_millis(ms);
-        let base = at(0);
-        let at = |ms| base + Duration::from_millis(ms);
-        let spans = vec![
-            (at(30), at(60)),
-            (at(0), at(20)),
-            (at(10), at(40)),
-            (at(90), at(200)),
-        ];
-        let covered = |from, to| covered(spans.clone(), at(from), at(to)).as_millis();
-        assert_eq!(covered(0, 100), 70);
-        assert_eq!(covered(15, 35), 20);
-        assert_eq!(covered(60, 90), 0);
-        assert_eq!(covered(100, 150), 50);
-    }
+    const MS: fn(u64) -> Duration = Duration::from_millis;
 
-    /// One watcher that beat last `ms` milliseconds after `begun`.
-    fn beat_at(begun: Instant, ms: u64) -> Shared {
-        Shared {
-            begun,
-            stop: AtomicBool::new(false),
-            stalls: Mutex::default(),
-            longest_ns: AtomicU64::new(0),
-            last_beat_ns: vec![AtomicU64::new(ms * 1_000_000)],
+    fn evidence(now: Instant, others_ms: u64, agent_ms: u64, apart: bool) -> Evidence {
+        Evidence {
+            now,
+            others_ran: Some(MS(others_ms)),
+            agent_ran: Some(MS(agent_ms)),
+            apart,
         }
     }
 
     #[test]
-    fn a_stall_that_is_not_over_counts_until_now_and_an_ordinary_pause_does_not() {
-        let begun = Instant::now();
-        let shared = beat_at(begun, 5);
-        let at = |ms| begun + Duration::from_millis(ms);
-        assert_eq!(shared.stalled(at(6), at(12), at(12)), Duration::ZERO);
-        assert_eq!(shared.longest(at(12)), Duration::ZERO);
+    fn what_the_agent_ran_itself_is_never_the_hosts() {
+        let asked = Instant::now();
+        let wait = Wait::begin(asked, asked, MS(1000));
+        let taken =
+            |others, agent| wait.taken(&Counters, evidence(asked + MS(10), others, agent, false));
+        assert_eq!(taken(4, 1), MS(4));
+        assert_eq!(taken(9, 8), MS(2));
+        assert_eq!(taken(9, 30), MS(0), "several threads");
+        let unknown = Evidence {
+            agent_ran: None,
+            ..evidence(asked + MS(10), 9, 0, true)
+        };
+        assert_eq!(wait.taken(&Counters, unknown), MS(0));
+        let nothing = Evidence {
+            others_ran: None,
+            ..evidence(asked + MS(80), 0, 0, true)
+        };
         assert_eq!(
-            shared.stalled(at(10), at(40), at(45)),
-            Duration::from_millis(30)
-        );
-        assert_eq!(shared.longest(at(45)), Duration::from_millis(40));
-    }
-
-    #[test]
-    fn a_wait_through_which_the_watchers_wake_on_time_is_no_stall() {
-        let begun = Instant::now();
-        let shared = beat_at(begun, 0);
-        let at = |ms| begun + Duration::from_millis(ms);
-        for ms in (0..2000).step_by(8) {
-            shared.woke(0, at(ms), at(ms + 8));
-        }
-        assert_eq!(shared.stalled(at(100), at(1900), at(2000)), Duration::ZERO);
-        assert_eq!(shared.longest(at(2000)), Duration::ZERO);
-        shared.woke(0, at(2000), at(2150));
-        assert_eq!(
-            shared.stalled(at(100), at(2100), at(2150)),
-            Duration::from_millis(100)
+            wait.taken(&Counters, nothing),
+            MS(0),
+            "no cgroup, no excuse"
         );
     }
 
-    /// Stops its parent, for 0.15 s from when each of its threads is seen to stand still.
-    const STOPS_ITS_PARENT: &str = "\
-import os, signal, time
-parent = os.getppid()
-def stands(thread):
-    try: return open(f'/proc/{parent}/task/{thread}/stat').read().rpartition(')')[2].split()[0] == 'T'
-    except OSError: return True
-os.kill(parent, signal.SIGSTOP)
-while not all(map(stands, os.listdir(f'/proc/{parent}/task'))): time.sleep(0.001)
-time.sleep(0.15)
-os.kill(parent, signal.SIGCONT)
-";
+    #[test]
+    fn an_evaluator_that_wakes_late_beyond_the_agents_reach_is_the_hosts_doing() {
+        let asked = Instant::now();
+        let mut wait = Wait::begin(asked, asked, MS(1000));
+        let taken =
+            |wait: &Wait, at, apart| wait.taken(&Counters, evidence(asked + MS(at), 0, 1, apart));
+        assert_eq!(taken(&wait, 9, true), MS(0));
+        assert_eq!(taken(&wait, 11, true), MS(0), "ordinary");
+        assert_eq!(taken(&wait, 60, true), MS(50));
+        assert_eq!(
+            taken(&wait, 60, false),
+            MS(0),
+            "the agent may have starved it"
+        );
+        // It woke for nothing at 12 ms: only what comes after that made the answer later.
+        wait.sleep_on(asked + MS(12));
+        assert_eq!(taken(&wait, 60, true), MS(43));
+    }
 
     #[test]
-    fn a_process_that_really_stands_still_is_seen() {
-        let watch = StallWatch::start(&[]).unwrap();
-        let from = Instant::now();
-        let stopped = std::process::Command::new("python3")
-            .args(["-c", STOPS_ITS_PARENT])
-            .status()
-            .unwrap();
-        assert!(stopped.success());
-        let seen_s = watch.stalled_s(from, Instant::now());
-        assert!(seen_s >= 0.15, "{seen_s}");
-        assert!(watch.longest_stall_s() >= 0.15);
+    fn a_limit_goes_on_while_the_host_explains_it_and_not_for_ever() {
+        let asked = Instant::now();
+        let at = |ms| asked + MS(ms);
+        let mut wait = Wait::begin(asked, asked, MS(1000));
+        assert_eq!((wait.wake, wait.deadline), (at(10), at(1000)));
+        assert_eq!(wait.extend(at(1000), MS(0)), Over::ByTheAgent);
+        assert_eq!(wait.extend(at(1000), MS(300)), Over::No);
+        assert_eq!((wait.wake, wait.deadline), (at(1005), at(1300)));
+        assert_eq!(wait.extend(at(1300), MS(300)), Over::ByTheAgent);
+        assert_eq!(wait.extend(at(4900), MS(4800)), Over::No);
+        assert_eq!(wait.deadline, at(5000));
+        assert_eq!(wait.extend(at(5000), MS(4001)), Over::ByTheHost);
+        assert_eq!(wait.extend(at(5000), MS(4000)), Over::ByTheAgent);
+        // A limit that began before, as the start-up's does.
+        let wait = Wait::begin(at(400), asked, MS(1000));
+        assert_eq!((wait.wake, wait.deadline), (at(410), at(1000)));
     }
 }

@@ -15,7 +15,6 @@ mod calibration;
 mod config;
 mod exchange;
 mod fault;
-mod host_noise;
 mod host_watch;
 mod log;
 mod player;

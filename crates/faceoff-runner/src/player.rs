@@ -3,35 +3,45 @@ use crate::{
     bundle::Bundle,
     config::AgentEnvironment,
     fault::{PlatformFault, Trouble},
-    host_noise::{AnswerWait, host_cost_points},
     host_watch::HostWatch,
     log::Log,
     session::Session,
 };
-use faceoff_episode::{Arena, Course, Question, StepSink, TimeSum};
+use faceoff_episode::{Arena, Course, Question, StepSink};
 use faceoff_types::{AgentFaultKind, EpisodeOutcome, Phase, Task};
 use std::time::Instant;
 
 /// Plays episodes of one task with one agent, which is restarted after a fault. An episode that the
-/// host's stalls cost the agent is played again.
+/// host ended is played again, by a new process, which knows nothing of the first try.
 pub(crate) struct Player<'a> {
     bundle: &'a Bundle,
     env: &'a AgentEnvironment,
     task: Task,
     arena: Arena,
     /// None before the first episode and after a fault.
-    session: Option<Session>,
+    session: Option<Session<'a>>,
     log: Log,
     resets: ResetBudget,
     watch: &'a dyn HostWatch,
-    host_noise_reruns: u32,
+    replays: Replays,
+    /// The most that the host took of one answer, in seconds.
+    longest_stall_s: f64,
+}
+
+/// Tries that were dropped and played again because the host kept the agent from answering.
+struct Replays {
+    played: u32,
+    /// At most so many.
+    limit: u32,
+    /// At most so many of one episode.
+    per_episode: u32,
 }
 
 /// One try of an episode.
 struct Try {
     outcome: EpisodeOutcome,
-    /// Did the host's stalls cost the agent points, or the episode?
-    spoilt_by_host: bool,
+    /// Did the host keep the agent from answering?
+    ended_by_host: bool,
 }
 
 /// The agent's fault, the line that shows it, and what its process has left on standard error.
@@ -39,14 +49,16 @@ struct StartUpFault {
     kind: AgentFaultKind,
     line: Option<String>,
     stderr: String,
+    /// Did the host keep it from starting in time?
+    ended_by_host: bool,
 }
 
 /// An episode under way, wherever it is recorded.
 type CourseTo<'a> = Course<&'a mut dyn StepSink>;
 
 impl<'a> Player<'a> {
-    /// The agent is started by the first episode. `episodes` are about to be played, which bounds the
-    /// time of their resets.
+    /// The agent is started by the first episode. Of so many `episodes` a part may be played again for
+    /// the host's sake, and they bound the time of all resets.
     pub fn new(
         bundle: &'a Bundle,
         env: &'a AgentEnvironment,
@@ -64,17 +76,27 @@ impl<'a> Player<'a> {
             log: Log::new(env.limits.stderr_tail_bytes),
             resets: ResetBudget::new(&env.time, episodes),
             watch,
-            host_noise_reruns: 0,
+            replays: Replays {
+                played: 0,
+                limit: env.time.host_noise_reruns_of(episodes),
+                per_episode: env.time.host_noise_reruns,
+            },
+            longest_stall_s: 0.0,
         }
     }
 
-    /// Tries that were dropped so far because the host stalled.
+    /// Tries that were dropped so far because the host kept the agent from answering.
     pub const fn host_noise_reruns(&self) -> u32 {
-        self.host_noise_reruns
+        self.replays.played
     }
 
-    /// Plays one episode of at most `max_steps` control steps, again while the host spoils it and the
-    /// limit of re-runs allows; the last try counts.
+    /// The most that the host took of one answer, in seconds.
+    pub const fn longest_stall_s(&self) -> f64 {
+        self.longest_stall_s
+    }
+
+    /// Plays one episode of at most `max_steps` control steps, again while the host ends it and the
+    /// limits of re-runs allow; the last try counts.
     ///
     /// # Errors
     /// The platform's alone; an agent's fault is an outcome. `cancelled` is asked before each step.
@@ -89,18 +111,17 @@ impl<'a> Player<'a> {
         loop {
             let Try {
                 outcome,
-                spoilt_by_host,
+                ended_by_host,
             } = self.attempt(episode, max_steps, sink, cancelled)?;
-            if spoilt_by_host && reruns < self.env.time.host_noise_reruns {
+            let replays = &mut self.replays;
+            if ended_by_host && reruns < replays.per_episode && replays.played < replays.limit {
                 reruns += 1;
-                self.host_noise_reruns += 1;
-                tracing::warn!(task = %self.task, episode, reruns, "the host stalled: the episode is played again");
-                if outcome.fault.is_some() {
-                    self.log.add(
-                        "",
-                        Some("not counted: the host stalled, and the episode is played again"),
-                    );
-                }
+                replays.played += 1;
+                tracing::warn!(task = %self.task, episode, reruns, "the host kept the agent from answering: the episode is played again");
+                self.log.add(
+                    "",
+                    Some("not counted: the host kept the agent from answering; the episode is played again, by a new process"),
+                );
                 continue;
             }
             sink.end(&outcome, reruns)?;
@@ -124,61 +145,42 @@ impl<'a> Player<'a> {
             Course::begin(&self.arena, self.task, episode, interpolation, sink).at_most(max_steps);
         let mut session = match session {
             Ok(session) => session,
-            Err(StartUpFault { kind, line, stderr }) => {
+            Err(StartUpFault {
+                kind,
+                line,
+                stderr,
+                ended_by_host,
+            }) => {
                 let outcome = course.failed(Phase::StartUp, kind, line);
                 self.note(&stderr, &outcome);
                 return Ok(Try {
                     outcome,
-                    spoilt_by_host: false,
+                    ended_by_host,
                 });
             }
         };
-        let mut without_noise = TimeSum::default();
-        match self.converse(
-            &mut session,
-            episode,
-            &mut course,
-            &mut without_noise,
-            cancelled,
-        ) {
-            Ok(outcome) => {
-                self.session = Some(session);
-                let (measured, without_noise) = (outcome.computation_time, without_noise.summary());
-                Ok(Try {
-                    outcome,
-                    spoilt_by_host: host_cost_points(&measured, &without_noise),
-                })
-            }
-            Err((_, Trouble::Platform(fault))) => {
-                self.session = Some(session);
-                Err(fault)
-            }
-            Err((phase, Trouble::Agent { fault, line })) => {
-                let spoilt_by_host =
-                    phase == Phase::Step && self.is_kept_from_answering(&session, &fault);
-                let outcome = course.failed(phase, fault, line);
-                self.note(&session.abort(), &outcome);
-                Ok(Try {
-                    outcome,
-                    spoilt_by_host,
-                })
-            }
-        }
-    }
-
-    /// Was it the host's stall that made a step's hard limit pass?
-    fn is_kept_from_answering(&self, session: &Session, fault: &AgentFaultKind) -> bool {
-        let (AgentFaultKind::TimedOut { limit_s, .. }, Some((asked, until))) =
-            (fault, session.waited())
-        else {
-            return false;
-        };
-        let wait = AnswerWait {
-            wall_s: (until - asked).as_secs_f64(),
-            cpu_s: session.cpu_time_since_answer_s(),
-            stalled_s: self.watch.stalled_s(asked, until),
-        };
-        wait.no_answer_is_noise(*limit_s)
+        let (phase, fault, line, ended_by_host) =
+            match self.converse(&mut session, episode, &mut course, cancelled) {
+                Ok(outcome) => {
+                    self.session = Some(session);
+                    return Ok(Try {
+                        outcome,
+                        ended_by_host: false,
+                    });
+                }
+                Err((_, Trouble::Platform(fault))) => {
+                    self.session = Some(session);
+                    return Err(fault);
+                }
+                Err((phase, Trouble::Host { fault })) => (phase, fault, None, true),
+                Err((phase, Trouble::Agent { fault, line })) => (phase, fault, line, false),
+            };
+        let outcome = course.failed(phase, fault, line);
+        self.note(&session.abort(), &outcome);
+        Ok(Try {
+            outcome,
+            ended_by_host,
+        })
     }
 
     /// Says goodbye to the agent and returns the log of all its processes.
@@ -198,28 +200,33 @@ impl<'a> Player<'a> {
         self.log.into_text()
     }
 
-    fn start(&self) -> Result<Result<Session, StartUpFault>, PlatformFault> {
-        match Session::start(self.bundle, self.env, self.task.into()) {
-            Ok(session) => Ok(Ok(session)),
-            Err((Trouble::Platform(fault), _)) => Err(fault),
-            Err((Trouble::Agent { fault: kind, line }, stderr)) => {
-                Ok(Err(StartUpFault { kind, line, stderr }))
-            }
-        }
+    fn start(&self) -> Result<Result<Session<'a>, StartUpFault>, PlatformFault> {
+        let started = Session::start_watched(self.bundle, self.env, self.task.into(), self.watch);
+        let (kind, line, stderr, ended_by_host) = match started {
+            Ok(session) => return Ok(Ok(session)),
+            Err((Trouble::Platform(fault), _)) => return Err(fault),
+            Err((Trouble::Host { fault }, stderr)) => (fault, None, stderr, true),
+            Err((Trouble::Agent { fault, line }, stderr)) => (fault, line, stderr, false),
+        };
+        Ok(Err(StartUpFault {
+            kind,
+            line,
+            stderr,
+            ended_by_host,
+        }))
     }
 
     /// The conversation of one episode; trouble comes with what the agent was asked for.
     fn converse(
         &mut self,
-        session: &mut Session,
+        session: &mut Session<'_>,
         episode: u32,
         course: &mut CourseTo<'_>,
-        without_noise: &mut TimeSum,
         cancelled: &dyn Fn() -> bool,
     ) -> Result<EpisodeOutcome, (Phase, Trouble)> {
         self.reset(session, episode)
             .map_err(|trouble| (Phase::Reset, trouble))?;
-        self.steps(session, course, without_noise, cancelled)
+        self.steps(session, course, cancelled)
             .and_then(|outcome| {
                 session.end(episode, outcome.steps)?;
                 Ok(outcome)
@@ -228,7 +235,7 @@ impl<'a> Player<'a> {
     }
 
     /// Announces an episode; the wait for the answer counts also if none came.
-    fn reset(&mut self, session: &mut Session, episode: u32) -> Result<(), Trouble> {
+    fn reset(&mut self, session: &mut Session<'_>, episode: u32) -> Result<(), Trouble> {
         self.resets.check()?;
         let asked = Instant::now();
         let answered = session.reset(episode);
@@ -238,10 +245,9 @@ impl<'a> Player<'a> {
     }
 
     fn steps(
-        &self,
-        session: &mut Session,
+        &mut self,
+        session: &mut Session<'_>,
         course: &mut CourseTo<'_>,
-        without_noise: &mut TimeSum,
         cancelled: &dyn Fn() -> bool,
     ) -> Result<EpisodeOutcome, Trouble> {
         let mut budget = EpisodeBudget::new(&self.env.time);
@@ -251,20 +257,11 @@ impl<'a> Player<'a> {
             }
             let Question { step, observation } = course.question()?;
             let answered = session.step(step, observation)?;
-            let wall_s = answered.computation_time_s;
-            without_noise.add(match session.waited() {
-                Some((asked, until)) if AnswerWait::is_late(wall_s) => AnswerWait {
-                    wall_s,
-                    cpu_s: answered.cpu_time_s,
-                    stalled_s: self.watch.stalled_s(asked, until),
-                }
-                .without_noise_s(),
-                _ => wall_s,
-            });
+            self.longest_stall_s = self.longest_stall_s.max(answered.host_time_s);
             if let Some(outcome) = course.answer(session.action(), answered) {
                 return Ok(outcome);
             }
-            budget.spend(wall_s)?;
+            budget.spend(answered.computation_time_s)?;
         }
     }
 

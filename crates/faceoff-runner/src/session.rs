@@ -3,6 +3,7 @@ use crate::{
     config::AgentEnvironment,
     exchange::{Answer, Exchange, Sent},
     fault::{PlatformFault, Trouble},
+    host_watch::{Counters, HostWatch},
     wire_env::wire_env,
 };
 use faceoff_episode::Answered;
@@ -16,20 +17,17 @@ use std::time::{Duration, Instant};
 /// [`Self::reset`] and [`Self::step`] ask and wait. Who has two agents asks both with `send_…` and
 /// then, in turns, waits for any and looks at each with [`Self::poll`].
 #[derive(Debug)]
-pub struct Session {
-    exchange: Exchange,
+pub struct Session<'w> {
+    exchange: Exchange<'w>,
     time: TimeLimits,
     interpolation: Interpolation,
     asked: Option<Asked>,
     /// The last action; its memory is reused.
     action: Vec<f64>,
-    /// At the last answer.
-    cpu_time_s: Option<f64>,
-    waited: Option<(Instant, Instant)>,
 }
 
 /// A question whose answer is due.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Asked {
     question: Question,
     sent: Sent,
@@ -41,7 +39,7 @@ enum Question {
     Step { step: u32 },
 }
 
-impl Session {
+impl Session<'static> {
     /// Starts the bundle's command and exchanges `hello` and `ready`.
     ///
     /// # Errors
@@ -51,9 +49,21 @@ impl Session {
         env: &AgentEnvironment,
         contest: Contest,
     ) -> Result<Self, (Trouble, String)> {
+        Self::start_watched(bundle, env, contest, &Counters)
+    }
+}
+
+impl<'w> Session<'w> {
+    /// [`Session::start`] with another judge of what the host takes.
+    pub(crate) fn start_watched(
+        bundle: &Bundle,
+        env: &AgentEnvironment,
+        contest: Contest,
+        watch: &'w dyn HostWatch,
+    ) -> Result<Self, (Trouble, String)> {
         let started = Instant::now();
         let mut exchange =
-            Exchange::start(bundle, env).map_err(|trouble| (trouble, String::new()))?;
+            Exchange::start(bundle, env, watch).map_err(|trouble| (trouble, String::new()))?;
         let stated = bundle.manifest.interpolation;
         match hello(&mut exchange, contest, stated, env.time.startup_s, started) {
             Ok(interpolation) => Ok(Self {
@@ -62,8 +72,6 @@ impl Session {
                 interpolation,
                 asked: None,
                 action: Vec::new(),
-                cpu_time_s: None,
-                waited: None,
             }),
             Err(trouble) => Err((trouble, abort(exchange))),
         }
@@ -121,10 +129,8 @@ impl Session {
             Question::Reset { .. } => (Phase::Reset, self.time.reset_s),
             Question::Step { .. } => (Phase::Step, self.time.step_s),
         };
-        (self.asked, self.waited) = (None, None);
-        let sent = self
-            .exchange
-            .send(message, phase, limit_s, Instant::now())?;
+        self.asked = None;
+        let sent = self.exchange.send(message, phase, limit_s, None)?;
         self.asked = Some(Asked { question, sent });
         Ok(())
     }
@@ -135,13 +141,10 @@ impl Session {
     /// # Errors
     /// The platform's alone.
     pub fn wait_for_any(sessions: &[&Self], until: Instant) -> Result<(), PlatformFault> {
-        let (mut due, mut until) = (Vec::with_capacity(sessions.len()), until);
-        for session in sessions {
-            if let Some(Asked { sent, .. }) = session.asked {
-                until = until.min(sent.deadline);
-                due.push(&session.exchange);
-            }
-        }
+        let due: Vec<_> = sessions
+            .iter()
+            .filter_map(|session| Some((&session.exchange, &session.asked.as_ref()?.sent)))
+            .collect();
         Exchange::wait_for_any(&due, until)
     }
 
@@ -151,22 +154,16 @@ impl Session {
     /// # Errors
     /// The agent's fault, which may be that its time is over, or the platform's.
     pub fn poll(&mut self, until: Instant) -> Result<Option<Answered>, Trouble> {
-        let Some(Asked { question, sent }) = self.asked else {
+        let Some(Asked { question, mut sent }) = self.asked.take() else {
             return Ok(None);
         };
-        let outcome = match self.exchange.poll(&sent, until) {
-            Ok(None) => return Ok(None),
-            Ok(Some(answer)) => {
-                self.waited = Some((sent.at, answer.at));
-                self.take(question, &sent, &answer).map(Some)
+        match self.exchange.poll(&mut sent, until)? {
+            Some(answer) => self.take(question, &answer).map(Some),
+            None => {
+                self.asked = Some(Asked { question, sent });
+                Ok(None)
             }
-            Err(trouble) => {
-                self.waited = Some((sent.at, Instant::now()));
-                Err(trouble)
-            }
-        };
-        self.asked = None;
-        outcome
+        }
     }
 
     /// Waits for the answer that is due as long as its limit allows.
@@ -178,12 +175,7 @@ impl Session {
         }
     }
 
-    fn take(
-        &mut self,
-        question: Question,
-        sent: &Sent,
-        answer: &Answer,
-    ) -> Result<Answered, Trouble> {
+    fn take(&mut self, question: Question, answer: &Answer) -> Result<Answered, Trouble> {
         match question {
             Question::Reset { episode } => answer::parse_reset_ready(&answer.bytes, episode),
             Question::Step { step } => {
@@ -191,25 +183,11 @@ impl Session {
             }
         }
         .map_err(|fault| answer.shows(fault))?;
-        let cpu_time_s = self.cpu_time_since_answer_s();
-        self.cpu_time_s = self.exchange.cpu_time_s();
         Ok(Answered {
-            computation_time_s: answer.at.saturating_duration_since(sent.at).as_secs_f64(),
-            cpu_time_s,
+            computation_time_s: answer.wall.saturating_sub(answer.host).as_secs_f64(),
+            host_time_s: answer.host.as_secs_f64(),
+            cpu_time_s: answer.cpu_time_s,
         })
-    }
-
-    /// When the last question had been asked, and when its answer came or was no longer waited for.
-    /// `None` when it could not even be asked.
-    pub(crate) const fn waited(&self) -> Option<(Instant, Instant)> {
-        self.waited
-    }
-
-    /// CPU time that the agent's process tree used since its last answer, in seconds, where the host
-    /// tells.
-    pub(crate) fn cpu_time_since_answer_s(&self) -> Option<f64> {
-        let before = self.cpu_time_s?;
-        Some((self.exchange.cpu_time_s()? - before).max(0.0))
     }
 
     /// Tells that an episode is over. An agent that no longer listens meets its fault at the next
@@ -219,7 +197,7 @@ impl Session {
     /// The platform's alone.
     pub fn end(&mut self, episode: u32, steps: u32) -> Result<(), PlatformFault> {
         let end = Message::End { episode, steps };
-        self.exchange.tell(&end, self.time.step_s)
+        self.exchange.tell(&end)
     }
 
     /// Says goodbye, waits for the exit, kills what is left, and returns the end of the agent's
@@ -228,7 +206,7 @@ impl Session {
     /// # Errors
     /// The platform's alone: how an agent exits is its own affair by now.
     pub fn finish(mut self) -> Result<String, PlatformFault> {
-        self.exchange.tell(&Message::Bye, self.time.bye_s)?;
+        self.exchange.tell(&Message::Bye)?;
         self.exchange.finish(TimeLimits::duration(self.time.bye_s))
     }
 
@@ -240,15 +218,15 @@ impl Session {
 
 /// The agent's first answer; `stated` is the interpolation that `agent.toml` promises.
 fn hello(
-    exchange: &mut Exchange,
+    exchange: &mut Exchange<'_>,
     contest: Contest,
     stated: Option<i64>,
     limit_s: f64,
     started: Instant,
 ) -> Result<Interpolation, Trouble> {
     let hello = Message::hello(contest, wire_env(contest));
-    let sent = exchange.send(&hello, Phase::StartUp, limit_s, started)?;
-    let answer = exchange.wait(&sent)?;
+    let mut sent = exchange.send(&hello, Phase::StartUp, limit_s, Some(started))?;
+    let answer = exchange.wait(&mut sent)?;
     let ready = answer::parse_ready(&answer.bytes).map_err(|fault| answer.shows(fault))?;
     match stated {
         Some(stated) if ready.interpolation.code() != Some(stated) => {
@@ -261,7 +239,7 @@ fn hello(
     }
 }
 
-fn abort(exchange: Exchange) -> String {
+fn abort(exchange: Exchange<'_>) -> String {
     exchange.finish(Duration::ZERO).unwrap_or_else(|error| {
         tracing::error!(%error, "an agent's end could not be observed");
         String::new()

@@ -3,7 +3,7 @@ use crate::{
     calibration::{self, CalibrationAgent},
     config::AgentEnvironment,
     fault::PlatformFault,
-    host_watch::{HostWatch, StallWatch},
+    host_watch::{Counters, HostWatch},
     player::Player,
 };
 use faceoff_dataset::{Recorder, ShardFolder, ShardReport};
@@ -38,12 +38,10 @@ pub fn run_shard(
     out: &Path,
     observer: &mut dyn Observer,
 ) -> Result<ShardReport, PlatformFault> {
-    let _pinned = PinnedElsewhere::than(&env.agent_cpus);
-    let watch = StallWatch::start(&env.agent_cpus)?;
-    run_shard_watched(spec, bundle, env, out, observer, &watch)
+    run_shard_watched(spec, bundle, env, out, observer, &Counters)
 }
 
-/// [`run_shard`] with another witness of what the host does.
+/// [`run_shard`] with another judge of what the host takes.
 ///
 /// # Errors
 /// As [`run_shard`].
@@ -75,7 +73,7 @@ pub fn run_shard_watched(
             return Err(fault);
         }
     };
-    let timing = calibration.finish(watch, player.host_noise_reruns());
+    let timing = calibration.finish(&player);
     let log = player.close()?;
     observer.log(&log);
     let report = ShardReport {
@@ -141,12 +139,12 @@ impl Calibration {
         self.agent.measure(calibration::BETWEEN, &mut self.during_s)
     }
 
-    fn finish(mut self, watch: &dyn HostWatch, host_noise_reruns: u32) -> SlotTiming {
+    fn finish(mut self, player: &Player<'_>) -> SlotTiming {
         SlotTiming {
             before_s: calibration::summarise(&mut self.before_s),
             during_s: calibration::summarise(&mut self.during_s),
-            longest_stall_s: watch.longest_stall_s(),
-            host_noise_reruns,
+            longest_stall_s: player.longest_stall_s(),
+            host_noise_reruns: player.host_noise_reruns(),
         }
     }
 }

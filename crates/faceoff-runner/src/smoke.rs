@@ -1,6 +1,6 @@
 use crate::{
-    bundle::Bundle, config::AgentEnvironment, fault::PlatformFault, host_watch::StallWatch,
-    log::Log, player::Player,
+    bundle::Bundle, config::AgentEnvironment, fault::PlatformFault, host_watch::Counters, log::Log,
+    player::Player,
 };
 use faceoff_episode::{Arena, EpisodeStart, RecordError, StepRow, StepSink};
 use faceoff_scoring::computation_time_penalty;
@@ -11,6 +11,7 @@ use std::fmt;
 
 /// Control steps of each task over which an agent's time is judged, at least (RULES).
 pub const SMOKE_STEPS: u32 = 250;
+
 /// What the smoke run of an upload found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SmokeReport {
@@ -67,13 +68,12 @@ pub fn smoke(
     env: &AgentEnvironment,
     cancelled: &dyn Fn() -> bool,
 ) -> Result<SmokeReport, PlatformFault> {
-    let watch = StallWatch::start(&env.agent_cpus)?;
     let arena = Arena::new(Profile::Evaluation, spec.seed, spec.mismatch_seed);
     let mut timing = Vec::with_capacity(Task::ALL.len());
     let mut log = Log::new(env.limits.stderr_tail_bytes);
     for task in Task::ALL {
         let part = Part::drawn(spec, task);
-        let mut player = Player::new(bundle, env, task, part.episodes, arena.clone(), &watch);
+        let mut player = Player::new(bundle, env, task, part.episodes, arena.clone(), &Counters);
         let mut answers = Answers::default();
         let mut outcomes = Vec::new();
         while answers.times_s.len() < part.steps as usize {

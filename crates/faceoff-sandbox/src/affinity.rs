@@ -9,10 +9,20 @@ use std::io;
 /// # Errors
 /// When the kernel does not tell.
 pub fn allowed() -> io::Result<Vec<usize>> {
-    let set = sched_getaffinity(None)?;
-    Ok((0..CpuSet::MAX_CPU)
+    Ok(numbers(&sched_getaffinity(None)?))
+}
+
+/// The CPUs that this process may use, whatever the calling thread is pinned to: those of its main thread.
+pub(crate) fn of_process() -> io::Result<Vec<usize>> {
+    Ok(numbers(&sched_getaffinity(
+        Some(rustix::process::getpid()),
+    )?))
+}
+
+fn numbers(set: &CpuSet) -> Vec<usize> {
+    (0..CpuSet::MAX_CPU)
         .filter(|cpu| set.is_set(*cpu))
-        .collect())
+        .collect()
 }
 
 /// Keeps the calling thread, and the threads that it starts from now on, on these CPUs; with none

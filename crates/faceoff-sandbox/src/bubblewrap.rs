@@ -25,6 +25,31 @@ const INNER_ID: &str = "1000";
 const PASSWD: &str = "agent:x:1000:1000:agent:/tmp:/bin/sh\n";
 const GROUP: &str = "agent:x:1000:\n";
 
+/// Settings and counters of the whole host (asynchronous input, terminals, open files …), and terminals
+/// themselves, whose number all agents share.
+const HIDDEN_FOLDERS: [&str; 4] = ["/proc/sys", "/proc/pressure", "/proc/fs", "/dev/pts"];
+/// Counters of the whole host, locks among them. Those that ordinary libraries read stay: `cpuinfo`,
+/// `meminfo`, `stat`, `uptime`, `loadavg`.
+const HIDDEN_FILES: [&str; 17] = [
+    "/proc/locks",
+    "/proc/vmstat",
+    "/proc/interrupts",
+    "/proc/softirqs",
+    "/proc/buddyinfo",
+    "/proc/pagetypeinfo",
+    "/proc/zoneinfo",
+    "/proc/slabinfo",
+    "/proc/vmallocinfo",
+    "/proc/diskstats",
+    "/proc/schedstat",
+    "/proc/cgroups",
+    "/proc/keys",
+    "/proc/key-users",
+    "/proc/timer_list",
+    "/proc/allocinfo",
+    "/proc/swaps",
+];
+
 /// An installed bubblewrap and what it can do.
 #[derive(Debug, Clone)]
 pub(crate) struct Bubblewrap {
@@ -134,9 +159,10 @@ impl Bubblewrap {
         ]);
         line.fd("--json-status-fd", status);
         for path in mount_order(&spec.runtime.read_only_paths) {
-            line.read_only(&path, &path)?;
+            line.read_only(&spec.runtime.source(&path), &path)?;
         }
         line.args(["--proc", "/proc", "--dev", "/dev"]);
+        line.hide_counters();
         let scratch = spec.limits.scratch_bytes.max(4096).to_string();
         for folder in ["/dev/shm", "/tmp"] {
             line.args(["--perms", "0700", "--size", &scratch, "--tmpfs", folder]);
@@ -213,6 +239,17 @@ impl CommandLine {
         self.inherit.push(fd);
     }
 
+    /// Covers what tells of the host as a whole, or of other agents, and is of no use to an agent.
+    fn hide_counters(&mut self) {
+        for folder in HIDDEN_FOLDERS.into_iter().filter(|path| is_there(path)) {
+            let cover = ["--perms", "0555", "--size", "4096", "--tmpfs", folder];
+            self.args(cover.into_iter().chain(["--remount-ro", folder]));
+        }
+        for file in HIDDEN_FILES.into_iter().filter(|path| is_there(path)) {
+            self.args(["--ro-bind", "/dev/null", file]);
+        }
+    }
+
     fn file(&mut self, inside: &str, content: &[u8]) -> Result<(), SandboxError> {
         let fd = memory_file(content)?;
         self.args(["--perms", "0444"]);
@@ -242,8 +279,12 @@ impl CommandLine {
     }
 }
 
+fn is_there(path: &str) -> bool {
+    path.starts_with("/dev/") || Path::new(path).exists()
+}
+
 /// Parents before what is inside them, and nothing that an earlier mount shows already.
-fn mount_order(paths: &[PathBuf]) -> Vec<PathBuf> {
+pub(crate) fn mount_order(paths: &[PathBuf]) -> Vec<PathBuf> {
     let mut sorted = paths.to_vec();
     sorted.sort();
     sorted.dedup();

@@ -197,6 +197,8 @@ fn errno_of(error: &seccompiler::Error) -> Errno {
 pub(crate) fn rlimits(limits: &Limits, own_user: bool) -> Vec<(Resource, Rlimit)> {
     const LOCKED_BYTES: u64 = 8 << 20;
     const STACK_BYTES: u64 = 8 << 20;
+    /// Queued signals. Each timer of `timer_create` holds one, so this bounds what can expire at one instant.
+    const PENDING_SIGNALS: u64 = 256;
     /// Not 0: a host whose core dumps go to a program starts it, as root, even at 0, but not at 1, which no
     /// dump fits either.
     const CORE_BYTES: u64 = 1;
@@ -206,6 +208,7 @@ pub(crate) fn rlimits(limits: &Limits, own_user: bool) -> Vec<(Resource, Rlimit)
         (Resource::Core, CORE_BYTES),
         (Resource::Memlock, LOCKED_BYTES),
         (Resource::Stack, STACK_BYTES),
+        (Resource::Sigpending, PENDING_SIGNALS),
         (Resource::Nice, 0),
         (Resource::Rtprio, 0),
     ];

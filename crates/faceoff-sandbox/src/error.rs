@@ -69,9 +69,6 @@ pub enum WriteError {
     /// Nobody reads the agent's standard input any more.
     #[error("the agent closed its standard input")]
     Closed,
-    /// The agent did not read in time and the pipe is full.
-    #[error("the agent did not read its standard input in time")]
-    TimedOut,
     /// The pipe or the sandbox failed.
     #[error(transparent)]
     Platform(#[from] SandboxError),

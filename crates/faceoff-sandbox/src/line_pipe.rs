@@ -1,5 +1,6 @@
-//! Lines to and from the agent: capped, deadline-bounded, answers stamped right after their last
-//! byte, questions right before theirs.
+//! Lines to and from the agent: capped, deadline-bounded, answers stamped right after their last byte.
+//! What the agent leaves no room for is kept, and follows while an answer is waited for: a write never
+//! waits, so that no time passes unseen.
 
 use rustix::{
     buffer::spare_capacity,
@@ -8,7 +9,7 @@ use rustix::{
 };
 use std::{
     io,
-    os::fd::{AsFd, BorrowedFd, OwnedFd},
+    os::fd::{BorrowedFd, OwnedFd},
     time::Instant,
 };
 
@@ -38,19 +39,16 @@ pub enum ReadLine {
     Closed,
 }
 
-/// How writing ended.
-#[derive(Debug)]
-pub(crate) enum Written {
-    /// The call that took the last of it began at this time.
-    At(Instant),
-    Closed,
-    TimedOut,
-}
+/// Nobody reads the other end any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Closed;
 
 /// Both ends that the service holds.
 #[derive(Debug)]
 pub(crate) struct LinePipe {
     input: Option<OwnedFd>,
+    /// What there was no room for yet.
+    unsent: Vec<u8>,
     output: OwnedFd,
     /// What has been read and not yet been handed out, from `start` on.
     buffer: Vec<u8>,
@@ -66,6 +64,7 @@ impl LinePipe {
         ioctl_fionbio(&output, true)?;
         Ok(Self {
             input: Some(input),
+            unsent: Vec::new(),
             output,
             buffer: Vec::with_capacity(2 * READ_BYTES),
             start: 0,
@@ -76,29 +75,45 @@ impl LinePipe {
 
     pub(crate) fn close_input(&mut self) {
         self.input = None;
+        self.unsent.clear();
     }
 
-    /// Writes all of `bytes` before `deadline`.
-    pub(crate) fn write(&mut self, mut bytes: &[u8], deadline: Instant) -> io::Result<Written> {
+    /// Writes what there is room for; the rest follows while an answer is waited for.
+    pub(crate) fn send(&mut self, bytes: &[u8]) -> io::Result<Result<(), Closed>> {
+        if !self.unsent.is_empty() {
+            self.unsent.extend_from_slice(bytes);
+            return self.send_rest();
+        }
+        let sent = self.write(bytes)?;
+        Ok(sent.map(|count| self.unsent.extend_from_slice(&bytes[count..])))
+    }
+
+    /// Has everything been taken by the pipe?
+    pub(crate) const fn is_all_sent(&self) -> bool {
+        self.unsent.is_empty()
+    }
+
+    fn send_rest(&mut self) -> io::Result<Result<(), Closed>> {
+        let sent = self.write(&self.unsent)?;
+        Ok(sent.map(|count| drop(self.unsent.drain(..count))))
+    }
+
+    /// Writes until there is no room; returns the number of bytes that were taken.
+    fn write(&self, bytes: &[u8]) -> io::Result<Result<usize, Closed>> {
         let Some(input) = &self.input else {
-            return Ok(Written::Closed);
+            return Ok(Err(Closed));
         };
-        loop {
-            // Before the call: on a shared CPU the agent may run, and even answer, before it returns.
-            let at = Instant::now();
-            match write(input, bytes) {
-                Ok(count) if count == bytes.len() => return Ok(Written::At(at)),
-                Ok(count) => bytes = &bytes[count..],
-                Err(Errno::PIPE) => return Ok(Written::Closed),
+        let mut sent = 0;
+        while sent < bytes.len() {
+            match write(input, &bytes[sent..]) {
+                Ok(count) => sent += count,
+                Err(Errno::AGAIN) => break,
                 Err(Errno::INTR) => {}
-                Err(Errno::AGAIN) => {
-                    if !wait_for(input.as_fd(), PollFlags::OUT, deadline)? {
-                        return Ok(Written::TimedOut);
-                    }
-                }
+                Err(Errno::PIPE | Errno::CONNRESET) => return Ok(Err(Closed)),
                 Err(error) => return Err(error.into()),
             }
         }
+        Ok(Ok(sent))
     }
 
     /// The next line of at most `max_bytes`, newline not counted.
@@ -111,10 +126,14 @@ impl LinePipe {
             if let Some(outcome) = self.take_line(max_bytes) {
                 return Ok(outcome);
             }
-            if !wait_for(self.output.as_fd(), PollFlags::IN, deadline)? {
+            if !wait_for_any(&mut self.awaited(), deadline)? {
                 return Ok(ReadLine::TimedOut);
             }
             if !self.fill()? {
+                return Ok(ReadLine::Closed);
+            }
+            // A line that was there before the rest is handed out before: it answers something else.
+            if !self.is_all_sent() && !self.holds_line() && self.send_rest()? == Err(Closed) {
                 return Ok(ReadLine::Closed);
             }
             // A dribbling agent always has something to read: the deadline holds all the same.
@@ -124,14 +143,18 @@ impl LinePipe {
         }
     }
 
+    /// What there is to wait for: output, and room for what was not sent yet.
+    pub(crate) fn awaited(&self) -> Vec<PollFd<'_>> {
+        let room = self.input.as_ref().filter(|_| !self.is_all_sent());
+        [(Some(&self.output), PollFlags::IN), (room, PollFlags::OUT)]
+            .into_iter()
+            .filter_map(|(fd, flags)| Some(PollFd::new(fd?, flags)))
+            .collect()
+    }
+
     /// Is there unread output, in the buffer or in the pipe?
     pub(crate) fn has_pending_output(&self) -> io::Result<bool> {
         Ok(self.start < self.buffer.len() || ioctl_fionread(&self.output)? > 0)
-    }
-
-    /// The descriptor's identity, for finding who else holds the pipe.
-    pub(crate) fn output(&self) -> BorrowedFd<'_> {
-        self.output.as_fd()
     }
 
     /// Has a whole line been read that has not been handed out?

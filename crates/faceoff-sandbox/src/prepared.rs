@@ -6,6 +6,7 @@ use crate::{
     agent_user::AgentUser,
     bubblewrap::{Bubblewrap, environment},
     cgroup::AgentCgroup,
+    channel::{Channel, Kind},
     child_setup::{ChildSetup, StepReport, rlimits},
     error::IoContext,
     line_pipe::LinePipe,
@@ -32,6 +33,8 @@ const SET_UP_PATIENCE: Duration = Duration::from_secs(120);
 /// What runs, and our ends of it.
 pub(crate) struct Started {
     pub lines: LinePipe,
+    /// How `/proc/*/fd` names the agent's output.
+    pub output_name: String,
     pub stderr: StderrTail,
     pub tree: ProcessTree,
 }
@@ -40,6 +43,7 @@ pub(crate) struct Started {
 pub(crate) struct Prepared {
     command: Command,
     setup: ChildSetup,
+    channel: Channel,
     status: Option<StatusPipe>,
     cgroup: Option<AgentCgroup>,
     scratch: Option<tempfile::TempDir>,
@@ -49,10 +53,15 @@ impl Prepared {
     /// Makes the cgroup, the filters and the command line.
     pub(crate) fn new(spec: &SpawnSpec) -> Result<Self, SandboxError> {
         if spec.isolation == Isolation::None {
-            return Ok(Self::unsandboxed(spec));
+            return Self::unsandboxed(spec);
         }
         let enforces = |layer| spec.isolation.enforces(layer);
         let user = AgentUser::for_next_agent()?;
+        let channel = Channel::new(if user.is_some() {
+            Kind::Pipes
+        } else {
+            Kind::Sockets
+        })?;
         let cgroup = AgentCgroup::create(&spec.limits, &spec.isolation, &spec.cpus)?;
         let held_by_cpuset = cgroup.as_ref().is_some_and(|cgroup| cgroup.holds_cpus);
         let filters = if enforces(Layer::Seccomp) {
@@ -86,6 +95,7 @@ impl Prepared {
             return Ok(Self {
                 command,
                 setup,
+                channel,
                 status: Some(status),
                 cgroup,
                 scratch: None,
@@ -103,13 +113,14 @@ impl Prepared {
         Ok(Self {
             command,
             setup,
+            channel,
             status: None,
             cgroup,
             scratch: Some(scratch),
         })
     }
 
-    fn unsandboxed(spec: &SpawnSpec) -> Self {
+    fn unsandboxed(spec: &SpawnSpec) -> Result<Self, SandboxError> {
         let mut command = direct_command(spec);
         command.envs(&spec.env);
         let cpus = (!spec.cpus.is_empty()).then(|| cpu_set(&spec.cpus));
@@ -117,13 +128,14 @@ impl Prepared {
             cpus,
             ..ChildSetup::default()
         };
-        Self {
+        Ok(Self {
             command,
             setup,
+            channel: Channel::new(Kind::Pipes)?,
             status: None,
             cgroup: None,
             scratch: None,
-        }
+        })
     }
 
     /// Forks; returns when the sandbox exists.
@@ -131,13 +143,19 @@ impl Prepared {
         let Self {
             mut command,
             setup,
+            channel,
             status,
             cgroup,
             scratch,
         } = self;
+        let Channel {
+            lines,
+            agents: [stdin, stdout],
+            output_name,
+        } = channel;
         command
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
+            .stdin(stdin)
+            .stdout(stdout)
             .stderr(Stdio::piped())
             .process_group(0);
         let sandboxed = status.is_some();
@@ -146,13 +164,12 @@ impl Prepared {
             Ok(child) => child,
             Err(source) => return Err(start_failure(report, source, sandboxed, spec)),
         };
-        let pipes = (child.stdin.take(), child.stdout.take(), child.stderr.take());
+        let stderr = child.stderr.take();
         const WATCH: &str = "cannot watch the agent";
         let mut tree = ProcessTree::new(child, status, cgroup, scratch).context(WATCH)?;
-        let (Some(stdin), Some(stdout), Some(stderr)) = pipes else {
-            return Err(SandboxError::other(WATCH, "its pipes are missing").into());
+        let Some(stderr) = stderr else {
+            return Err(SandboxError::other(WATCH, "its log is missing").into());
         };
-        let lines = LinePipe::new(stdin.into(), stdout.into()).context(WATCH)?;
         let mut stderr =
             StderrTail::drain(stderr.into(), spec.limits.stderr_tail_bytes).context(WATCH)?;
         if let Some(status) = &mut tree.status {
@@ -172,6 +189,7 @@ impl Prepared {
         }
         Ok(Started {
             lines,
+            output_name,
             stderr,
             tree,
         })

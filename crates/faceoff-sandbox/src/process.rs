@@ -1,10 +1,10 @@
 use crate::{
-    Isolation, Limits, ReadLine, SandboxError, SpawnError, SpawnSpec, WriteError,
+    CpuReading, Isolation, Limits, ReadLine, SandboxError, SpawnError, SpawnSpec, WriteError,
     cgroup::AgentCgroup,
     command_check::check_command,
     end::{End, Evidence},
     error::IoContext,
-    line_pipe::{LinePipe, Written, wait_for_any},
+    line_pipe::{Closed, LinePipe, wait_for_any},
     next_look::NextLook,
     output_holders,
     prepared::{Prepared, Started},
@@ -14,7 +14,7 @@ use crate::{
     sweep,
 };
 use faceoff_types::AgentFaultKind;
-use rustix::event::{PollFd, PollFlags};
+use rustix::event::PollFd;
 use std::{
     fs,
     sync::Once,
@@ -28,6 +28,7 @@ const END_PATIENCE: Duration = Duration::from_millis(500);
 #[derive(Debug)]
 pub struct AgentProcess {
     lines: LinePipe,
+    output_name: String,
     stderr: StderrTail,
     tree: ProcessTree,
     limits: Limits,
@@ -73,11 +74,13 @@ impl AgentProcess {
         };
         let Started {
             lines,
+            output_name,
             stderr,
             tree,
         } = Prepared::new(&spec)?.start(&spec)?;
         Ok(Self {
             lines,
+            output_name,
             stderr,
             tree,
             limits: spec.limits,
@@ -86,24 +89,30 @@ impl AgentProcess {
         })
     }
 
-    /// Writes all of `line` (which ends in `\n`) before `deadline`; returns the time right before the
-    /// call that wrote its last byte: once woken, an agent that shares our CPU may run before it returns.
+    /// Sends `line` (which ends in `\n`) without waiting, and returns the time of the attempt: from then
+    /// on the agent's time runs. What it leaves no room for follows while its answer is waited for.
     ///
     /// # Errors
-    /// [`WriteError::Closed`] and [`WriteError::TimedOut`] are the agent's doing, the rest is ours.
-    pub fn write_line(&mut self, line: &[u8], deadline: Instant) -> Result<Instant, WriteError> {
-        match self.lines.write(line, deadline) {
-            Ok(Written::At(at)) => {
+    /// [`WriteError::Closed`] is the agent's doing, the rest is ours.
+    pub fn send_line(&mut self, line: &[u8]) -> Result<Instant, WriteError> {
+        // Before the call: on a shared CPU the agent may run, and even answer, before it returns.
+        let at = Instant::now();
+        match self.lines.send(line) {
+            Ok(Ok(())) => {
                 self.next_look = NextLook::first(at);
                 Ok(at)
             }
-            Ok(Written::TimedOut) => Err(WriteError::TimedOut),
-            Ok(Written::Closed) => {
+            Ok(Err(Closed)) => {
                 self.diagnose_end(END_PATIENCE)?;
                 Err(WriteError::Closed)
             }
             Err(source) => Err(SandboxError::io("cannot write to the agent", source).into()),
         }
+    }
+
+    /// Has the channel taken every line that was sent?
+    pub const fn has_taken_all(&self) -> bool {
+        self.lines.is_all_sent()
     }
 
     /// Waits for the agent's next line, of at most `max_bytes` without its newline, until `deadline`;
@@ -149,11 +158,11 @@ impl AgentProcess {
         let until = agents
             .iter()
             .fold(deadline, |until, agent| agent.until_next_look(until));
-        let mut outputs: Vec<PollFd<'_>> = agents
+        let mut awaited: Vec<PollFd<'_>> = agents
             .iter()
-            .map(|agent| PollFd::from_borrowed_fd(agent.lines.output(), PollFlags::IN))
+            .flat_map(|agent| agent.lines.awaited())
             .collect();
-        wait_for_any(&mut outputs, until).context("cannot wait for the agents' output")?;
+        wait_for_any(&mut awaited, until).context("cannot wait for the agents' output")?;
         Ok(())
     }
 
@@ -201,6 +210,21 @@ impl AgentProcess {
         self.tree.cpu_time_s()
     }
 
+    /// The counters of the agent's CPUs, as the beginning of a span; `None` without a cgroup.
+    pub fn read_cpus(&self) -> Option<CpuReading> {
+        self.tree.cgroup.as_ref()?.cpu_evidence.as_ref()?.begin()
+    }
+
+    /// For how much of the time since `begun` the agent cannot have run, because all CPUs that it may use
+    /// ran something outside of its cgroup, or were held up by a machine below this one. Never more than
+    /// the kernel's counters prove, if the agent was waited for since 10 ms before `begun`, the longest
+    /// that they lag behind: with version 1 of the cgroup interface in nanoseconds, with version 2 in
+    /// ticks of 10 ms, of which a few may be missing.
+    pub fn taken_from_it_since(&self, begun: &CpuReading) -> Option<Duration> {
+        let evidence = self.tree.cgroup.as_ref()?.cpu_evidence.as_ref()?;
+        evidence.taken_since(begun)
+    }
+
     /// Closes the agent's input, waits up to `grace` for it to exit, then kills the tree; always reaps.
     ///
     /// # Errors
@@ -244,7 +268,7 @@ impl AgentProcess {
     /// Has the agent, though alive, closed its output, with nothing left in it?
     fn output_is_abandoned(&self) -> Result<bool, SandboxError> {
         let held =
-            output_holders::any_holds(self.lines.output(), &self.tree.processes(), self.tree.pid());
+            output_holders::any_holds(&self.output_name, &self.tree.processes(), self.tree.pid());
         if held {
             return Ok(false);
         }

@@ -1,4 +1,4 @@
-use crate::{SandboxError, error::IoContext};
+use crate::{SandboxError, error::IoContext, memory_image};
 use serde::{Deserialize, Serialize};
 use std::{
     fs,
@@ -46,6 +46,9 @@ pub struct Runtime {
     pub read_only_paths: Vec<PathBuf>,
     /// The agent's `PATH`.
     pub path: String,
+    /// Where a copy of the paths lies in memory, if one was made.
+    #[serde(skip)]
+    pub image: Option<PathBuf>,
 }
 
 impl Runtime {
@@ -54,6 +57,7 @@ impl Runtime {
         Self {
             read_only_paths: existing(&LIBRARY_PATHS),
             path: "/usr/bin:/bin".into(),
+            image: None,
         }
     }
 
@@ -94,7 +98,16 @@ impl Runtime {
         Ok(Self {
             read_only_paths: paths,
             path,
+            image: None,
         })
+    }
+
+    /// Where the files of one of its paths are. A symbolic link is shown as the same link.
+    pub(crate) fn source(&self, path: &Path) -> PathBuf {
+        match &self.image {
+            Some(image) if !path.is_symlink() => memory_image::inside(image, path),
+            _ => path.to_owned(),
+        }
     }
 
     /// The host path of the first `python3` this runtime's PATH leads to, for messages.

@@ -1,8 +1,12 @@
 //! Which system calls an agent may not make.
 //!
-//! Two filters. The first names what an agent has no use for (`EPERM`). The second answers `ENOSYS` to
-//! everything newer than this list, to `clone3`, whose flags a filter cannot see, and to the x32 calls,
-//! which would slip past a list of numbers; programs then take their older way.
+//! Most filters name what an agent has no use for, each with the answer that programs survive best: not
+//! permitted, not there, not for this file, or advice that is taken note of and not followed. One answers
+//! `ENOSYS` to everything newer than this list, to `clone3`, whose flags a filter cannot see, and to the
+//! x32 calls, which would slip past a list of numbers; programs then take their older way.
+//!
+//! What agents share, the files of the bundle and the runtime, must not be a notice board: whatever leaves
+//! a trace on a file or in the kernel's copy of it, and whatever shows one, is among what is refused.
 
 use crate::{Layer, SandboxError};
 use seccompiler::{
@@ -92,6 +96,54 @@ const REFUSED_HERE: &[i64] = &[
 #[cfg(not(target_arch = "x86_64"))]
 const REFUSED_HERE: &[i64] = &[];
 
+/// As on a kernel without them (`ENOSYS`).
+const ABSENT: &[i64] = &[
+    // locks on a file that agents share are seen by all of them; by `fcntl` see below
+    libc::SYS_flock,
+    // tells what others do with a file
+    libc::SYS_inotify_init1,
+    // tell what is in memory of a file, and so what others have read
+    libc::SYS_mincore,
+    CACHESTAT,
+    // its slots are counted for the whole host, and the count can be read
+    libc::SYS_io_setup,
+];
+
+#[cfg(target_arch = "x86_64")]
+const ABSENT_HERE: &[i64] = &[libc::SYS_inotify_init];
+#[cfg(not(target_arch = "x86_64"))]
+const ABSENT_HERE: &[i64] = &[];
+
+/// The same number on all architectures.
+const CACHESTAT: i64 = 451;
+
+/// Advice about files, which is all that they are: success, and nothing happens. They would bring a file
+/// that agents share into memory, or drop it.
+const UNHEEDED: &[i64] = &[libc::SYS_fadvise64, libc::SYS_readahead];
+/// The same for a mapping.
+const UNHEEDED_ADVICE: [libc::c_int; 3] =
+    [libc::MADV_WILLNEED, libc::MADV_COLD, libc::MADV_PAGEOUT];
+
+/// Requests of `fcntl` that are answered as if the kernel did not know them (`EINVAL`). Locks for an agent's
+/// own files stay, but nobody is told of another's: not of those by `flock`'s heirs, which `/proc/locks`
+/// shows to all, nor by asking for one.
+const UNKNOWN_REQUESTS: [libc::c_int; 11] = [
+    libc::F_GETLK,
+    libc::F_OFD_GETLK,
+    libc::F_OFD_SETLK,
+    libc::F_OFD_SETLKW,
+    libc::F_SETLEASE,
+    libc::F_GETLEASE,
+    libc::F_NOTIFY,
+    // hints about a file's future are kept with the file, and can be read
+    RW_HINTS[0],
+    RW_HINTS[1],
+    RW_HINTS[2],
+    RW_HINTS[3],
+];
+/// `F_GET_RW_HINT`, `F_SET_RW_HINT` and the same for an open file.
+const RW_HINTS: [libc::c_int; 4] = [1035, 1036, 1037, 1038];
+
 /// `clone` with one of these is `unshare` by another name.
 const NAMESPACE_FLAGS: [libc::c_int; 7] = [
     libc::CLONE_NEWNS,
@@ -107,82 +159,95 @@ const NAMESPACE_FLAGS: [libc::c_int; 7] = [
 /// since 424. Newer ones do not exist for agents until somebody has read what they do.
 const NEWEST_KNOWN: u32 = 462;
 
-/// The two programs.
+/// The programs, in the order of installation.
 #[derive(Debug, Clone)]
-pub(crate) struct Filters {
-    refuse: BpfProgram,
-    unknown: BpfProgram,
-}
+pub(crate) struct Filters(Vec<BpfProgram>);
+
+type Rules = BTreeMap<i64, Vec<SeccompRule>>;
 
 impl Filters {
     /// `keep_affinity`: also refuse to change CPU affinity, for hosts where no cpuset holds the agent.
     pub(crate) fn build(keep_affinity: bool) -> Result<Self, SandboxError> {
-        let arch =
-            TargetArch::try_from(std::env::consts::ARCH).map_err(|error| unavailable(&error))?;
-        let mut rules: BTreeMap<i64, Vec<SeccompRule>> = REFUSED
-            .iter()
-            .chain(REFUSED_HERE)
-            .map(|&call| (call, Vec::new()))
-            .collect();
+        let mut rules = whatever_arguments(&[REFUSED, REFUSED_HERE]);
         if keep_affinity {
             rules.insert(libc::SYS_sched_setaffinity, Vec::new());
         }
         rules.insert(libc::SYS_clone, namespace_rules()?);
         // Sockets of one's own only: no family but AF_UNIX, which reaches nothing outside the sandbox
         // (no path of the host is mounted, abstract names belong to the network namespace).
-        let not_unix = [SeccompCondition::new(
-            0,
-            SeccompCmpArgLen::Dword,
-            SeccompCmpOp::Ne,
-            libc::AF_UNIX as u64,
-        )];
-        let not_unix = vec![rule(not_unix)?];
+        let not_unix = vec![rule([argument(0, SeccompCmpOp::Ne, libc::AF_UNIX)])?];
         rules.insert(libc::SYS_socket, not_unix.clone());
         rules.insert(libc::SYS_socketpair, not_unix);
         // Pushing input into a terminal.
-        let mut terminal = Vec::new();
-        for request in [libc::TIOCSTI, libc::TIOCLINUX] {
-            terminal.push(rule([SeccompCondition::new(
-                1,
-                SeccompCmpArgLen::Dword,
-                SeccompCmpOp::Eq,
-                request,
-            )])?);
-        }
-        rules.insert(libc::SYS_ioctl, terminal);
-        let refuse = SeccompFilter::new(
-            rules,
-            SeccompAction::Allow,
-            SeccompAction::Errno(libc::EPERM as u32),
-            arch,
-        )
-        .and_then(BpfProgram::try_from)
-        .map_err(|error| unavailable(&error))?;
-        Ok(Self {
-            refuse,
-            unknown: unknown_calls(),
-        })
+        let terminal = [libc::TIOCSTI, libc::TIOCLINUX].map(|request| request as libc::c_int);
+        rules.insert(libc::SYS_ioctl, one_of(1, &terminal)?);
+        // A question that does not fit into a smaller pipe would come late.
+        rules.insert(libc::SYS_fcntl, one_of(1, &[libc::F_SETPIPE_SZ])?);
+
+        let mut unheeded = whatever_arguments(&[UNHEEDED]);
+        unheeded.insert(libc::SYS_madvise, one_of(2, &UNHEEDED_ADVICE)?);
+        let mut unknown_requests = Rules::new();
+        unknown_requests.insert(libc::SYS_fcntl, one_of(1, &UNKNOWN_REQUESTS)?);
+        // Collapsing pages of a file changes what others find of it.
+        unknown_requests.insert(libc::SYS_madvise, one_of(2, &[libc::MADV_COLLAPSE])?);
+        // With a flag: only if it is in memory, or so that it does not stay there.
+        let flagged = vec![rule([argument(5, SeccompCmpOp::Ne, 0)])?];
+        let no_such_reading = Rules::from([(libc::SYS_preadv2, flagged)]);
+        Ok(Self(vec![
+            unknown_calls(),
+            program(whatever_arguments(&[ABSENT, ABSENT_HERE]), libc::ENOSYS)?,
+            program(unheeded, 0)?,
+            program(unknown_requests, libc::EINVAL)?,
+            program(no_such_reading, libc::EOPNOTSUPP)?,
+            // The one that refuses `seccomp` itself comes last.
+            program(rules, libc::EPERM)?,
+        ]))
     }
 
-    /// In the order of installation: the one that refuses `seccomp` itself comes last.
-    pub(crate) fn in_order(&self) -> [&BpfProgram; 2] {
-        [&self.unknown, &self.refuse]
+    /// In the order of installation.
+    pub(crate) fn in_order(&self) -> &[BpfProgram] {
+        &self.0
     }
 }
 
-fn namespace_rules() -> Result<Vec<SeccompRule>, SandboxError> {
-    NAMESPACE_FLAGS
+fn whatever_arguments(lists: &[&[i64]]) -> Rules {
+    let calls = lists.iter().copied().flatten();
+    calls.map(|&call| (call, Vec::new())).collect()
+}
+
+/// The rules of calls that are answered with `errno`; 0 is success.
+fn program(rules: Rules, errno: libc::c_int) -> Result<BpfProgram, SandboxError> {
+    let arch = TargetArch::try_from(std::env::consts::ARCH).map_err(|error| unavailable(&error))?;
+    let answer = SeccompAction::Errno(errno.cast_unsigned());
+    SeccompFilter::new(rules, SeccompAction::Allow, answer, arch)
+        .and_then(BpfProgram::try_from)
+        .map_err(|error| unavailable(&error))
+}
+
+/// A comparison of the lower half of an argument.
+fn argument(
+    index: u8,
+    compare: SeccompCmpOp,
+    value: libc::c_int,
+) -> Result<SeccompCondition, seccompiler::BackendError> {
+    let value = u64::from(value.cast_unsigned());
+    SeccompCondition::new(index, SeccompCmpArgLen::Dword, compare, value)
+}
+
+/// Rules for the argument being any of these.
+fn one_of(index: u8, values: &[libc::c_int]) -> Result<Vec<SeccompRule>, SandboxError> {
+    let rules = values
         .iter()
-        .map(|&flag| {
-            let flag = u64::from(flag.cast_unsigned());
-            rule([SeccompCondition::new(
-                0,
-                SeccompCmpArgLen::Dword,
-                SeccompCmpOp::MaskedEq(flag),
-                flag,
-            )])
-        })
-        .collect()
+        .map(|&value| rule([argument(index, SeccompCmpOp::Eq, value)]));
+    rules.collect()
+}
+
+fn namespace_rules() -> Result<Vec<SeccompRule>, SandboxError> {
+    let rules = NAMESPACE_FLAGS.iter().map(|&flag| {
+        let set = SeccompCmpOp::MaskedEq(u64::from(flag.cast_unsigned()));
+        rule([argument(0, set, flag)])
+    });
+    rules.collect()
 }
 
 fn rule<const N: usize>(

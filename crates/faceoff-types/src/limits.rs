@@ -95,9 +95,11 @@ pub struct TimeLimits {
     pub resets_extra_s: f64,
     /// To exit after `bye`, or once it has closed its output, before it is killed.
     pub bye_s: f64,
-    /// How often an episode is played again because the host stalled, at most; then the last try
-    /// counts as it is. 0: never.
+    /// How often an episode is played again because the host kept the agent from answering, at most; then
+    /// the last try counts as it is. 0: never.
     pub host_noise_reruns: u32,
+    /// How many are played again so, at most, of 100 episodes; of fewer in proportion, rounded up.
+    pub host_noise_reruns_per_100: u32,
 }
 
 impl Default for TimeLimits {
@@ -113,6 +115,7 @@ impl Default for TimeLimits {
             resets_extra_s: 30.0,
             bye_s: 5.0,
             host_noise_reruns: 2,
+            host_noise_reruns_per_100: 5,
         }
     }
 }
@@ -120,6 +123,13 @@ impl Default for TimeLimits {
 impl TimeLimits {
     /// No wait for an agent is longer.
     pub const LONGEST: Duration = Duration::from_secs(3600);
+
+    /// How many of so many episodes may be played again because of the host.
+    #[must_use]
+    pub fn host_noise_reruns_of(&self, episodes: u32) -> u32 {
+        let reruns = (u64::from(episodes) * u64::from(self.host_noise_reruns_per_100)).div_ceil(100);
+        u32::try_from(reruns).unwrap_or(u32::MAX)
+    }
 
     /// A limit as a duration; one that is no sensible number of seconds counts as an hour, so that
     /// a deadline exists whatever a configuration says.

@@ -35,10 +35,9 @@ pub struct SlotTiming {
     pub before_s: RoundTrips,
     /// Round trips between the episodes, in seconds.
     pub during_s: RoundTrips,
-    /// Longest time for which one of the slot's CPUs served nobody, in seconds; 0 when none was longer
-    /// than what the watch can tell from ordinary scheduling.
+    /// The most that the host took of one answer's time, in seconds; 0 when no answer was late by it.
     pub longest_stall_s: f64,
-    /// Tries of episodes that were dropped and played again because the host stalled.
+    /// Tries of episodes that were dropped and played again because the host kept the agent from answering.
     pub host_noise_reruns: u32,
 }
 

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Name and version of the layout described here. Another meaning of a column is another version.
-pub const DATASET_SCHEMA: &str = "faceoff-dataset/3";
+pub const DATASET_SCHEMA: &str = "faceoff-dataset/4";
 
 /// `manifest.json`: what the dataset is and what its files must hash to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -102,6 +102,22 @@ pub struct SlowEpisode {
     pub max_s: f64,
     /// What they cost: 0.5, 1 or 2.
     pub points: f64,
+    /// Since layout 4, if a step was answered.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slowest: Option<SlowStep>,
+}
+
+/// The slowest answer of an episode: what it took, and whose time that was.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SlowStep {
+    /// The control step, from 0; the first of those that took equally long.
+    pub step: u32,
+    /// From the first attempt to write the question to the last byte of the answer, in seconds.
+    pub wall_s: f64,
+    /// What the host took of it, in seconds; the rest counts.
+    pub host_s: f64,
+    /// CPU time of the agent's process tree meanwhile, in seconds, where the host told.
+    pub cpu_s: Option<f64>,
 }
 
 /// `calibration.json`: how evenly the slots kept time, measured by the platform itself.

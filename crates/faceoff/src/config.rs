@@ -135,11 +135,22 @@ impl Default for WorkersConfig {
 }
 
 /// `[sandbox]`
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SandboxConfig {
     /// Layers that this host cannot provide and the organiser does without.
     pub given_up: Vec<Layer>,
+    /// The runtimes' files are copied into memory if they have no more bytes than this; 0: never.
+    pub resident_bytes: u64,
+}
+
+impl Default for SandboxConfig {
+    fn default() -> Self {
+        Self {
+            given_up: Vec::new(),
+            resident_bytes: 1 << 30,
+        }
+    }
 }
 
 impl Config {

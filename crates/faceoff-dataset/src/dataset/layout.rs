@@ -6,19 +6,23 @@ pub enum Layout {
     /// Sealed by a hash in the archive's comment; its tables split integers by bytes and have no index
     /// of pages. Mean computation times were summed up from the shortest time on.
     Two,
-    /// Today's. Mean computation times are summed up in order of play.
+    /// What the host took of an answer's time is not told apart. Mean computation times are summed up in
+    /// order of play, as in all that follow.
     Three,
+    /// Today's.
+    Four,
 }
 
 impl Layout {
-    const ALL: [Self; 2] = [Self::Two, Self::Three];
+    const ALL: [Self; 3] = [Self::Two, Self::Three, Self::Four];
 
     /// As manifests name it.
     #[must_use]
     pub const fn schema(self) -> &'static str {
         match self {
             Self::Two => "faceoff-dataset/2",
-            Self::Three => DATASET_SCHEMA,
+            Self::Three => "faceoff-dataset/3",
+            Self::Four => DATASET_SCHEMA,
         }
     }
 
@@ -30,6 +34,6 @@ impl Layout {
 
     /// For messages.
     pub(super) fn all() -> String {
-        Self::ALL.map(Self::schema).join(" and ")
+        Self::ALL.map(Self::schema).join(", ")
     }
 }

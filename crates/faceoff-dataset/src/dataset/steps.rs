@@ -1,5 +1,9 @@
 use super::file_range::FileRange;
-use crate::{error::DatasetError, files::STEPS_FILE, table::StepRows};
+use crate::{
+    error::DatasetError,
+    files::STEPS_FILE,
+    table::{HOST_TIME, StepRows, without_host_time},
+};
 use arrow_array::{RecordBatch, RecordBatchReader};
 use arrow_schema::{DataType, Schema};
 use faceoff_types::Task;
@@ -42,19 +46,29 @@ pub(super) fn has_columns(
     Ok(())
 }
 
+/// Is it a table of an earlier layout?
+fn lacks_host_time(found: &Schema) -> bool {
+    found.column_with_name(HOST_TIME).is_none()
+}
+
 /// A reader of a table of control steps, of all columns or of the named ones.
 pub(super) fn reader<R: ChunkReader + 'static>(
     table: R,
     metadata: &ArrowReaderMetadata,
     columns: Option<&[String]>,
 ) -> Result<ParquetRecordBatchReaderBuilder<R>, DatasetError> {
-    let (found, rows) = (metadata.schema(), StepRows::new(Task::Hit));
-    has_columns(STEPS_FILE, found, rows.schema())?;
-    if found.fields().len() != rows.schema().fields().len() {
+    let found = metadata.schema();
+    let lacks_host_time = lacks_host_time(found);
+    let rows = StepRows::new(Task::Hit);
+    let fields = rows.schema().fields().iter();
+    let fields = fields.filter(|field| !lacks_host_time || field.name() != HOST_TIME);
+    let expected = Schema::new(fields.cloned().collect::<Vec<_>>());
+    has_columns(STEPS_FILE, found, &expected)?;
+    if found.fields().len() != expected.fields().len() {
         return Err(DatasetError::Unreadable(format!(
             "{STEPS_FILE} has {} columns, expected {}",
             found.fields().len(),
-            rows.schema().fields().len()
+            expected.fields().len()
         )));
     }
     let mask = match columns {
@@ -97,17 +111,31 @@ impl StepTable {
         Ok(Self { table, metadata })
     }
 
-    /// All rows from the first on, batch by batch, of all columns or of the named ones.
+    /// Does it tell apart what the host took, as all do since layout 4?
+    pub(crate) fn tells_host_time(&self) -> bool {
+        !lacks_host_time(self.metadata.schema())
+    }
+
+    /// All rows from the first on, batch by batch, of all columns or of the named ones. A table of an
+    /// earlier layout is read as one in which the host took nothing.
     ///
     /// # Errors
     /// [`DatasetError::Absent`] if a column is unknown, [`DatasetError::Unreadable`] if the table is
     /// damaged.
     pub fn read(self, columns: Option<&[String]>) -> Result<StepBatches, DatasetError> {
-        let reader = reader(self.table, &self.metadata, columns)?
+        let is_host_time = |name: &String| name == HOST_TIME;
+        let adds_host_time =
+            !self.tells_host_time() && columns.is_none_or(|names| names.iter().any(is_host_time));
+        let columns = columns.map(|names| -> Vec<String> {
+            let there = |name: &&String| !(adds_host_time && is_host_time(name));
+            names.iter().filter(there).cloned().collect()
+        });
+        let reader = reader(self.table, &self.metadata, columns.as_deref())?
             .build()
             .map_err(DatasetError::unreadable(STEPS_FILE))?;
         Ok(StepBatches {
             reader,
+            adds_host_time,
             read: VecDeque::new(),
         })
     }
@@ -116,6 +144,7 @@ impl StepTable {
 /// Rows of `steps.parquet`, from the first on.
 pub struct StepBatches {
     reader: ParquetRecordBatchReader,
+    adds_host_time: bool,
     read: VecDeque<RecordBatch>,
 }
 
@@ -136,10 +165,12 @@ impl StepBatches {
         if let Some(batch) = self.read.pop_front() {
             return Ok(Some(batch));
         }
-        self.reader
-            .next()
-            .transpose()
-            .map_err(DatasetError::unreadable(STEPS_FILE))
+        let next = self.reader.next().transpose();
+        next.and_then(|batch| match batch {
+            Some(batch) if self.adds_host_time => without_host_time(&batch).map(Some),
+            batch => Ok(batch),
+        })
+        .map_err(DatasetError::unreadable(STEPS_FILE))
     }
 
     /// The next `count` rows, in pieces; fewer at the table's end.

@@ -1,5 +1,9 @@
-use super::writer::{TableWriter, schema_metadata};
+use super::{
+    steps::{HOST_TIME, with_host_time, without_host_time},
+    writer::{TableWriter, schema_metadata},
+};
 use crate::error::RecordingError;
+use crate::files::STEPS_FILE;
 use fs_err::File;
 use parquet::{
     arrow::{ARROW_SCHEMA_META_KEY, arrow_reader::ParquetRecordBatchReaderBuilder},
@@ -22,7 +26,7 @@ use std::{
 pub(crate) enum ShardTable {
     /// In today's layout: its bytes are taken as they are.
     Ready(PathBuf),
-    /// In the layout before: written anew.
+    /// In a layout before: written anew.
     Old(PathBuf),
 }
 
@@ -133,9 +137,20 @@ fn rewritten(path: &Path, scratch: &Path) -> Result<fs::File, RecordingError> {
         .map_err(RecordingError::unusable(&what))?;
     let file = tempfile::tempfile_in(scratch)?;
     let copy = File::from_parts(file.try_clone()?, path);
-    let mut writer = TableWriter::new(copy, builder.schema())?;
+    // Layouts differ in nothing else that is not the writer's.
+    let lacks_host_time =
+        path.ends_with(STEPS_FILE) && builder.schema().column_with_name(HOST_TIME).is_none();
+    let schema = if lacks_host_time {
+        Arc::new(with_host_time(builder.schema()))
+    } else {
+        builder.schema().clone()
+    };
+    let mut writer = TableWriter::new(copy, &schema)?;
     for batch in builder.build().map_err(RecordingError::unusable(&what))? {
-        let batch = batch.map_err(RecordingError::unusable(&what))?;
+        let mut batch = batch.map_err(RecordingError::unusable(&what))?;
+        if lacks_host_time {
+            batch = without_host_time(&batch).map_err(RecordingError::unusable(&what))?;
+        }
         writer.write(batch.columns().to_vec())?;
     }
     writer.finish()?;

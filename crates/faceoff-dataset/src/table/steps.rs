@@ -1,10 +1,10 @@
 use super::columns::{FloatColumns, joints};
 use crate::times::nanoseconds;
 use arrow_array::{
-    ArrayRef, StringArray,
+    ArrayRef, Int64Array, RecordBatch, StringArray,
     builder::{Float64Builder, Int64Builder, ListBuilder, UInt32Builder},
 };
-use arrow_schema::{DataType, Field, Schema, SchemaRef};
+use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
 use faceoff_episode::StepRow;
 use faceoff_types::Task;
 use std::sync::Arc;
@@ -44,6 +44,7 @@ pub(crate) struct StepRows {
     observations: FloatColumns,
     actions: ListBuilder<Float64Builder>,
     computation_times: Int64Builder,
+    host_times: Int64Builder,
     cpu_times: Int64Builder,
     rest: FloatColumns,
 }
@@ -62,7 +63,8 @@ impl StepRows {
         ];
         fields.extend_from_slice(observations.fields());
         fields.push(Field::new("action", DataType::List(item.clone()), false));
-        fields.push(Field::new("computation_time_ns", DataType::Int64, false));
+        fields.push(Field::new(COMPUTATION_TIME, DataType::Int64, false));
+        fields.push(Field::new(HOST_TIME, DataType::Int64, false));
         fields.push(Field::new("cpu_time_ns", DataType::Int64, true));
         fields.extend_from_slice(rest.fields());
         Self {
@@ -74,6 +76,7 @@ impl StepRows {
             observations,
             actions: ListBuilder::new(Float64Builder::new()).with_field(item),
             computation_times: Int64Builder::new(),
+            host_times: Int64Builder::new(),
             cpu_times: Int64Builder::new(),
             rest,
         }
@@ -93,6 +96,7 @@ impl StepRows {
             self.observations.take();
             self.actions.finish();
             self.computation_times.finish();
+            self.host_times.finish();
             self.cpu_times.finish();
             self.rest.take();
         }
@@ -110,6 +114,8 @@ impl StepRows {
         self.actions.append(true);
         self.computation_times
             .append_value(nanoseconds(row.answered.computation_time_s));
+        self.host_times
+            .append_value(nanoseconds(row.answered.host_time_s));
         self.cpu_times
             .append_option(row.answered.cpu_time_s.map(nanoseconds));
         let rest = &mut self.rest;
@@ -132,10 +138,37 @@ impl StepRows {
         columns.extend(self.observations.take());
         columns.push(Arc::new(self.actions.finish()));
         columns.push(Arc::new(self.computation_times.finish()));
+        columns.push(Arc::new(self.host_times.finish()));
         columns.push(Arc::new(self.cpu_times.finish()));
         columns.extend(self.rest.take());
         columns
     }
+}
+
+const COMPUTATION_TIME: &str = "computation_time_ns";
+/// What the host took of a step's time; a column since layout 4.
+pub(crate) const HOST_TIME: &str = "host_time_ns";
+
+/// The columns of a table of control steps of an earlier layout, with the one for the host's time.
+pub(crate) fn with_host_time(schema: &Schema) -> Schema {
+    let mut fields = schema.fields().to_vec();
+    let field = Arc::new(Field::new(HOST_TIME, DataType::Int64, false));
+    fields.insert(place(schema), field);
+    Schema::new_with_metadata(fields, schema.metadata().clone())
+}
+
+/// Rows of an earlier layout in which the host took nothing, for nothing was told apart then.
+pub(crate) fn without_host_time(batch: &RecordBatch) -> Result<RecordBatch, ArrowError> {
+    let mut columns = batch.columns().to_vec();
+    let none = Int64Array::from_value(0, batch.num_rows());
+    columns.insert(place(&batch.schema()), Arc::new(none));
+    RecordBatch::try_new(Arc::new(with_host_time(&batch.schema())), columns)
+}
+
+/// After the computation time.
+fn place(schema: &Schema) -> usize {
+    let times = schema.column_with_name(COMPUTATION_TIME);
+    times.map_or(schema.fields().len(), |(index, _)| index + 1)
 }
 
 /// Constraint values per step, in the order of the columns.

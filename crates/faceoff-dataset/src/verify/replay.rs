@@ -3,7 +3,7 @@ use crate::{
     dataset::Columns,
     files::{EPISODES_FILE, STEPS_FILE},
     score::Measured,
-    table::{EpisodeRows, StepRows},
+    table::{EpisodeRows, HOST_TIME, StepRows},
     times::seconds,
 };
 use arrow_array::{
@@ -56,7 +56,7 @@ impl StepSink for Rows {
         self.episodes.step(row);
         let c = row.constraints;
         self.measured.push(Measured {
-            time_s: row.answered.computation_time_s,
+            answered: row.answered,
             constraints: [c.joint_pos, c.joint_vel, c.ee, c.link],
         });
     }
@@ -196,6 +196,7 @@ impl Again<'_> {
         };
         Ok(Answered {
             computation_time_s: seconds(computation_time),
+            host_time_s: time(HOST_TIME)?.map(seconds).unwrap_or_default(),
             cpu_time_s: time("cpu_time_ns")?.map(seconds),
         })
     }

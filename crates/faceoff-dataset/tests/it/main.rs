@@ -6,5 +6,6 @@ mod assemble;
 mod by_index;
 mod forgery;
 mod layout_2;
+mod layout_3;
 mod played;
 mod verify;

@@ -145,6 +145,7 @@ fn converse(
             action: action.as_flattened(),
             answered: Answered {
                 computation_time_s: time.as_secs_f64(),
+                host_time_s: 0.0,
                 cpu_time_s: (!step.is_multiple_of(5)).then(|| (time / 2).as_secs_f64()),
             },
             state: &world.state(),

@@ -127,7 +127,7 @@ fn one_bit_of_any_column_of_a_step_is_found_where_it_is() {
         );
         match name.as_str() {
             // The digest tells what moves nothing or follows from nothing.
-            "computation_time_ns" | "cpu_time_ns" => {
+            "computation_time_ns" | "host_time_ns" | "cpu_time_ns" => {
                 assert_eq!(found.step, None, "{found}");
                 let fields = ["computation_time_mean_s", "times_blake3"];
                 assert!(fields.contains(&found.field.as_str()), "{found}");
@@ -463,7 +463,7 @@ fn other_layouts_rulesets_and_simulators_are_named() {
         .clone();
     for (from, to, words) in [
         (
-            "faceoff-dataset/3",
+            "faceoff-dataset/4",
             "faceoff-dataset/1",
             "layout is \"faceoff-dataset/1\"",
         ),

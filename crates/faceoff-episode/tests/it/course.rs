@@ -49,6 +49,7 @@ fn answer<S: StepSink>(course: &mut Course<S>) -> Option<EpisodeOutcome> {
     action.extend([0.0; 7]);
     let answered = Answered {
         computation_time_s: 0.001 * f64::from(question.step),
+        host_time_s: 0.0,
         cpu_time_s: None,
     };
     course.answer(&action, answered)
@@ -142,6 +143,7 @@ fn a_world_that_stops_being_finite_asks_nothing_more() {
     let mut course = begin(Task::Hit, Nowhere);
     let answered = Answered {
         computation_time_s: 0.001,
+        host_time_s: 0.0,
         cpu_time_s: None,
     };
     assert_eq!(course.answer(&[f64::MAX; 14], answered), None);

@@ -134,6 +134,7 @@ pub fn unconfined() -> AgentEnvironment {
         Runtime {
             read_only_paths: Vec::new(),
             path: std::env::var("PATH").unwrap(),
+            image: None,
         },
     );
     env

@@ -29,6 +29,7 @@ fn timeless_columns(dir: &Path, table: &str) -> Vec<(String, arrow_array::ArrayR
         .map(|(field, column)| (field.name().clone(), column.clone()))
         .filter(|(name, _)| {
             !name.starts_with("computation_time")
+                && name != "host_time_ns"
                 && name != "cpu_time_ns"
                 && name != "times_blake3"
                 && name != "penalty_points"

@@ -1,7 +1,7 @@
-//! Late answers, and whose fault they are: real agents, and a host that stalls or says that it does.
+//! Late answers, and whose time they are: real agents, and a host that takes time or is said to.
 
 use crate::{
-    agents::{Agent, impatient, sandboxed, unconfined},
+    agents::{Agent, sandboxed, unconfined},
     recording::{floats, ints, read, seconds},
     shard::{Watcher, run, spec, timeless},
 };
@@ -9,10 +9,12 @@ use arrow_array::Array;
 use faceoff_runner::{
     AgentEnvironment, HostWatch, ShardReport, ShardSpec, run_shard, run_shard_watched,
 };
+use faceoff_sandbox::affinity;
 use faceoff_types::{AgentFaultKind, Task};
 use std::{
-    path::{Path, PathBuf},
-    time::Instant,
+    fs,
+    path::Path,
+    time::{Duration, Instant},
 };
 
 /// Answers the second step of each episode late without doing anything.
@@ -20,68 +22,32 @@ const SLEEPS: &str = "def on_step(step, answer):\n    \
     if step == 1: time.sleep(0.15)\n    \
     return json.dumps(answer)";
 
-/// Tells by a file that the host is to have stalled, which takes an agent without a sandbox.
-struct Mark(PathBuf);
+/// Answers nothing at the fourth step.
+const HANGS: &str = "def on_hello(hello): print('a new process', file=sys.stderr)\n\
+    def on_step(step, answer):\n    \
+    return None if step == 3 else json.dumps(answer)";
 
-impl Mark {
-    fn of(out: &Path) -> Self {
-        Self(out.join("stalled"))
-    }
+/// The host took this share of every wait, whatever it really did.
+#[derive(Debug)]
+struct Took(f64);
 
-    /// Hooks in which `stall()` leaves the mark and `go_on()` removes it.
-    fn hooks(&self, hooks: &str) -> String {
-        let path = self.0.to_str().unwrap();
-        format!(
-            "def stall(): open({path:?}, 'w').close()\n\
-             def go_on(): os.remove({path:?})\n{hooks}"
-        )
+impl HostWatch for Took {
+    fn taken(&self, asked: Instant, now: Instant, _: Option<Duration>) -> Duration {
+        (now - asked).mul_f64(self.0)
     }
 }
 
-/// Stalled while the mark is there, whatever the host really does.
-impl HostWatch for Mark {
-    fn stalled_s(&self, from: Instant, to: Instant) -> f64 {
-        if self.0.exists() {
-            (to - from).as_secs_f64()
-        } else {
-            0.0
-        }
-    }
-}
-
-/// Computes for longer than half of the largest limit.
-const COMPUTES: &str = "def on_step(step, answer):\n    \
-    if step == 1: stall()\n    \
-    if step == 2: go_on()\n    \
-    until = time.process_time() + 0.15\n    \
-    while step == 1 and time.process_time() < until: pass\n    \
-    return json.dumps(answer)";
-
-struct NeverStalled;
-
-impl HostWatch for NeverStalled {
-    fn stalled_s(&self, _: Instant, _: Instant) -> f64 {
-        0.0
-    }
-}
-
-struct AlwaysStalled;
-
-impl HostWatch for AlwaysStalled {
-    fn stalled_s(&self, from: Instant, to: Instant) -> f64 {
-        (to - from).as_secs_f64()
-    }
-}
-
-fn env(reruns: u32) -> AgentEnvironment {
-    let mut env = sandboxed();
-    env.time.host_noise_reruns = reruns;
+/// Re-runs: of one episode, and of 100.
+fn with_reruns(mut env: AgentEnvironment, of_one: u32, of_100: u32) -> AgentEnvironment {
+    env.time.host_noise_reruns = of_one;
+    env.time.host_noise_reruns_per_100 = of_100;
     env
 }
 
-fn developers() -> AgentEnvironment {
-    let mut env = unconfined();
-    env.time.host_noise_reruns = 2;
+/// With a short limit of a step, for agents that meet it because they never answer.
+fn impatient(step_s: f64) -> AgentEnvironment {
+    let mut env = sandboxed();
+    env.time.step_s = step_s;
     env
 }
 
@@ -106,13 +72,9 @@ fn watched(
 #[test]
 fn an_agent_that_sleeps_is_not_excused() {
     let out = tempfile::tempdir().unwrap();
-    let report = watched(
-        &spec(Task::Hit, 0..2),
-        &Agent::with(SLEEPS),
-        &env(2),
-        &NeverStalled,
-        out.path(),
-    );
+    let env = with_reruns(sandboxed(), 2, 100);
+    let agent = Agent::with(SLEEPS);
+    let report = watched(&spec(Task::Hit, 0..2), &agent, &env, &Took(0.0), out.path());
     assert_eq!(report.timing.host_noise_reruns, 0);
     for outcome in &report.outcomes {
         assert!(outcome.computation_time.max_s >= 0.15, "{outcome:?}");
@@ -124,37 +86,62 @@ fn an_agent_that_sleeps_is_not_excused() {
 }
 
 #[test]
-fn an_agent_that_computes_is_not_excused_even_if_the_host_stalls() {
+fn a_late_answer_counts_less_what_the_host_took_and_nothing_is_played_again() {
     let out = tempfile::tempdir().unwrap();
-    let mark = Mark::of(out.path());
-    let agent = Agent::with(&mark.hooks(COMPUTES));
-    let spec = spec(Task::Hit, 0..1);
-    let report = watched(&spec, &agent, &developers(), &mark, out.path());
+    let env = with_reruns(sandboxed(), 2, 100);
+    let agent = Agent::with(SLEEPS);
+    let report = watched(&spec(Task::Hit, 0..1), &agent, &env, &Took(0.5), out.path());
     assert_eq!(report.timing.host_noise_reruns, 0);
     let steps = read(&out.path().join("steps.parquet"));
-    assert!(seconds(&steps, "cpu_time_ns")[1] >= 0.15);
+    let (counted, host) = (
+        seconds(&steps, "computation_time_ns"),
+        seconds(&steps, "host_time_ns"),
+    );
+    assert!((counted[1] - host[1]).abs() < 1e-6, "{counted:?} {host:?}");
+    assert!(counted[1] + host[1] >= 0.15, "{counted:?} {host:?}");
+    assert_eq!(
+        report.outcomes[0].computation_time.max_s,
+        counted.iter().copied().fold(0.0, f64::max)
+    );
+    assert_eq!(
+        report.timing.longest_stall_s,
+        host.iter().copied().fold(0.0, f64::max)
+    );
 }
 
 #[test]
-fn an_episode_that_the_host_spoilt_is_played_again_and_the_dropped_try_leaves_no_trace() {
+fn an_episode_that_the_host_ended_is_played_again_by_a_new_process_and_leaves_no_trace() {
     let out = tempfile::tempdir().unwrap();
-    let mark = Mark::of(out.path());
     let spec = spec(Task::Defend, 0..2);
-    // The host stalls for the whole first try, which is late at least once; the second counts.
-    let agent = Agent::with(&mark.hooks(
-        "tries = 0\n\
-         def on_reset(episode):\n    \
-         global tries; tries += 1; print('reset', episode, file=sys.stderr)\n    \
-         if tries == 1: stall()\n    \
-         if tries == 2: go_on()\n\
+    // Without a sandbox the second process can tell that it is not the first.
+    let mark = out.path().join("mark");
+    let agent = Agent::with(&format!(
+        "def on_hello(hello): print('a new process', file=sys.stderr)\n\
+         def on_reset(episode): print('reset', episode, file=sys.stderr)\n\
          def on_step(step, answer):\n    \
-         if step == 3 and tries == 1: time.sleep(0.15)\n    \
-         return json.dumps(answer)",
+         if step == 3 and not os.path.exists({mark:?}):\n        \
+         open({mark:?}, 'w').close(); return None\n    \
+         return json.dumps(answer)"
     ));
-    let dir = out.path().join("spoilt");
-    let report = watched(&spec, &agent, &developers(), &mark, &dir);
+    let mut env = with_reruns(unconfined(), 2, 100);
+    env.time.step_s = 0.5;
+    let dir = out.path().join("ended");
+    let report = watched(&spec, &agent, &env, &Took(1.0), &dir);
     assert_eq!(report.timing.host_noise_reruns, 1);
-    assert_eq!(report.log, "reset 0\nreset 0\nreset 1\ngoodbye\n");
+    let said: Vec<&str> = report
+        .log
+        .lines()
+        .filter(|line| !line.starts_with("[faceoff]"))
+        .collect();
+    let expected = [
+        "a new process",
+        "reset 0",
+        "a new process",
+        "reset 0",
+        "reset 1",
+        "goodbye",
+    ];
+    assert_eq!(said, expected);
     let episodes = read(&dir.join("episodes.parquet"));
     assert_eq!(ints(&episodes, "host_noise_reruns").values(), &[1, 0]);
     assert_eq!(ints(&episodes, "episode").values(), &[0, 1]);
@@ -163,103 +150,259 @@ fn an_episode_that_the_host_spoilt_is_played_again_and_the_dropped_try_leaves_no
     let plain = out.path().join("plain");
     let undisturbed = run(&spec, &Agent::behaving(), &sandboxed(), &plain).unwrap();
     assert_eq!(timeless(&report.outcomes), timeless(&undisturbed.outcomes));
-    let [spoilt, plain] = [dir, plain].map(|dir| read(&dir.join("steps.parquet")));
+    let [ended, plain] = [dir, plain].map(|dir| read(&dir.join("steps.parquet")));
     for name in ["obs_puck_x", "puck_x", "ee_z", "constraint_ee"] {
-        assert_eq!(floats(&spoilt, name), floats(&plain, name), "{name}");
+        assert_eq!(floats(&ended, name), floats(&plain, name), "{name}");
     }
-    assert_eq!(ints(&spoilt, "step"), ints(&plain, "step"));
+    assert_eq!(ints(&ended, "step"), ints(&plain, "step"));
 }
 
 #[test]
-fn reruns_are_bounded_and_the_last_try_counts() {
+fn reruns_are_bounded_per_episode_and_in_all_and_the_last_try_counts() {
     let out = tempfile::tempdir().unwrap();
-    for reruns in [0, 2] {
-        let report = watched(
-            &spec(Task::Hit, 0..1),
-            &Agent::with(SLEEPS),
-            &env(reruns),
-            &AlwaysStalled,
-            out.path(),
-        );
-        assert_eq!(report.timing.host_noise_reruns, reruns);
-        assert_eq!(report.outcomes.len(), 1);
-        assert!(report.outcomes[0].computation_time.max_s >= 0.15);
+    for (of_one, of_100, expected) in [(0, 100, [0, 0, 0]), (2, 100, [2, 1, 0]), (2, 5, [1, 0, 0])]
+    {
+        let env = with_reruns(impatient(0.1), of_one, of_100);
+        let mut spec = spec(Task::Hit, 0..3);
+        spec.max_faults = 10;
+        let report = watched(&spec, &Agent::with(HANGS), &env, &Took(1.0), out.path());
+        assert_eq!(report.outcomes.len(), 3);
+        for outcome in &report.outcomes {
+            let fault = outcome.fault.as_ref().map(|fault| &fault.fault);
+            assert!(
+                matches!(fault, Some(AgentFaultKind::TimedOut { .. })),
+                "{fault:?}"
+            );
+        }
         let episodes = read(&out.path().join("episodes.parquet"));
-        assert_eq!(ints(&episodes, "host_noise_reruns").values(), &[reruns]);
+        assert_eq!(ints(&episodes, "host_noise_reruns").values(), &expected);
+        let in_all: u32 = expected.iter().sum();
+        assert_eq!(report.timing.host_noise_reruns, in_all);
+        // Every try had a process of its own.
+        let processes = report.log.lines().filter(|line| *line == "a new process");
+        let processes = processes.count();
+        assert_eq!(processes, 3 + in_all as usize, "{}", report.log);
+        let notes = report.log.matches("not counted").count();
+        assert_eq!(notes, in_all as usize, "{}", report.log);
     }
 }
 
 #[test]
-fn a_hard_limit_that_passed_while_the_host_stalled_is_tried_again_before_it_is_a_fault() {
+fn a_hard_limit_goes_on_by_what_the_host_took_and_by_nothing_else() {
     let out = tempfile::tempdir().unwrap();
-    let agent = Agent::with("def on_step(step, answer): return None");
-    let mut env = impatient();
-    env.time.host_noise_reruns = 1;
-    let mut spec = spec(Task::Hit, 0..1);
-    spec.max_faults = 0;
-    let report = watched(&spec, &agent, &env, &AlwaysStalled, out.path());
-    assert_eq!(report.timing.host_noise_reruns, 1);
-    let fault = report.outcomes[0].fault.as_ref().unwrap();
-    assert!(matches!(fault.fault, AgentFaultKind::TimedOut { .. }));
-    let notes: Vec<&str> = report
-        .log
-        .lines()
-        .filter(|line| line.starts_with("[faceoff]"))
-        .collect();
-    assert_eq!(notes.len(), 3, "{}", report.log);
-    assert!(notes[1].contains("not counted"), "{}", notes[1]);
-
-    let punished = watched(&spec, &agent, &env, &NeverStalled, out.path());
-    assert_eq!(punished.timing.host_noise_reruns, 0);
-    assert!(punished.outcomes[0].fault.is_some());
+    let late = "def on_step(step, answer):\n    \
+        if step == 1: time.sleep(0.7)\n    \
+        return json.dumps(answer)";
+    let env = with_reruns(impatient(0.4), 2, 100);
+    let agent = Agent::with(late);
+    let play = |share| {
+        watched(
+            &spec(Task::Hit, 0..1),
+            &agent,
+            &env,
+            &Took(share),
+            out.path(),
+        )
+        .outcomes
+        .remove(0)
+    };
+    // On a machine that is slow enough even this comes too late, by the agent's own doing.
+    let fault = play(0.0).fault.unwrap();
+    assert!(
+        matches!(fault.fault, AgentFaultKind::TimedOut { .. }),
+        "{fault:?}"
+    );
+    assert_eq!(fault.step, Some(1));
+    assert_eq!(play(1.0).fault, None);
 }
 
-/// The platform really stands still here: a developer's agent, which no sandbox keeps from it, stops
-/// the process that asks it, for 0.15 s from when each of its threads is seen to stand still.
+/// Ways to let many things happen at one instant on the agent's own CPU, which once starved the witness
+/// of the host's stalls: what comes of each is the agent's time.
+const STORMS: [(&str, &str); 6] = [
+    (
+        "timers that send signals",
+        "event = (ctypes.c_int * 16)(0, 0, signal.SIGCONT, 0)\n    \
+         for _ in range(40_000):\n        \
+         timer = ctypes.c_void_p()\n        \
+         if libc.timer_create(1, ctypes.byref(event), ctypes.byref(timer)): break\n        \
+         libc.timer_settime(timer, 1, (ctypes.c_long * 4)(0, 0, *at), None)",
+    ),
+    (
+        "timers behind descriptors",
+        "for _ in range(900):\n        \
+         fd = libc.timerfd_create(1, 0)\n        \
+         if fd < 0: break\n        \
+         libc.timerfd_settime(fd, 1, (ctypes.c_long * 4)(0, 0, *at), None)",
+    ),
+    (
+        "an interval timer in each of many processes",
+        "children = []\n    \
+         for _ in range(15):\n        \
+         child = os.fork()\n        \
+         if child == 0:\n            \
+         signal.signal(signal.SIGALRM, lambda *_: None)\n            \
+         signal.setitimer(signal.ITIMER_REAL, 0.05, 0.0001)\n            \
+         until = time.monotonic() + 0.1\n            \
+         while time.monotonic() < until: time.sleep(0.01)\n            \
+         os._exit(0)\n        \
+         children.append(child)\n    \
+         for child in children: os.waitpid(child, 0)",
+    ),
+    (
+        "threads that sleep to one instant",
+        "def run():\n        \
+         time.sleep(max(0, at[0] + at[1] * 1e-9 - time.monotonic()))\n        \
+         for _ in range(50): time.sleep(0.001)\n    \
+         threads = [threading.Thread(target=run) for _ in range(15)]\n    \
+         for thread in threads: thread.start()\n    \
+         for thread in threads: thread.join()",
+    ),
+    (
+        "processes that start and end",
+        "until = time.monotonic() + 0.1\n    \
+         while time.monotonic() < until:\n        \
+         children = []\n        \
+         for _ in range(8):\n            \
+         children.append(os.fork())\n            \
+         if children[-1] == 0: os._exit(0)\n        \
+         for child in children: os.waitpid(child, 0)",
+    ),
+    (
+        "memory up to the limit",
+        "for _ in range(2): hoard = bytearray(90 << 20); hoard[::4096] = bytes(len(hoard[::4096]))",
+    ),
+];
+
+/// Run time of everything on a CPU and what a machine below took of it, seconds, where version 1 of the
+/// cgroup interface tells.
+fn busy_s(cpu: usize) -> Option<f64> {
+    let each = fs::read_to_string("/sys/fs/cgroup/cpuacct/cpuacct.usage_percpu").ok()?;
+    let ran_ns: f64 = each.split_whitespace().nth(cpu)?.parse().ok()?;
+    let stat = fs::read_to_string("/proc/stat").ok()?;
+    let name = format!("cpu{cpu} ");
+    let line = stat.lines().find_map(|line| line.strip_prefix(&name))?;
+    let stolen_ticks: f64 = line.split_whitespace().nth(7)?.parse().ok()?;
+    Some(ran_ns * 1e-9 + stolen_ticks * 0.01)
+}
+
 #[test]
-fn a_service_that_was_stopped_is_seen_by_the_watch() {
+fn no_storm_of_the_agents_own_is_put_down_to_the_host() {
     let out = tempfile::tempdir().unwrap();
-    let agent = Agent::with(
-        "import signal\n\
-         def stands(thread):\n    \
-         try: return open(f'/proc/{os.getppid()}/task/{thread}/stat').read().rpartition(')')[2].split()[0] == 'T'\n    \
-         except OSError: return True\n\
-         def on_step(step, answer):\n    \
-         if step == 2:\n        \
-         os.kill(os.getppid(), signal.SIGSTOP)\n        \
-         while not all(map(stands, os.listdir(f'/proc/{os.getppid()}/task'))): time.sleep(0.001)\n        \
-         time.sleep(0.15); os.kill(os.getppid(), signal.SIGCONT)\n    \
-         return json.dumps(answer)",
-    );
+    let cpu = *affinity::allowed().unwrap().last().unwrap();
+    for (name, storm) in STORMS {
+        let agent = Agent::with(&format!(
+            "import ctypes, signal, threading\n\
+             libc = ctypes.CDLL(None)\n\
+             signal.signal(signal.SIGCONT, lambda *_: None)\n\
+             def unleash(at):\n    {storm}\n\
+             def on_step(step, answer):\n    \
+             if step in range(5, 50, 5):\n        \
+             nanoseconds = time.monotonic_ns() + 50_000_000\n        \
+             unleash(divmod(nanoseconds, 10**9))\n        \
+             while time.monotonic_ns() < nanoseconds + 100_000_000: time.sleep(0.001)\n    \
+             return json.dumps(answer)"
+        ));
+        let mut env = with_reruns(sandboxed(), 2, 100);
+        env.agent_cpus = vec![cpu];
+        env.limits.pids = 40;
+        let before_s = busy_s(cpu);
+        let report = run_shard(
+            &spec(Task::Hit, 0..1),
+            &agent.bundle,
+            &env,
+            out.path(),
+            &mut Watcher::default(),
+        )
+        .unwrap();
+        let after_s = busy_s(cpu);
+        assert_eq!(report.outcomes[0].fault, None, "{name}");
+        assert_eq!(report.timing.host_noise_reruns, 0, "{name}");
+        let steps = read(&out.path().join("steps.parquet"));
+        let [host, counted, cpu] = ["host_time_ns", "computation_time_ns", "cpu_time_ns"]
+            .map(|name| seconds(&steps, name));
+        for storm in (5..50).step_by(5).take_while(|step| *step < host.len()) {
+            assert!(host[storm] + counted[storm] >= 0.15, "{name}: step {storm}");
+        }
+        // Another witness: more than what others ran there all the while cannot have been taken.
+        if let (Some(before_s), Some(after_s)) = (before_s, after_s) {
+            let others_s = after_s - before_s - cpu.iter().sum::<f64>();
+            let taken_s: f64 = host.iter().sum();
+            // Ticks of the stolen time are cut off.
+            assert!(
+                taken_s <= others_s + 0.02,
+                "{name}: {taken_s} of {others_s}"
+            );
+        }
+    }
+}
+
+#[test]
+fn without_a_cgroup_there_is_no_evidence_and_no_excuse() {
+    let out = tempfile::tempdir().unwrap();
     let report = run_shard(
         &spec(Task::Hit, 0..1),
-        &agent.bundle,
-        &developers(),
+        &Agent::with(SLEEPS).bundle,
+        &with_reruns(unconfined(), 2, 100),
         out.path(),
         &mut Watcher::default(),
     )
     .unwrap();
-    assert!(report.timing.longest_stall_s >= 0.15, "{:?}", report.timing);
+    assert_eq!(report.timing.longest_stall_s, 0.0);
+    let steps = read(&out.path().join("steps.parquet"));
+    assert!(
+        seconds(&steps, "host_time_ns")
+            .iter()
+            .all(|time| *time == 0.0)
+    );
+    assert!(seconds(&steps, "computation_time_ns")[1] >= 0.15);
 }
 
+/// A program of the host's, outside of the agent's cgroup, on the agent's CPU.
 #[test]
-fn an_agent_that_sleeps_does_not_look_like_a_stall() {
+fn what_others_run_on_the_agents_cpu_is_told_apart() {
     let out = tempfile::tempdir().unwrap();
-    let report = run_shard(
-        &spec(Task::Hit, 0..4),
-        &Agent::with(SLEEPS).bundle,
-        &env(2),
-        out.path(),
-        &mut Watcher::default(),
-    )
-    .unwrap();
-    // A busy host stalls, too, now and then, and then is blamed; a calm one never is.
-    let timing = report.timing;
-    assert!(
-        timing.longest_stall_s > 0.0 || timing.host_noise_reruns == 0,
-        "{timing:?}"
+    let cpu = *affinity::allowed().unwrap().last().unwrap();
+    let mut env = sandboxed();
+    env.agent_cpus = vec![cpu];
+    // More of them than the agent's share: each of its steps needs 0.1 s of a CPU that it has a part of.
+    let burn = format!(
+        "import os\nos.sched_setaffinity(0, [{cpu}])\n\
+         print(flush=True)\nwhile os.getppid() != 1: sum(range(1000))"
     );
-    assert_eq!(report.outcomes.len(), 4);
+    let mut burners: Vec<_> = (0..3)
+        .map(|_| {
+            let burner = std::process::Command::new("python3")
+                .args(["-c", &burn])
+                .stdout(std::process::Stdio::null())
+                .spawn();
+            burner.unwrap()
+        })
+        .collect();
+    let agent = Agent::with(
+        "def on_step(step, answer):\n    \
+         until = time.thread_time() + 0.1\n    \
+         while step in range(1, 6) and time.thread_time() < until: pass\n    \
+         return json.dumps(answer)",
+    );
+    let report = run(&spec(Task::Hit, 0..1), &agent, &env, out.path());
+    for burner in &mut burners {
+        burner.kill().unwrap();
+        burner.wait().unwrap();
+    }
+    report.unwrap();
+    let steps = read(&out.path().join("steps.parquet"));
+    let [host, counted, cpu] =
+        ["host_time_ns", "computation_time_ns", "cpu_time_ns"].map(|name| seconds(&steps, name));
+    if cpu[1] == 0.0 || host.iter().all(|time| *time == 0.0) {
+        panic!("nothing was told apart: {host:?} {counted:?} {cpu:?}");
+    }
+    for step in 1..6 {
+        // The kernel tells what runs now a tick later.
+        assert!(
+            counted[step] + 0.02 >= cpu[step],
+            "{step}: {counted:?} {cpu:?}"
+        );
+    }
 }
 
 #[test]
@@ -293,9 +436,7 @@ fn cpu_time_is_measured_without_a_sandbox_too_and_counts_children() {
          child.stdout.readline()\n    \
          return json.dumps(answer)",
     );
-    let mut env = developers();
-    env.time.host_noise_reruns = 0;
-    run(&spec(Task::Hit, 0..1), &agent, &env, out.path()).unwrap();
+    run(&spec(Task::Hit, 0..1), &agent, &unconfined(), out.path()).unwrap();
     let steps = read(&out.path().join("steps.parquet"));
     let column = steps.column_by_name("cpu_time_ns").unwrap();
     assert_eq!(column.null_count(), 0);

@@ -9,14 +9,14 @@ use std::time::{Duration, Instant};
 
 const SIDES: [Side; 2] = [Side::First, Side::Second];
 
-fn start(agent: &Agent, env: &AgentEnvironment, side: Side) -> Session {
+fn start(agent: &Agent, env: &AgentEnvironment, side: Side) -> Session<'static> {
     Session::start(&agent.bundle, env, Contest::Game { side })
         .map_err(|(trouble, stderr)| format!("{trouble:?} {stderr}"))
         .unwrap()
 }
 
 /// Waits for both answers; the first that comes is taken first.
-fn both(sessions: &mut [Session; 2]) -> [Result<Answered, Trouble>; 2] {
+fn both(sessions: &mut [Session<'_>; 2]) -> [Result<Answered, Trouble>; 2] {
     let mut came = [None, None];
     while came.iter().any(Option::is_none) {
         let [first, second] = &*sessions;

@@ -5,7 +5,12 @@ use super::{
     hierarchy::{Hierarchies, Home, Version},
     leaf::{leaf_name, remove_leaf},
 };
-use crate::{Isolation, Layer, Limits, SandboxError, affinity::cpu_list, error::IoContext};
+use crate::{
+    Isolation, Layer, Limits, SandboxError,
+    affinity::{self, cpu_list},
+    cpu_evidence::{CpuEvidence, RunTime},
+    error::IoContext,
+};
 use rustix::process::Pid;
 use std::{
     fs::{self, File},
@@ -37,7 +42,11 @@ pub(crate) struct AgentCgroup {
     leaves: Vec<PathBuf>,
     memory: Option<(Version, PathBuf)>,
     pids: Option<PathBuf>,
+    /// Where its quota is.
+    cpu: Option<PathBuf>,
     cpu_usage: Option<(Version, File)>,
+    /// What else ran on its CPUs; `None` where the host does not tell.
+    pub(crate) cpu_evidence: Option<CpuEvidence>,
     /// Does a cpuset hold the tree to its CPUs, whatever it asks for?
     pub(crate) holds_cpus: bool,
 }
@@ -66,7 +75,9 @@ impl AgentCgroup {
             leaves: Vec::new(),
             memory: None,
             pids: None,
+            cpu: None,
             cpu_usage: None,
+            cpu_evidence: None,
             holds_cpus: false,
         };
         // Where a controller is known to be needed in the same v2 cgroup, all are enabled together.
@@ -97,7 +108,7 @@ impl AgentCgroup {
                 .limit(layer, home.version, &leaf, limits)
                 .map_err(|error| unavailable(error.to_string()))?;
         }
-        group.measure_cpu(&hierarchies, &name);
+        group.measure_cpu(&hierarchies, &name, cpus);
         if !cpus.is_empty() {
             group.holds_cpus = group.hold_cpus(&hierarchies, &name, cpus);
         }
@@ -168,14 +179,15 @@ impl AgentCgroup {
                     }
                     Version::V2 => set("cpu.max", format!("{quota_us} {CPU_PERIOD_US}"))?,
                 }
+                self.cpu = Some(leaf.to_path_buf());
             }
             (Layer::Namespaces | Layer::Seccomp | Layer::Rlimits, _) => {}
         }
         Ok(())
     }
 
-    /// Opens the file that tells the tree's CPU time, where there is one.
-    fn measure_cpu(&mut self, hierarchies: &Hierarchies, name: &str) {
+    /// Opens the files that tell the tree's CPU time and that of everything else, where they are.
+    fn measure_cpu(&mut self, hierarchies: &Hierarchies, name: &str, cpus: &[usize]) {
         let Some(home) = hierarchies
             .find("cpuacct")
             .or_else(|| hierarchies.find("cpu"))
@@ -189,9 +201,30 @@ impl AgentCgroup {
         let Ok(leaf) = self.leaf(&home, controllers, name) else {
             return;
         };
-        self.cpu_usage = File::open(leaf.join(file))
-            .ok()
-            .map(|file| (home.version, file));
+        let open = |path: PathBuf| File::open(path).ok();
+        self.cpu_usage = open(leaf.join(file)).map(|file| (home.version, file));
+        let cpus = if cpus.is_empty() {
+            affinity::of_process().unwrap_or_default()
+        } else {
+            cpus.to_vec()
+        };
+        let run_time = match home.version {
+            Version::V1 => {
+                const EACH: &str = "cpuacct.usage_percpu";
+                open(home.top.join(EACH))
+                    .zip(open(leaf.join(EACH)))
+                    .map(|(all, agent)| RunTime::PerCpu { all, agent })
+            }
+            Version::V2 => open(leaf.join(file)).map(|agent| RunTime::Whole { agent }),
+        };
+        let limited = self.cpu.as_ref().map(|leaf| leaf.join("cpu.stat"));
+        self.cpu_evidence = run_time
+            .filter(|_| !cpus.is_empty())
+            .map(|run_time| CpuEvidence {
+                cpus,
+                run_time,
+                throttled: limited.and_then(open),
+            });
     }
 
     /// Confines the tree to `cpus` by a cpuset, where the host offers one; tells whether it does.
@@ -299,7 +332,7 @@ impl AgentCgroup {
 
     /// Kills what still lives in it and removes it.
     pub(crate) fn remove(&mut self) {
-        self.cpu_usage = None;
+        (self.cpu_usage, self.cpu_evidence) = (None, None);
         for leaf in std::mem::take(&mut self.leaves) {
             remove_leaf(&leaf);
         }

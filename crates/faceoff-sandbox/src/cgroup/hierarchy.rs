@@ -20,6 +20,8 @@ pub(super) enum Version {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Home {
     pub version: Version,
+    /// Where it is mounted: the cgroup of everything that can be seen from here.
+    pub top: PathBuf,
     /// The service's own cgroup in it.
     pub own: PathBuf,
 }
@@ -50,6 +52,7 @@ impl Home {
             })?;
             return Some(Self {
                 version: Version::V1,
+                top: mount.point.into(),
                 own: mount.path_of(own),
             });
         }
@@ -66,6 +69,7 @@ impl Home {
         }
         Some(Self {
             version: Version::V2,
+            top: mount.point.into(),
             own,
         })
     }

@@ -70,7 +70,7 @@ fn writing_to_an_agent_that_is_gone_says_so() {
     let subject = Subject::new("ends", &["exit", "4"]);
     let mut agent = subject.spawn();
     assert_eq!(subject.end(&mut agent), AgentFaultKind::Exited { code: 4 });
-    let outcome = agent.write_line(b"anybody there?\n", Instant::now() + PATIENCE);
+    let outcome = agent.send_line(b"anybody there?\n");
     assert!(matches!(outcome, Err(WriteError::Closed)), "{outcome:?}");
     // What it said before is still there.
     assert_eq!(expect_line(&mut agent), "ready");

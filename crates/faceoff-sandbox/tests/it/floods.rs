@@ -50,13 +50,15 @@ fn a_flood_of_log_neither_blocks_the_agent_nor_fills_the_service() {
 
 #[test]
 fn an_agent_that_does_not_read_meets_its_deadline() {
-    use faceoff_sandbox::WriteError;
     use std::time::Duration;
     let subject = Subject::new("ends", &["deaf"]);
     let mut agent = subject.spawn();
     assert_eq!(expect_line(&mut agent), "ready");
     let line = vec![b'x'; 1 << 20];
-    let outcome = agent.write_line(&line, Instant::now() + Duration::from_millis(50));
-    assert!(matches!(outcome, Err(WriteError::TimedOut)), "{outcome:?}");
+    agent.send_line(&line).unwrap();
+    assert!(!agent.has_taken_all());
+    let outcome = agent.read_line(LINE_CAP, Instant::now() + Duration::from_millis(50));
+    assert!(matches!(outcome, Ok(ReadLine::TimedOut)), "{outcome:?}");
+    assert!(!agent.has_taken_all());
     subject.finish(agent);
 }

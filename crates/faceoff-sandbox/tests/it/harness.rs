@@ -181,9 +181,7 @@ pub fn expect_line(agent: &mut AgentProcess) -> String {
 
 /// Sends `line` and expects it back.
 pub fn expect_echo(agent: &mut AgentProcess, line: &str) {
-    agent
-        .write_line(format!("{line}\n").as_bytes(), Instant::now() + PATIENCE)
-        .unwrap();
+    agent.send_line(format!("{line}\n").as_bytes()).unwrap();
     assert_eq!(expect_line(agent), line);
 }
 

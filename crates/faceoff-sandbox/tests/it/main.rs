@@ -20,6 +20,7 @@ mod killed_service;
 mod looks_around;
 mod moves_cpu;
 mod multiplies;
+mod notice_board;
 mod probe;
 mod runtimes;
 mod system_calls;

@@ -1,6 +1,11 @@
-use crate::harness::{Subject, expect_echo};
-use faceoff_sandbox::Runtime;
-use std::{fs, os::unix::fs::PermissionsExt, path::Path};
+use crate::harness::{Subject, expect_echo, expect_line};
+use faceoff_sandbox::{MemoryImage, Runtime};
+use std::{
+    collections::BTreeMap,
+    fs,
+    os::unix::fs::PermissionsExt,
+    path::{Path, PathBuf},
+};
 
 #[test]
 fn a_native_program_finds_its_libraries_and_no_interpreter() {
@@ -73,6 +78,52 @@ fn a_python_outside_of_usr_brings_its_own_prefix_and_nothing_beside_it() {
     let mut agent = subject.spawn();
     expect_echo(&mut agent, "hello");
     subject.finish(agent);
+}
+
+#[test]
+fn a_runtime_in_memory_is_shown_in_place_of_the_hosts_files() {
+    let mut subject = Subject::new("echo", &[]);
+    let program = subject.bundle.path().join("agent");
+    fs::copy("/usr/bin/cat", &program).unwrap();
+    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+    // Only what this program needs: all libraries of a developer's host are too many to copy.
+    let said = std::process::Command::new("ldd")
+        .arg(&program)
+        .output()
+        .unwrap();
+    let said = String::from_utf8(said.stdout).unwrap();
+    let needed: Vec<&Path> = said
+        .split_whitespace()
+        .filter(|word| word.starts_with('/'))
+        .map(Path::new)
+        .collect();
+    let mut paths = vec!["/lib".into(), "/lib64".into(), "/usr/lib64".into()];
+    paths
+        .retain(|path: &PathBuf| path.is_symlink() || path.ends_with("usr/lib64") && path.exists());
+    paths.extend(needed.iter().map(|path| fs::canonicalize(path).unwrap()));
+    let runtime = Runtime {
+        read_only_paths: paths,
+        ..Runtime::native()
+    };
+    let mut runtimes = BTreeMap::from([("native".to_owned(), runtime)]);
+    let image = MemoryImage::make(&mut runtimes, 1 << 30).unwrap();
+    subject.spec.runtime = runtimes.remove("native").unwrap();
+    subject.spec.command = vec!["./agent".into(), "/proc/self/mountinfo".into(), "-".into()];
+    let mut agent = subject.spawn();
+    let library = fs::canonicalize(needed[0]).unwrap();
+    let library = format!(" {} ", library.display());
+    let mount = loop {
+        let line = expect_line(&mut agent);
+        if line.contains(&library) {
+            break line;
+        }
+    };
+    assert!(
+        mount.contains(" - tmpfs ") && mount.contains("/faceoff-runtime-"),
+        "{mount}"
+    );
+    subject.finish(agent);
+    drop(image);
 }
 
 #[test]

@@ -8,9 +8,7 @@ fn an_agent_answers_line_by_line_and_leaves_cleanly() {
     let mut agent = subject.spawn();
     for question in ["one", "two", "three"] {
         let before = Instant::now();
-        let written = agent
-            .write_line(format!("{question}\n").as_bytes(), before + PATIENCE)
-            .unwrap();
+        let written = agent.send_line(format!("{question}\n").as_bytes()).unwrap();
         let ReadLine::Line { bytes, at } = agent.read_line(LINE_CAP, before + PATIENCE).unwrap()
         else {
             panic!("no line")
@@ -42,9 +40,7 @@ fn the_largest_line_passes_both_ways() {
 fn an_answer_before_the_question_is_noticed() {
     let subject = Subject::new("echo", &[]);
     let mut agent = subject.spawn();
-    agent
-        .write_line(b"one\ntwo\n", Instant::now() + PATIENCE)
-        .unwrap();
+    agent.send_line(b"one\ntwo\n").unwrap();
     assert_eq!(expect_line(&mut agent), "one");
     // The second answer is in the buffer, in the pipe, or about to be written.
     let mut pending = agent.has_pending_output().unwrap();

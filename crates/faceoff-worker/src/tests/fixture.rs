@@ -330,6 +330,7 @@ impl Server {
                     reset_s: 1.0,
                     step_s: 1.0,
                     bye_s: 1.0,
+                    host_noise_reruns: 0,
                     ..TimeLimits::default()
                 },
                 isolation: Isolation::None,

@@ -3,7 +3,7 @@
 use crate::config::Config;
 use anyhow::{Context as _, bail};
 use clap::Args;
-use faceoff_sandbox::{HostFeature, Layer, Runtime, probe_host};
+use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime, probe_host};
 use serde::Serialize;
 use std::{io::Write, path::PathBuf};
 
@@ -25,7 +25,16 @@ struct Findings {
     ok: bool,
     features: Vec<Feature>,
     runtimes: Vec<RuntimeFound>,
+    in_memory: InMemory,
     cpus: Cpus,
+}
+
+/// Will the runtimes' files be kept in memory, where they tell no agent what another has read?
+#[derive(Debug, Serialize)]
+struct InMemory {
+    available: bool,
+    found: String,
+    cure: Option<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -109,6 +118,7 @@ impl Findings {
             ok,
             features,
             runtimes: runtimes(config),
+            in_memory: in_memory(config),
             cpus: cpus(config),
         }
     }
@@ -133,6 +143,10 @@ impl Findings {
             writeln!(out, "  {mark:<9} {:<14} {}", runtime.name, runtime.found)?;
             print_cure(out, runtime.cure.as_deref())?;
         }
+        let kept = &self.in_memory;
+        let mark = if kept.available { "ok" } else { "none" };
+        writeln!(out, "  {mark:<9} {:<14} {}", "in memory", kept.found)?;
+        print_cure(out, kept.cure.as_deref())?;
         let cpus = &self.cpus;
         writeln!(out, "CPUs")?;
         let bound = match cpus.agent_cpus.as_slice() {
@@ -194,6 +208,25 @@ fn runtimes(config: &Config) -> Vec<RuntimeFound> {
     found
 }
 
+fn in_memory(config: &Config) -> InMemory {
+    let runtimes = config.agent_environment().runtimes;
+    match MemoryImage::size(&runtimes, config.sandbox.resident_bytes) {
+        Ok(bytes) => InMemory {
+            available: true,
+            found: format!(
+                "{} MiB of files are kept in memory while serving",
+                bytes >> 20
+            ),
+            cure: None,
+        },
+        Err(why) => InMemory {
+            available: false,
+            found: format!("{why}: an agent may learn what others have read of them"),
+            cure: Some("offer smaller runtimes, or raise sandbox.resident_bytes".to_owned()),
+        },
+    }
+}
+
 fn describe(name: &str, runtime: &Runtime) -> String {
     match runtime.interpreter() {
         Some(interpreter) if name == "python3" => interpreter.display().to_string(),
@@ -232,6 +265,7 @@ mod tests {
             ok: available || given_up,
             features: vec![Feature { host, given_up }],
             runtimes: Vec::new(),
+            in_memory: in_memory(&Config::default()),
             cpus: cpus(&Config::default()),
         }
     }

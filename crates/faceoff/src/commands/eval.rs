@@ -149,6 +149,7 @@ impl EvalCommand {
                 Runtime {
                     read_only_paths: Vec::new(),
                     path,
+                    image: None,
                 },
             );
         }

@@ -7,12 +7,13 @@ use faceoff_http::{
     HttpConfig, HttpLimits,
     token::{Token, TokenKind, hash_token},
 };
-use faceoff_sandbox::{HostFeature, Layer, probe_host};
+use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime, probe_host};
 use faceoff_store::{Actor, Store};
 use faceoff_types::Clock;
 use faceoff_worker::{DailyPlan, WorkerConfig};
 use jiff::Timestamp;
 use std::{
+    collections::BTreeMap,
     fs::{self, OpenOptions},
     io::{IsTerminal as _, Write as _},
     net::SocketAddr,
@@ -137,11 +138,14 @@ async fn serve(config: Config) -> anyhow::Result<()> {
             limits: HttpLimits::default(),
         },
     );
+    let mut agent = config.agent_environment();
+    // For as long as agents run.
+    let _image = in_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
     let workers = WorkerConfig {
         slots: config.slots(),
         lease_s: config.workers.lease_s,
         scratch_dir,
-        agent: config.agent_environment(),
+        agent,
         bundle_limits: config.bundle,
     };
     tracing::info!(
@@ -276,6 +280,25 @@ fn check_sandbox(features: &[HostFeature], given_up: &[Layer]) -> anyhow::Result
          configuration: [sandbox] given_up = [\"…\"]",
         missing.join("\n  ")
     )
+}
+
+/// Has agents use a copy of the runtimes' files in memory, if there may be one.
+fn in_memory(runtimes: &mut BTreeMap<String, Runtime>, limit_bytes: u64) -> Option<MemoryImage> {
+    faceoff_sandbox::sweep_stale();
+    match MemoryImage::make(runtimes, limit_bytes) {
+        Ok(image) => {
+            tracing::info!(bytes = image.bytes, folder = %image.folder().display(), "the runtimes' files are kept in memory");
+            Some(image)
+        }
+        Err(why) => {
+            tracing::warn!(
+                %why,
+                "the runtimes' files are not kept in memory: by what is read of them, and how fast, one \
+                 agent may tell another something; offer smaller runtimes or raise sandbox.resident_bytes"
+            );
+            None
+        }
+    }
 }
 
 /// A layer's name as the configuration spells it.

@@ -102,6 +102,7 @@ fn joined(dir: &Path, task: Task, shards: u32, episodes: u32, steps: u32) -> Vec
                         action: &state.q.repeat(2),
                         answered: Answered {
                             computation_time_s: 1e-3,
+                            host_time_s: 0.0,
                             cpu_time_s: None,
                         },
                         state: &state,

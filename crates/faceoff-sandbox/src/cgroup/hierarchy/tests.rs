@@ -16,6 +16,7 @@ fn each_controller_is_found_where_it_is_on_a_hybrid_host() {
         find("memory"),
         Home {
             version: Version::V1,
+            top: "/sys/fs/cgroup/memory".into(),
             own: "/sys/fs/cgroup/memory".into()
         }
     );
@@ -25,6 +26,7 @@ fn each_controller_is_found_where_it_is_on_a_hybrid_host() {
         find("pids"),
         Home {
             version: Version::V2,
+            top: "/sys/fs/cgroup/unified".into(),
             own: "/sys/fs/cgroup/unified".into()
         }
     );
@@ -48,6 +50,7 @@ fn a_unified_host_has_all_controllers_in_the_services_own_cgroup() {
             home,
             Home {
                 version: Version::V2,
+                top: host.path().into(),
                 own: own.clone()
             }
         );

@@ -1,0 +1,333 @@
+//! What ran on an agent's CPUs beside the agent, by the kernel's own counters: evidence that lies outside
+//! of an agent's reach. Its timers' interrupts, its threads and its page faults are never among it, for
+//! they count as the agent's own time, or as nobody's.
+//!
+//! Version 1 of the cgroup interface counts per CPU and in nanoseconds, for all and for the agent alike.
+//! Version 2 tells only the agent's own time; what all did is then taken from `/proc/stat`, in ticks
+//! of 10 ms. What such a tick leaves open is always read in the host's disfavour.
+
+use std::{
+    fs::{self, File},
+    os::unix::fs::FileExt,
+    time::{Duration, Instant},
+};
+
+/// `USER_HZ` of every architecture that the seccomp filter knows.
+const TICK: Duration = Duration::from_millis(10);
+
+/// Where the counters of one agent are.
+#[derive(Debug)]
+pub(crate) struct CpuEvidence {
+    /// The CPUs that the agent may use.
+    pub cpus: Vec<usize>,
+    pub run_time: RunTime,
+    /// The agent's `cpu.stat`, for what its own quota held it up.
+    pub throttled: Option<File>,
+}
+
+/// Who ran.
+#[derive(Debug)]
+pub(crate) enum RunTime {
+    /// `cpuacct.usage_percpu` of everything and of the agent.
+    PerCpu { all: File, agent: File },
+    /// The agent's `cpu.stat`.
+    Whole { agent: File },
+}
+
+/// The counters at one time. Only the difference of two says something.
+#[derive(Debug, Clone)]
+pub struct CpuReading {
+    at: Instant,
+    agent: Duration,
+    /// Run time of everything on the agent's CPUs; zero where only ticks tell.
+    all: Duration,
+    throttled: Duration,
+    ticks: Vec<Ticks>,
+}
+
+/// What one CPU did since the host's start, in ticks.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct Ticks {
+    /// In user mode, the same with a nice value, in the kernel; interrupts are not among them.
+    busy: [u64; 3],
+    /// Idle, and idle with a disk at work.
+    idle: [u64; 2],
+    /// Held up by the machine below a virtual one.
+    stolen: u64,
+}
+
+/// Which counters are read first: between two readings others must seem to have run for less.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum First {
+    Agent,
+    Others,
+}
+
+impl CpuEvidence {
+    /// The counters now, as the beginning of a span; `None` if the host does not tell.
+    pub(crate) fn begin(&self) -> Option<CpuReading> {
+        self.read(First::Agent)
+    }
+
+    /// For how much of the time since `begun` nothing of the agent can have run, because everything that it
+    /// may run on ran something else.
+    pub(crate) fn taken_since(&self, begun: &CpuReading) -> Option<Duration> {
+        let now = self.read(First::Others)?;
+        Some(taken(
+            begun,
+            &now,
+            matches!(self.run_time, RunTime::PerCpu { .. }),
+        ))
+    }
+
+    fn read(&self, first: First) -> Option<CpuReading> {
+        let mut at = Instant::now();
+        let mut agent = Duration::ZERO;
+        if first == First::Agent {
+            agent = self.agent()?;
+        }
+        let all = match &self.run_time {
+            RunTime::PerCpu { all, .. } => of_cpus(&text(all)?, &self.cpus)?,
+            RunTime::Whole { .. } => Duration::ZERO,
+        };
+        let ticks = ticks_of(&fs::read_to_string("/proc/stat").ok()?, &self.cpus)?;
+        if first == First::Others {
+            agent = self.agent()?;
+        } else {
+            at = Instant::now();
+        }
+        let throttled = self
+            .throttled
+            .as_ref()
+            .and_then(|file| throttled(&text(file)?));
+        Some(CpuReading {
+            at,
+            agent,
+            all,
+            throttled: throttled.unwrap_or_default(),
+            ticks,
+        })
+    }
+
+    fn agent(&self) -> Option<Duration> {
+        match &self.run_time {
+            RunTime::PerCpu { agent, .. } => of_cpus(&text(agent)?, &self.cpus),
+            RunTime::Whole { agent } => {
+                Some(Duration::from_micros(keyed(&text(agent)?, "usage_usec")?))
+            }
+        }
+    }
+}
+
+/// What others provably took of all CPUs at once.
+fn taken(from: &CpuReading, to: &CpuReading, precise: bool) -> Duration {
+    let wall = to.at.saturating_duration_since(from.at);
+    let agent = to.agent.saturating_sub(from.agent);
+    let (mut busy, mut idle, mut stolen) = (0, 0, 0);
+    for (from, to) in from.ticks.iter().zip(&to.ticks) {
+        // A counter that moved by n ticks has counted more than n - 1 and less than n + 1.
+        let at_least = |from: u64, to: u64| to.saturating_sub(from).saturating_sub(1);
+        busy += std::iter::zip(from.busy, to.busy)
+            .map(|(from, to)| at_least(from, to))
+            .sum::<u64>();
+        idle += std::iter::zip(from.idle, to.idle)
+            .map(|(from, to)| to.saturating_sub(from) + 1)
+            .sum::<u64>();
+        stolen += at_least(from.stolen, to.stolen);
+    }
+    let cpus = u32::try_from(to.ticks.len()).unwrap_or(u32::MAX);
+    let (busy, idle, stolen) = (ticks(busy), ticks(idle), ticks(stolen));
+    let others = if precise {
+        // Kernels differ in whether stolen time is also somebody's run time: it must not count twice.
+        to.all
+            .saturating_sub(from.all)
+            .saturating_sub(agent)
+            .max(stolen)
+    } else {
+        // Ticks are sampled: an agent that runs whenever one is due would seem to be others. Then most of
+        // the time is idle.
+        (busy + stolen)
+            .min((wall * cpus).saturating_sub(idle))
+            .saturating_sub(agent)
+    };
+    others
+        .saturating_sub(wall * cpus.saturating_sub(1))
+        .saturating_sub(to.throttled.saturating_sub(from.throttled))
+        .min(wall)
+}
+
+fn ticks(count: u64) -> Duration {
+    TICK * u32::try_from(count).unwrap_or(u32::MAX)
+}
+
+/// A counter file's content; they are short.
+fn text(file: &File) -> Option<String> {
+    let mut bytes = vec![0; 16 << 10];
+    let count = file.read_at(&mut bytes, 0).ok()?;
+    bytes.truncate(count);
+    String::from_utf8(bytes).ok()
+}
+
+/// The sum of some CPUs of `cpuacct.usage_percpu`.
+fn of_cpus(text: &str, cpus: &[usize]) -> Option<Duration> {
+    let each: Vec<&str> = text.split_ascii_whitespace().collect();
+    let sum = cpus
+        .iter()
+        .map(|cpu| each.get(*cpu)?.parse::<u64>().ok())
+        .sum::<Option<u64>>()?;
+    Some(Duration::from_nanos(sum))
+}
+
+/// The lines of some CPUs of `/proc/stat`.
+fn ticks_of(stat: &str, cpus: &[usize]) -> Option<Vec<Ticks>> {
+    let one = |cpu: &usize| {
+        let name = format!("cpu{cpu} ");
+        let line = stat.lines().find_map(|line| line.strip_prefix(&name))?;
+        let numbers: Vec<u64> = line
+            .split_ascii_whitespace()
+            .map_while(|number| number.parse().ok())
+            .collect();
+        let [user, nice, system, idle, waiting, _hard, _soft, stolen, ..] = numbers[..] else {
+            return None;
+        };
+        Some(Ticks {
+            busy: [user, nice, system],
+            idle: [idle, waiting],
+            stolen,
+        })
+    };
+    cpus.iter().map(one).collect()
+}
+
+/// `cpu.stat` of either version.
+fn throttled(stat: &str) -> Option<Duration> {
+    keyed(stat, "throttled_usec")
+        .map(Duration::from_micros)
+        .or_else(|| keyed(stat, "throttled_time").map(Duration::from_nanos))
+}
+
+fn keyed(text: &str, key: &str) -> Option<u64> {
+    text.lines()
+        .find_map(|line| line.strip_prefix(key)?.trim().parse().ok())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: fn(u64) -> Duration = Duration::from_millis;
+
+    fn reading(at: Instant, agent: u64, all: u64, ticks: &[Ticks]) -> CpuReading {
+        CpuReading {
+            at,
+            agent: MS(agent),
+            all: MS(all),
+            throttled: Duration::ZERO,
+            ticks: ticks.to_vec(),
+        }
+    }
+
+    fn cpu(busy: u64, idle: u64, stolen: u64) -> Ticks {
+        Ticks {
+            busy: [busy, 0, 0],
+            idle: [idle, 0],
+            stolen,
+        }
+    }
+
+    #[test]
+    fn only_what_ran_beside_the_agent_counts_and_never_more_than_the_time() {
+        let begun = Instant::now();
+        let taken = |agent: u64, all: u64, ticks: &[Ticks], wall: u64| {
+            let still = vec![Ticks::default(); ticks.len()];
+            let from = reading(begun, 500, 700, &still);
+            let to = reading(begun + MS(wall), 500 + agent, 700 + all, ticks);
+            super::taken(&from, &to, true)
+        };
+        let one = [cpu(0, 0, 0)];
+        assert_eq!(taken(0, 60, &one, 100), MS(60));
+        assert_eq!(taken(40, 100, &one, 100), MS(60), "less what it ran itself");
+        assert_eq!(
+            taken(90, 90, &one, 100),
+            MS(0),
+            "its own threads are its own"
+        );
+        assert_eq!(
+            taken(0, 0, &one, 100),
+            MS(0),
+            "it slept, or its timers fired"
+        );
+        assert_eq!(
+            taken(0, 250, &one, 100),
+            MS(100),
+            "what ran before is not in the wait"
+        );
+        assert_eq!(
+            taken(0, 0, &[cpu(0, 0, 8)], 100),
+            MS(70),
+            "the machine below took it"
+        );
+        assert_eq!(
+            taken(0, 60, &[cpu(0, 0, 5)], 100),
+            MS(60),
+            "and is not counted twice"
+        );
+        // Of two CPUs one was free at least for the rest.
+        let two = [cpu(0, 0, 0); 2];
+        assert_eq!(taken(0, 100, &two, 100), MS(0));
+        assert_eq!(taken(0, 170, &two, 100), MS(70));
+    }
+
+    #[test]
+    fn its_own_quota_is_no_excuse() {
+        let begun = Instant::now();
+        let from = reading(begun, 0, 0, &[cpu(0, 0, 0)]);
+        let mut to = reading(begun + MS(100), 10, 90, &[cpu(0, 0, 0)]);
+        to.throttled = MS(50);
+        assert_eq!(taken(&from, &to, true), MS(30));
+    }
+
+    #[test]
+    fn ticks_are_read_in_the_hosts_disfavour() {
+        let begun = Instant::now();
+        let taken = |agent, ticks| {
+            let from = reading(begun, 0, 0, &[cpu(0, 0, 0)]);
+            let to = reading(begun + MS(200), agent, 0, &[ticks]);
+            super::taken(&from, &to, false)
+        };
+        assert_eq!(taken(0, cpu(20, 0, 0)), MS(180));
+        assert_eq!(taken(50, cpu(20, 0, 0)), MS(130));
+        assert_eq!(taken(0, cpu(1, 18, 0)), MS(0), "a tick proves nothing");
+        assert_eq!(taken(0, cpu(10, 0, 10)), MS(180), "steal counts");
+        // It runs whenever a tick is due and sleeps in between, which is idle.
+        assert_eq!(taken(20, cpu(20, 17, 0)), MS(0));
+        // Its timers' interrupts came out of idleness: no tick says that somebody ran.
+        assert_eq!(taken(1, cpu(1, 2, 0)), MS(0));
+    }
+
+    #[test]
+    fn counters_are_found_in_the_kernels_files() {
+        let stat =
+            "cpu  9 9 9 9 9 9 9 9 0 0\ncpu1 1 2 3 4 5 6 7 8 0 0\ncpu10 0 0 0 0 0 0 0 0\nintr 5\n";
+        let found = Ticks {
+            busy: [1, 2, 3],
+            idle: [4, 5],
+            stolen: 8,
+        };
+        assert_eq!(
+            ticks_of(stat, &[1, 10]),
+            Some(vec![found, Ticks::default()])
+        );
+        assert_eq!(ticks_of(stat, &[0]), None);
+        assert_eq!(
+            of_cpus("10 20 30 \n", &[0, 2]),
+            Some(Duration::from_nanos(40))
+        );
+        assert_eq!(of_cpus("10\n", &[1]), None);
+        let v1 = "nr_periods 4\nnr_throttled 2\nthrottled_time 1500\n";
+        assert_eq!(throttled(v1), Some(Duration::from_nanos(1500)));
+        let v2 = "usage_usec 70\nnr_throttled 1\nthrottled_usec 3\n";
+        assert_eq!(throttled(v2), Some(Duration::from_micros(3)));
+        assert_eq!(keyed(v2, "usage_usec"), Some(70));
+    }
+}
