@@ -8,7 +8,7 @@ use crate::{
     session::Session,
 };
 use faceoff_episode::{Arena, Course, Question, StepSink, TimeSum};
-use faceoff_types::{AgentFaultKind, EpisodeOutcome, Phase, Profile, Seed, Task};
+use faceoff_types::{AgentFaultKind, EpisodeOutcome, Phase, Task};
 
 /// Plays episodes of one task with one agent, which is restarted after a fault. An episode that the
 /// host's stalls cost the agent is played again.
@@ -42,21 +42,19 @@ struct StartUpFault {
 type CourseTo<'a> = Course<&'a mut dyn StepSink>;
 
 impl<'a> Player<'a> {
-    /// Prepares the plant; the agent is started by the first episode.
+    /// The agent is started by the first episode.
     pub fn new(
         bundle: &'a Bundle,
         env: &'a AgentEnvironment,
         task: Task,
-        profile: Profile,
-        seed: Seed,
-        mismatch_seed: Seed,
+        arena: Arena,
         watch: &'a dyn HostWatch,
     ) -> Self {
         Self {
             bundle,
             env,
             task,
-            arena: Arena::new(profile, seed, mismatch_seed),
+            arena,
             session: None,
             log: Log::new(env.limits.stderr_tail_bytes),
             watch,
@@ -247,7 +245,7 @@ impl<'a> Player<'a> {
                 .without_noise_s(),
                 _ => wall_s,
             });
-            if let Some(outcome) = course.answer(session.action(), answered) {
+            if let Some(outcome) = course.answer(session.action(), answered)? {
                 return Ok(outcome);
             }
         }

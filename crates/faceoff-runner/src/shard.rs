@@ -7,6 +7,7 @@ use crate::{
     player::Player,
 };
 use faceoff_dataset::{Recorder, ShardFolder, ShardReport};
+use faceoff_episode::Arena;
 use faceoff_sandbox::affinity::PinnedElsewhere;
 use faceoff_types::{EpisodeOutcome, SlotTiming};
 use faceoff_wire::work::ShardSpec;
@@ -62,9 +63,7 @@ pub fn run_shard_watched(
         bundle,
         env,
         spec.task,
-        spec.profile,
-        spec.seed,
-        spec.mismatch_seed,
+        Arena::by(spec.ruleset, spec.profile, spec.seed, spec.mismatch_seed),
         watch,
     );
     let played = play(spec, &mut player, &mut recorder, observer, &mut calibration);
@@ -75,7 +74,7 @@ pub fn run_shard_watched(
             return Err(fault);
         }
     };
-    let timing = calibration.finish(watch, player.host_noise_reruns());
+    let timing = calibration.finish(watch, player.host_noise_reruns(), spec.platform_retries);
     let log = player.close()?;
     observer.log(&log);
     let report = ShardReport {
@@ -141,12 +140,18 @@ impl Calibration {
         self.agent.measure(calibration::BETWEEN, &mut self.during_s)
     }
 
-    fn finish(mut self, watch: &dyn HostWatch, host_noise_reruns: u32) -> SlotTiming {
+    fn finish(
+        mut self,
+        watch: &dyn HostWatch,
+        host_noise_reruns: u32,
+        platform_retries: u32,
+    ) -> SlotTiming {
         SlotTiming {
             before_s: calibration::summarise(&mut self.before_s),
             during_s: calibration::summarise(&mut self.during_s),
             longest_stall_s: watch.longest_stall_s(),
             host_noise_reruns,
+            platform_retries,
         }
     }
 }

@@ -2,7 +2,7 @@ use crate::{
     bundle::Bundle, config::AgentEnvironment, fault::PlatformFault, host_watch::StallWatch,
     log::Log, player::Player,
 };
-use faceoff_episode::Nowhere;
+use faceoff_episode::{Arena, Nowhere};
 use faceoff_types::{AgentFault, Profile, Seed, Task};
 use serde::{Deserialize, Serialize};
 
@@ -40,9 +40,7 @@ pub fn smoke(
             bundle,
             env,
             task,
-            Profile::Evaluation,
-            seed,
-            seed.model_mismatch(),
+            Arena::new(Profile::Evaluation, seed, seed.model_mismatch()),
             &watch,
         );
         let outcome = player.play(0, SMOKE_STEPS, &mut Nowhere, cancelled)?;

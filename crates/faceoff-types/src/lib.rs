@@ -39,7 +39,9 @@ pub use limits::{AgentLimits, BundleLimits, ResourceLimits, TimeLimits};
 pub use outcome::{EpisodeEnd, EpisodeOutcome};
 pub use profile::{Factor, Factors, ParseProfileError, Profile};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult, ViolationCounts};
-pub use ruleset::{FOULS_PER_POINT, GAME_WINDOWS, RULESET, WINDOW_STEPS};
+pub use ruleset::{
+    ACTION_LIMIT, FOULS_PER_POINT, GAME_WINDOWS, RULESET, Ruleset, UnknownRuleset, WINDOW_STEPS,
+};
 pub use seed::{ParseSeedError, Seed};
 pub use seed_label::{ParseSeedLabelError, SeedLabel};
 pub use smoke_outcome::SmokeOutcome;

@@ -14,7 +14,7 @@ use faceoff_dataset::{
     Dataset, DatasetError, EpisodeRecord,
     verify::{Difference, SeasonClaim, Verified, VerifyError, verify},
 };
-use faceoff_types::{EvaluationResult, RULESET, Seed, Task};
+use faceoff_types::{EvaluationResult, Seed, Task};
 use faceoff_wire::dataset::DatasetManifest;
 use std::{
     fs,
@@ -467,7 +467,11 @@ fn other_layouts_rulesets_and_simulators_are_named() {
             "faceoff-dataset/1",
             "layout is \"faceoff-dataset/1\"",
         ),
-        (RULESET, "airhockey-1999", "ruleset \"airhockey-1999\""),
+        (
+            "airhockey-2023.2",
+            "airhockey-1999",
+            "unknown ruleset \"airhockey-1999\"",
+        ),
         (
             &*fingerprint,
             "00",

@@ -89,7 +89,7 @@ async fn the_board_shows_tiers_in_order_with_rates_intervals_points_and_score() 
         assert!(first.contains(part), "{part:?} is not in {first:?}");
     }
     let caption = &texts(&html, ".board caption")[0];
-    let setting = "evaluation profile, 1000 episodes per task, rules airhockey-2023.1";
+    let setting = "evaluation profile, 1000 episodes per task, rules airhockey-2023.2";
     assert!(caption.contains(setting), "{caption}");
     let commitment = site.store.season().await.unwrap().commitment;
     let legend = texts(&html, ".legend").join(" ");
@@ -110,7 +110,7 @@ async fn the_board_shows_tiers_in_order_with_rates_intervals_points_and_score() 
     ] {
         assert!(legend.contains(&rule), "{rule:?} is not in the legend");
     }
-    assert!(texts(&html, "footer")[0].contains("airhockey-2023.1"));
+    assert!(texts(&html, "footer")[0].contains("airhockey-2023.2"));
     assert!(texts(&html, ".lead")[0].contains("Test season"));
     // what a screen reader needs of a table
     assert_eq!(texts(&html, "table.board caption").len(), 1);

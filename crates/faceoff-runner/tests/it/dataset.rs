@@ -9,7 +9,7 @@ use faceoff_dataset::{
     Dataset, assemble,
     verify::{Verified, verify},
 };
-use faceoff_types::{RULESET, Task};
+use faceoff_types::{Ruleset, Task};
 use faceoff_wire::work::EvaluationMeta;
 use std::{
     fs::File,
@@ -98,7 +98,7 @@ fn meta() -> EvaluationMeta {
         seed: spec.seed,
         mismatch_seed: spec.mismatch_seed,
         agent: "test".into(),
-        ruleset: RULESET.into(),
+        ruleset: Ruleset::CURRENT,
     }
 }
 

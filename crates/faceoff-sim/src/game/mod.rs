@@ -8,7 +8,7 @@ use crate::{
     perturbation::{settings::PerturbationSettings, table_factors::TableFactors},
     robot::plant::Plant,
     stream::Stream,
-    world::World,
+    world::{Divergence, World},
 };
 use faceoff_types::{Factors, Interpolation, Seed, Violations, WINDOW_STEPS};
 use referee::{GAME_RULES, RallyEnd, Referee};
@@ -82,7 +82,7 @@ impl Game {
     }
 
     /// One control step of both robots. When the game is over is the caller's to
-    /// decide.
+    /// decide. A world that diverges ends the rally: a fault of the robots that the end names.
     pub fn step(&mut self, commands: [Command<'_>; 2]) -> GameStep {
         let Rally {
             world,
@@ -103,7 +103,14 @@ impl Game {
         for (values, violations) in constraints.iter().zip(&mut self.violations) {
             values.mark(violations);
         }
-        let rally_end = self.referee.judge(world.puck());
+        let rally_end = match world.divergence() {
+            Some(Divergence { by, .. }) => {
+                let end = RallyEnd::Diverged { by };
+                self.referee.ends_by(end);
+                Some(end)
+            }
+            None => self.referee.judge(world.puck()),
+        };
         if rally_end.is_some() {
             let next = *number + 1;
             self.rally = Rally::new(&self.setup, next, self.referee.serves);

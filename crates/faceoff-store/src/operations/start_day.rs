@@ -14,7 +14,7 @@ use crate::{
     },
     write::Tx,
 };
-use faceoff_types::{EvaluationId, RunId, SeedLabel, SubmissionId};
+use faceoff_types::{EvaluationId, Ruleset, RunId, SeedLabel, SubmissionId};
 use jiff::{Timestamp, civil::Date};
 
 /// Takes the turn of `day` and queues the shards.
@@ -26,6 +26,7 @@ async fn queue_evaluation(
 ) -> Result<Evaluation> {
     let run = Run {
         id: RunId::new(),
+        ruleset: Ruleset::CURRENT,
         plan: plan.clone(),
         seed: SeedLabel::Day(day),
         keeps_recordings: true,

@@ -4,7 +4,9 @@ use crate::{
     store::Store,
     tables::teams::Team,
 };
-use faceoff_types::{EvaluationId, EvaluationResult, RunId, SubmissionId, TeamId, TeamName};
+use faceoff_types::{
+    EvaluationId, EvaluationResult, Ruleset, RunId, SubmissionId, TeamId, TeamName,
+};
 use jiff::{Timestamp, civil::Date};
 use sqlx::types::Text;
 
@@ -32,9 +34,22 @@ pub struct BoardRecord {
 }
 
 impl Store {
-    /// What the board is made of: each team's newest finished evaluation, in the teams' order of
-    /// names. Ranks and tiers are the scoring's.
-    pub async fn board(&self) -> Result<Vec<BoardRecord>> {
+    /// The newest rules that an evaluation is finished under, the current ones before there is any.
+    pub async fn board_ruleset(&self) -> Result<Ruleset> {
+        let rulesets = sqlx::query_scalar!(
+            r#"SELECT DISTINCT r.ruleset AS "ruleset: Text<Ruleset>"
+               FROM evaluations e JOIN runs r ON r.id = e.run_id WHERE e.state = 'finished'"#
+        )
+        .fetch_all(&self.database.read)
+        .await?;
+        let newest = rulesets.into_iter().map(|ruleset| ruleset.0).max();
+        Ok(newest.unwrap_or(Ruleset::CURRENT))
+    }
+
+    /// What the board of a ruleset is made of: each team's newest evaluation that is finished under it,
+    /// in the teams' order of names. Ranks and tiers are the scoring's.
+    pub async fn board(&self, ruleset: Ruleset) -> Result<Vec<BoardRecord>> {
+        let ruleset = Text(ruleset);
         let rows = sqlx::query!(
             r#"/* board */ SELECT t.id AS "team: Text<TeamId>", t.name AS "name: Text<TeamName>",
                       t.created_at AS "invited_at: Instant",
@@ -45,10 +60,13 @@ impl Store {
                       e.result AS "result!: Json<EvaluationResult>"
                FROM teams t
                JOIN evaluations e ON e.rowid = (SELECT n.rowid FROM evaluations n
+                                                JOIN runs r ON r.id = n.run_id
                                                 WHERE n.team_id = t.id AND n.state = 'finished'
+                                                  AND r.ruleset = ?
                                                 ORDER BY n.day DESC LIMIT 1)
                JOIN submissions s ON s.id = e.submission_id
-               ORDER BY t.name"#
+               ORDER BY t.name"#,
+            ruleset,
         )
         .fetch_all(&self.database.read)
         .await?;

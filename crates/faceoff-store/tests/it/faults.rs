@@ -63,7 +63,7 @@ async fn one_fault_more_ends_the_evaluation_without_a_score() {
         f.claim().await.is_none(),
         "the remaining shards are dropped"
     );
-    assert!(f.store.board().await.unwrap().is_empty());
+    assert!(f.store.board(Ruleset::CURRENT).await.unwrap().is_empty());
     let again = f
         .store
         .create_evaluation(Actor::Organiser, submission.id, &plan(), f.now)

@@ -287,7 +287,7 @@ async fn the_board_shows_each_teams_newest_finished_day() {
             }
         }
     }
-    let board = f.store.board().await.unwrap();
+    let board = f.store.board(Ruleset::CURRENT).await.unwrap();
     let rows: Vec<_> = board
         .iter()
         .map(|r| (r.team.name.as_str(), r.day, r.result.score))

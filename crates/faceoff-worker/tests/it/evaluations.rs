@@ -69,7 +69,7 @@ async fn two_teams_meet_the_same_episodes_however_the_work_is_shared_out() {
         ));
     }
     assert_eq!(outcomes[0], outcomes[1]);
-    assert_eq!(server.store.board().await.unwrap().len(), 2);
+    assert_eq!(server.store.board(Ruleset::CURRENT).await.unwrap().len(), 2);
     worker.stop().await;
 }
 
