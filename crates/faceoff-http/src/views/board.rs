@@ -1,6 +1,8 @@
 //! Who stands where, and how sure that is.
 
-use crate::{app::AppState, problem::Problem, seeds::DaySeeds, summaries::RunSummaries};
+use crate::{
+    app::AppState, problem::Problem, seeds::DaySeeds, summaries::RunSummaries, views::shown,
+};
 use faceoff_scoring::{
     BoardEntry, Played, RankedEntry, SIGNIFICANCE, TIER_CHANGE_RESAMPLES, overall_board,
     rank_groups, task_board,
@@ -155,7 +157,7 @@ fn row(
         tier_change_probability,
         team: record.team.name,
         team_id: record.team.id,
-        agent: record.agent_name,
+        agent: record.agent_name.map(shown),
         evaluation: record.evaluation,
         day: record.day,
         finished_at: record.finished_at,
