@@ -7,7 +7,9 @@ mod demo;
 mod house;
 mod kills;
 mod privacy;
+mod told_text;
 mod upgrade;
+mod void_at_will;
 
 use faceoff_tests::{bundle, server::Server};
 use serde_json::{Value, json};

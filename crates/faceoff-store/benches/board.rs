@@ -5,7 +5,8 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use faceoff_store::Store;
 use faceoff_types::{
-    ComputationTimeSummary, EvaluationId, EvaluationResult, Profile, RULESET, RunId, Seed, ShardId,
+    ComputationTimeSummary, EvaluationId, EvaluationResult, Profile, RULESET, Ruleset, RunId, Seed,
+    ShardId,
     SubmissionId, Task, TaskResult, TeamId, Tier, ViolationCounts,
 };
 use jiff::{ToSpan, civil::date};

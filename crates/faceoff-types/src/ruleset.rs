@@ -18,6 +18,9 @@ pub enum Ruleset {
 }
 
 impl Ruleset {
+    /// All, the earlier first.
+    pub const ALL: [Self; 2] = [Self::First, Self::Second];
+
     /// What new runs are played by.
     pub const CURRENT: Self = Self::Second;
 
@@ -55,7 +58,7 @@ pub struct UnknownRuleset(pub String);
 impl FromStr for Ruleset {
     type Err = UnknownRuleset;
     fn from_str(name: &str) -> Result<Self, UnknownRuleset> {
-        [Self::First, Self::Second]
+        Self::ALL
             .into_iter()
             .find(|ruleset| ruleset.as_str() == name)
             .ok_or_else(|| UnknownRuleset(name.to_owned()))

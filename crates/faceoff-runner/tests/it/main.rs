@@ -6,6 +6,7 @@ mod agents;
 mod archives;
 mod bundle;
 mod dataset;
+mod fuzz;
 mod host_noise;
 mod misbehaviour;
 mod recording;

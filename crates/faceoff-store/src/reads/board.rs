@@ -36,14 +36,19 @@ pub struct BoardRecord {
 impl Store {
     /// The newest rules that an evaluation is finished under, the current ones before there is any.
     pub async fn board_ruleset(&self) -> Result<Ruleset> {
-        let rulesets = sqlx::query_scalar!(
-            r#"SELECT DISTINCT r.ruleset AS "ruleset: Text<Ruleset>"
-               FROM evaluations e JOIN runs r ON r.id = e.run_id WHERE e.state = 'finished'"#
-        )
-        .fetch_all(&self.database.read)
-        .await?;
-        let newest = rulesets.into_iter().map(|ruleset| ruleset.0).max();
-        Ok(newest.unwrap_or(Ruleset::CURRENT))
+        for ruleset in Ruleset::ALL.into_iter().rev() {
+            let name = Text(ruleset);
+            let found = sqlx::query_scalar!(
+                r#"SELECT EXISTS (SELECT 1 FROM runs r CROSS JOIN evaluations e
+                                  WHERE r.ruleset = ? AND e.run_id = r.id AND e.state = 'finished')
+                   AS "found!: bool""#,
+                name,
+            );
+            if found.fetch_one(&self.database.read).await? {
+                return Ok(ruleset);
+            }
+        }
+        Ok(Ruleset::CURRENT)
     }
 
     /// What the board of a ruleset is made of: each team's newest evaluation that is finished under it,
@@ -59,10 +64,9 @@ impl Store {
                       e.day AS "day: Text<Date>", e.finished_at AS "finished_at!: Instant",
                       e.result AS "result!: Json<EvaluationResult>"
                FROM teams t
-               JOIN evaluations e ON e.rowid = (SELECT n.rowid FROM evaluations n
-                                                JOIN runs r ON r.id = n.run_id
+               JOIN evaluations e ON e.rowid = (SELECT n.rowid FROM evaluations n CROSS JOIN runs r
                                                 WHERE n.team_id = t.id AND n.state = 'finished'
-                                                  AND r.ruleset = ?
+                                                  AND r.id = n.run_id AND r.ruleset = ?
                                                 ORDER BY n.day DESC LIMIT 1)
                JOIN submissions s ON s.id = e.submission_id
                ORDER BY t.name"#,

@@ -2,6 +2,7 @@
 
 use crate::fixture::*;
 use faceoff_store::*;
+use faceoff_types::Ruleset;
 
 #[tokio::test]
 async fn as_many_faults_as_allowed_are_scored() {

@@ -15,5 +15,7 @@ mod opening;
 mod queries;
 mod queue;
 mod releases;
+mod retries;
+mod rulesets;
 mod teams;
 mod turns;

@@ -2,7 +2,7 @@
 
 use crate::fixture::*;
 use faceoff_store::*;
-use faceoff_types::SmokeOutcome;
+use faceoff_types::{Ruleset, SmokeOutcome};
 use jiff::civil::date;
 
 fn used(result: Result<Evaluation, StoreError>) -> (jiff::civil::Date, jiff::civil::Date) {
