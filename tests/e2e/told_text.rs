@@ -15,7 +15,9 @@ use std::{
 };
 
 fn text(value: &Value) -> &str {
-    value.as_str().unwrap_or_else(|| panic!("{value} is no text"))
+    value
+        .as_str()
+        .unwrap_or_else(|| panic!("{value} is no text"))
 }
 
 /// What must not arrive: control characters, and what turns the writing direction or is invisible.
@@ -41,7 +43,9 @@ fn an_agent_toml_that_is_no_file_is_the_uploads_fault() {
     // Its path in an archive with a top folder of its own.
     let top = scratch.path().join("with-top");
     fs::create_dir_all(top.join("striker/agent.toml")).expect("a scratch folder");
-    let folder = bundle("folder", &|path| fs::create_dir(path).expect("a scratch folder"));
+    let folder = bundle("folder", &|path| {
+        fs::create_dir(path).expect("a scratch folder")
+    });
     let full = bundle("full", &|path| {
         fs::create_dir(path).expect("a scratch folder");
         fs::write(path.join("agent.toml"), "name = \"x\"").expect("a scratch file");
@@ -52,12 +56,28 @@ fn an_agent_toml_that_is_no_file_is_the_uploads_fault() {
     };
     for (name, archive, word) in [
         ("folder", packed(&folder), "agent.toml is a folder"),
-        ("a folder that holds one", packed(&full), "agent.toml is a folder"),
+        (
+            "a folder that holds one",
+            packed(&full),
+            "agent.toml is a folder",
+        ),
         ("below a top folder", packed(&top), "agent.toml is a folder"),
-        ("link to a file", linked("link", "agent.py"), "agent.toml is a link"),
-        ("link to nothing", linked("dangling", "missing"), "agent.toml is a link"),
+        (
+            "link to a file",
+            linked("link", "agent.py"),
+            "agent.toml is a link",
+        ),
+        (
+            "link to nothing",
+            linked("dangling", "missing"),
+            "agent.toml is a link",
+        ),
         ("link to itself", linked("circle", "agent.toml"), "circle"),
-        ("link to the host", linked("host", "/etc/passwd"), "leaves the bundle"),
+        (
+            "link to the host",
+            linked("host", "/etc/passwd"),
+            "leaves the bundle",
+        ),
     ] {
         let id = team.upload(&server, archive);
         let verdict = team.verdict(&server, &id);
@@ -77,7 +97,9 @@ fn packed_with_links(folder: &Path) -> Vec<u8> {
     archive
         .append_dir_all(".", folder)
         .expect("the bundle's folder can be read");
-    let encoder = archive.into_inner().expect("writing to memory does not fail");
+    let encoder = archive
+        .into_inner()
+        .expect("writing to memory does not fail");
     encoder.finish().expect("writing to memory does not fail")
 }
 
@@ -108,9 +130,8 @@ fn a_command_asks_nothing_of_the_hosts_files() {
     {
         let told = ["secret", "shadow", "no-such-file"].map(|name| {
             let folder = python_bundle(scratch.path(), &format!("agent-{number}-{name}"), "pass");
-            let manifest = format!(
-                "name = \"x\"\ncommand = [\"{place}{name}\"]\nruntime = \"python3\"\n"
-            );
+            let manifest =
+                format!("name = \"x\"\ncommand = [\"{place}{name}\"]\nruntime = \"python3\"\n");
             fs::write(folder.join("agent.toml"), manifest).expect("a scratch file");
             let verdict = team.submit(&server, &folder);
             assert_eq!(verdict["state"], "invalid", "{place}{name}: {verdict:#}");

@@ -23,16 +23,56 @@ const SHAPES: [(&str, &str); 7] = [
 /// Lines that are refused, written as they are: a name, `ACTION` for the action's text of interpolation 3,
 /// and a word of the verdict. `ROW` is seven numbers.
 const LINES: [(&str, &str, &str); 10] = [
-    ("out of range", r#"{"type":"act","step":STEP,"action":[ROW,[0,0,0,1e999,0,0,0]]}"#, "not finite"),
-    ("minus out of range", r#"{"type":"act","step":STEP,"action":[ROW,[0,0,0,0,0,0,-1e309]]}"#, "not finite"),
-    ("thousands of digits", r#"{"type":"act","step":STEP,"action":[ROW,[DIGITS,0,0,0,0,0,0]]}"#, "not finite"),
-    ("huge integer", r#"{"type":"act","step":STEP,"action":[ROW,[123456789012345678901234567890,0,0,0,0,0,0]]}"#, "action[1][0]"),
-    ("just too large", r#"{"type":"act","step":STEP,"action":[ROW,[0,0,10000.001,0,0,0,0]]}"#, "action[1][2]"),
-    ("one too large", r#"{"type":"act","step":STEP,"action":[[-1e5,0,0,0,0,0,0],ROW]}"#, "action[0][0]"),
-    ("key twice", r#"{"type":"act","step":STEP,"step":STEP,"action":[ROW,ROW]}"#, "twice"),
-    ("unknown key twice", r#"{"type":"act","step":STEP,"x":1,"x":2,"action":[ROW,ROW]}"#, "twice"),
-    ("nested key twice", r#"{"type":"act","step":STEP,"x":[{"y":{"a":1,"b":2,"a":3}}],"action":[ROW,ROW]}"#, "twice"),
-    ("escaped key twice", r#"{"type":"act","step":STEP,"x":{"a":1,"\u0061":2},"action":[ROW,ROW]}"#, "twice"),
+    (
+        "out of range",
+        r#"{"type":"act","step":STEP,"action":[ROW,[0,0,0,1e999,0,0,0]]}"#,
+        "not finite",
+    ),
+    (
+        "minus out of range",
+        r#"{"type":"act","step":STEP,"action":[ROW,[0,0,0,0,0,0,-1e309]]}"#,
+        "not finite",
+    ),
+    (
+        "thousands of digits",
+        r#"{"type":"act","step":STEP,"action":[ROW,[DIGITS,0,0,0,0,0,0]]}"#,
+        "not finite",
+    ),
+    (
+        "huge integer",
+        r#"{"type":"act","step":STEP,"action":[ROW,[123456789012345678901234567890,0,0,0,0,0,0]]}"#,
+        "action[1][0]",
+    ),
+    (
+        "just too large",
+        r#"{"type":"act","step":STEP,"action":[ROW,[0,0,10000.001,0,0,0,0]]}"#,
+        "action[1][2]",
+    ),
+    (
+        "one too large",
+        r#"{"type":"act","step":STEP,"action":[[-1e5,0,0,0,0,0,0],ROW]}"#,
+        "action[0][0]",
+    ),
+    (
+        "key twice",
+        r#"{"type":"act","step":STEP,"step":STEP,"action":[ROW,ROW]}"#,
+        "twice",
+    ),
+    (
+        "unknown key twice",
+        r#"{"type":"act","step":STEP,"x":1,"x":2,"action":[ROW,ROW]}"#,
+        "twice",
+    ),
+    (
+        "nested key twice",
+        r#"{"type":"act","step":STEP,"x":[{"y":{"a":1,"b":2,"a":3}}],"action":[ROW,ROW]}"#,
+        "twice",
+    ),
+    (
+        "escaped key twice",
+        r#"{"type":"act","step":STEP,"x":{"a":1,"\u0061":2},"action":[ROW,ROW]}"#,
+        "twice",
+    ),
 ];
 
 /// An agent that says another interpolation than 3.
@@ -70,11 +110,14 @@ fn the_largest_number_is_refused_in_every_interpolation() {
         .flat_map(|(interpolation, shape)| {
             ["1.7e308", "-1.7e308"].map(|number| {
                 let action = shape.replace('N', number);
-                let on_step = format!(
-                    "say({{'type': 'act', 'step': message['step'], 'action': {action}}})"
-                );
+                let on_step =
+                    format!("say({{'type': 'act', 'step': message['step'], 'action': {action}}})");
                 let name = format!("{number} in interpolation {interpolation}");
-                (name, agent(interpolation, &on_step), "numbers between -10000 and 10000")
+                (
+                    name,
+                    agent(interpolation, &on_step),
+                    "numbers between -10000 and 10000",
+                )
             })
         })
         .collect();
@@ -100,8 +143,16 @@ fn lines_that_say_two_things_or_no_number_are_refused() {
 /// What agents do within the bounds from their second episode of `prepare` on, with the interpolation
 /// that they say.
 const WITHIN: [(&str, &str, &str); 6] = [
-    ("all-drives-at-their-limit", "None", "[[[0.0] * 7, [0.0] * 7, [1e4] * 7]] * 20"),
-    ("swinging", "None", "[[[s] * 7, [s] * 7, [s] * 7] for _ in range(20)]"),
+    (
+        "all-drives-at-their-limit",
+        "None",
+        "[[[0.0] * 7, [0.0] * 7, [1e4] * 7]] * 20",
+    ),
+    (
+        "swinging",
+        "None",
+        "[[[s] * 7, [s] * 7, [s] * 7] for _ in range(20)]",
+    ),
     ("accelerations-only", "5", "[held, [0.0] * 7, [s] * 7]"),
     ("velocities-only", "3", "[held, [s] * 7]"),
     ("positions-only", "1", "[s] * 7"),
@@ -158,7 +209,11 @@ fn commands_within_the_bounds_are_played_or_the_agents_fault_and_verify() {
         assert_eq!(done["state"], "finished", "{name}: {done:#}");
         let timing = &done["result"]["timing"];
         assert!(timing.is_object(), "{name}: {done:#}");
-        assert_eq!(timing["platform_retries"], serde_json::Value::Null, "{name}");
+        assert_eq!(
+            timing["platform_retries"],
+            serde_json::Value::Null,
+            "{name}"
+        );
         assert_eq!(done["result"]["tasks"]["prepare"]["episodes"], 4, "{name}");
         verify(&server, &evaluation, &team.token, scratch.path());
     }

@@ -126,7 +126,9 @@ fn open_dir(path: &Path) -> Result<Bundle, BundleError> {
         _ => error.into(),
     };
     // Looked at before it is opened: opening a pipe waits for somebody to write.
-    let kind = fs_err::symlink_metadata(&place).map_err(teams_own)?.file_type();
+    let kind = fs_err::symlink_metadata(&place)
+        .map_err(teams_own)?
+        .file_type();
     if !kind.is_file() {
         let kind = if kind.is_dir() {
             "a folder"

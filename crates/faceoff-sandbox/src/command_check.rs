@@ -133,8 +133,16 @@ mod tests {
         symlink(host.path(), bundle.join("host")).unwrap();
         symlink("../secret", bundle.join("link")).unwrap();
         for place in [
-            "../", "./../", "bin/../../", "bin/./../.././", "/agent/../", "/agent//../", "up/",
-            "bin/../up/", "host/", "/agent/host/",
+            "../",
+            "./../",
+            "bin/../../",
+            "bin/./../.././",
+            "/agent/../",
+            "/agent//../",
+            "up/",
+            "bin/../up/",
+            "host/",
+            "/agent/host/",
         ] {
             let told = ["secret", "missing", "secret/x"].map(|name| {
                 let told = check(&bundle, &format!("{place}{name}"));

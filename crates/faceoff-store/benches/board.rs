@@ -6,8 +6,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use faceoff_store::Store;
 use faceoff_types::{
     ComputationTimeSummary, EvaluationId, EvaluationResult, Profile, RULESET, Ruleset, RunId, Seed,
-    ShardId,
-    SubmissionId, Task, TaskResult, TeamId, Tier, ViolationCounts,
+    ShardId, SubmissionId, Task, TaskResult, TeamId, Tier, ViolationCounts,
 };
 use jiff::{ToSpan, civil::date};
 use sqlx::{Connection, SqliteConnection};

@@ -170,13 +170,19 @@ fn commands_that_make_the_world_diverge_are_the_agents_fault() {
         }
     };
     assert!(matches!(kind, AgentFaultKind::Diverged { .. }), "{kind:?}");
-    assert!(kind.to_string().contains("made the simulated world diverge"));
+    assert!(
+        kind.to_string()
+            .contains("made the simulated world diverge")
+    );
     assert_eq!(course.diverged(), Some(&kind));
     let outcome = course.failed(Phase::Step, kind, Some("{}".to_owned()));
     let fault = outcome.fault.clone().unwrap();
     // The step was played: it is recorded, and named by the fault.
     assert_eq!(fault.step, Some(outcome.steps - 1));
-    assert_eq!((outcome.end, outcome.success), (EpisodeEnd::AgentFault, false));
+    assert_eq!(
+        (outcome.end, outcome.success),
+        (EpisodeEnd::AgentFault, false)
+    );
 
     // The recorded answers lead there again, and no other fault agrees with that.
     let mut course = begin_by(Ruleset::Second, Told::default());

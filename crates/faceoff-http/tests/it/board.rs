@@ -127,6 +127,16 @@ async fn the_api_board_has_the_same_order_and_hides_the_seed_of_the_day() {
         assert_eq!((&row["tier"], &row["team"]), (&json!(tier), &json!(name)));
     }
     assert_eq!(rows.len(), ORDER.len());
+    assert_eq!(board["ruleset"], "airhockey-2023.2");
+    let first = site.get("/api/v1/board?ruleset=airhockey-2023.1", None);
+    let first = first.await.json(200);
+    assert_eq!(
+        (&first["ruleset"], &first["rows"]),
+        (&json!("airhockey-2023.1"), &json!([]))
+    );
+    site.get("/api/v1/board/hit?ruleset=chess", None)
+        .await
+        .problem(400, "invalid-request", &["airhockey-2023.1"]);
     assert_eq!(
         rows[0]["tasks"]["hit"]["success_ci95"]
             .as_array()
@@ -214,7 +224,11 @@ async fn an_evaluations_page_shows_results_violations_and_times_to_everybody() {
         assert!(tables.contains(part), "{part:?} is not in {tables:?}");
     }
     let facts = texts(&html, ".facts").join(" ");
-    for part in ["Longest stall of the server30 ms", "played again for it2"] {
+    for part in [
+        "Longest stall of the server30 ms",
+        "played again for it2",
+        "begun again after a fault of ours1",
+    ] {
         assert!(facts.contains(part), "{part:?} is not in {facts:?}");
     }
 }

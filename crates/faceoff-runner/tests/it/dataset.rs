@@ -9,7 +9,7 @@ use faceoff_dataset::{
     Dataset, assemble,
     verify::{Verified, verify},
 };
-use faceoff_types::{Ruleset, Task};
+use faceoff_types::{AgentFaultKind, Ruleset, Task};
 use faceoff_wire::work::EvaluationMeta;
 use std::{
     fs::File,
@@ -126,4 +126,41 @@ fn what_agents_play_verifies_faults_and_all() {
     assert_eq!(verified(&agent, Task::Prepare, 4).episodes, 4);
     let silent = Agent::script("import sys\nsys.exit('no model')");
     assert_eq!(verified(&silent, Task::Hit, 2).steps, 0);
+}
+
+#[test]
+fn a_world_that_an_agent_makes_diverge_is_its_fault_and_verifies() {
+    let dir = tempfile::tempdir().unwrap();
+    let shard = dir.path().join("shard");
+    let agent = Agent::with(
+        "INTERPOLATION = None\n\
+         now = 0\n\
+         def on_hello(hello): print('start', file=sys.stderr)\n\
+         def on_reset(episode):\n    global now; now = episode\n\
+         def on_step(step, answer):\n    \
+         push = (1e4 if step % 2 else -1e4) if now == 1 else 0.0\n    \
+         answer['action'] = [[held, [0.0] * 7, [push] * 7]] * 20\n    \
+         return json.dumps(answer)",
+    );
+    let report = run(&spec(Task::Prepare, 0..3), &agent, &sandboxed(), &shard).unwrap();
+    let faults: Vec<_> = report.outcomes.iter().map(|o| o.fault.clone()).collect();
+    let [None, Some(fault), None] = &faults[..] else {
+        panic!("one episode diverges: {faults:?}");
+    };
+    assert!(
+        matches!(fault.fault, AgentFaultKind::Diverged { .. }),
+        "{fault}"
+    );
+    assert_eq!(fault.step, Some(report.outcomes[1].steps - 1));
+    assert_eq!(report.log.matches("start\n").count(), 2, "{}", report.log);
+    assert!(report.log.contains("made the simulated world diverge"));
+    assert_eq!(report.timing.host_noise_reruns, 0);
+
+    let archive = dir.path().join("dataset.zip");
+    assemble(&meta(), &[shard], &archive).unwrap();
+    let dataset = Dataset::open(&archive).unwrap();
+    let workers = NonZero::new(2).unwrap();
+    let verified = verify(&dataset, workers, &|| ()).unwrap();
+    assert_eq!(verified.episodes, 3);
+    assert_eq!(dataset.episodes().unwrap()[1].outcome, report.outcomes[1]);
 }

@@ -2,8 +2,8 @@
 //! stay finite, and if the world diverges it is their fault.
 
 use faceoff_sim::{
-    Command, Episode, Game, GameSetup, Interpolation, JOINTS, PerturbationSettings, Plant, RallyEnd,
-    stream::Stream,
+    Command, Episode, Game, GameSetup, Interpolation, JOINTS, PerturbationSettings, Plant,
+    RallyEnd, stream::Stream,
 };
 use faceoff_types::{ACTION_LIMIT, EpisodeEnd, Factors, Seed, Task};
 
@@ -202,7 +202,14 @@ fn a_diverged_world_stands_still() {
     let mut stream = Stream::new(&seed, "unused");
     let mut push = |episode: &mut Episode| {
         let q = episode.state().q;
-        let action = action(Habit::Constant, ACTION_LIMIT, interpolation, 0, &q, &mut stream);
+        let action = action(
+            Habit::Constant,
+            ACTION_LIMIT,
+            interpolation,
+            0,
+            &q,
+            &mut stream,
+        );
         episode.step(&action)
     };
     while episode.divergence().is_none() {
@@ -219,7 +226,13 @@ fn a_diverged_world_stands_still() {
 fn commands_that_are_no_numbers_leave_a_world_of_numbers() {
     let settings = PerturbationSettings::default();
     for interpolation in interpolations() {
-        for number in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, f64::MIN] {
+        for number in [
+            f64::NAN,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::MAX,
+            f64::MIN,
+        ] {
             let mut episode = Episode::new(
                 Task::Hit,
                 interpolation,

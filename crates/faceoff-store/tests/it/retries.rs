@@ -7,10 +7,9 @@ async fn claimed(f: &Fixture) -> (Claim, u32) {
     match f.claim().await {
         Some(Claimed {
             claim,
-            work:
-                Work::Shard {
-                    platform_retries, ..
-                },
+            work: Work::Shard {
+                platform_retries, ..
+            },
         }) => (claim, platform_retries),
         other => panic!("expected a shard, claimed {other:?}"),
     }

@@ -51,14 +51,21 @@ async fn what_is_under_way_at_an_upgrade_finishes_by_its_own_rules_on_its_own_bo
 
     f.later(24 * 3600);
     f.evaluate(alpha.id, &plan()).await;
-    assert_eq!(play(&f, 20.0).await, Ruleset::First, "Beta's was queued before");
+    assert_eq!(
+        play(&f, 20.0).await,
+        Ruleset::First,
+        "Beta's was queued before"
+    );
     assert_eq!(play(&f, 30.0).await, Ruleset::Second);
     assert_eq!(f.store.board_ruleset().await.unwrap(), Ruleset::Second);
     assert_eq!(teams(&f, Ruleset::First).await, ["Alpha", "Beta"]);
     assert_eq!(teams(&f, Ruleset::Second).await, ["Alpha"]);
     let scores: Vec<_> = f.store.board(Ruleset::First).await.unwrap();
     assert_eq!(
-        scores.iter().map(|row| row.result.score).collect::<Vec<_>>(),
+        scores
+            .iter()
+            .map(|row| row.result.score)
+            .collect::<Vec<_>>(),
         [10.0, 20.0]
     );
 }

@@ -27,7 +27,13 @@ fn finite() -> impl Strategy<Value = f64> {
 
 /// Any number that an action may hold.
 fn in_bounds() -> impl Strategy<Value = f64> {
-    finite().prop_map(|value| if value.abs() > ACTION_LIMIT { value % ACTION_LIMIT } else { value })
+    finite().prop_map(|value| {
+        if value.abs() > ACTION_LIMIT {
+            value % ACTION_LIMIT
+        } else {
+            value
+        }
+    })
 }
 
 /// The line of an action, as serde_json writes nested arrays.

@@ -8,9 +8,30 @@ use faceoff_wire::{
 use serde_json::Value;
 
 const WORDS: [&str; 24] = [
-    "NaN", "-Infinity", "1e999", "1.7e308", "-10001", "1e4", "5e-324", "-0", "7", "null", "true", "\"\"",
-    "{}", "[]", "{\"a\":1,\"a\":2}", "\"x\":{\"y\":[]},", "\"step\":7,", "\"type\":\"act\",", "ready",
-    "act", "\\u0061", "\\ud800", "\u{202e}", "\u{1b}[2J",
+    "NaN",
+    "-Infinity",
+    "1e999",
+    "1.7e308",
+    "-10001",
+    "1e4",
+    "5e-324",
+    "-0",
+    "7",
+    "null",
+    "true",
+    "\"\"",
+    "{}",
+    "[]",
+    "{\"a\":1,\"a\":2}",
+    "\"x\":{\"y\":[]},",
+    "\"step\":7,",
+    "\"type\":\"act\",",
+    "ready",
+    "act",
+    "\\u0061",
+    "\\ud800",
+    "\u{202e}",
+    "\u{1b}[2J",
 ];
 
 fn act(interpolation: Interpolation) -> String {
@@ -25,7 +46,9 @@ fn act(interpolation: Interpolation) -> String {
     }
     let mut numbers = (0..interpolation.len()).map(|i| format!("{}", i as f64 / 16.0 - 3.0));
     let action = nest(interpolation.shape(), &mut numbers);
-    format!("{{\"type\":\"act\",\"step\":7,\"action\":{action},\"note\":{{\"a\":[1,{{\"b\":2}}]}}}}")
+    format!(
+        "{{\"type\":\"act\",\"step\":7,\"action\":{action},\"note\":{{\"a\":[1,{{\"b\":2}}]}}}}"
+    )
 }
 
 /// What is told of a fault is text that can be shown.
@@ -48,7 +71,8 @@ fn answers_are_whole_or_the_agents_fault() {
         let interpolation = *draws.pick(&codes);
         let kind = draws.below(6);
         let mut line = match kind {
-            0 => br#"{"type":"ready","protocol":1,"interpolation":3,"name":"a","version":"1"}"#.to_vec(),
+            0 => br#"{"type":"ready","protocol":1,"interpolation":3,"name":"a","version":"1"}"#
+                .to_vec(),
             1 => br#"{"type":"ready","episode":7}"#.to_vec(),
             _ => act(interpolation).into_bytes(),
         };
@@ -82,7 +106,13 @@ fn answers_are_whole_or_the_agents_fault() {
     assert_met(
         &met,
         &[
-            "accepted", "NotJson", "WrongMessage", "WrongShape", "NonFinite", "TooLarge", "LineTooLong",
+            "accepted",
+            "NotJson",
+            "WrongMessage",
+            "WrongShape",
+            "NonFinite",
+            "TooLarge",
+            "LineTooLong",
         ],
     );
 }

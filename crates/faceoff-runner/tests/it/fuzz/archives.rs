@@ -18,14 +18,43 @@ const LIMITS: BundleLimits = BundleLimits {
 };
 
 const NAMES: [&str; 22] = [
-    "agent.toml", "agent.py", "./agent.py", "top/agent.toml", "top/agent.py", "weights/w.bin", "weights",
-    "weights/", "", ".", "/etc/passwd", "../x", "a/../../x", "a//b", "agent.toml/x", "link", "link/x",
-    "deep/up", "\u{202e}x", "x\\y", "a/b/c/d/e/f/g/h/i/j/k/l/m/n", "\u{1b}[2J",
+    "agent.toml",
+    "agent.py",
+    "./agent.py",
+    "top/agent.toml",
+    "top/agent.py",
+    "weights/w.bin",
+    "weights",
+    "weights/",
+    "",
+    ".",
+    "/etc/passwd",
+    "../x",
+    "a/../../x",
+    "a//b",
+    "agent.toml/x",
+    "link",
+    "link/x",
+    "deep/up",
+    "\u{202e}x",
+    "x\\y",
+    "a/b/c/d/e/f/g/h/i/j/k/l/m/n",
+    "\u{1b}[2J",
 ];
 
 const TARGETS: [&str; 12] = [
-    "agent.py", "..", "../..", "/etc/passwd", "link", "deep/up/../x", "weights", ".", "missing", "top/..",
-    "", "agent.toml",
+    "agent.py",
+    "..",
+    "../..",
+    "/etc/passwd",
+    "link",
+    "deep/up/../x",
+    "weights",
+    ".",
+    "missing",
+    "top/..",
+    "",
+    "agent.toml",
 ];
 
 const MODES: [u32; 6] = [0o644, 0o755, 0o600, 0o000, 0o4755, 0o2644];
@@ -57,9 +86,16 @@ fn entries(draws: &mut Draws) -> Vec<Entry> {
         let at = draws.below(entries.len() + 1);
         let mut entry = file(draws.pick(&NAMES), b"x");
         entry.kind = *draws.pick(&[
-            EntryType::Regular, EntryType::Directory, EntryType::Symlink, EntryType::Symlink,
-            EntryType::Link, EntryType::Char, EntryType::Fifo, EntryType::XHeader,
-            EntryType::GNULongName, EntryType::GNUSparse,
+            EntryType::Regular,
+            EntryType::Directory,
+            EntryType::Symlink,
+            EntryType::Symlink,
+            EntryType::Link,
+            EntryType::Char,
+            EntryType::Fifo,
+            EntryType::XHeader,
+            EntryType::GNULongName,
+            EntryType::GNUSparse,
         ]);
         entry.mode = *draws.pick(&MODES);
         entry.target = draws.pick(&TARGETS).to_string();
@@ -102,8 +138,13 @@ fn tar_of(entries: &[Entry]) -> Vec<u8> {
         match kind {
             EntryType::GNULongName => {
                 let long = entry.name.as_bytes();
-                tar.entry(*kind, "././@LongLink", 0o644, "", long)
-                    .entry(EntryType::Regular, &name, *mode, "", content)
+                tar.entry(*kind, "././@LongLink", 0o644, "", long).entry(
+                    EntryType::Regular,
+                    &name,
+                    *mode,
+                    "",
+                    content,
+                )
             }
             _ => tar.entry(*kind, &name, *mode, target, content),
         }

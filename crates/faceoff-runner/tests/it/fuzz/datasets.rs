@@ -19,8 +19,22 @@ use tempfile::TempDir;
 use zip::ZipArchive;
 
 const WORDS: [&str; 16] = [
-    "null", "-1", "1e999", "4294967296", "\"\"", "{}", "[]", "faceoff-dataset/2", "faceoff-dataset/1",
-    "airhockey-2023.1", "airhockey-1999", "PAR1", "hit", "prepare", "00", "\u{202e}",
+    "null",
+    "-1",
+    "1e999",
+    "4294967296",
+    "\"\"",
+    "{}",
+    "[]",
+    "faceoff-dataset/2",
+    "faceoff-dataset/1",
+    "airhockey-2023.1",
+    "airhockey-1999",
+    "PAR1",
+    "hit",
+    "prepare",
+    "00",
+    "\u{202e}",
 ];
 
 /// The dataset of two short episodes.
@@ -127,7 +141,9 @@ impl Valid {
             _ => mutate(files.get_mut(name).unwrap(), &WORDS, draws),
         }
         // A forger makes the hashes fit.
-        let manifest = files.get("manifest.json").map(|bytes| serde_json::from_slice(bytes));
+        let manifest = files
+            .get("manifest.json")
+            .map(|bytes| serde_json::from_slice(bytes));
         if let Some(Ok::<DatasetManifest, _>(mut manifest)) = manifest
             && !draws.once_in(4)
         {
@@ -193,6 +209,13 @@ fn a_dataset_is_read_or_refused() {
         fs::remove_dir_all(&dir).unwrap();
         label.to_owned()
     });
-    let kinds = ["read", "differs", "unreadable", "foreign", "altered", "absent"];
+    let kinds = [
+        "read",
+        "differs",
+        "unreadable",
+        "foreign",
+        "altered",
+        "absent",
+    ];
     assert_met(&met, &kinds);
 }

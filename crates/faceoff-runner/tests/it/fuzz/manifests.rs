@@ -9,9 +9,30 @@ const VALID: [&str; 2] = [
 ];
 
 const WORDS: [&str; 24] = [
-    "\"\"", "''", "[]", "{}", "[\"\"]", "0", "-1", "99", "true", "inf", "\\u0000", "\\u202e", "\u{202e}",
-    "../x", "a b", "=", "\n", "[env]", "name = \"y\"\n", "\"A=B\" = \"c\"\n", "1 = \"c\"\n",
-    "interpolation", "command = [\"\"]\n", "\u{1b}[2J",
+    "\"\"",
+    "''",
+    "[]",
+    "{}",
+    "[\"\"]",
+    "0",
+    "-1",
+    "99",
+    "true",
+    "inf",
+    "\\u0000",
+    "\\u202e",
+    "\u{202e}",
+    "../x",
+    "a b",
+    "=",
+    "\n",
+    "[env]",
+    "name = \"y\"\n",
+    "\"A=B\" = \"c\"\n",
+    "1 = \"c\"\n",
+    "interpolation",
+    "command = [\"\"]\n",
+    "\u{1b}[2J",
 ];
 
 #[test]
@@ -29,7 +50,10 @@ fn an_agent_toml_is_read_or_its_key_is_named() {
             }
             Err(error) => {
                 let told = error.to_string();
-                assert!(told.chars().all(|c| is_harmless(c) || "\n\t\r".contains(c)), "{told:?}");
+                assert!(
+                    told.chars().all(|c| is_harmless(c) || "\n\t\r".contains(c)),
+                    "{told:?}"
+                );
                 match error {
                     ManifestError::Toml(_) => "not toml".to_owned(),
                     ManifestError::Value { key, .. } => {
@@ -43,8 +67,13 @@ fn an_agent_toml_is_read_or_its_key_is_named() {
     assert_met(
         &met,
         &[
-            "accepted", "not toml", "value of name", "value of command", "value of runtime",
-            "value of interpolation", "value of env",
+            "accepted",
+            "not toml",
+            "value of name",
+            "value of command",
+            "value of runtime",
+            "value of interpolation",
+            "value of env",
         ],
     );
 }
@@ -52,7 +81,9 @@ fn an_agent_toml_is_read_or_its_key_is_named() {
 /// TOML's basic strings are JSON's, but for one character.
 fn toml_of(manifest: &Manifest) -> String {
     fn json<T: serde::Serialize>(value: &T) -> String {
-        serde_json::to_string(value).unwrap().replace('\u{7f}', "\\u007f")
+        serde_json::to_string(value)
+            .unwrap()
+            .replace('\u{7f}', "\\u007f")
     }
     let Manifest {
         name,
@@ -68,6 +99,9 @@ fn toml_of(manifest: &Manifest) -> String {
     ];
     lines.extend(interpolation.map(|code| format!("interpolation = {code}")));
     lines.push("[env]".to_owned());
-    lines.extend(env.iter().map(|(name, value)| format!("{name} = {}", json(value))));
+    lines.extend(
+        env.iter()
+            .map(|(name, value)| format!("{name} = {}", json(value))),
+    );
     lines.join("\n")
 }
