@@ -240,6 +240,24 @@ mod tests {
             assert_eq!(serde_json::from_str::<AgentFault>(stored).unwrap(), fault);
             assert_eq!(fault.to_string(), shown);
         }
+        for (kind, stored) in [
+            (
+                AgentFaultKind::TooLarge {
+                    place: "action[3]".into(),
+                    value: -1.7e308,
+                    limit: 1e4,
+                },
+                r#"{"kind":"too_large","place":"action[3]","value":-1.7e308,"limit":10000.0}"#,
+            ),
+            (
+                AgentFaultKind::Diverged { detail: "x".into() },
+                r#"{"kind":"diverged","detail":"x"}"#,
+            ),
+        ] {
+            assert_eq!(serde_json::to_string(&kind).unwrap(), stored);
+            let read: AgentFaultKind = serde_json::from_str(stored).unwrap();
+            assert_eq!(read, kind);
+        }
         for wrong in [
             r#"{"task":"tournament"}"#,
             r#"{"task":"hit","side":1}"#,
