@@ -3,7 +3,7 @@
 
 use crate::{CONFIG, Team};
 use faceoff_tests::{
-    bundle::{python_agent, python_bundle},
+    bundle::{packed, python_agent, python_bundle},
     program,
     server::Server,
 };
@@ -85,17 +85,17 @@ fn agent(interpolation: &str, on_step: &str) -> String {
 fn verdicts(agents: &[(String, String, &str)]) {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
-    let team = Team::create(&server, "Voider");
     let uploads: Vec<_> = agents
         .iter()
         .enumerate()
         .map(|(number, (name, source, word))| {
             let folder = python_bundle(scratch.path(), &format!("agent-{number}"), source);
-            let id = team.upload(&server, faceoff_tests::bundle::packed(&folder));
-            (name, word, id)
+            let team = Team::create(&server, &format!("Voider {number}"));
+            let id = team.upload(&server, packed(&folder));
+            (name, word, team, id)
         })
         .collect();
-    for (name, word, id) in uploads {
+    for (name, word, team, id) in uploads {
         let verdict = team.verdict(&server, &id);
         assert_eq!(verdict["state"], "invalid", "{name}: {verdict:#}");
         let reason = verdict["reason"].as_str().expect("a verdict has a reason");
