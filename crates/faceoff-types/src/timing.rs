@@ -46,10 +46,6 @@ pub struct SlotTiming {
     pub platform_retries: u32,
 }
 
-#[expect(
-    clippy::trivially_copy_pass_by_ref,
-    reason = "serde passes a field by reference"
-)]
 const fn is_zero(count: &u32) -> bool {
     *count == 0
 }

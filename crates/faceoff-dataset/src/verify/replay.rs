@@ -153,7 +153,7 @@ impl Again<'_> {
         Ok(self
             .course
             .answer(action.values(), answered)
-            .unwrap_or(None))
+            .unwrap_or_default())
     }
 
     /// The recorded action: it is the simulation's input, so it must be one.

@@ -80,16 +80,21 @@ fn assert_finite(what: &str, numbers: &[f64]) {
 }
 
 /// Plays an episode; did its world diverge?
-fn diverges(task: Task, interpolation: Interpolation, habit: Habit, size: f64) -> bool {
+fn diverges(
+    plant: &Plant,
+    task: Task,
+    interpolation: Interpolation,
+    habit: Habit,
+    size: f64,
+) -> bool {
     let settings = PerturbationSettings::default();
     let seed = Seed::from_number(11);
-    let plant = Plant::under(Factors::ALL, &settings, seed.model_mismatch());
     let mut episode = Episode::new(
         task,
         interpolation,
         Factors::ALL,
         &settings,
-        &plant,
+        plant,
         seed.episode(task, 0),
     );
     let what = format!("{task}, interpolation {interpolation}, {habit:?}, {size}");
@@ -125,11 +130,14 @@ fn diverges(task: Task, interpolation: Interpolation, habit: Habit, size: f64) -
 #[test]
 fn no_episode_breaks_whatever_is_commanded() {
     let (mut diverged, mut played) = (0, 0);
+    let settings = PerturbationSettings::default();
+    let mismatch_seed = Seed::from_number(11).model_mismatch();
+    let plant = Plant::under(Factors::ALL, &settings, mismatch_seed);
     for task in Task::ALL {
         for interpolation in interpolations() {
             for habit in HABITS {
                 for size in [ACTION_LIMIT, 30.0] {
-                    match diverges(task, interpolation, habit, size) {
+                    match diverges(&plant, task, interpolation, habit, size) {
                         true => diverged += 1,
                         false => played += 1,
                     }
@@ -146,6 +154,7 @@ fn no_episode_breaks_whatever_is_commanded() {
 fn in_a_game_the_robot_that_first_left_its_bounds_is_to_blame() {
     let settings = PerturbationSettings::default();
     let seed = Seed::from_number(12);
+    let plant = Plant::under(Factors::ALL, &settings, seed.model_mismatch());
     let mut rallies = 0;
     for interpolation in interpolations() {
         for habit in HABITS {
@@ -153,7 +162,7 @@ fn in_a_game_the_robot_that_first_left_its_bounds_is_to_blame() {
                 let mut game = Game::new(GameSetup {
                     interpolation: [interpolation; 2],
                     factors: Factors::ALL,
-                    plant: Plant::under(Factors::ALL, &settings, seed.model_mismatch()),
+                    plant: plant.clone(),
                     settings: settings.clone(),
                     seed,
                 });

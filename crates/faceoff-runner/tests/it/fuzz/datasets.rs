@@ -141,10 +141,9 @@ impl Valid {
             _ => mutate(files.get_mut(name).unwrap(), &WORDS, draws),
         }
         // A forger makes the hashes fit.
-        let manifest = files
-            .get("manifest.json")
-            .map(|bytes| serde_json::from_slice(bytes));
-        if let Some(Ok::<DatasetManifest, _>(mut manifest)) = manifest
+        let manifest = files.get("manifest.json").map(Vec::as_slice);
+        let manifest = manifest.map(serde_json::from_slice::<DatasetManifest>);
+        if let Some(Ok(mut manifest)) = manifest
             && !draws.once_in(4)
         {
             for (name, digest) in &mut manifest.files {

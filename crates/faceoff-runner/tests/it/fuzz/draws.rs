@@ -7,12 +7,12 @@ impl Draws {
         let mut draws = Self(seed);
         for byte in target.bytes().chain(run.to_le_bytes()) {
             draws.0 = draws.0.wrapping_add(u64::from(byte));
-            draws.0 = draws.next();
+            draws.0 = draws.bits();
         }
         draws
     }
 
-    pub fn next(&mut self) -> u64 {
+    fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut x = self.0;
         x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -23,7 +23,7 @@ impl Draws {
     /// From 0 to below `end`; 0 where that is nothing.
     pub fn below(&mut self, end: usize) -> usize {
         let end = u64::try_from(end.max(1)).unwrap();
-        usize::try_from(self.next() % end).unwrap()
+        usize::try_from(self.bits() % end).unwrap()
     }
 
     /// Once in `n` times.
