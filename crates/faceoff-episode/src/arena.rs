@@ -5,7 +5,7 @@ use faceoff_types::{Factors, Interpolation, Profile, Ruleset, Seed, Task};
 /// seed that theirs derive from.
 #[derive(Debug, Clone)]
 pub struct Arena {
-    ruleset: Ruleset,
+    bounds: Bounds,
     factors: Factors,
     settings: PerturbationSettings,
     plant: Plant,
@@ -24,12 +24,18 @@ impl Arena {
     pub fn by(ruleset: Ruleset, profile: Profile, seed: Seed, mismatch_seed: Seed) -> Self {
         let (factors, settings) = (profile.factors(), PerturbationSettings::default());
         Self {
-            ruleset,
+            bounds: Bounds::of(ruleset),
             plant: Plant::under(factors, &settings, mismatch_seed),
             factors,
             settings,
             seed,
         }
+    }
+
+    /// The same within other bounds than the ruleset's.
+    #[must_use]
+    pub fn within(self, bounds: Bounds) -> Self {
+        Self { bounds, ..self }
     }
 
     /// An episode's own seed; `index` counts within the evaluation.
@@ -48,6 +54,6 @@ impl Arena {
             &self.plant,
             self.seed(task, index),
         )
-        .within(Bounds::of(self.ruleset))
+        .within(self.bounds)
     }
 }

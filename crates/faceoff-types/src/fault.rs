@@ -247,7 +247,7 @@ mod tests {
                     value: -1.7e308,
                     limit: 1e4,
                 },
-                r#"{"kind":"too_large","place":"action[3]","value":-1.7e308,"limit":10000.0}"#,
+                r#"{"kind":"too_large","place":"action[3]","value":-1.7e+308,"limit":10000.0}"#,
             ),
             (
                 AgentFaultKind::Diverged { detail: "x".into() },

@@ -6,7 +6,6 @@ use std::{fmt, str::FromStr};
 /// A change of behaviour (a constant of the simulator, the pinned contact finder, a bound of a tier)
 /// is a new ruleset. Recordings of earlier ones are verified, and runs under way finished, by their own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub enum Ruleset {
     /// Numbers of an action are only finite, and a world may move however fast.
     #[serde(rename = "airhockey-2023.1")]

@@ -592,3 +592,30 @@ fn extreme_commands_verify_whatever_comes_of_them() {
     let verified = check(&evaluation.archive(), 2).unwrap();
     assert_eq!(verified.episodes, 3);
 }
+
+#[test]
+fn a_divergence_that_did_not_happen_is_found() {
+    let quits: Agent = |turn| (turn.step != Some(3)).then_some([turn.held, [0.0; 7]]);
+    let evaluation = Evaluation::play(Some(quits), &[(Task::Prepare, 0..2)]).assembled();
+    check(&evaluation.archive(), 2).unwrap();
+    let forgery = Forgery::of(&evaluation.folder());
+    forgery.table("episodes.parquet", |batch| {
+        let mut columns = batch.columns().to_vec();
+        let index = batch.schema().index_of("fault").unwrap();
+        let faults: &StringArray = batch["fault"].as_string();
+        let diverged = r#""kind":"diverged","detail":"x""#;
+        let forged = |fault: Option<&str>| {
+            fault.map(|fault| fault.replace(r#""kind":"non_finite""#, diverged))
+        };
+        let forged: StringArray = faults.iter().map(forged).collect();
+        columns[index] = Arc::new(forged);
+        RecordBatch::try_new(batch.schema(), columns).unwrap()
+    });
+    let found = difference(forgery.reseal().dir.path(), 2);
+    assert_eq!(
+        (&*found.field, found.episode),
+        ("fault", Some(0)),
+        "{found}"
+    );
+    assert!(found.recorded.contains("diverge"), "{found}");
+}

@@ -16,6 +16,7 @@ use utoipa::IntoParams;
 #[into_params(parameter_in = Query)]
 pub(crate) struct RulesetQuery {
     /// The newest with results without it. No board mixes two.
+    #[param(value_type = Option<String>, example = "airhockey-2023.1")]
     ruleset: Option<Ruleset>,
 }
 

@@ -556,7 +556,7 @@ fn an_agent_toml_that_is_no_file_is_the_teams_doing() {
     refused(&circle.gz(), "leads in a circle");
     for kind in [EntryType::Fifo, EntryType::Char, EntryType::Block] {
         let device = Tar::new().entry(kind, "agent.toml", 0o644, "", b"");
-        refused(&device.gz(), "is a device, pipe or socket");
+        refused(&device.gz(), "a bundle holds files, folders and links");
     }
 
     // A developer's own folder, opened in place.

@@ -9,7 +9,7 @@ use faceoff_dataset::{
     Dataset, assemble,
     verify::{Verified, verify},
 };
-use faceoff_types::{AgentFaultKind, Ruleset, Task};
+use faceoff_types::{Ruleset, Task};
 use faceoff_wire::work::EvaluationMeta;
 use std::{
     fs::File,
@@ -129,38 +129,29 @@ fn what_agents_play_verifies_faults_and_all() {
 }
 
 #[test]
-fn a_world_that_an_agent_makes_diverge_is_its_fault_and_verifies() {
+fn commands_at_their_bound_are_played_and_verify() {
     let dir = tempfile::tempdir().unwrap();
     let shard = dir.path().join("shard");
+    // The way that each joint turns already, so that it turns ever faster.
     let agent = Agent::with(
         "INTERPOLATION = None\n\
-         now = 0\n\
-         def on_hello(hello): print('start', file=sys.stderr)\n\
-         def on_reset(episode):\n    global now; now = episode\n\
          def on_step(step, answer):\n    \
-         push = (1e4 if step % 2 else -1e4) if now == 1 else 0.0\n    \
-         answer['action'] = [[held, [0.0] * 7, [push] * 7]] * 20\n    \
+         push = [1e4 if dq > 0 else -1e4 for dq in obs[13:20]]\n    \
+         answer['action'] = [[push, push, push]] * 20\n    \
          return json.dumps(answer)",
     );
-    let report = run(&spec(Task::Prepare, 0..3), &agent, &sandboxed(), &shard).unwrap();
+    let report = run(&spec(Task::Prepare, 0..2), &agent, &sandboxed(), &shard).unwrap();
     let faults: Vec<_> = report.outcomes.iter().map(|o| o.fault.clone()).collect();
-    let [None, Some(fault), None] = &faults[..] else {
-        panic!("one episode diverges: {faults:?}");
-    };
+    assert_eq!(faults, [None, None]);
     assert!(
-        matches!(fault.fault, AgentFaultKind::Diverged { .. }),
-        "{fault}"
+        report
+            .outcomes
+            .iter()
+            .all(|outcome| outcome.violations.joint_vel)
     );
-    assert_eq!(fault.step, Some(report.outcomes[1].steps - 1));
-    assert_eq!(report.log.matches("start\n").count(), 2, "{}", report.log);
-    assert!(report.log.contains("made the simulated world diverge"));
-    assert_eq!(report.timing.host_noise_reruns, 0);
-
     let archive = dir.path().join("dataset.zip");
     assemble(&meta(), &[shard], &archive).unwrap();
     let dataset = Dataset::open(&archive).unwrap();
     let workers = NonZero::new(2).unwrap();
-    let verified = verify(&dataset, workers, &|| ()).unwrap();
-    assert_eq!(verified.episodes, 3);
-    assert_eq!(dataset.episodes().unwrap()[1].outcome, report.outcomes[1]);
+    assert_eq!(verify(&dataset, workers, &|| ()).unwrap().episodes, 2);
 }

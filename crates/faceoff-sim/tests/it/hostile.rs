@@ -2,7 +2,7 @@
 //! stay finite, and if the world diverges it is their fault.
 
 use faceoff_sim::{
-    Command, Episode, Game, GameSetup, Interpolation, JOINTS, PerturbationSettings, Plant,
+    Bounds, Command, Episode, Game, GameSetup, Interpolation, JOINTS, PerturbationSettings, Plant,
     RallyEnd, stream::Stream,
 };
 use faceoff_types::{ACTION_LIMIT, EpisodeEnd, Factors, Seed, Task};
@@ -23,9 +23,11 @@ enum Habit {
     Drawn,
     /// Twenty steps of rest, then one blow, and so on.
     Blows,
+    /// Always the way that the joint turns already.
+    Pumping,
 }
 
-const HABITS: [Habit; 8] = [
+const HABITS: [Habit; 9] = [
     Habit::Constant,
     Habit::Swinging,
     Habit::Chequered,
@@ -34,6 +36,7 @@ const HABITS: [Habit; 8] = [
     Habit::OneRow(2),
     Habit::Drawn,
     Habit::Blows,
+    Habit::Pumping,
 ];
 
 /// All that `ready` may say.
@@ -47,9 +50,10 @@ fn action(
     size: f64,
     interpolation: Interpolation,
     step: u32,
-    q: &[f64],
+    observation: &[f64],
     stream: &mut Stream,
 ) -> Vec<f64> {
+    let (q, dq) = (&observation[6..13], &observation[13..20]);
     let held: [f64; JOINTS] = std::array::from_fn(|i| q[i]);
     let held = interpolation.held(&held);
     let alternating = |n: usize| if n.is_multiple_of(2) { size } else { -size };
@@ -68,6 +72,7 @@ fn action(
                 }
                 Habit::Blows if step % 21 == 20 => alternating(i),
                 Habit::Blows => held[i],
+                Habit::Pumping => size.copysign(dq[i % JOINTS]),
             };
             assert!(number.abs() <= ACTION_LIMIT);
             number
@@ -81,6 +86,7 @@ fn assert_finite(what: &str, numbers: &[f64]) {
 
 /// Plays an episode; did its world diverge?
 fn diverges(
+    bounds: Bounds,
     plant: &Plant,
     task: Task,
     interpolation: Interpolation,
@@ -96,14 +102,15 @@ fn diverges(
         &settings,
         plant,
         seed.episode(task, 0),
-    );
+    )
+    .within(bounds);
     let what = format!("{task}, interpolation {interpolation}, {habit:?}, {size}");
     let mut stream = Stream::new(&seed, &what);
     loop {
         assert_finite(&what, episode.observation());
         let step = episode.steps();
-        let q = &episode.observation()[6..13].to_vec();
-        let action = action(habit, size, interpolation, step, q, &mut stream);
+        let seen = episode.observation();
+        let action = action(habit, size, interpolation, step, seen, &mut stream);
         let outcome = episode.step(&action);
         let state = episode.state();
         assert_finite(&what, episode.observation());
@@ -127,27 +134,40 @@ fn diverges(
     }
 }
 
+/// What an agent can bring about, so that the tests see what a diverging world does. The ruleset's own
+/// bounds are ten times as wide, and no command within the protocol's has been found that reaches them.
+const NARROW: Bounds = Bounds {
+    joint_rad_s: 100.0,
+    ..Bounds::WIDE
+};
+
 #[test]
 fn no_episode_breaks_whatever_is_commanded() {
-    let (mut diverged, mut played) = (0, 0);
     let settings = PerturbationSettings::default();
     let mismatch_seed = Seed::from_number(11).model_mismatch();
     let plant = Plant::under(Factors::ALL, &settings, mismatch_seed);
-    for task in Task::ALL {
-        for interpolation in interpolations() {
-            for habit in HABITS {
-                for size in [ACTION_LIMIT, 30.0] {
-                    match diverges(&plant, task, interpolation, habit, size) {
-                        true => diverged += 1,
-                        false => played += 1,
+    let count = |bounds: Bounds| {
+        let (mut diverged, mut played) = (0, 0);
+        for task in Task::ALL {
+            for interpolation in interpolations() {
+                for habit in HABITS {
+                    for size in [ACTION_LIMIT, 30.0] {
+                        if diverges(bounds, &plant, task, interpolation, habit, size) {
+                            diverged += 1;
+                        } else {
+                            played += 1;
+                        }
                     }
                 }
             }
         }
-    }
-    println!("{diverged} worlds diverged, {played} did not");
+        println!("{bounds:?}: {diverged} worlds diverged, {played} did not");
+        (diverged, played)
+    };
+    let (diverged, played) = count(NARROW);
     // Both happen, or the test says nothing.
     assert!(diverged > 0 && played > 0);
+    assert!(count(Bounds::WIDE).1 > played);
 }
 
 #[test]
@@ -165,16 +185,17 @@ fn in_a_game_the_robot_that_first_left_its_bounds_is_to_blame() {
                     plant: plant.clone(),
                     settings: settings.clone(),
                     seed,
-                });
+                })
+                .within(NARROW);
                 let what = format!("interpolation {interpolation}, {habit:?}, robot {hostile}");
                 let mut stream = Stream::new(&seed, &what);
                 for step in 0..60 {
                     let actions = [0, 1].map(|robot| {
-                        let q = &game.observation(robot)[6..13];
+                        let seen = game.observation(robot);
                         if robot == hostile {
-                            action(habit, ACTION_LIMIT, interpolation, step, q, &mut stream)
+                            action(habit, ACTION_LIMIT, interpolation, step, seen, &mut stream)
                         } else {
-                            let q: [f64; JOINTS] = std::array::from_fn(|i| q[i]);
+                            let q: [f64; JOINTS] = std::array::from_fn(|i| seen[6 + i]);
                             interpolation.held(&q)[..interpolation.len()].to_vec()
                         }
                     });
@@ -207,16 +228,17 @@ fn a_diverged_world_stands_still() {
         &settings,
         &Plant::nominal(),
         seed,
-    );
+    )
+    .within(NARROW);
     let mut stream = Stream::new(&seed, "unused");
     let mut push = |episode: &mut Episode| {
-        let q = episode.state().q;
+        let seen = episode.observation();
         let action = action(
-            Habit::Constant,
+            Habit::Pumping,
             ACTION_LIMIT,
             interpolation,
             0,
-            &q,
+            seen,
             &mut stream,
         );
         episode.step(&action)
@@ -226,6 +248,7 @@ fn a_diverged_world_stands_still() {
         push(&mut episode);
     }
     let (state, divergence) = (episode.state(), episode.divergence());
+    assert!(state.dq.iter().all(|dq| dq.abs() <= NARROW.joint_rad_s));
     push(&mut episode);
     assert_eq!((episode.state(), episode.divergence()), (state, divergence));
 }

@@ -19,7 +19,7 @@ impl Fixture {
                         shard,
                         bundle,
                         seeds,
-                        platform_retries: 0,
+                        ..
                     },
             }) => {
                 assert_eq!(bundle, crate::fixture::bundle());

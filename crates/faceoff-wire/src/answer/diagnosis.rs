@@ -8,6 +8,9 @@ use serde_json::Value;
 /// Characters of a repeated key that are shown.
 const QUOTED_KEY_CHARS: usize = 60;
 
+/// Characters of the parser's words that are kept, but for the place that they end with.
+const DETAIL_CHARS: usize = 200;
+
 /// The fault of a line longer than the protocol allows.
 #[must_use]
 pub const fn too_long() -> AgentFaultKind {
@@ -44,7 +47,9 @@ pub(super) fn diagnose(
     }
     // A line is line 1 of itself: the column alone helps.
     let detail = message.replace(" at line 1 column ", " at character ");
-    AgentFaultKind::NotJson { detail }
+    AgentFaultKind::NotJson {
+        detail: cut(&detail),
+    }
 }
 
 /// The fault of an object with a repeated key.
@@ -52,6 +57,17 @@ pub(super) fn twice(key: &str) -> AgentFaultKind {
     let key: String = key.chars().take(QUOTED_KEY_CHARS).collect();
     AgentFaultKind::NotJson {
         detail: format!("the key {key:?} is given twice"),
+    }
+}
+
+/// The parser quotes what it did not expect, which may be all of a line.
+fn cut(detail: &str) -> String {
+    match detail.char_indices().nth(DETAIL_CHARS) {
+        None => detail.to_owned(),
+        Some((end, _)) => {
+            let place = detail.rfind(" at character ").unwrap_or(end).max(end);
+            format!("{}…{}", &detail[..end], &detail[place..])
+        }
     }
 }
 

@@ -218,6 +218,12 @@ fn rubbish_is_not_json() {
     not_json("{'type':'act'}", "key must be a string");
     not_json("{\"type\":NaNsense}", "at character 9");
     not_json("loss: NaN", "at character 1");
+    let long = format!("\"{}\"", "é".repeat(20_000));
+    not_json(&long, "… at character 40002");
+    let Err(AgentFaultKind::NotJson { detail }) = parse(&long) else {
+        panic!("it is no object");
+    };
+    assert!(detail.chars().count() < 260, "{detail}");
     let mut action = Vec::new();
     let fault =
         parse_act(b"{\"type\":\"\xff\"}", 0, Interpolation::Cubic, &mut action).unwrap_err();
