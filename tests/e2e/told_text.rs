@@ -220,6 +220,6 @@ fn what_agents_write_steers_no_terminal_and_turns_no_page() {
             &server.admin_token,
             &json!({ "name": name }),
         );
-        assert_eq!(answer.status(), 400, "{name:?}");
+        assert_eq!(answer.status(), 422, "{name:?}");
     }
 }
