@@ -142,7 +142,12 @@ fn lines_that_say_two_things_or_no_number_are_refused() {
 
 /// What agents do within the bounds from their second episode of `prepare` on, with the interpolation
 /// that they say.
-const WITHIN: [(&str, &str, &str); 6] = [
+const WITHIN: [(&str, &str, &str); 7] = [
+    (
+        "the-way-it-turns",
+        "None",
+        "[[[1e4 if v > 0 else -1e4 for v in message['obs'][13:20]]] * 3] * 20",
+    ),
     (
         "all-drives-at-their-limit",
         "None",
