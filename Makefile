@@ -5,16 +5,18 @@ EPISODES ?= 50
 SERVE    ?= 1
 LISTEN   ?= 127.0.0.1:8080
 DEMO_DIR ?= demo-data
+MINUTES  ?= 60
 
 CARGO      ?= cargo
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
 
-.PHONY: demo test steady lint format fidelity setup setup-test agents clean-demo help
+.PHONY: demo test fuzz steady lint format fidelity setup setup-test agents clean-demo help
 
 help:
 	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
 	@echo "make test   run everything that proves that it works"
+	@echo "make fuzz   feed the readers what is nearly valid: MINUTES=$(MINUTES)"
 	@echo "make steady run the tests ten times, and three times on a busy machine"
 	@echo "make lint   format check and lints"
 	@echo "make fidelity   draw how far the simulator is from the recordings"
@@ -53,6 +55,11 @@ test: setup-test
 	    else $(CARGO) test --locked --workspace --no-fail-fast -- --test-threads 2; fi
 	@# The golden hashes again, as the released program computes them: the same bits.
 	$(CARGO) test --release --locked --package faceoff-sim --test it golden
+
+# The fuzz targets, all at once for so many minutes; FUZZ_SEED=N for other inputs than last time.
+fuzz: setup-test
+	FUZZ_MINUTES=$(MINUTES) $(CARGO) test --release --locked --package faceoff-runner --test it fuzz:: \
+	    -- --nocapture --test-threads 4
 
 # No verdict may depend on how busy the machine is.
 steady:

@@ -10,7 +10,9 @@ mod kills;
 mod luck;
 mod privacy;
 mod real_time;
+mod told_text;
 mod upgrade;
+mod void_at_will;
 
 use faceoff_tests::{bundle, server::Server};
 use serde_json::{Value, json};

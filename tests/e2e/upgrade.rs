@@ -128,6 +128,7 @@ fn a_data_folder_of_the_first_release_continues_where_it_was_cut_off() {
         });
         assert_eq!(finished["state"], "finished", "{name}: {finished:#}");
         assert_eq!(finished["result"]["tasks"]["hit"]["episodes"], 2, "{name}");
+        assert_eq!(finished["result"]["ruleset"], FIRST, "{name}");
     }
     let waiting = server.poll(
         &told.path("submissions", "submission Beta"),
@@ -172,12 +173,39 @@ fn a_data_folder_of_the_first_release_continues_where_it_was_cut_off() {
             scratch.path(),
         );
     }
+    // The first ruleset's board stays until there is a result of the next, and does not mix with it.
+    assert_board(&server, "/api/v1/board", FIRST, 2);
+    let started = server.post("/api/v1/days", &admin, &serde_json::json!({}));
+    assert!(started.status().is_success(), "starting a day");
+    let today = get(&server, "/api/v1/evaluations", &admin);
+    let mut begun = today.as_array().expect("a list").iter();
+    let beta = begun
+        .find(|evaluation| evaluation["team_name"] == "Beta")
+        .unwrap_or_else(|| panic!("Beta plays: {today:#}"));
+    let path = format!(
+        "/api/v1/evaluations/{}",
+        beta["id"].as_str().expect("it has an id")
+    );
+    let finished = server.poll(&path, &admin, |answer| answer["state"] == "finished");
+    assert_eq!(finished["result"]["ruleset"], "airhockey-2023.2");
     let board = get(&server, "/api/v1/board", &admin);
-    let teams: Vec<&Value> = board["rows"]
-        .as_array()
-        .expect("a board has rows")
-        .iter()
-        .map(|row| &row["team"])
-        .collect();
-    assert_eq!(teams.len(), 2, "Alpha and Epsilon have scores: {board:#}");
+    assert_eq!(board["ruleset"], "airhockey-2023.2");
+    for row in board["rows"].as_array().expect("a board has rows") {
+        assert_eq!(row["ruleset"], "airhockey-2023.2", "{board:#}");
+    }
+    let first = format!("/api/v1/board?ruleset={FIRST}");
+    assert_board(&server, &first, FIRST, 2);
+}
+
+const FIRST: &str = "airhockey-2023.1";
+
+fn assert_board(server: &Server, path: &str, ruleset: &str, rows: usize) {
+    let board = get(server, path, &server.admin_token);
+    assert_eq!(board["ruleset"], ruleset);
+    let shown = board["rows"].as_array().expect("a board has rows");
+    assert_eq!(shown.len(), rows, "{board:#}");
+    assert!(
+        shown.iter().all(|row| row["ruleset"] == ruleset),
+        "{board:#}"
+    );
 }

@@ -7,7 +7,7 @@ use faceoff_dataset::{Dataset, Recorder, ShardFolder, ShardReport, assemble};
 use faceoff_episode::{Answered, EpisodeStart, StepRow, StepSink};
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
 use faceoff_types::{
-    ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, RULESET, Seed, Task, Violations,
+    ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, Ruleset, Seed, Task, Violations,
 };
 use faceoff_wire::work::{EvaluationMeta, ShardSpec};
 use std::{hint::black_box, path::Path};
@@ -87,6 +87,8 @@ fn slice(criterion: &mut Criterion) {
     for task in Task::ALL {
         for start in (0..EPISODES).step_by(EPISODES_PER_SHARD as usize) {
             let spec = ShardSpec {
+                ruleset: Ruleset::CURRENT,
+                platform_retries: 0,
                 task,
                 episodes: start..start + EPISODES_PER_SHARD,
                 profile: Profile::Evaluation,
@@ -104,7 +106,7 @@ fn slice(criterion: &mut Criterion) {
         seed,
         mismatch_seed: seed,
         agent: "noise".to_owned(),
-        ruleset: RULESET.to_owned(),
+        ruleset: Ruleset::CURRENT,
     };
     let archive = dir.path().join("dataset.zip");
     let megabytes = assemble(&meta, &shards, &archive).unwrap().archive.bytes / 1_000_000;

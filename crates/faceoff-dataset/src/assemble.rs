@@ -14,7 +14,7 @@ use crate::{
     simulator::simulator_id,
     table::{ShardTable, join},
 };
-use faceoff_types::{EvaluationResult, RULESET, Task};
+use faceoff_types::{EvaluationResult, Task};
 use faceoff_wire::{
     dataset::{CalibrationFile, DATASET_SCHEMA, DatasetManifest, FileDigest, ShardCalibration},
     work::EvaluationMeta,
@@ -58,6 +58,7 @@ pub fn assemble(
     let episodes = check(meta, &shards)?;
     let calibration = calibration(&shards);
     let scored = score(
+        meta.ruleset,
         meta.profile,
         meta.seed,
         Layout::Four,
@@ -114,7 +115,7 @@ fn write(
     dataset.add(LOG_FILE, |out| write_log(shards, out))?;
     let manifest = DatasetManifest {
         schema: DATASET_SCHEMA.to_owned(),
-        ruleset: meta.ruleset.clone(),
+        ruleset: meta.ruleset.to_string(),
         simulator: simulator_id().clone(),
         profile: meta.profile,
         seed: meta.seed,
@@ -134,12 +135,6 @@ fn check(
     shards: &[ShardRecording],
 ) -> Result<BTreeMap<Task, u32>, RecordingError> {
     let wrong = |what: String| Err(RecordingError::Unusable(what));
-    if meta.ruleset != RULESET {
-        return wrong(format!(
-            "the evaluation was played by {}, this version scores {RULESET}",
-            meta.ruleset
-        ));
-    }
     let mut episodes = BTreeMap::new();
     for ShardRecording { spec, report, .. } in shards {
         let name = format!(
@@ -150,6 +145,12 @@ fn check(
             != (meta.profile, meta.seed, meta.mismatch_seed)
         {
             return wrong(format!("shard {name} belongs to another evaluation"));
+        }
+        if spec.ruleset != meta.ruleset {
+            return wrong(format!(
+                "shard {name} was played by {}, the evaluation by {}",
+                spec.ruleset, meta.ruleset
+            ));
         }
         if report.stopped_by_faults {
             return wrong(format!(

@@ -14,7 +14,8 @@ use arrow_array::{
 use faceoff_episode::Answered;
 use faceoff_scoring::StepTimes;
 use faceoff_types::{
-    ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationResult, Profile, Seed, SlotTiming, Task,
+    ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationResult, Profile, Ruleset, Seed,
+    SlotTiming, Task,
 };
 use faceoff_wire::dataset::{
     ConstraintViolation, SlowEpisode, SlowStep, TaskViolations, ViolationsFile,
@@ -182,6 +183,7 @@ pub(crate) struct Scored {
 
 /// Scores an evaluation; `violations.json` names the layout.
 pub(crate) fn score(
+    ruleset: Ruleset,
     profile: Profile,
     seed: Seed,
     layout: Layout,
@@ -214,7 +216,7 @@ pub(crate) fn score(
             },
         );
     }
-    let mut result = faceoff_scoring::score_evaluation(profile, seed, tasks);
+    let mut result = faceoff_scoring::score_evaluation(ruleset, profile, seed, tasks);
     result.timing = timing;
     Scored { result, violations }
 }

@@ -6,7 +6,7 @@ use crate::{
     simulator::simulator_id,
     table::ShardTable,
 };
-use faceoff_types::RULESET;
+use faceoff_types::Ruleset;
 use faceoff_wire::{
     dataset::{FileDigest, SimulatorId},
     work::ShardSpec,
@@ -36,7 +36,7 @@ const FILES: [&str; 4] = [STEPS_FILE, EPISODES_FILE, LOG_FILE, REPORT_FILE];
 #[derive(Debug, Serialize, Deserialize)]
 struct ShardFile {
     schema: String,
-    ruleset: String,
+    ruleset: Ruleset,
     simulator: SimulatorId,
     spec: ShardSpec,
     files: BTreeMap<String, FileDigest>,
@@ -88,7 +88,7 @@ impl ShardFolder {
         }
         let shard = ShardFile {
             schema: SHARD_SCHEMA.to_owned(),
-            ruleset: RULESET.to_owned(),
+            ruleset: spec.ruleset,
             simulator: simulator_id().clone(),
             spec: spec.clone(),
             files,
@@ -147,10 +147,10 @@ impl ShardRecording {
                 )));
             }
         };
-        if shard.ruleset != RULESET {
+        if shard.ruleset != shard.spec.ruleset {
             return Err(damaged(format!(
-                "it was played by {}, this version scores {RULESET}",
-                shard.ruleset
+                "it says {} and {}",
+                shard.ruleset, shard.spec.ruleset
             )));
         }
         if &shard.simulator != simulator_id() {

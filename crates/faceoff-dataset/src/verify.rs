@@ -23,7 +23,7 @@ use crate::{
     score::{Scored, Tally, json_file, score},
     simulator::simulator_id,
 };
-use faceoff_types::{EvaluationResult, RULESET, Task};
+use faceoff_types::{EvaluationResult, Ruleset, Task, UnknownRuleset};
 use feed::{Feed, Recorded};
 use rayon::{
     ThreadPoolBuilder,
@@ -58,10 +58,10 @@ pub fn verify(
     workers: NonZero<usize>,
     progress: &(dyn Fn() + Sync),
 ) -> Result<Verified, VerifyError> {
-    made_here(dataset)?;
+    let ruleset = made_here(dataset)?;
     let mut feed = Feed::open(dataset)?;
     let mut totals = Totals::new(dataset, feed.steps_of_tasks());
-    let replay = Replay::new(dataset.manifest());
+    let replay = Replay::new(ruleset, dataset.manifest());
     let pool = ThreadPoolBuilder::new()
         .num_threads(workers.get())
         .thread_name(|index| format!("verify-{index}"))
@@ -91,18 +91,16 @@ pub fn verify(
         }
         episodes.then
     })?;
-    totals.finish(dataset)
+    totals.finish(ruleset, dataset)
 }
 
 /// Only the same rules and the same simulator can make the states again.
-fn made_here(dataset: &Dataset) -> Result<(), DatasetError> {
+fn made_here(dataset: &Dataset) -> Result<Ruleset, DatasetError> {
     let (manifest, here) = (dataset.manifest(), simulator_id());
-    if manifest.ruleset != RULESET {
-        return Err(DatasetError::Foreign(format!(
-            "the dataset was played by ruleset {:?}, this version knows {RULESET:?}",
-            manifest.ruleset
-        )));
-    }
+    let ruleset = manifest
+        .ruleset
+        .parse()
+        .map_err(|unknown: UnknownRuleset| DatasetError::Foreign(unknown.to_string()))?;
     if &manifest.simulator != here {
         return Err(DatasetError::Foreign(format!(
             "the dataset was simulated by version {} (fingerprint {}), this is version {} \
@@ -113,7 +111,7 @@ fn made_here(dataset: &Dataset) -> Result<(), DatasetError> {
             here.fingerprint
         )));
     }
-    Ok(())
+    Ok(ruleset)
 }
 
 /// What the episodes add up to, in order of play.
@@ -151,7 +149,7 @@ impl Totals {
     }
 
     /// Scores again.
-    fn finish(self, dataset: &Dataset) -> Result<Verified, VerifyError> {
+    fn finish(self, ruleset: Ruleset, dataset: &Dataset) -> Result<Verified, VerifyError> {
         let manifest = dataset.manifest();
         let timing = dataset.calibration()?.worst();
         let counted = timing.map_or(0, |timing| timing.host_noise_reruns);
@@ -168,8 +166,14 @@ impl Totals {
             .into());
         }
         let (profile, seed) = (manifest.profile, manifest.seed);
-        let Scored { result, violations } =
-            score(profile, seed, dataset.layout(), self.played, timing);
+        let Scored { result, violations } = score(
+            ruleset,
+            profile,
+            seed,
+            dataset.layout(),
+            self.played,
+            timing,
+        );
         for (name, expected) in [
             (VIOLATIONS_FILE, json_file(&violations)),
             (RESULTS_FILE, json_file(&result)),

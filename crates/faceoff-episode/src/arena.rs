@@ -1,10 +1,11 @@
-use faceoff_sim::{Episode, PerturbationSettings, Plant};
-use faceoff_types::{Factors, Interpolation, Profile, Seed, Task};
+use faceoff_sim::{Bounds, Episode, PerturbationSettings, Plant};
+use faceoff_types::{Factors, Interpolation, Profile, Ruleset, Seed, Task};
 
-/// What all episodes of an evaluation share: the perturbations, the season's plant and the seed that
-/// theirs derive from.
+/// What all episodes of an evaluation share: the rules, the perturbations, the season's plant and the
+/// seed that theirs derive from.
 #[derive(Debug, Clone)]
 pub struct Arena {
+    bounds: Bounds,
     factors: Factors,
     settings: PerturbationSettings,
     plant: Plant,
@@ -12,16 +13,29 @@ pub struct Arena {
 }
 
 impl Arena {
-    /// With the ruleset's magnitudes. Draws the plant, which takes milliseconds: make one, play many.
+    /// By the current ruleset.
     #[must_use]
     pub fn new(profile: Profile, seed: Seed, mismatch_seed: Seed) -> Self {
+        Self::by(Ruleset::CURRENT, profile, seed, mismatch_seed)
+    }
+
+    /// With the ruleset's magnitudes. Draws the plant, which takes milliseconds: make one, play many.
+    #[must_use]
+    pub fn by(ruleset: Ruleset, profile: Profile, seed: Seed, mismatch_seed: Seed) -> Self {
         let (factors, settings) = (profile.factors(), PerturbationSettings::default());
         Self {
+            bounds: Bounds::of(ruleset),
             plant: Plant::under(factors, &settings, mismatch_seed),
             factors,
             settings,
             seed,
         }
+    }
+
+    /// The same within other bounds than the ruleset's.
+    #[must_use]
+    pub fn within(self, bounds: Bounds) -> Self {
+        Self { bounds, ..self }
     }
 
     /// An episode's own seed; `index` counts within the evaluation.
@@ -40,5 +54,6 @@ impl Arena {
             &self.plant,
             self.seed(task, index),
         )
+        .within(self.bounds)
     }
 }

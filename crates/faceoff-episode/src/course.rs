@@ -13,7 +13,7 @@ use faceoff_types::{
 ///
 /// ```
 /// # use faceoff_episode::{Answered, Arena, Course, Nowhere};
-/// # use faceoff_types::{Interpolation, Profile, Seed, Task};
+/// # use faceoff_types::{Interpolation, Phase, Profile, Seed, Task};
 /// # let seed = Seed::from_number(1);
 /// let arena = Arena::new(Profile::Ideal, seed, seed.model_mismatch());
 /// let mut course = Course::begin(&arena, Task::Hit, 0, Some(Interpolation::Linear), Nowhere);
@@ -24,8 +24,10 @@ use faceoff_types::{
 ///         host_time_s: 0.0,
 ///         cpu_time_s: None,
 ///     };
-///     if let Some(outcome) = course.answer(&joint_positions, answered) {
-///         break outcome;
+///     match course.answer(&joint_positions, answered) {
+///         Ok(None) => {}
+///         Ok(Some(outcome)) => break outcome,
+///         Err(fault) => break course.failed(Phase::Step, fault, None),
 ///     }
 /// };
 /// assert!(outcome.steps <= 500);
@@ -42,6 +44,8 @@ pub struct Course<S> {
     world: Episode,
     times: TimeSum,
     end: Option<EpisodeEnd>,
+    /// The agent's last answer made the world diverge.
+    diverged: Option<AgentFaultKind>,
     sink: S,
 }
 
@@ -54,17 +58,15 @@ pub struct Question<'a> {
     pub observation: &'a [f64],
 }
 
-/// The simulator left what is finite. No agent can be asked then: JSON would say null, and the agent
+/// The initial state is not finite. No agent can be asked then: JSON would say null, and the agent
 /// would be blamed for what it makes of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the simulator's observation of {task}, episode {episode}, step {step} is not finite")]
+#[error("the simulator's first observation of {task}, episode {episode} is not finite")]
 pub struct NotFinite {
-    /// What was being played.
+    /// What was to be played.
     pub task: Task,
     /// Index within the evaluation.
     pub episode: u32,
-    /// The control step whose observation it is, from 0.
-    pub step: u32,
 }
 
 impl<S: StepSink> Course<S> {
@@ -91,6 +93,7 @@ impl<S: StepSink> Course<S> {
             world,
             times: TimeSum::default(),
             end: None,
+            diverged: None,
             sink,
         }
     }
@@ -107,11 +110,11 @@ impl<S: StepSink> Course<S> {
     /// The simulator failed: this is neither an end nor the agent's fault.
     pub fn question(&self) -> Result<Question<'_>, NotFinite> {
         let (step, observation) = (self.world.steps(), self.world.observation());
-        if !observation.iter().all(|value| value.is_finite()) {
+        // Later ones are finite: a world that diverges is the agent's fault.
+        if step == 0 && !are_finite(observation) {
             return Err(NotFinite {
                 task: self.task,
                 episode: self.episode,
-                step,
             });
         }
         Ok(Question { step, observation })
@@ -119,7 +122,15 @@ impl<S: StepSink> Course<S> {
 
     /// Plays one control step. `action` is row-major, of the interpolation's length, finite. The
     /// outcome comes with the episode's end, after which there must be no further answer.
-    pub fn answer(&mut self, action: &[f64], answered: Answered) -> Option<EpisodeOutcome> {
+    ///
+    /// # Errors
+    /// The answer made the world diverge: the agent's fault, and the episode's end. The step is told to
+    /// the sink like any other, so that playing the same answers again leads there again.
+    pub fn answer(
+        &mut self,
+        action: &[f64],
+        answered: Answered,
+    ) -> Result<Option<EpisodeOutcome>, AgentFaultKind> {
         debug_assert_eq!(self.end, None, "the episode has ended");
         let step = self.world.steps();
         self.sink.observe(self.world.observation());
@@ -133,9 +144,22 @@ impl<S: StepSink> Course<S> {
             constraints: outcome.constraints,
             next_observation: self.world.observation(),
         });
+        let detail = match self.world.divergence() {
+            Some(divergence) => Some(divergence.what.to_string()),
+            None if !are_finite(self.world.observation()) => {
+                Some("an observation is not finite".to_owned())
+            }
+            None => None,
+        };
+        if let Some(detail) = detail {
+            self.end = Some(EpisodeEnd::AgentFault);
+            let fault = AgentFaultKind::Diverged { detail };
+            self.diverged = Some(fault.clone());
+            return Err(fault);
+        }
         let horizon = (self.steps() >= self.max_steps).then_some(EpisodeEnd::Horizon);
         self.end = outcome.end.or(horizon);
-        self.end.map(|end| self.outcome(end, None))
+        Ok(self.end.map(|end| self.outcome(end, None)))
     }
 
     /// The outcome after the agent's fault, which came when it was asked for `phase`.
@@ -149,7 +173,7 @@ impl<S: StepSink> Course<S> {
             fault,
             contest: Contest::Task(self.task),
             episode: (phase != Phase::StartUp).then_some(self.episode),
-            step: (phase == Phase::Step).then(|| self.steps()),
+            step: (phase == Phase::Step).then(|| self.faulty_step()),
             line,
         };
         self.outcome(EpisodeEnd::AgentFault, Some(fault))
@@ -165,18 +189,33 @@ impl<S: StepSink> Course<S> {
             ..
         } = fault;
         let in_time = match (episode, step) {
-            (Some(episode), Some(step)) => episode == self.episode && step == self.steps(),
+            (Some(episode), Some(step)) => episode == self.episode && step == self.faulty_step(),
             (Some(episode), None) => episode == self.episode && self.steps() == 0,
             (None, None) => self.steps() == 0,
             (None, Some(_)) => false,
         };
-        let possible = self.end.is_none() && contest == Contest::Task(self.task) && in_time;
+        // Whether the world diverged is seen here; nobody needs to tell.
+        let agrees = match &self.diverged {
+            Some(diverged) => fault.fault == *diverged,
+            None => self.end.is_none() && !matches!(fault.fault, AgentFaultKind::Diverged { .. }),
+        };
+        let possible = agrees && contest == Contest::Task(self.task) && in_time;
         possible.then(|| self.outcome(EpisodeEnd::AgentFault, Some(fault)))
     }
 
-    /// How the episode ended, unless by a fault; `None` while it is under way.
+    /// The step of a fault: the one whose answer is due, or whose answer made the world diverge.
+    fn faulty_step(&self) -> u32 {
+        self.steps() - u32::from(self.diverged.is_some())
+    }
+
+    /// How the episode ended, unless by a fault that the driver tells of; `None` while it is under way.
     pub const fn end(&self) -> Option<EpisodeEnd> {
         self.end
+    }
+
+    /// The fault, if the last answer made the world diverge.
+    pub const fn diverged(&self) -> Option<&AgentFaultKind> {
+        self.diverged.as_ref()
     }
 
     /// Control steps played.
@@ -201,4 +240,8 @@ impl<S: StepSink> Course<S> {
             fault,
         }
     }
+}
+
+fn are_finite(observation: &[f64]) -> bool {
+    observation.iter().all(|value| value.is_finite())
 }

@@ -18,7 +18,7 @@ use faceoff_runner::{
     AgentEnvironment, Observer, Session, ShardSpec, TimeLimits, bundle::Bundle, run_shard,
 };
 use faceoff_sandbox::{Isolation, Limits, Runtime, affinity};
-use faceoff_types::{EpisodeOutcome, Interpolation, Profile, Seed, Task};
+use faceoff_types::{EpisodeOutcome, Interpolation, Profile, Ruleset, Seed, Task};
 use faceoff_wire::{Manifest, Message};
 use std::{
     collections::BTreeMap,
@@ -293,6 +293,8 @@ fn steps(criterion: &mut Criterion) {
     });
     let out = tempfile::tempdir().unwrap();
     let spec = ShardSpec {
+        ruleset: Ruleset::CURRENT,
+        platform_retries: 0,
         task: Task::Hit,
         episodes: 0..20,
         profile: Profile::Evaluation,

@@ -117,12 +117,35 @@ pub fn copy(folder: &Path, into: &Path, limits: &BundleLimits) -> Result<Bundle,
 
 fn open_dir(path: &Path) -> Result<Bundle, BundleError> {
     let dir = fs_err::canonicalize(path)?;
-    let file = File::open(dir.join(MANIFEST_NAME)).map_err(|error| match error.kind() {
+    let place = dir.join(MANIFEST_NAME);
+    let teams_own = |error: io::Error| match error.kind() {
         io::ErrorKind::NotFound => no_manifest(),
+        io::ErrorKind::PermissionDenied => {
+            BundleError::Invalid(format!("{MANIFEST_NAME} cannot be read: permission denied"))
+        }
         _ => error.into(),
-    })?;
+    };
+    // Looked at before it is opened: opening a pipe waits for somebody to write.
+    let kind = fs_err::symlink_metadata(&place)
+        .map_err(teams_own)?
+        .file_type();
+    if !kind.is_file() {
+        let kind = if kind.is_dir() {
+            "a folder"
+        } else if kind.is_symlink() {
+            "a link"
+        } else {
+            "a device, pipe or socket"
+        };
+        return Err(BundleError::Invalid(format!(
+            "{MANIFEST_NAME} is {kind}: expected a file"
+        )));
+    }
     let mut bytes = Vec::new();
-    file.take(MANIFEST_MAX_BYTES + 1).read_to_end(&mut bytes)?;
+    File::open(&place)
+        .map_err(teams_own)?
+        .take(MANIFEST_MAX_BYTES + 1)
+        .read_to_end(&mut bytes)?;
     let text = String::from_utf8(bytes)
         .map_err(|_| BundleError::Invalid(format!("{MANIFEST_NAME}: not UTF-8")))?;
     let manifest =

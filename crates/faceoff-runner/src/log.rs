@@ -1,4 +1,7 @@
-/// The end of what an agent's processes wrote to standard error, one after the other.
+use faceoff_types::harmless;
+
+/// The end of what an agent's processes wrote to standard error, one after the other, harmless to
+/// whoever looks at it.
 #[derive(Debug)]
 pub(crate) struct Log {
     text: String,
@@ -16,13 +19,13 @@ impl Log {
 
     /// Adds what one process wrote, and why it ended, if that was a fault.
     pub fn add(&mut self, stderr: &str, fault: Option<&str>) {
-        self.text.push_str(stderr);
+        self.text.push_str(&harmless(stderr));
         if !self.text.is_empty() && !self.text.ends_with('\n') {
             self.text.push('\n');
         }
         if let Some(fault) = fault {
             self.text.push_str("[faceoff] ");
-            self.text.push_str(fault);
+            self.text.push_str(&harmless(fault));
             self.text.push('\n');
         }
         if self.text.len() > self.limit_bytes {
@@ -57,6 +60,9 @@ mod tests {
             "{:?}",
             log.text
         );
+        let mut log = Log::new(100);
+        log.add("\u{1b}[2J", Some("got \u{202e}"));
+        assert_eq!(log.text, "\\u001b[2J\n[faceoff] got \\u202e\n");
         let mut log = Log::new(2);
         log.add("éé", None);
         assert_eq!(log.text, "\n");

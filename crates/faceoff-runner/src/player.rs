@@ -258,7 +258,7 @@ impl<'a> Player<'a> {
             let Question { step, observation } = course.question()?;
             let answered = session.step(step, observation)?;
             self.longest_stall_s = self.longest_stall_s.max(answered.host_time_s);
-            if let Some(outcome) = course.answer(session.action(), answered) {
+            if let Some(outcome) = course.answer(session.action(), answered)? {
                 return Ok(outcome);
             }
             budget.spend(answered.computation_time_s)?;

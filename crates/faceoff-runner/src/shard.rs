@@ -62,7 +62,7 @@ pub fn run_shard_watched(
         env,
         spec.task,
         spec.episodes.end.saturating_sub(spec.episodes.start),
-        Arena::new(spec.profile, spec.seed, spec.mismatch_seed),
+        Arena::by(spec.ruleset, spec.profile, spec.seed, spec.mismatch_seed),
         watch,
     );
     let played = play(spec, &mut player, &mut recorder, observer, &mut calibration);
@@ -73,7 +73,7 @@ pub fn run_shard_watched(
             return Err(fault);
         }
     };
-    let timing = calibration.finish(&player);
+    let timing = calibration.finish(&player, spec.platform_retries);
     let log = player.close()?;
     observer.log(&log);
     let report = ShardReport {
@@ -139,12 +139,13 @@ impl Calibration {
         self.agent.measure(calibration::BETWEEN, &mut self.during_s)
     }
 
-    fn finish(mut self, player: &Player<'_>) -> SlotTiming {
+    fn finish(mut self, player: &Player<'_>, platform_retries: u32) -> SlotTiming {
         SlotTiming {
             before_s: calibration::summarise(&mut self.before_s),
             during_s: calibration::summarise(&mut self.during_s),
             longest_stall_s: player.longest_stall_s(),
             host_noise_reruns: player.host_noise_reruns(),
+            platform_retries,
         }
     }
 }

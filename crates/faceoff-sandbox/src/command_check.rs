@@ -1,15 +1,19 @@
 //! Looks at the bundle's command before anything is started, so that the usual mistakes get a clear word.
 
 use faceoff_types::AgentFaultKind;
-use std::{collections::BTreeMap, fs, os::unix::fs::PermissionsExt, path::Path};
+use rustix::{
+    fs::{FileType, Mode, OFlags, ResolveFlags, Stat, fstat, open, openat2},
+    io::Errno,
+};
+use std::{collections::BTreeMap, path::Path};
 
 /// Far below what the kernel takes (128 KiB and 2 MiB), so that it is never our command line that is too
 /// long.
 const MAX_WORD_BYTES: usize = 32 << 10;
 const MAX_TOTAL_BYTES: usize = 256 << 10;
 
-/// Refuses an empty command, what cannot be passed to a program, and a program of the bundle that is missing or not executable. A program
-/// of the runtime is looked up inside the sandbox only.
+/// Refuses an empty command, what cannot be passed to a program, and a program of the bundle that is
+/// missing or not executable. A program of the runtime is looked up inside the sandbox only.
 pub(crate) fn check_command(
     bundle_dir: &Path,
     command: &[String],
@@ -40,22 +44,136 @@ pub(crate) fn check_command(
         ));
     }
     let in_bundle = match program.strip_prefix("/agent/") {
-        Some(rest) => rest,
+        Some(rest) => rest.trim_start_matches('/'),
         None if program.starts_with('/') || !program.contains('/') => return Ok(()),
         None => program.as_str(),
     };
-    // Links are followed inside the sandbox, where they cannot leave the bundle.
-    let Ok(meta) = fs::symlink_metadata(bundle_dir.join(in_bundle)) else {
-        return refuse(format!("`{program}` is not in the bundle"));
+    if climbs_out(in_bundle) {
+        return refuse(format!("`{program}` leads out of the bundle"));
+    }
+    let found = match look_beneath(bundle_dir, in_bundle) {
+        Ok(found) => found,
+        Err(Errno::NOENT | Errno::NOTDIR | Errno::NAMETOOLONG) => {
+            return refuse(format!("`{program}` is not in the bundle"));
+        }
+        // A link leads out, or the kernel does not look for us: where the agent runs will tell.
+        Err(_) => return Ok(()),
     };
-    if meta.is_dir() {
-        return refuse(format!("`{program}` is a folder"));
-    }
-    if meta.is_file() && meta.permissions().mode() & 0o111 == 0 {
-        return refuse(format!(
+    match FileType::from_raw_mode(found.st_mode) {
+        FileType::Directory => refuse(format!("`{program}` is a folder")),
+        FileType::RegularFile if found.st_mode & 0o111 == 0 => refuse(format!(
             "`{program}` is not executable (mode {:o})",
-            meta.permissions().mode() & 0o777
-        ));
+            found.st_mode & 0o777
+        )),
+        _ => Ok(()),
     }
-    Ok(())
+}
+
+/// Does a relative path go above where it starts?
+fn climbs_out(path: &str) -> bool {
+    let mut depth = 0_usize;
+    for part in path.split('/').filter(|part| !matches!(*part, "" | ".")) {
+        match (part, depth) {
+            ("..", 0) => return true,
+            ("..", _) => depth -= 1,
+            _ => depth += 1,
+        }
+    }
+    false
+}
+
+/// What is at a path of the bundle. Never looks at anything outside of it, whatever its links say: that
+/// would tell an agent of the host's files. The last part is not followed if it is a link.
+fn look_beneath(bundle_dir: &Path, path: &str) -> Result<Stat, Errno> {
+    let folder = open(
+        bundle_dir,
+        OFlags::PATH | OFlags::DIRECTORY | OFlags::CLOEXEC,
+        Mode::empty(),
+    )?;
+    let found = openat2(
+        folder,
+        path,
+        OFlags::PATH | OFlags::NOFOLLOW | OFlags::CLOEXEC,
+        Mode::empty(),
+        ResolveFlags::BENEATH | ResolveFlags::NO_MAGICLINKS,
+    )?;
+    fstat(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::{
+        fs,
+        os::unix::fs::{PermissionsExt, symlink},
+    };
+
+    fn check(bundle_dir: &Path, program: &str) -> Option<String> {
+        match check_command(bundle_dir, &[program.to_owned()], &BTreeMap::new()) {
+            Ok(()) => None,
+            Err(AgentFaultKind::CannotStart { detail }) => Some(detail),
+            Err(other) => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn nothing_is_told_of_what_is_outside_of_the_bundle() {
+        let host = tempfile::tempdir().unwrap();
+        let bundle = host.path().join("bundle");
+        fs::create_dir_all(bundle.join("bin")).unwrap();
+        fs::write(bundle.join("agent"), "").unwrap();
+        // One that exists, not executable and of a telling mode, and one that does not.
+        fs::write(host.path().join("secret"), "").unwrap();
+        fs::set_permissions(
+            host.path().join("secret"),
+            fs::Permissions::from_mode(0o640),
+        )
+        .unwrap();
+        symlink("..", bundle.join("up")).unwrap();
+        symlink(host.path(), bundle.join("host")).unwrap();
+        symlink("../secret", bundle.join("link")).unwrap();
+        for place in [
+            "../",
+            "./../",
+            "bin/../../",
+            "bin/./../.././",
+            "/agent/../",
+            "/agent//../",
+            "up/",
+            "bin/../up/",
+            "host/",
+            "/agent/host/",
+        ] {
+            let told = ["secret", "missing", "secret/x"].map(|name| {
+                let told = check(&bundle, &format!("{place}{name}"));
+                told.map(|told| told.replace(name, "NAME"))
+            });
+            assert_eq!(told[0], told[1], "{place}");
+            assert_eq!(told[0], told[2], "{place}");
+        }
+        let absolute = host.path().join("secret").display().to_string();
+        for program in [&*absolute, "/etc/shadow", "//agent/../etc/shadow", "./link"] {
+            assert_eq!(check(&bundle, program), None, "{program}");
+        }
+        let beneath = check(&bundle, &format!("/agent/{absolute}")).unwrap();
+        assert!(beneath.ends_with("is not in the bundle"), "{beneath}");
+        assert_eq!(
+            check(&bundle, "../secret").unwrap(),
+            "`../secret` leads out of the bundle"
+        );
+    }
+
+    #[test]
+    fn mistakes_inside_the_bundle_are_named() {
+        let bundle = tempfile::tempdir().unwrap();
+        fs::create_dir(bundle.path().join("bin")).unwrap();
+        fs::write(bundle.path().join("bin/agent"), "").unwrap();
+        let told = |program: &str| check(bundle.path(), program).unwrap();
+        assert!(told("./bin").ends_with("is a folder"));
+        assert!(told("bin/../bin/agent").ends_with("is not executable (mode 644)"));
+        assert!(told("bin/agent/x").ends_with("is not in the bundle"));
+        let agent = bundle.path().join("bin/agent");
+        fs::set_permissions(agent, fs::Permissions::from_mode(0o755)).unwrap();
+        assert_eq!(check(bundle.path(), "/agent/bin/agent"), None);
+    }
 }

@@ -1,4 +1,4 @@
-use faceoff_types::{EvaluationResult, Profile, RULESET, Seed, Task, TaskResult, Tier};
+use faceoff_types::{EvaluationResult, Profile, Ruleset, Seed, Task, TaskResult, Tier};
 use std::collections::BTreeMap;
 
 /// What a task's success rate weighs in the overall score, in percent.
@@ -31,12 +31,13 @@ pub fn overall_score(rates: impl IntoIterator<Item = (Task, f64)>) -> f64 {
 /// 0, no penalty, deployable.
 #[must_use]
 pub fn score_evaluation(
+    ruleset: Ruleset,
     profile: Profile,
     seed: Seed,
     tasks: BTreeMap<Task, TaskResult>,
 ) -> EvaluationResult {
     EvaluationResult {
-        ruleset: RULESET.to_owned(),
+        ruleset: ruleset.to_string(),
         profile,
         seed,
         score: overall_score(

@@ -2,7 +2,7 @@
 //!
 //! Everything here is a pure function of what it is given, so that a stored recording can be scored
 //! again without simulating, and anyone can check a published number. The rules are those of the
-//! ruleset [`faceoff_types::RULESET`]; `docs/rules.md` explains them.
+//! rulesets of [`faceoff_types::Ruleset`]; `docs/rules.md` explains them.
 //!
 //! This crate reads no file, no clock and no random numbers (the bootstrap of the tiers draws from a hash
 //! of what it is given), and it knows neither the simulator nor

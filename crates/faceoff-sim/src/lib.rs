@@ -39,4 +39,4 @@ pub use game::{Game, GameSetup, GameStep, referee::RallyEnd};
 pub use faceoff_types::{Interpolation, JOINTS, SUBSTEPS};
 pub use perturbation::settings::PerturbationSettings;
 pub use robot::plant::Plant;
-pub use world::{MalletState, World};
+pub use world::{Bounds, Divergence, MalletState, Runaway, World};

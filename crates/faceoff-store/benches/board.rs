@@ -5,8 +5,8 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use faceoff_store::Store;
 use faceoff_types::{
-    ComputationTimeSummary, EvaluationId, EvaluationResult, Profile, RULESET, RunId, Seed, ShardId,
-    SubmissionId, Task, TaskResult, TeamId, Tier, ViolationCounts,
+    ComputationTimeSummary, EvaluationId, EvaluationResult, Profile, RULESET, Ruleset, RunId, Seed,
+    ShardId, SubmissionId, Task, TaskResult, TeamId, Tier, ViolationCounts,
 };
 use jiff::{ToSpan, civil::date};
 use sqlx::{Connection, SqliteConnection};
@@ -159,11 +159,11 @@ fn board(criterion: &mut Criterion) {
         .unwrap()
         .len();
     eprintln!("the database: {} MB", bytes / 1_000_000);
-    let records = runtime.block_on(store.board()).unwrap();
+    let records = runtime.block_on(store.board(Ruleset::CURRENT)).unwrap();
     assert_eq!(records.len(), TEAMS);
     let runs: Vec<_> = records.iter().map(|record| record.run).collect();
     criterion.bench_function("board of 200 teams × 120 days", |bencher| {
-        bencher.iter(|| black_box(runtime.block_on(store.board()).unwrap()));
+        bencher.iter(|| black_box(runtime.block_on(store.board(Ruleset::CURRENT)).unwrap()));
     });
     criterion.bench_function("its episode summaries", |bencher| {
         bencher.iter(|| black_box(runtime.block_on(store.episode_summaries(&runs, 1)).unwrap()));

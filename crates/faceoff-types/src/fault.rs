@@ -28,6 +28,20 @@ pub enum AgentFaultKind {
     },
     /// NaN or an infinity, or a number beyond what `f64` holds.
     NonFinite,
+    /// A finite number that no action needs.
+    TooLarge {
+        /// Where, e.g. `action[1][3]`.
+        place: String,
+        /// What came.
+        value: f64,
+        /// The largest magnitude allowed.
+        limit: f64,
+    },
+    /// The commands drove the simulated world beyond what can be simulated.
+    Diverged {
+        /// What left its bounds, and which.
+        detail: String,
+    },
     /// A line longer than the protocol allows.
     LineTooLong {
         /// The limit in bytes.
@@ -86,6 +100,19 @@ impl fmt::Display for AgentFaultKind {
                 write!(f, "expected an action of shape {expected}, got {got}")
             }
             Self::NonFinite => f.write_str("the action holds a number that is not finite"),
+            Self::TooLarge {
+                place,
+                value,
+                limit,
+            } => write!(
+                f,
+                "{place} is {value:?}: expected numbers between -{limit} and {limit} (rad, rad/s, rad/s²)"
+            ),
+            Self::Diverged { detail } => write!(
+                f,
+                "the commands made the simulated world diverge: {detail}; command positions, \
+                 velocities and accelerations that the robot can follow"
+            ),
             Self::LineTooLong { limit_bytes } => {
                 write!(
                     f,
@@ -236,6 +263,24 @@ mod tests {
             assert_eq!(serde_json::to_string(&fault).unwrap(), stored);
             assert_eq!(serde_json::from_str::<AgentFault>(stored).unwrap(), fault);
             assert_eq!(fault.to_string(), shown);
+        }
+        for (kind, stored) in [
+            (
+                AgentFaultKind::TooLarge {
+                    place: "action[3]".into(),
+                    value: -1.7e308,
+                    limit: 1e4,
+                },
+                r#"{"kind":"too_large","place":"action[3]","value":-1.7e+308,"limit":10000.0}"#,
+            ),
+            (
+                AgentFaultKind::Diverged { detail: "x".into() },
+                r#"{"kind":"diverged","detail":"x"}"#,
+            ),
+        ] {
+            assert_eq!(serde_json::to_string(&kind).unwrap(), stored);
+            let read: AgentFaultKind = serde_json::from_str(stored).unwrap();
+            assert_eq!(read, kind);
         }
         for wrong in [
             r#"{"task":"tournament"}"#,

@@ -11,6 +11,7 @@ mod computation_time;
 mod constraint;
 mod contest;
 mod fault;
+mod harmless;
 mod ids;
 mod interpolation;
 mod limits;
@@ -33,13 +34,16 @@ pub use computation_time::ComputationTime;
 pub use constraint::{Constraint, Violations};
 pub use contest::{Contest, Side};
 pub use fault::{AgentFault, AgentFaultKind, Phase};
+pub use harmless::{harmless, is_harmless};
 pub use ids::{AblationId, EvaluationId, ParseIdError, RunId, ShardId, SubmissionId, TeamId};
 pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, UnknownInterpolation};
 pub use limits::{AgentLimits, BundleLimits, ResourceLimits, TimeLimits};
 pub use outcome::{EpisodeEnd, EpisodeOutcome};
 pub use profile::{Factor, Factors, ParseProfileError, Profile};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult, ViolationCounts};
-pub use ruleset::{FOULS_PER_POINT, GAME_WINDOWS, RULESET, WINDOW_STEPS};
+pub use ruleset::{
+    ACTION_LIMIT, FOULS_PER_POINT, GAME_WINDOWS, RULESET, Ruleset, UnknownRuleset, WINDOW_STEPS,
+};
 pub use seed::{ParseSeedError, Seed};
 pub use seed_label::{ParseSeedLabelError, SeedLabel};
 pub use smoke_outcome::{SmokeOutcome, SmokeTiming};

@@ -1,8 +1,75 @@
-/// Name of the rules and of the simulator behaviour that every published score refers to.
+use serde::{Deserialize, Serialize};
+use std::{fmt, str::FromStr};
+
+/// The rules and the simulator behaviour that a published score refers to.
 ///
 /// A change of behaviour (a constant of the simulator, the pinned contact finder, a bound of a tier)
-/// is a new ruleset.
-pub const RULESET: &str = "airhockey-2023.1";
+/// is a new ruleset. Recordings of earlier ones are verified, and runs under way finished, by their own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum Ruleset {
+    /// Numbers of an action are only finite, and a world may move however fast.
+    #[serde(rename = "airhockey-2023.1")]
+    First,
+    /// With the day's cut, the clock's start at the first attempt to write, bounded numbers, a bounded
+    /// world and time budgets.
+    #[serde(rename = "airhockey-2023.2")]
+    Second,
+}
+
+impl Ruleset {
+    /// All, the earlier first.
+    pub const ALL: [Self; 2] = [Self::First, Self::Second];
+
+    /// What new runs are played by.
+    pub const CURRENT: Self = Self::Second;
+
+    /// The name in files and tables.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::First => "airhockey-2023.1",
+            Self::Second => "airhockey-2023.2",
+        }
+    }
+
+    /// The largest magnitude of a number in a recorded action.
+    #[must_use]
+    pub const fn action_limit(self) -> f64 {
+        match self {
+            Self::First => f64::MAX,
+            Self::Second => ACTION_LIMIT,
+        }
+    }
+}
+
+impl fmt::Display for Ruleset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.as_str())
+    }
+}
+
+/// Rules that this version does not know.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("unknown ruleset {0:?}: this version knows {first} and {second}",
+        first = Ruleset::First, second = Ruleset::Second)]
+pub struct UnknownRuleset(pub String);
+
+impl FromStr for Ruleset {
+    type Err = UnknownRuleset;
+    fn from_str(name: &str) -> Result<Self, UnknownRuleset> {
+        Self::ALL
+            .into_iter()
+            .find(|ruleset| ruleset.as_str() == name)
+            .ok_or_else(|| UnknownRuleset(name.to_owned()))
+    }
+}
+
+/// Name of the current ruleset.
+pub const RULESET: &str = Ruleset::CURRENT.as_str();
+
+/// The largest magnitude of a number in an answer's action, whatever its unit: rad, rad/s or rad/s².
+/// No robot can follow commands near it, and nothing overflows that is computed of them.
+pub const ACTION_LIMIT: f64 = 1e4;
 
 /// Control steps of a window, the tournament's equivalent of an episode: the same violation counts once
 /// in each (paper §2.2).

@@ -1,3 +1,4 @@
+use crate::is_harmless;
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
@@ -48,7 +49,7 @@ impl FromStr for TeamName {
         }
         if let Some(bad) = s
             .chars()
-            .find(|c| !c.is_alphanumeric() && !" ._-".contains(*c))
+            .find(|c| !(c.is_alphanumeric() && is_harmless(*c)) && !" ._-".contains(*c))
         {
             return Err(InvalidTeamName::Character(bad));
         }
@@ -100,6 +101,12 @@ mod tests {
             "<b>".parse::<TeamName>(),
             Err(InvalidTeamName::Character('<'))
         );
+        for invisible in ['\u{202e}', '\u{200f}', '\u{3164}', '\u{1b}', '\u{9b}'] {
+            assert_eq!(
+                format!("a{invisible}b").parse::<TeamName>(),
+                Err(InvalidTeamName::Character(invisible))
+            );
+        }
         assert_eq!(" a".parse::<TeamName>(), Err(InvalidTeamName::Space));
     }
 }

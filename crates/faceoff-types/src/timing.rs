@@ -39,10 +39,18 @@ pub struct SlotTiming {
     pub longest_stall_s: f64,
     /// Tries of episodes that were dropped and played again because the host kept the agent from answering.
     pub host_noise_reruns: u32,
+    /// How often episodes were begun again from a shard's first because something of ours broke; absent
+    /// if never.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub platform_retries: u32,
+}
+
+const fn is_zero(count: &u32) -> bool {
+    *count == 0
 }
 
 impl SlotTiming {
-    /// The worse of two slots, value by value; re-runs add up.
+    /// The worse of two slots, value by value; re-runs and retries add up.
     #[must_use]
     pub fn worse(self, other: Self) -> Self {
         Self {
@@ -52,6 +60,7 @@ impl SlotTiming {
             host_noise_reruns: self
                 .host_noise_reruns
                 .saturating_add(other.host_noise_reruns),
+            platform_retries: self.platform_retries.saturating_add(other.platform_retries),
         }
     }
 }
@@ -73,6 +82,7 @@ mod tests {
             during_s,
             longest_stall_s,
             host_noise_reruns,
+            platform_retries: 2 * host_noise_reruns,
         };
         let worse = slot(trips(1.0, 9.0), trips(4.0, 5.0), 0.1, 1).worse(slot(
             trips(2.0, 3.0),

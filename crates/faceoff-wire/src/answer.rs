@@ -1,9 +1,9 @@
 //! What an agent answers, parsed strictly: `ready` and `act`.
 //!
 //! One pass over the line, without an intermediate tree: an action's numbers go straight into the
-//! caller's buffer. Only a line that is refused is looked at again, to say what was wrong with it.
-//! Unknown fields are skipped without recursion, and known fields refuse to nest, so that no line
-//! can exhaust the stack.
+//! caller's buffer. Looked at again is only a line that is refused, to say what was wrong with it, and
+//! one with fields that the protocol does not know, for keys given twice. Unknown fields are skipped
+//! without recursion, and known fields refuse to nest, so that no line can exhaust the stack.
 
 use crate::protocol::PROTOCOL_VERSION;
 use faceoff_types::{AgentFaultKind, Interpolation};
@@ -13,6 +13,7 @@ mod action;
 mod diagnosis;
 mod fields;
 mod marks;
+mod repeated_keys;
 mod scalar;
 
 pub use diagnosis::too_long;
@@ -75,12 +76,12 @@ pub fn parse_reset_ready(line: &[u8], episode: u32) -> Result<(), AgentFaultKind
 
 /// Parses the answer to `step` into `action`, row-major. The line comes without its newline.
 ///
-/// On success `action` holds exactly [`Interpolation::len`] finite numbers; after an
-/// error its content is meaningless.
+/// On success `action` holds exactly [`Interpolation::len`] numbers of at most
+/// [`ACTION_LIMIT`](faceoff_types::ACTION_LIMIT) in magnitude; after an error its content is meaningless.
 ///
 /// # Errors
 /// The agent's fault: not a JSON object, another message or step, another shape, a number that is
-/// not finite, a key given twice.
+/// not finite or too large, a key given twice, at any depth.
 pub fn parse_act(
     line: &[u8],
     step: u32,

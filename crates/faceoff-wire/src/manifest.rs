@@ -1,4 +1,4 @@
-use faceoff_types::Interpolation;
+use faceoff_types::{Interpolation, harmless, is_harmless};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -51,8 +51,10 @@ impl Manifest {
                 "longer than {MANIFEST_MAX_BYTES} bytes"
             )));
         }
-        let manifest: Self =
-            toml::from_str(text).map_err(|error| ManifestError::Toml(error.to_string()))?;
+        let manifest: Self = toml::from_str(text).map_err(|error| {
+            // It quotes the text.
+            ManifestError::Toml(harmless(&error.to_string()).into_owned())
+        })?;
         manifest.check()?;
         Ok(manifest)
     }
@@ -60,9 +62,10 @@ impl Manifest {
     fn check(&self) -> Result<(), ManifestError> {
         let chars = self.name.chars().count();
         require(
-            (1..=60).contains(&chars) && !self.name.chars().any(char::is_control),
+            (1..=60).contains(&chars) && self.name.chars().all(is_harmless),
             "name",
-            "must have 1 to 60 characters and no control characters",
+            "must have 1 to 60 characters, none that steers a terminal, is invisible or turns the \
+             writing direction",
         )?;
         require(
             !self.command.is_empty(),
@@ -113,7 +116,7 @@ impl Manifest {
             let name_ok = name.len() <= 128
                 && name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
                 && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_');
-            let key: String = format!("env.{name}").chars().take(80).collect();
+            let key: String = format!("env.{}", harmless(name)).chars().take(80).collect();
             require(
                 name_ok,
                 &key,
@@ -169,6 +172,12 @@ mod tests {
         for (from, to, needle) in [
             ("name = \"striker\"", "", "missing field `name`"),
             ("name = \"striker\"", "name = \"\"", "name must have"),
+            (
+                "name = \"striker\"",
+                "name = \"a\\u202eb\"",
+                "name must have",
+            ),
+            ("name = \"striker\"", "\u{202e}", "\\u202e"),
             (
                 "[\"python3\", \"agent.py\"]",
                 "[]",

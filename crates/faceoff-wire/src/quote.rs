@@ -1,12 +1,15 @@
+use faceoff_types::harmless;
+
 /// Characters of an offending line that are kept in a fault.
 const QUOTED_CHARS: usize = 400;
 
-/// An offending line as a fault shows it: lossy UTF-8, cut to 400 characters.
+/// An offending line as a fault shows it: lossy UTF-8, harmless, cut to 400 characters.
 #[must_use]
 pub fn quote_line(line: &[u8]) -> String {
     // Four bytes hold any character, so that a long line is not decoded as a whole.
     let head = &line[..line.len().min(4 * QUOTED_CHARS)];
     let text = String::from_utf8_lossy(head);
+    let text = harmless(&text);
     let mut quoted: String = text.chars().take(QUOTED_CHARS).collect();
     if quoted.len() < text.len() || head.len() < line.len() {
         quoted.push('…');
@@ -33,5 +36,6 @@ mod tests {
             400
         );
         assert_eq!(quote_line(&[0xff]), "\u{fffd}");
+        assert_eq!(quote_line(b"\x1b[2J"), "\\u001b[2J");
     }
 }

@@ -4,7 +4,7 @@
 //! derived from: whoever carries it out learns nothing of another day.
 
 use faceoff_types::{
-    AgentLimits, BundleRef, EpisodeOutcome, EvaluationId, EvaluationResult, Profile, Seed,
+    AgentLimits, BundleRef, EpisodeOutcome, EvaluationId, EvaluationResult, Profile, Ruleset, Seed,
     SmokeOutcome, SubmissionId, Task,
 };
 use jiff::Timestamp;
@@ -95,6 +95,9 @@ pub struct SmokeSpec {
 /// Which episodes to simulate, and how.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ShardSpec {
+    /// By which rules; recordings of the first do not say.
+    #[serde(default = "first_ruleset")]
+    pub ruleset: Ruleset,
     /// The task.
     pub task: Task,
     /// The episodes, by their index within the evaluation.
@@ -107,6 +110,9 @@ pub struct ShardSpec {
     pub mismatch_seed: Seed,
     /// More faults than this end the shard early.
     pub max_faults: u32,
+    /// How often these episodes were begun before and broken by us.
+    #[serde(default)]
+    pub platform_retries: u32,
 }
 
 /// What the dataset of an evaluation says about itself.
@@ -120,8 +126,12 @@ pub struct EvaluationMeta {
     pub mismatch_seed: Seed,
     /// The agent's name.
     pub agent: String,
-    /// The ruleset's name.
-    pub ruleset: String,
+    /// The rules it was played by.
+    pub ruleset: Ruleset,
+}
+
+const fn first_ruleset() -> Ruleset {
+    Ruleset::First
 }
 
 /// What came of an order. Faults of ours are not in it: those give the unit back.

@@ -5,7 +5,7 @@ use crate::server::{Claimed, GivenBack, Holding, QueueMark, WorkServer};
 use faceoff_store::{
     Claim, Claimed as Leased, Committed, RunOwner, ShardCommit, Store, StoreError, Work,
 };
-use faceoff_types::{AgentLimits, BundleRef, Clock, EvaluationResult, RULESET};
+use faceoff_types::{AgentLimits, BundleRef, Clock, EvaluationResult};
 use faceoff_wire::work::{
     AgentOrder, Assignment, EvaluationMeta, Lease, ShardSpec, SmokeSpec, WorkOrder, WorkReport,
 };
@@ -63,6 +63,7 @@ impl LocalServer {
                 shard,
                 bundle,
                 seeds,
+                platform_retries,
             } => Assignment::Play {
                 part_of: match owner {
                     RunOwner::Evaluation(id) => id.as_uuid(),
@@ -70,6 +71,8 @@ impl LocalServer {
                 },
                 agent: self.agent(bundle),
                 spec: ShardSpec {
+                    ruleset: run.ruleset,
+                    platform_retries,
                     task: shard.task,
                     episodes: shard.first_episode..shard.end_episode,
                     profile: run.plan.profile,
@@ -92,7 +95,7 @@ impl LocalServer {
                     seed: seeds.episodes,
                     mismatch_seed: seeds.mismatch,
                     agent: agent_name,
-                    ruleset: RULESET.to_owned(),
+                    ruleset: run.ruleset,
                 },
                 recordings,
                 dataset: format!("datasets/{evaluation}/{}.zip", claim.nonce),

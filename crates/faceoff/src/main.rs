@@ -1,5 +1,8 @@
 //! The `faceoff` binary: parses the command line and hands over to one file per subcommand.
 
+#[macro_use]
+mod terminal;
+
 mod client;
 mod commands;
 mod config;

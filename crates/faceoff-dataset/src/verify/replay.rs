@@ -12,11 +12,14 @@ use arrow_array::{
     types::{Float64Type, Int64Type},
 };
 use faceoff_episode::{Answered, Arena, Course, EpisodeStart, RecordError, StepRow, StepSink};
-use faceoff_types::{AgentFault, EpisodeOutcome, Interpolation};
+use faceoff_types::{ACTION_LIMIT, AgentFault, EpisodeOutcome, Interpolation, Ruleset};
 use faceoff_wire::dataset::DatasetManifest;
 
 /// What it takes to simulate the episodes of an evaluation again.
-pub(super) struct Replay(Arena);
+pub(super) struct Replay {
+    ruleset: Ruleset,
+    arena: Arena,
+}
 
 /// An episode that is what was recorded.
 pub(super) struct Replayed {
@@ -30,6 +33,7 @@ pub(super) struct Replayed {
 /// One episode being simulated again, with the recorded answers.
 struct Again<'a> {
     recorded: &'a Recorded,
+    ruleset: Ruleset,
     interpolation: Interpolation,
     course: Course<Rows>,
 }
@@ -78,12 +82,12 @@ struct Given {
 }
 
 impl Replay {
-    pub fn new(manifest: &DatasetManifest) -> Self {
-        Self(Arena::new(
-            manifest.profile,
-            manifest.seed,
-            manifest.mismatch_seed,
-        ))
+    pub fn new(ruleset: Ruleset, manifest: &DatasetManifest) -> Self {
+        let (profile, seed) = (manifest.profile, manifest.seed);
+        Self {
+            ruleset,
+            arena: Arena::by(ruleset, profile, seed, manifest.mismatch_seed),
+        }
     }
 
     /// Simulates an episode again and compares every number of it.
@@ -97,9 +101,10 @@ impl Replay {
         let (task, episode) = (recorded.task, recorded.episode);
         let mut again = Again {
             recorded,
+            ruleset: self.ruleset,
             // Without an agent there are no steps to interpolate.
             interpolation: given.interpolation.unwrap_or(Interpolation::Cubic),
-            course: Course::begin(&self.0, task, episode, given.interpolation, rows),
+            course: Course::begin(&self.arena, task, episode, given.interpolation, rows),
         };
         let mut ended = None;
         for piece in &recorded.steps {
@@ -144,7 +149,11 @@ impl Again<'_> {
         }
         let action = self.action(piece, row, step)?;
         let answered = self.answered(piece, row, step)?;
-        Ok(self.course.answer(action.values(), answered))
+        // That the world diverged is the course's to remember: the recorded fault must say so, too.
+        Ok(self
+            .course
+            .answer(action.values(), answered)
+            .unwrap_or_default())
     }
 
     /// The recorded action: it is the simulation's input, so it must be one.
@@ -156,7 +165,13 @@ impl Again<'_> {
     ) -> Result<Float64Array, Difference> {
         let actions: &ListArray = piece["action"].as_list();
         let wrong = |recorded: String| {
-            let expected = format!("{} finite numbers", self.interpolation.len());
+            let expected = match self.ruleset {
+                Ruleset::First => format!("{} finite numbers", self.interpolation.len()),
+                Ruleset::Second => format!(
+                    "{} numbers of at most {ACTION_LIMIT} in magnitude",
+                    self.interpolation.len()
+                ),
+            };
             self.at_step(step, "action", recorded, expected)
         };
         if actions.is_null(row) {
@@ -170,8 +185,10 @@ impl Again<'_> {
                 action.len() - action.null_count()
             )));
         }
-        match action.values().iter().find(|number| !number.is_finite()) {
-            Some(number) => Err(wrong(number.to_string())),
+        let limit = self.ruleset.action_limit();
+        let allowed = |number: &&f64| number.abs() <= limit;
+        match action.values().iter().find(|number| !allowed(number)) {
+            Some(number) => Err(wrong(format!("{number:?}"))),
             None => Ok(action.clone()),
         }
     }
@@ -208,12 +225,14 @@ impl Again<'_> {
         fault: Option<AgentFault>,
     ) -> Result<Replayed, Difference> {
         let (recorded, steps) = (self.recorded, self.course.steps());
+        let diverged = self.course.diverged().map(ToString::to_string);
         let outcome = match (ended, fault) {
             (Some(outcome), None) => outcome,
             (None, Some(fault)) => {
                 let told = fault.to_string();
                 self.course.ended_by(fault).ok_or_else(|| {
-                    let expected = format!("a fault of this episode after {steps} steps");
+                    let expected = diverged
+                        .unwrap_or_else(|| format!("a fault of this episode after {steps} steps"));
                     in_row(recorded, "fault", told, expected)
                 })?
             }
@@ -223,6 +242,9 @@ impl Again<'_> {
                 return Err(in_row(recorded, "fault", fault.to_string(), expected));
             }
             (None, None) => {
+                if let Some(expected) = diverged {
+                    return Err(in_row(recorded, "fault", "nothing", expected));
+                }
                 let expected = "more: the episode has not ended".to_owned();
                 return Err(in_row(recorded, "steps", steps.to_string(), expected));
             }

@@ -2,7 +2,7 @@ use crate::played::{Agent, Evaluation, holding, json, moving, play, spec, table,
 use arrow_array::{StringArray, cast::AsArray, types::Int64Type};
 use faceoff_dataset::RecordingError;
 use faceoff_scoring::StepTimes;
-use faceoff_types::{EpisodeOutcome, EvaluationResult, SlotTiming, Task};
+use faceoff_types::{EpisodeOutcome, EvaluationResult, Ruleset, SlotTiming, Task};
 use faceoff_wire::dataset::{CalibrationFile, DATASET_SCHEMA, DatasetManifest, ViolationsFile};
 use std::{
     collections::BTreeMap,
@@ -97,7 +97,7 @@ fn the_dataset_is_whole_and_its_score_is_the_direct_one() {
     let meta = &evaluation.meta;
     let direct = EvaluationResult {
         timing: result.timing,
-        ..faceoff_scoring::score_evaluation(meta.profile, meta.seed, tasks)
+        ..faceoff_scoring::score_evaluation(meta.ruleset, meta.profile, meta.seed, tasks)
     };
     assert_eq!(result, direct);
 
@@ -211,10 +211,13 @@ fn what_is_missing_twice_or_foreign_is_refused() {
     evaluation.shards = Vec::new();
     refused(&evaluation, "an evaluation without shards");
     evaluation.shards = whole;
+    evaluation.meta.ruleset = Ruleset::First;
+    refused(
+        &evaluation,
+        "was played by airhockey-2023.2, the evaluation by airhockey-2023.1",
+    );
     evaluation.meta.seed = evaluation.meta.seed.model_mismatch();
     refused(&evaluation, "belongs to another evaluation");
-    evaluation.meta.ruleset = "airhockey-1999".into();
-    refused(&evaluation, "played by airhockey-1999");
 }
 
 #[test]

@@ -90,6 +90,7 @@ fn a_shard_of_an_evaluation_under_way_is_joined() {
     let file: serde_json::Value = serde_json::from_slice(&text).unwrap();
     let played: ShardSpec = serde_json::from_value(file["spec"].clone()).unwrap();
     let mut evaluation = Evaluation::play(None, &[]);
+    evaluation.meta.ruleset = played.ruleset;
     evaluation.meta.profile = played.profile;
     evaluation.meta.seed = played.seed;
     evaluation.meta.mismatch_seed = played.mismatch_seed;

@@ -5,8 +5,8 @@ use faceoff_dataset::{Assembled, Recorder, RecordingError, ShardFolder, ShardRep
 use faceoff_episode::{Answered, EpisodeStart, StepRow, StepSink};
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
 use faceoff_types::{
-    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, RULESET,
-    RoundTrips, Seed, SlotTiming, Task,
+    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, RoundTrips,
+    Ruleset, Seed, SlotTiming, Task,
 };
 use faceoff_wire::work::{EvaluationMeta, ShardSpec};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
@@ -44,6 +44,8 @@ pub fn moving(turn: &Turn) -> Option<[[f64; 7]; 2]> {
 pub fn spec(task: Task, episodes: Range<u32>) -> ShardSpec {
     let seed = Seed::from_number(7);
     ShardSpec {
+        ruleset: Ruleset::CURRENT,
+        platform_retries: 0,
         task,
         episodes,
         profile: Profile::Evaluation,
@@ -104,6 +106,7 @@ pub fn play(spec: &ShardSpec, agent: Option<Agent>, out: &Path) -> ShardReport {
             during_s: trips,
             longest_stall_s: 0.0,
             host_noise_reruns: 0,
+            platform_retries: spec.platform_retries,
         },
     };
     folder.commit(spec, &report).unwrap();
@@ -152,6 +155,13 @@ fn converse(
             constraints: outcome.constraints,
             next_observation: world.observation(),
         });
+        if let Some(divergence) = world.divergence() {
+            let mut outcome = failed(task, Some(episode), Some(step), episode, world, &times_s);
+            let detail = divergence.what.to_string();
+            let fault = AgentFaultKind::Diverged { detail };
+            outcome.fault.as_mut().unwrap().fault = fault;
+            return outcome;
+        }
         if let Some(end) = outcome.end {
             return EpisodeOutcome {
                 task,
@@ -220,7 +230,7 @@ impl Evaluation {
                 seed: spec.seed,
                 mismatch_seed: spec.mismatch_seed,
                 agent: "test".into(),
-                ruleset: RULESET.into(),
+                ruleset: Ruleset::CURRENT,
             },
             dir,
         };

@@ -2,7 +2,7 @@
 
 use crate::{
     forgery::{Forgery, concat, flipped},
-    played::{Agent, Evaluation, moving, spec, table},
+    played::{Agent, Evaluation, Turn, moving, spec, table},
 };
 use arrow_array::{
     Array, Float64Array, ListArray, RecordBatch, StringArray, UInt32Array,
@@ -14,7 +14,7 @@ use faceoff_dataset::{
     Dataset, DatasetError, EpisodeRecord,
     verify::{Difference, SeasonClaim, Verified, VerifyError, verify},
 };
-use faceoff_types::{EvaluationResult, RULESET, Seed, Task};
+use faceoff_types::{EvaluationResult, Seed, Task};
 use faceoff_wire::dataset::DatasetManifest;
 use std::{
     fs,
@@ -467,7 +467,11 @@ fn other_layouts_rulesets_and_simulators_are_named() {
             "faceoff-dataset/1",
             "layout is \"faceoff-dataset/1\"",
         ),
-        (RULESET, "airhockey-1999", "ruleset \"airhockey-1999\""),
+        (
+            "airhockey-2023.2",
+            "airhockey-1999",
+            "unknown ruleset \"airhockey-1999\"",
+        ),
         (
             &*fingerprint,
             "00",
@@ -530,4 +534,88 @@ fn seeds_follow_from_the_revealed_secret() {
     assert_eq!(what(&broken, &manifest), "the commitment");
     manifest.mismatch_seed = manifest.seed;
     assert_eq!(what(&claim, &manifest), "the seed of the model mismatch");
+}
+
+/// Commands that no robot can follow, from its 4th step on.
+fn throwing(turn: &Turn) -> Option<[[f64; 7]; 2]> {
+    let step = turn.step.unwrap_or(0);
+    let sign = if step.is_multiple_of(2) { 1e4 } else { -1e4 };
+    Some(match (turn.episode, step) {
+        (1, 4..) => [[sign; 7], [-sign; 7]],
+        _ => [turn.held, [0.0; 7]],
+    })
+}
+
+#[test]
+fn numbers_beyond_a_rulesets_bound_are_found() {
+    let forge = |ruleset: &str| {
+        let forgery = forgery();
+        forgery.text("manifest.json", "airhockey-2023.2", ruleset);
+        forgery.text("results.json", "airhockey-2023.2", ruleset);
+        forgery.table("steps.parquet", |batch| {
+            let mut columns = batch.columns().to_vec();
+            let index = batch.schema().index_of("action").unwrap();
+            let actions: &ListArray = batch["action"].as_list();
+            let mut changed =
+                ListBuilder::new(Float64Builder::new()).with_field(match actions.data_type() {
+                    DataType::List(field) => field.clone(),
+                    other => panic!("{other}"),
+                });
+            for row in 0..batch.num_rows() {
+                let values = actions.value(row);
+                let values: &Float64Array = values.as_primitive();
+                for (i, value) in values.values().iter().enumerate() {
+                    // The last step of all: it moves nothing that is recorded after it.
+                    let last = row + 1 == batch.num_rows() && i == 9;
+                    changed
+                        .values()
+                        .append_value(if last { 2e4 } else { *value });
+                }
+                changed.append(true);
+            }
+            columns[index] = Arc::new(changed.finish());
+            RecordBatch::try_new(batch.schema(), columns).unwrap()
+        });
+        difference(forgery.reseal().dir.path(), 2)
+    };
+    let found = forge("airhockey-2023.2");
+    assert_eq!((&*found.field, &*found.recorded), ("action", "20000.0"));
+    assert_eq!(found.expected, "14 numbers of at most 10000 in magnitude");
+    // The first ruleset only asked for finite numbers; what they lead to is another state.
+    let found = forge("airhockey-2023.1");
+    assert_ne!(found.field, "action");
+}
+
+#[test]
+fn extreme_commands_verify_whatever_comes_of_them() {
+    let evaluation = Evaluation::play(Some(throwing), &[(Task::Prepare, 0..3)]).assembled();
+    let verified = check(&evaluation.archive(), 2).unwrap();
+    assert_eq!(verified.episodes, 3);
+}
+
+#[test]
+fn a_divergence_that_did_not_happen_is_found() {
+    let quits: Agent = |turn| (turn.step != Some(3)).then_some([turn.held, [0.0; 7]]);
+    let evaluation = Evaluation::play(Some(quits), &[(Task::Prepare, 0..2)]).assembled();
+    check(&evaluation.archive(), 2).unwrap();
+    let forgery = Forgery::of(&evaluation.folder());
+    forgery.table("episodes.parquet", |batch| {
+        let mut columns = batch.columns().to_vec();
+        let index = batch.schema().index_of("fault").unwrap();
+        let faults: &StringArray = batch["fault"].as_string();
+        let diverged = r#""kind":"diverged","detail":"x""#;
+        let forged = |fault: Option<&str>| {
+            fault.map(|fault| fault.replace(r#""kind":"non_finite""#, diverged))
+        };
+        let forged: StringArray = faults.iter().map(forged).collect();
+        columns[index] = Arc::new(forged);
+        RecordBatch::try_new(batch.schema(), columns).unwrap()
+    });
+    let found = difference(forgery.reseal().dir.path(), 2);
+    assert_eq!(
+        (&*found.field, found.episode),
+        ("fault", Some(0)),
+        "{found}"
+    );
+    assert!(found.recorded.contains("diverge"), "{found}");
 }

@@ -1,9 +1,10 @@
 use faceoff_episode::{
-    Answered, Arena, Course, EpisodeStart, NotFinite, Nowhere, RecordError, StepRow, StepSink,
+    Answered, Arena, Course, EpisodeStart, Nowhere, Question, RecordError, StepRow, StepSink,
 };
+use faceoff_sim::Bounds;
 use faceoff_types::{
-    AgentFault, AgentFaultKind, EpisodeEnd, EpisodeOutcome, Interpolation, Phase, Profile, Seed,
-    Task,
+    AgentFault, AgentFaultKind, EpisodeEnd, EpisodeOutcome, Interpolation, Phase, Profile, Ruleset,
+    Seed, Task,
 };
 
 /// All that a sink is told, to the last bit: floats are shown so that they read back the same.
@@ -52,7 +53,7 @@ fn answer<S: StepSink>(course: &mut Course<S>) -> Option<EpisodeOutcome> {
         host_time_s: 0.0,
         cpu_time_s: None,
     };
-    course.answer(&action, answered)
+    course.answer(&action, answered).unwrap()
 }
 
 #[test]
@@ -74,7 +75,7 @@ fn the_same_answers_give_the_same_course_and_outcome() {
         let mut again = None;
         for (action, answered) in played.actions.iter().zip(&played.times) {
             assert_eq!(again, None, "it ends with the last answer");
-            again = course.answer(action, *answered);
+            again = course.answer(action, *answered).unwrap();
         }
         assert_eq!(again, Some(outcome));
         assert_eq!(course.sink().course, played.course);
@@ -138,26 +139,85 @@ fn a_fault_of_another_time_or_place_cannot_have_ended_the_episode() {
     assert_eq!(course.ended_by(after_the_end), None);
 }
 
+/// Everything at its bound, the way that each joint turns already.
+fn pump(observation: &[f64]) -> Vec<f64> {
+    let dq = &observation[13..20];
+    (0..Interpolation::Trajectory.len())
+        .map(|i| 1e4f64.copysign(dq[i % 7]))
+        .collect()
+}
+
+fn begin_within<S: StepSink>(bounds: Bounds, sink: S) -> Course<S> {
+    let interpolation = Some(Interpolation::Trajectory);
+    let arena = arena().within(bounds);
+    Course::begin(&arena, Task::Prepare, 4, interpolation, sink)
+}
+
 #[test]
-fn a_world_that_stops_being_finite_asks_nothing_more() {
-    let mut course = begin(Task::Hit, Nowhere);
+fn commands_that_make_the_world_diverge_are_the_agents_fault() {
     let answered = Answered {
         computation_time_s: 0.001,
         host_time_s: 0.0,
         cpu_time_s: None,
     };
-    assert_eq!(course.answer(&[f64::MAX; 14], answered), None);
-    let stopped = course.question().unwrap_err();
-    assert_eq!(
-        stopped,
-        NotFinite {
-            task: Task::Hit,
-            episode: 4,
-            step: 1
+    let narrow = Bounds {
+        joint_rad_s: 50.0,
+        ..Bounds::WIDE
+    };
+    let mut played = Told::default();
+    let mut course = begin_within(narrow, &mut played);
+    let kind = loop {
+        let Question { observation, .. } = course.question().unwrap();
+        assert!(observation.iter().all(|number| number.is_finite()));
+        let action = pump(observation);
+        match course.answer(&action, answered) {
+            Ok(None) => {}
+            Ok(Some(outcome)) => panic!("it ended by {:?}", outcome.end),
+            Err(kind) => break kind,
         }
+    };
+    assert!(matches!(kind, AgentFaultKind::Diverged { .. }), "{kind:?}");
+    assert!(
+        kind.to_string()
+            .contains("made the simulated world diverge")
     );
+    assert_eq!(course.diverged(), Some(&kind));
+    let outcome = course.failed(Phase::Step, kind, Some("{}".to_owned()));
+    let fault = outcome.fault.clone().unwrap();
+    // The step was played: it is recorded, and named by the fault.
+    assert_eq!(fault.step, Some(outcome.steps - 1));
     assert_eq!(
-        stopped.to_string(),
-        "the simulator's observation of hit, episode 4, step 1 is not finite"
+        (outcome.end, outcome.success),
+        (EpisodeEnd::AgentFault, false)
     );
+
+    // The recorded answers lead there again, and no other fault agrees with that.
+    let mut course = begin_within(narrow, Told::default());
+    let (last, before) = played.actions.split_last().unwrap();
+    for action in before {
+        assert_eq!(course.answer(action, answered), Ok(None));
+        assert_eq!(course.ended_by(fault.clone()), None);
+    }
+    course.answer(last, answered).unwrap_err();
+    assert_eq!(course.sink().course, played.course);
+    let with = |change: &dyn Fn(&mut AgentFault)| {
+        let mut fault = fault.clone();
+        change(&mut fault);
+        fault
+    };
+    for other in [
+        with(&|fault| fault.fault = AgentFaultKind::NonFinite),
+        with(&|fault| fault.fault = AgentFaultKind::Diverged { detail: "x".into() }),
+        with(&|fault| fault.step = Some(outcome.steps)),
+        with(&|fault| fault.step = None),
+    ] {
+        assert_eq!(course.ended_by(other.clone()), None, "{other}");
+    }
+    assert_eq!(course.ended_by(fault), Some(outcome));
+
+    // What the first ruleset recorded moved without such bounds.
+    let mut course = begin_within(Bounds::of(Ruleset::First), Nowhere);
+    for action in &played.actions {
+        assert!(course.answer(action, answered).is_ok());
+    }
 }

@@ -150,7 +150,7 @@ struct OverallPage {
 pub(super) async fn overall(State(app): State<App>) -> Result<Response, PageProblem> {
     let season = SeasonHead::now(&app).await?;
     let today = app.config.clock.today();
-    let board = BoardView::of(&app, None).await?;
+    let board = BoardView::newest(&app, None).await?;
     let setting = common_setting(&board.rows);
     let page = OverallPage {
         frame: Frame::new(season.name, "/"),
@@ -263,7 +263,7 @@ pub(super) async fn by_task(
             "Bring a puck from the border to a good hitting position.",
         ),
     };
-    let mut board = BoardView::of(&app, Some(task)).await?;
+    let mut board = BoardView::newest(&app, Some(task)).await?;
     // The board leaves out teams without the task; a row without one could show nothing.
     board.rows.retain(|row| row.tasks.contains_key(&task));
     let setting = common_setting(&board.rows);

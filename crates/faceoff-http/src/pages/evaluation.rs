@@ -123,6 +123,7 @@ struct TimingFigures {
     /// `None` when there was none.
     longest_stall_ms: Option<String>,
     host_noise_reruns: u32,
+    platform_retries: u32,
 }
 
 /// Round trips to the calibration agent, in milliseconds.
@@ -147,6 +148,7 @@ impl TimingFigures {
             longest_stall_ms: (timing.longest_stall_s > 0.0)
                 .then(|| figures::milliseconds(timing.longest_stall_s)),
             host_noise_reruns: timing.host_noise_reruns,
+            platform_retries: timing.platform_retries,
         }
     }
 }

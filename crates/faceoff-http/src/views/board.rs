@@ -1,23 +1,23 @@
 //! Who stands where, and how sure that is.
 
 use super::task::TaskView;
-use crate::{app::AppState, problem::Problem, summaries::RunSummaries};
+use crate::{app::AppState, problem::Problem, summaries::RunSummaries, views::shown};
 use faceoff_scoring::{
     BoardEntry, Played, RankedEntry, SIGNIFICANCE, TIER_CHANGE_RESAMPLES, overall_board,
     rank_groups, task_board,
 };
 use faceoff_store::BoardRecord;
-use faceoff_types::{EvaluationId, Profile, RULESET, Seed, Task, TeamId, TeamName, Tier};
+use faceoff_types::{EvaluationId, Profile, Ruleset, Seed, Task, TeamId, TeamName, Tier};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-/// A board: each team's newest finished evaluation, in board order.
+/// A board: each team's newest evaluation that is finished under one ruleset, in board order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct BoardView {
     /// The rules that the scores refer to.
-    #[schema(example = "airhockey-2023.1")]
+    #[schema(example = "airhockey-2023.2")]
     pub ruleset: String,
     /// The task, or null for the overall board.
     pub task: Option<Task>,
@@ -73,9 +73,19 @@ pub struct BoardRow {
 }
 
 impl BoardView {
-    /// The overall board, or that of one task. A constant number of reads, however many teams there are.
-    pub(crate) async fn of(app: &AppState, task: Option<Task>) -> Result<Self, Problem> {
-        let records = app.store.board().await?;
+    /// The overall board, or that of one task, of the newest ruleset with results. A constant number of
+    /// reads, however many teams there are.
+    pub(crate) async fn newest(app: &AppState, task: Option<Task>) -> Result<Self, Problem> {
+        Self::of(app, app.store.board_ruleset().await?, task).await
+    }
+
+    /// The board of a ruleset.
+    pub(crate) async fn of(
+        app: &AppState,
+        ruleset: Ruleset,
+        task: Option<Task>,
+    ) -> Result<Self, Problem> {
+        let records = app.store.board(ruleset).await?;
         let runs: Vec<_> = records.iter().map(|record| record.run).collect();
         let summaries = app.summaries.of(&runs).await?;
         let mismatch_seed = app.store.season().await?.secret.model_mismatch();
@@ -99,7 +109,7 @@ impl BoardView {
             Ok(row(ranked, rank_group, tier_change_probability))
         });
         Ok(Self {
-            ruleset: RULESET.to_owned(),
+            ruleset: ruleset.to_string(),
             task,
             significance: SIGNIFICANCE,
             tier_change_resamples: TIER_CHANGE_RESAMPLES,
@@ -142,7 +152,7 @@ fn row(
         tier_change_probability,
         team: record.team.name,
         team_id: record.team.id,
-        agent: record.agent_name,
+        agent: record.agent_name.map(shown),
         evaluation: record.evaluation,
         day: record.day,
         finished_at: record.finished_at,

@@ -1,7 +1,7 @@
 //! An evaluation on its way to a score or a failure.
 
 use super::task::TaskView;
-use crate::{app::AppState, paths, problem::Problem};
+use crate::{app::AppState, paths, problem::Problem, views::shown};
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::{Evaluation, EvaluationState};
 use faceoff_types::{
@@ -174,11 +174,11 @@ pub struct FaultView {
 impl From<AgentFault> for FaultView {
     fn from(fault: AgentFault) -> Self {
         Self {
-            message: fault.fault.to_string(),
+            message: shown(fault.fault.to_string()),
             task: fault.contest.to_string(),
             episode: fault.episode,
             step: fault.step,
-            line: fault.line,
+            line: fault.line.map(shown),
         }
     }
 }
@@ -198,7 +198,7 @@ impl EvaluationView {
         {
             let of_run = app.store.run_faults(run).await?;
             *faults = Some(of_run.faults.into_iter().map(FaultView::from).collect());
-            *log = Some(of_run.log);
+            *log = Some(shown(of_run.log));
         }
         Ok(view)
     }

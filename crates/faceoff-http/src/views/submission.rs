@@ -1,6 +1,6 @@
 //! An uploaded agent and its smoke run's verdict.
 
-use crate::{app::AppState, problem::Problem};
+use crate::{app::AppState, problem::Problem, views::shown};
 use faceoff_store::{Submission, SubmissionState};
 use faceoff_types::{SmokeTiming, SubmissionId, TeamId};
 use jiff::Timestamp;
@@ -87,13 +87,18 @@ impl SubmissionView {
             bytes: submission.bundle.bytes,
             blake3: submission.bundle.blake3,
             created_at: submission.created_at,
-            agent_name: submission.agent_name,
+            agent_name: submission.agent_name.map(shown),
             timing: submission.timing,
             active: submission.active,
             status: match submission.state {
                 SubmissionState::Validating => SubmissionStatus::Validating,
-                SubmissionState::Valid => SubmissionStatus::Valid { log },
-                SubmissionState::Invalid { reason } => SubmissionStatus::Invalid { reason, log },
+                SubmissionState::Valid => SubmissionStatus::Valid {
+                    log: log.map(shown),
+                },
+                SubmissionState::Invalid { reason } => SubmissionStatus::Invalid {
+                    reason: shown(reason),
+                    log: log.map(shown),
+                },
                 SubmissionState::ValidationError { reason } => {
                     SubmissionStatus::ValidationError { reason }
                 }

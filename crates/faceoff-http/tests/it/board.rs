@@ -90,7 +90,7 @@ async fn the_board_shows_tiers_in_order_with_rates_intervals_points_and_score() 
         assert!(first.contains(part), "{part:?} is not in {first:?}");
     }
     let caption = &texts(&html, ".board caption")[0];
-    let setting = "evaluation profile, 1000 episodes per task, rules airhockey-2023.1";
+    let setting = "evaluation profile, 1000 episodes per task, rules airhockey-2023.2";
     assert!(caption.contains(setting), "{caption}");
     let commitment = site.store.season().await.unwrap().commitment;
     let legend = texts(&html, ".legend").join(" ");
@@ -111,7 +111,7 @@ async fn the_board_shows_tiers_in_order_with_rates_intervals_points_and_score() 
     ] {
         assert!(legend.contains(&rule), "{rule:?} is not in the legend");
     }
-    assert!(texts(&html, "footer")[0].contains("airhockey-2023.1"));
+    assert!(texts(&html, "footer")[0].contains("airhockey-2023.2"));
     assert!(texts(&html, ".lead")[0].contains("Test season"));
     // what a screen reader needs of a table
     assert_eq!(texts(&html, "table.board caption").len(), 1);
@@ -154,6 +154,17 @@ async fn until_the_day_is_released_the_boards_tell_score_and_points_only() {
     for (row, (tier, name)) in board["rows"].as_array().unwrap().iter().zip(ORDER) {
         assert_eq!((&row["tier"], &row["team"]), (&json!(tier), &json!(name)));
     }
+    assert_eq!(board["rows"].as_array().unwrap().len(), ORDER.len());
+    assert_eq!(board["ruleset"], "airhockey-2023.2");
+    let first = site.get("/api/v1/board?ruleset=airhockey-2023.1", None);
+    let first = first.await.json(200);
+    assert_eq!(
+        (&first["ruleset"], &first["rows"]),
+        (&json!("airhockey-2023.1"), &json!([]))
+    );
+    site.get("/api/v1/board/hit?ruleset=chess", None)
+        .await
+        .problem(400, "invalid-request", &["airhockey-2023.1"]);
     let evaluation = format!(
         "/evaluations/{}",
         board["rows"][0]["evaluation"].as_str().unwrap()
@@ -246,7 +257,11 @@ async fn an_evaluations_page_shows_results_violations_and_times_to_everybody() {
         assert!(tables.contains(part), "{part:?} is not in {tables:?}");
     }
     let facts = texts(&html, ".facts").join(" ");
-    for part in ["Longest stall of the server30 ms", "played again for it2"] {
+    for part in [
+        "Longest stall of the server30 ms",
+        "played again for it2",
+        "begun again after a fault of ours1",
+    ] {
         assert!(facts.contains(part), "{part:?} is not in {facts:?}");
     }
 }

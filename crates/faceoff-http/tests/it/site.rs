@@ -346,6 +346,7 @@ impl Site {
                         )
                     });
                     let result = faceoff_scoring::score_evaluation(
+                        run.ruleset,
                         run.plan.profile,
                         seeds.episodes,
                         tasks.into(),
@@ -526,6 +527,7 @@ pub fn result(rates: [f64; 3], penalty_points: f64) -> EvaluationResult {
             },
             longest_stall_s: 0.0305,
             host_noise_reruns: 2,
+            platform_retries: 1,
         }),
     }
 }

@@ -151,6 +151,25 @@ async fn the_newest_valid_upload_is_active_until_the_team_chooses() {
         .problem(403, "forbidden", &[]);
 }
 
+/// What earlier versions have stored may hold anything.
+#[tokio::test]
+async fn what_agents_wrote_is_shown_as_text() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let id = text(&site.upload(&team.token, GZIP.to_vec()).await.json(201)["id"]);
+    let outcome = SmokeOutcome::Invalid {
+        agent_name: Some("a\u{202e}b".into()),
+        reason: "expected act, got \u{2066}\u{1b}[2J".into(),
+        log: "\u{9b}31m red\n".into(),
+    };
+    site.smoke(outcome).await;
+    let path = format!("/api/v1/submissions/{id}");
+    let submission = site.get(&path, Some(&team.token)).await.json(200);
+    assert_eq!(submission["agent_name"], "a\\u202eb");
+    assert_eq!(submission["reason"], "expected act, got \\u2066\\u001b[2J");
+    assert_eq!(submission["log"], "\\u009b31m red\n");
+}
+
 #[tokio::test]
 async fn a_bundle_that_is_too_large_is_refused_with_and_without_an_announced_length() {
     let site = Site::start().await;

@@ -34,7 +34,7 @@ for line in sys.stdin:
         obs = message["obs"]
         if held is None:
             held = [obs[i] for i in env["joint_pos_ids"]]
-        action = {1: held, 3: [held, [0.0] * 7]}[INTERPOLATION]
+        action = {1: held, 3: [held, [0.0] * 7]}.get(INTERPOLATION)
         answer = on_step(message["step"], {"type": "act", "step": message["step"], "action": action})
         if answer is not None:
             say(answer)

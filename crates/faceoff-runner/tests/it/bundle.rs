@@ -530,3 +530,58 @@ fn a_folder_is_copied_under_the_rules_of_an_archive() {
     std::os::unix::fs::symlink("/etc", source.join("etc")).unwrap();
     assert!(refusal("link", &limits).contains("\"etc\" is a link that leaves the bundle"));
 }
+
+#[test]
+fn an_agent_toml_that_is_no_file_is_the_teams_doing() {
+    let manifest = MANIFEST.as_bytes();
+    let folder = Tar::new()
+        .folder("agent.toml/")
+        .file("agent.py", 0o644, b"");
+    refused(&folder.gz(), "agent.toml is a folder: expected a file");
+    let full = Tar::new().file("agent.toml/agent.toml", 0o644, manifest);
+    refused(&full.zst(), "agent.toml is a folder");
+    let below = Tar::new().folder("top/agent.toml/");
+    refused(&below.gz(), "agent.toml is a folder");
+    refused(
+        &zip(&[("agent.toml/", 0o755, b"")]),
+        "agent.toml is a folder",
+    );
+    for target in ["real.toml", "missing", "."] {
+        let link = Tar::new()
+            .file("real.toml", 0o644, manifest)
+            .symlink("agent.toml", target);
+        refused(&link.gz(), "agent.toml is a link: expected a file");
+    }
+    let circle = Tar::new().symlink("agent.toml", "agent.toml");
+    refused(&circle.gz(), "leads in a circle");
+    for kind in [EntryType::Fifo, EntryType::Char, EntryType::Block] {
+        let device = Tar::new().entry(kind, "agent.toml", 0o644, "", b"");
+        refused(&device.gz(), "a bundle holds files, folders and links");
+    }
+
+    // A developer's own folder, opened in place.
+    let own = tempfile::tempdir().unwrap();
+    let told = |make: &dyn Fn(&Path)| {
+        let dir = tempfile::tempdir_in(own.path()).unwrap();
+        make(&dir.path().join("agent.toml"));
+        let opened = open(dir.path(), own.path(), &BundleLimits::default());
+        match opened {
+            Err(BundleError::Invalid(told)) => told,
+            other => panic!("{other:?}"),
+        }
+    };
+    assert!(told(&|path| fs::create_dir(path).unwrap()).contains("is a folder"));
+    let pipe = |path: &Path| {
+        rustix::fs::mknodat(
+            rustix::fs::CWD,
+            path,
+            rustix::fs::FileType::Fifo,
+            rustix::fs::Mode::RUSR,
+            0,
+        )
+        .unwrap();
+    };
+    assert!(told(&pipe).contains("is a device, pipe or socket"));
+    let link = |path: &Path| std::os::unix::fs::symlink("/dev/null", path).unwrap();
+    assert!(told(&link).contains("is a link"));
+}

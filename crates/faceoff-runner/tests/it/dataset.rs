@@ -9,7 +9,7 @@ use faceoff_dataset::{
     Dataset, assemble,
     verify::{Verified, verify},
 };
-use faceoff_types::{RULESET, Task};
+use faceoff_types::{AgentFaultKind, Ruleset, Task};
 use faceoff_wire::work::EvaluationMeta;
 use std::{
     fs::File,
@@ -99,7 +99,7 @@ fn meta() -> EvaluationMeta {
         seed: spec.seed,
         mismatch_seed: spec.mismatch_seed,
         agent: "test".into(),
-        ruleset: RULESET.into(),
+        ruleset: Ruleset::CURRENT,
     }
 }
 
@@ -127,4 +127,39 @@ fn what_agents_play_verifies_faults_and_all() {
     assert_eq!(verified(&agent, Task::Prepare, 4).episodes, 4);
     let silent = Agent::script("import sys\nsys.exit('no model')");
     assert_eq!(verified(&silent, Task::Hit, 2).steps, 0);
+}
+
+#[test]
+fn a_world_that_an_agent_makes_diverge_is_its_fault_and_verifies() {
+    let dir = tempfile::tempdir().unwrap();
+    let shard = dir.path().join("shard");
+    // The way that each joint turns already, so that it turns ever faster.
+    let agent = Agent::with(
+        "INTERPOLATION = None\n\
+         def on_hello(hello): print('start', file=sys.stderr)\n\
+         def on_step(step, answer):\n    \
+         push = [1e4 if dq > 0 else -1e4 for dq in obs[13:20]]\n    \
+         answer['action'] = [[push, push, push]] * 20\n    \
+         return json.dumps(answer)",
+    );
+    let report = run(&spec(Task::Prepare, 0..2), &agent, &sandboxed(), &shard).unwrap();
+    let faults: Vec<_> = report.outcomes.iter().map(|o| o.fault.clone()).collect();
+    // The first world diverges; the second is thrown about, but stays a world.
+    let [Some(fault), None] = &faults[..] else {
+        panic!("{faults:?}");
+    };
+    assert!(
+        matches!(fault.fault, AgentFaultKind::Diverged { .. }),
+        "{fault}"
+    );
+    assert_eq!(fault.step, Some(report.outcomes[0].steps - 1));
+    assert_eq!(report.log.matches("start\n").count(), 2, "{}", report.log);
+    assert!(report.log.contains("made the simulated world diverge"));
+
+    let archive = dir.path().join("dataset.zip");
+    assemble(&meta(), &[shard], &archive).unwrap();
+    let dataset = Dataset::open(&archive).unwrap();
+    let workers = NonZero::new(2).unwrap();
+    assert_eq!(verify(&dataset, workers, &|| ()).unwrap().episodes, 2);
+    assert_eq!(dataset.episodes().unwrap()[0].outcome, report.outcomes[0]);
 }

@@ -7,6 +7,7 @@ mod archives;
 mod bundle;
 mod dataset;
 mod free_time;
+mod fuzz;
 mod host_noise;
 mod misbehaviour;
 mod recording;

@@ -211,6 +211,23 @@ fn nan_is_not_finite() {
 }
 
 #[test]
+fn a_number_that_no_action_needs_is_named() {
+    let (kind, report) = verdict(
+        "def on_step(step, answer):\n    \
+         answer['action'][1][2] = 1.7e308\n    return json.dumps(answer)",
+    );
+    assert_eq!(
+        kind,
+        AgentFaultKind::TooLarge {
+            place: "action[1][2]".into(),
+            value: 1.7e308,
+            limit: 1e4
+        }
+    );
+    assert!(report.fault.unwrap().line.unwrap().contains("1.7e+308"));
+}
+
+#[test]
 fn silence_times_out() {
     let agent = Agent::with("def on_step(step, answer): return None");
     let (kind, report) = verdict_in(&agent, &impatient());

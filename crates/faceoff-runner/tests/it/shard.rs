@@ -2,7 +2,7 @@ use crate::agents::{Agent, sandboxed};
 use faceoff_runner::{
     AgentEnvironment, Observer, PlatformFault, ShardReport, ShardSpec, run_shard,
 };
-use faceoff_types::{AgentFaultKind, EpisodeEnd, EpisodeOutcome, Profile, Seed, Task};
+use faceoff_types::{AgentFaultKind, EpisodeEnd, EpisodeOutcome, Profile, Ruleset, Seed, Task};
 use std::{ops::Range, path::Path};
 
 /// Watches, and stops after a number of episodes.
@@ -31,6 +31,8 @@ impl Observer for Watcher {
 pub fn spec(task: Task, episodes: Range<u32>) -> ShardSpec {
     let seed = Seed::from_number(7);
     ShardSpec {
+        ruleset: Ruleset::CURRENT,
+        platform_retries: 0,
         task,
         episodes,
         profile: Profile::Evaluation,

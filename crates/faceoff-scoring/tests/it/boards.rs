@@ -2,14 +2,19 @@ use crate::support::task_result;
 use faceoff_scoring::{
     BoardEntry, RankedEntry, overall_board, rank_groups, score_evaluation, task_board,
 };
-use faceoff_types::{Profile, Seed, Task, Tier};
+use faceoff_types::{Profile, Ruleset, Seed, Task, Tier};
 use proptest::prelude::*;
 use std::{collections::BTreeMap, convert::Infallible};
 
 /// An entry that played `hit` (50 episodes) alone.
 fn entry<K>(key: K, successes: u32, penalty_points: f64, submitted_at_ms: i64) -> BoardEntry<K> {
     let tasks = BTreeMap::from([(Task::Hit, task_result(50, successes, penalty_points))]);
-    let result = score_evaluation(Profile::Evaluation, Seed::from_number(0), tasks);
+    let result = score_evaluation(
+        Ruleset::CURRENT,
+        Profile::Evaluation,
+        Seed::from_number(0),
+        tasks,
+    );
     BoardEntry {
         key,
         result,

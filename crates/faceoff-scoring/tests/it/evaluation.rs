@@ -1,7 +1,7 @@
 use crate::support::{episode, task_result};
 use faceoff_scoring::{StepTimes, episode_penalty, score_evaluation, score_task};
 use faceoff_types::{
-    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, Profile, RULESET, Seed, Task, Tier,
+    AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, Profile, Ruleset, Seed, Task, Tier,
     Violations,
 };
 use std::collections::BTreeMap;
@@ -107,27 +107,32 @@ fn an_evaluation_takes_the_worst_task_for_safety_and_weighs_the_rates() {
         (Task::Defend, task_result(50, 40, 60.0)),
         (Task::Prepare, task_result(50, 5, 0.0)),
     ]);
-    let result = score_evaluation(Profile::Evaluation, seed, tasks.clone());
+    let result = score_evaluation(Ruleset::CURRENT, Profile::Evaluation, seed, tasks.clone());
     assert_eq!((result.score, result.penalty_points), (54.0, 60.0));
     assert_eq!(result.tier, Tier::Improvable);
     assert_eq!(
         (result.ruleset.as_str(), result.profile),
-        (RULESET, Profile::Evaluation)
+        ("airhockey-2023.2", Profile::Evaluation)
     );
     assert_eq!((result.seed, result.tasks), (seed, tasks.clone()));
 
     let mut hit_alone = tasks;
     hit_alone.retain(|task, _| *task == Task::Hit);
-    let result = score_evaluation(Profile::Ideal, seed, hit_alone);
+    let result = score_evaluation(Ruleset::CURRENT, Profile::Ideal, seed, hit_alone);
     assert_eq!((result.score, result.tier), (20.0, Tier::Deployable));
-    let nothing = score_evaluation(Profile::Ideal, seed, BTreeMap::new());
+    let nothing = score_evaluation(Ruleset::CURRENT, Profile::Ideal, seed, BTreeMap::new());
     assert_eq!((nothing.score, nothing.penalty_points), (0.0, 0.0));
 }
 
 #[test]
 fn results_survive_their_file() {
     let tasks = BTreeMap::from([(Task::Hit, task_result(30, 7, 12.5))]);
-    let result = score_evaluation(Profile::Evaluation, Seed::from_number(1), tasks);
+    let result = score_evaluation(
+        Ruleset::CURRENT,
+        Profile::Evaluation,
+        Seed::from_number(1),
+        tasks,
+    );
     let json = serde_json::to_string(&result).unwrap();
     assert_eq!(
         serde_json::from_str::<faceoff_types::EvaluationResult>(&json).unwrap(),

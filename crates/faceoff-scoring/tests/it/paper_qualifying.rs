@@ -1,6 +1,6 @@
 use crate::support::{read, rows, task_result};
 use faceoff_scoring::{BoardEntry, QualifyingSheet, overall_board, score_evaluation, task_board};
-use faceoff_types::{Profile, Seed, Task};
+use faceoff_types::{Profile, Ruleset, Seed, Task};
 use serde_json::{Map, Value, json};
 
 const GOLDEN: &str = include_str!(concat!(
@@ -134,6 +134,7 @@ fn boards_of_evaluations_give_the_same_tables() {
             BoardEntry {
                 key: row["team"].as_str().unwrap(),
                 result: score_evaluation(
+                    Ruleset::CURRENT,
                     Profile::Evaluation,
                     Seed::from_number(0),
                     tasks.into_iter().collect(),

@@ -13,7 +13,7 @@ use crate::{
     perturbation::{settings::PerturbationSettings, table_factors::TableFactors},
     robot::plant::Plant,
     stream::Stream,
-    world::World,
+    world::{Bounds, Divergence, World},
 };
 use constraints::ConstraintValues;
 use faceoff_types::{EpisodeEnd, Factors, Interpolation, Seed, Task, Violations};
@@ -73,6 +73,13 @@ impl Episode {
         }
     }
 
+    /// The same episode within other bounds than the current ruleset's.
+    #[must_use]
+    pub fn within(mut self, bounds: Bounds) -> Self {
+        self.world.set_bounds(bounds);
+        self
+    }
+
     /// The observation that the agent gets: 23 numbers for `hit`, 20 otherwise (PROTOCOL).
     #[must_use]
     pub fn observation(&self) -> &[f64] {
@@ -80,7 +87,8 @@ impl Episode {
     }
 
     /// One control step. `action` is row-major, of length [`Interpolation::len`], finite. Must not
-    /// be called after an end.
+    /// be called after an end. A world that diverges ends as [`EpisodeEnd::AgentFault`]: nothing but the
+    /// agent's commands can bring it so far.
     pub fn step(&mut self, action: &[f64]) -> StepOutcome {
         self.channel.command(&mut self.world, Command::Act(action));
         if let Some(opponent) = &mut self.opponent {
@@ -93,8 +101,17 @@ impl Episode {
 
         let constraints = self.constraints();
         constraints.mark(&mut self.violations);
-        let end = task::end(self.task, self.world.puck(), self.steps);
+        let end = match self.divergence() {
+            Some(_) => Some(EpisodeEnd::AgentFault),
+            None => task::end(self.task, self.world.puck(), self.steps),
+        };
         StepOutcome { end, constraints }
+    }
+
+    /// Set once the world has diverged; all its numbers are finite all the same.
+    #[must_use]
+    pub fn divergence(&self) -> Option<Divergence> {
+        self.world.divergence()
     }
 
     /// Control steps played.

@@ -8,9 +8,9 @@ use crate::{
     perturbation::{settings::PerturbationSettings, table_factors::TableFactors},
     robot::plant::Plant,
     stream::Stream,
-    world::World,
+    world::{Bounds, Divergence, World},
 };
-use faceoff_types::{Factors, Interpolation, Seed, Violations, WINDOW_STEPS};
+use faceoff_types::{Factors, Interpolation, Ruleset, Seed, Violations, WINDOW_STEPS};
 use referee::{GAME_RULES, RallyEnd, Referee};
 
 /// What a game is played with.
@@ -33,6 +33,7 @@ pub struct GameSetup {
 #[derive(Debug, Clone)]
 pub struct Game {
     setup: GameSetup,
+    bounds: Bounds,
     referee: Referee,
     rally: Rally,
     steps: u32,
@@ -65,14 +66,24 @@ impl Game {
     #[must_use]
     pub fn new(setup: GameSetup) -> Self {
         let serves = usize::from(Stream::new(&setup.seed, "first_side").unit() < 0.5);
-        let rally = Rally::new(&setup, 0, serves);
+        let bounds = Bounds::of(Ruleset::CURRENT);
+        let rally = Rally::new(&setup, bounds, 0, serves);
         Self {
             setup,
+            bounds,
             referee: Referee::new(serves),
             rally,
             steps: 0,
             violations: [Violations::default(); 2],
         }
+    }
+
+    /// The same game within other bounds than the current ruleset's.
+    #[must_use]
+    pub fn within(mut self, bounds: Bounds) -> Self {
+        self.bounds = bounds;
+        self.rally.world.set_bounds(bounds);
+        self
     }
 
     /// What a robot's agent is told: 23 numbers in its own base frame.
@@ -82,7 +93,7 @@ impl Game {
     }
 
     /// One control step of both robots. When the game is over is the caller's to
-    /// decide.
+    /// decide. A world that diverges ends the rally: a fault of the robots that the end names.
     pub fn step(&mut self, commands: [Command<'_>; 2]) -> GameStep {
         let Rally {
             world,
@@ -103,10 +114,17 @@ impl Game {
         for (values, violations) in constraints.iter().zip(&mut self.violations) {
             values.mark(violations);
         }
-        let rally_end = self.referee.judge(world.puck());
+        let rally_end = match world.divergence() {
+            Some(Divergence { by, .. }) => {
+                let end = RallyEnd::Diverged { by };
+                self.referee.ends_by(end);
+                Some(end)
+            }
+            None => self.referee.judge(world.puck()),
+        };
         if rally_end.is_some() {
             let next = *number + 1;
-            self.rally = Rally::new(&self.setup, next, self.referee.serves);
+            self.rally = Rally::new(&self.setup, self.bounds, next, self.referee.serves);
         }
         let window = self
             .steps
@@ -146,7 +164,7 @@ impl Game {
 
 impl Rally {
     /// Both robots in their initial state, the puck at rest on the side of `serves`.
-    fn new(setup: &GameSetup, number: u32, serves: usize) -> Self {
+    fn new(setup: &GameSetup, bounds: Bounds, number: u32, serves: usize) -> Self {
         let seed = setup.seed.rally(number);
         let mut stream = Stream::new(&seed, "initial_state");
         let [near, far] = GAME_RULES.start_x_m;
@@ -154,6 +172,7 @@ impl Rally {
         let y = stream.uniform(-PLAYABLE_Y_M, PLAYABLE_Y_M);
         let x = if serves == 0 { -x } else { x };
         let mut world = World::with_robots(&setup.plant, 2, [x, y, 0.0, 0.0, 0.0, 0.0]);
+        world.set_bounds(bounds);
         let table = TableFactors::new(setup.factors, &setup.settings, &seed, &mut world);
         let channels = [0, 1].map(|robot| {
             let interpolation = setup.interpolation[robot];

@@ -50,6 +50,12 @@ pub enum RallyEnd {
     Stuck,
     /// The puck left the table beside the goals.
     LeftTable,
+    /// The world diverged: a fault, which counts for nobody's score. The rally starts again on the same
+    /// side.
+    Diverged {
+        /// The robots whose commands or states left their bounds first.
+        by: [bool; 2],
+    },
 }
 
 /// Keeps the count of a game, and decides whose side the next rally starts on.
@@ -87,6 +93,12 @@ impl Referee {
     /// Judges the true puck after a control step. An end sets who serves next and resets the clock.
     pub fn judge(&mut self, puck: &Puck) -> Option<RallyEnd> {
         let end = self.end_of_rally(puck)?;
+        self.ends_by(end);
+        Some(end)
+    }
+
+    /// Counts a rally's end.
+    pub(super) fn ends_by(&mut self, end: RallyEnd) {
         self.watched = None;
         match end {
             RallyEnd::Goal { by } => {
@@ -97,9 +109,8 @@ impl Referee {
                 self.fouls[by] += 1;
                 self.serves = 1 - by;
             }
-            RallyEnd::Stuck | RallyEnd::LeftTable => {}
+            RallyEnd::Stuck | RallyEnd::LeftTable | RallyEnd::Diverged { .. } => {}
         }
-        Some(end)
     }
 
     fn end_of_rally(&mut self, puck: &Puck) -> Option<RallyEnd> {

@@ -42,9 +42,9 @@ impl Limiter {
             let p = self.commanded[i];
             let slowest = clamp(-LIMITER_GAIN * (p + q_max), -v_max, v_max);
             let fastest = clamp(-LIMITER_GAIN * (p - q_max), -v_max, v_max);
-            command.velocity[i] = clamp(desired.velocity[i], slowest, fastest);
+            command.velocity[i] = clamp(or(desired.velocity[i], 0.0), slowest, fastest);
             command.position[i] = clamp(
-                desired.position[i],
+                or(desired.position[i], p),
                 p + SUBSTEP_S * slowest,
                 p + SUBSTEP_S * fastest,
             );
@@ -68,7 +68,7 @@ pub fn torque(
         let feedback = plant.kp[i] * (command.position[i] - q[i])
             + plant.kd[i] * (command.velocity[i] - dq_filtered[i]);
         let limit = LINKS[i].torque_limit_n_m;
-        clamp(feedback + feed_forward[i], -limit, limit)
+        clamp(or(feedback + feed_forward[i], 0.0), -limit, limit)
     })
 }
 
@@ -78,6 +78,12 @@ pub fn filter_velocity(dq_filtered: &mut [f64; JOINTS], dq: &[f64]) {
     for i in 0..JOINTS {
         dq_filtered[i] = FILTER_NEW * dq[i] + FILTER_OLD * dq_filtered[i];
     }
+}
+
+/// A desired value that is not a number is none: the joint stays, or is left alone.
+#[inline(always)]
+fn or(x: f64, otherwise: f64) -> f64 {
+    if x.is_nan() { otherwise } else { x }
 }
 
 /// `f64::clamp` without its panic; the bounds are in order by construction.

@@ -65,6 +65,19 @@ impl Arm {
         self.coasted = 0;
     }
 
+    /// Is the trajectory made of numbers?
+    pub fn is_commanded_finitely(&self) -> bool {
+        self.trajectory.iter().all(|setpoint| {
+            let Setpoint {
+                position,
+                velocity,
+                acceleration,
+            } = setpoint;
+            let all = |row: &[f64; JOINTS]| row.iter().all(|x| x.is_finite());
+            all(position) && all(velocity) && all(acceleration)
+        })
+    }
+
     /// Starts a control step that commands the last position again, at rest.
     pub fn hold(&mut self, interpolation: Interpolation) {
         let action = interpolation.held(&self.end().position);

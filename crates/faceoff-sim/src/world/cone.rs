@@ -57,7 +57,9 @@ pub fn solve_cone<const N: usize>(
                 force[first + d] = next[d];
             }
         }
-        if friction.len() == 1 || change <= SWEEP_TOLERANCE * size {
+        // Written so that forces that are no numbers end it too: they will not become any.
+        let goes_on = change > SWEEP_TOLERANCE * size;
+        if friction.len() == 1 || !goes_on || !size.is_finite() {
             break;
         }
     }

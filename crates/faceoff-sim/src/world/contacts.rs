@@ -102,11 +102,10 @@ impl Contacts {
         self.count == 0
     }
 
-    /// Does a contact push an arm?
-    pub fn move_arms(&self) -> bool {
-        self.rows[..DIRECTIONS * self.count]
-            .iter()
-            .any(|row| row.arms.iter().any(Option::is_some))
+    /// Which arms a contact pushes.
+    pub fn pushed(&self) -> [bool; 2] {
+        let rows = &self.rows[..DIRECTIONS * self.count];
+        [0, 1].map(|arm| rows.iter().any(|row| row.arms[arm].is_some()))
     }
 
     /// Force on the puck (N, N, N m) of contacts that push no arm, at a given acceleration without

@@ -1,6 +1,7 @@
 //! The physical world: a puck, and one or two arms around it.
 
 mod arm;
+mod bounds;
 mod cone;
 mod contacts;
 mod joints;
@@ -18,7 +19,8 @@ use crate::{
     },
 };
 use arm::Arm;
-use faceoff_types::Interpolation;
+pub use bounds::{Bounds, Divergence, Runaway};
+use faceoff_types::{Interpolation, Ruleset};
 
 /// A mallet's striking cylinder: centre x, y, z (m) and velocity vx, vy (m/s), table frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,6 +44,12 @@ pub struct World {
     air_n: [f64; 2],
     /// Index of the next substep within the control step.
     substep: usize,
+    bounds: Bounds,
+    /// The robots that were first to command or to move as no robot does.
+    runaway: Option<[bool; 2]>,
+    /// The robots that a contact pushed last.
+    pushed: [bool; 2],
+    divergence: Option<Divergence>,
 }
 
 impl World {
@@ -59,7 +67,23 @@ impl World {
             imposed: None,
             air_n: [0.0; 2],
             substep: 0,
+            bounds: Bounds::of(Ruleset::CURRENT),
+            runaway: None,
+            pushed: [false; 2],
+            divergence: None,
         }
+    }
+
+    /// Replaces the bounds of what is simulated.
+    pub fn set_bounds(&mut self, bounds: Bounds) {
+        self.bounds = bounds;
+    }
+
+    /// Set once the world would have left its bounds. It stands still since, in its last state inside:
+    /// all its numbers are finite.
+    #[must_use]
+    pub fn divergence(&self) -> Option<Divergence> {
+        self.divergence
     }
 
     /// A world of `robots` arms in their initial pose.
@@ -72,6 +96,20 @@ impl World {
     /// [`Interpolation::len`].
     pub fn command(&mut self, robot: usize, interpolation: Interpolation, action: &[f64]) {
         self.arms[robot].command(interpolation, action);
+        if !self.arms[robot].is_commanded_finitely() {
+            self.note_runaway(|a, _| a == robot);
+        }
+    }
+
+    /// Remembers the robots that a test finds, unless others came first.
+    fn note_runaway(&mut self, is_runaway: impl Fn(usize, &Arm) -> bool) {
+        let mut found = [false; 2];
+        for (a, arm) in self.arms.iter().enumerate() {
+            found[a] = is_runaway(a, arm);
+        }
+        if found != [false; 2] {
+            self.runaway.get_or_insert(found);
+        }
     }
 
     /// Imposes the motion of robot 1's mallet from now on, or frees it. With an imposed mallet

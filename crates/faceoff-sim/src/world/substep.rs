@@ -1,7 +1,8 @@
 //! One millisecond of arms and puck.
 
 use super::{
-    World,
+    Divergence, Runaway, World,
+    bounds::{is_ordinary, is_ordinary_puck, is_runaway},
     contacts::{Contacts, MalletMotion, Pair},
     solver::{accelerations_in_contact, add, joint_accelerations},
 };
@@ -34,8 +35,12 @@ impl World {
     }
 
     /// Advances by one substep, 1 ms. After 20 of them a new action is due; without one the last
-    /// trajectory would be repeated, so [`World::command`] or [`World::hold`] first.
+    /// trajectory would be repeated, so [`World::command`] or [`World::hold`] first. A world that has come
+    /// to the end of its bounds stands still.
     pub fn substep(&mut self) {
+        if self.divergence.is_some() {
+            return;
+        }
         if self.imposed.is_some() {
             self.substep_imposed();
         } else {
@@ -94,10 +99,14 @@ impl World {
 
         // Friction, stops and contacts.
         let contacts = find_contacts(&kinematics, &dq, &self.puck);
+        let pushed = contacts.as_ref().map_or([false; 2], Contacts::pushed);
+        if pushed != [false; 2] {
+            self.pushed = pushed;
+        }
         let free = || self.puck.free_acceleration(&self.puck_damping, self.air_n);
         let puck_force;
         let accelerations = match &contacts {
-            Some(contacts) if contacts.move_arms() => {
+            Some(contacts) if pushed != [false; 2] => {
                 let (accelerations, forces) =
                     accelerations_in_contact(arms, &mass, &load, contacts, &free());
                 for (load, force) in load.iter_mut().zip(&forces.arms) {
@@ -127,7 +136,40 @@ impl World {
             }
             filter_velocity(&mut arm.dq_filtered, &arm.dq);
         }
+        let puck = self.puck;
         self.advance_puck(puck_force);
+        let ordinary = self.arms.iter().all(is_ordinary) && is_ordinary_puck(&self.puck);
+        if !ordinary && let Some(what) = self.extraordinary() {
+            // Back to where all were inside.
+            self.puck = puck;
+            for (a, arm) in self.arms.iter_mut().enumerate() {
+                arm.q = std::array::from_fn(|i| q[i].lane(a));
+                arm.dq = std::array::from_fn(|i| dq[i].lane(a));
+                arm.dq_filtered = std::array::from_fn(|i| dq_filtered[i].lane(a));
+            }
+            self.diverge(what);
+        }
+    }
+
+    /// Looks closer at a state that is not an ordinary one: who is to blame if it gets worse, and whether
+    /// it is out of bounds.
+    #[cold]
+    fn extraordinary(&mut self) -> Option<Runaway> {
+        self.note_runaway(|_, arm| is_runaway(arm));
+        let beyond = |(robot, arm)| {
+            let joint = self.bounds.joint_beyond(arm)?;
+            Some(Runaway::Joint { robot, joint })
+        };
+        let joint = self.arms.iter().enumerate().find_map(beyond);
+        joint.or_else(|| self.bounds.puck_beyond(&self.puck).then_some(Runaway::Puck))
+    }
+
+    fn diverge(&mut self, what: Runaway) {
+        let by = self.runaway.unwrap_or_else(|| match what {
+            Runaway::Joint { robot, .. } => [0, 1].map(|a| a == robot),
+            Runaway::Puck => self.pushed,
+        });
+        self.divergence = Some(Divergence { by, what });
     }
 
     fn advance_puck_alone(&mut self) {

@@ -17,6 +17,7 @@ mod delay;
 mod determinism;
 mod episodes;
 mod game;
+mod hostile;
 mod kinematics;
 mod mallet_impact;
 mod outcomes;

@@ -7,7 +7,7 @@ use crate::{
         purpose::{self, Purpose},
         runs::{self, RunOwner},
     },
-    queue::{self, Claim},
+    queue::{self, Claim, Leased},
     store::Store,
     tables::{
         evaluations, runs as run_rows,
@@ -58,6 +58,8 @@ pub enum Work {
         bundle: BundleRef,
         /// Of the run's episodes.
         seeds: RunSeeds,
+        /// How often it was begun before and broken by us.
+        platform_retries: u32,
     },
     /// Join the recordings of an evaluation whose shards are all committed, and score it.
     Finalise {
@@ -100,7 +102,7 @@ impl Store {
                 let reason = if unit.attempts > MAX_LEASES {
                     format!("{MAX_LEASES} workers died over it")
                 } else {
-                    match describe(tx, unit.id.0, &unit.kind).await {
+                    match describe(tx, &unit).await {
                         Ok(work) => {
                             let lease = SignedDuration::from_secs(lease_s.into());
                             let claim = Claim {
@@ -129,8 +131,8 @@ impl Store {
 }
 
 /// Reads what the leased unit is about.
-async fn describe(tx: &mut Tx, unit: Uuid, label: &str) -> Result<Work> {
-    match purpose::of_unit(tx, unit, label).await? {
+async fn describe(tx: &mut Tx, unit: &Leased) -> Result<Work> {
+    match purpose::of_unit(tx, unit.id.0, &unit.kind).await? {
         Purpose::Smoke(id) => {
             tx.advanced(Subject::Submission(id));
             let submission = submissions::find(tx, id).await?;
@@ -153,6 +155,7 @@ async fn describe(tx: &mut Tx, unit: Uuid, label: &str) -> Result<Work> {
                 shard,
                 bundle: submission.bundle,
                 seeds,
+                platform_retries: unit.attempts.saturating_sub(1),
             })
         }
         Purpose::Finalise(evaluation) => {

@@ -12,13 +12,14 @@ use crate::{
     },
     write::Tx,
 };
-use faceoff_types::{EvaluationId, RunId, SeedLabel, SubmissionId, TeamId};
+use faceoff_types::{EvaluationId, Ruleset, RunId, SeedLabel, SubmissionId, TeamId};
 use jiff::civil::Date;
 
 /// What is to play a day.
 pub(crate) struct Entrant {
     pub(crate) submission: SubmissionId,
     pub(crate) team: TeamId,
+    pub(crate) ruleset: Ruleset,
     pub(crate) rerun_of: Option<EvaluationId>,
 }
 
@@ -33,6 +34,7 @@ pub(crate) async fn enter(
 ) -> Result<EvaluationId> {
     let run = Run {
         id: RunId::new(),
+        ruleset: entrant.ruleset,
         plan: plan.clone(),
         seed: SeedLabel::Day(day),
         keeps_recordings: true,

@@ -12,7 +12,7 @@ use crate::{
         submissions::{self, SubmissionState},
     },
 };
-use faceoff_types::{AblationId, Profile, RunId, SeedLabel, SubmissionId, Task};
+use faceoff_types::{AblationId, Profile, Ruleset, RunId, SeedLabel, SubmissionId, Task};
 use jiff::Timestamp;
 
 impl Store {
@@ -45,6 +45,7 @@ impl Store {
             for profile in Profile::ABLATION {
                 let run = Run {
                     id: RunId::new(),
+                    ruleset: Ruleset::CURRENT,
                     plan: RunPlan {
                         profile,
                         ..plan.clone()

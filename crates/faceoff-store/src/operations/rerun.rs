@@ -22,13 +22,14 @@ use jiff::Timestamp;
 pub const RERUN_PAUSES_S: [u32; 2] = [60, 600];
 
 async fn again(tx: &mut Tx, broken: Entry, rest_s: u32) -> Result<EvaluationId> {
+    let run = runs::find(tx, broken.run).await?;
     let entrant = Entrant {
         submission: broken.submission,
         team: broken.team,
+        ruleset: run.ruleset,
         rerun_of: Some(broken.id),
     };
-    let plan = runs::find(tx, broken.run).await?.plan;
-    enter(tx, entrant, broken.day, &plan, rest_s).await
+    enter(tx, entrant, broken.day, &run.plan, rest_s).await
 }
 
 /// Queues what has just ended by our fault again: unless its day is released, or this was tried often

@@ -12,6 +12,7 @@ use crate::{
     tables::{days, evaluations::Evaluation, plan::RunPlan, season, submissions},
     write::Tx,
 };
+use faceoff_types::Ruleset;
 use jiff::{Timestamp, civil::Date, tz::TimeZone};
 
 /// The UTC day of an instant.
@@ -30,6 +31,7 @@ async fn cut(tx: &mut Tx, plan: &RunPlan) -> Result<Vec<Evaluation>> {
         let entrant = Entrant {
             submission: submission.id,
             team: submission.team,
+            ruleset: Ruleset::CURRENT,
             rerun_of: None,
         };
         let id = enter(tx, entrant, day, plan, 0).await?;

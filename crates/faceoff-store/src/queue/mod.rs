@@ -7,4 +7,4 @@ mod units;
 
 pub use lease::Claim;
 pub(crate) use lease::{Hold, hold, mark_done, release, renew, requeue_failed};
-pub(crate) use units::{NewUnit, claim_next, drop_units, end_leases_of, insert};
+pub(crate) use units::{Leased, NewUnit, claim_next, drop_units, end_leases_of, insert};

@@ -4,7 +4,9 @@ use crate::{
     store::Store,
     tables::teams::Team,
 };
-use faceoff_types::{EvaluationId, EvaluationResult, RunId, SubmissionId, TeamId, TeamName};
+use faceoff_types::{
+    EvaluationId, EvaluationResult, Ruleset, RunId, SubmissionId, TeamId, TeamName,
+};
 use jiff::{Timestamp, civil::Date};
 use sqlx::types::Text;
 
@@ -34,9 +36,27 @@ pub struct BoardRecord {
 }
 
 impl Store {
-    /// What the board is made of: each team's newest finished evaluation, in the teams' order of
-    /// names. Ranks and tiers are the scoring's.
-    pub async fn board(&self) -> Result<Vec<BoardRecord>> {
+    /// The newest rules that an evaluation is finished under, the current ones before there is any.
+    pub async fn board_ruleset(&self) -> Result<Ruleset> {
+        for ruleset in Ruleset::ALL.into_iter().rev() {
+            let name = Text(ruleset);
+            let found = sqlx::query_scalar!(
+                r#"SELECT EXISTS (SELECT 1 FROM runs r CROSS JOIN evaluations e
+                                  WHERE r.ruleset = ? AND e.run_id = r.id AND e.state = 'finished')
+                   AS "found!: bool""#,
+                name,
+            );
+            if found.fetch_one(&self.database.read).await? {
+                return Ok(ruleset);
+            }
+        }
+        Ok(Ruleset::CURRENT)
+    }
+
+    /// What the board of a ruleset is made of: each team's newest evaluation that is finished under it,
+    /// in the teams' order of names. Ranks and tiers are the scoring's.
+    pub async fn board(&self, ruleset: Ruleset) -> Result<Vec<BoardRecord>> {
+        let ruleset = Text(ruleset);
         let rows = sqlx::query!(
             r#"/* board */ SELECT t.id AS "team: Text<TeamId>", t.name AS "name: Text<TeamName>",
                       t.created_at AS "invited_at: Instant",
@@ -47,12 +67,14 @@ impl Store {
                       e.finished_at AS "finished_at!: Instant",
                       e.result AS "result!: Json<EvaluationResult>"
                FROM teams t
-               JOIN evaluations e ON e.rowid = (SELECT n.rowid FROM evaluations n
+               JOIN evaluations e ON e.rowid = (SELECT n.rowid FROM evaluations n CROSS JOIN runs r
                                                 WHERE n.team_id = t.id AND n.state = 'finished'
+                                                  AND r.id = n.run_id AND r.ruleset = ?
                                                 ORDER BY n.day DESC LIMIT 1)
                LEFT JOIN days d ON d.day = e.day
                JOIN submissions s ON s.id = e.submission_id
-               ORDER BY t.name"#
+               ORDER BY t.name"#,
+            ruleset,
         )
         .fetch_all(&self.database.read)
         .await?;

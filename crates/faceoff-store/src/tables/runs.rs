@@ -3,7 +3,7 @@ use crate::{
     error::{Result, StoreError},
     tables::plan::RunPlan,
 };
-use faceoff_types::{Profile, RunId, SeedLabel, SubmissionId, Task};
+use faceoff_types::{Profile, Ruleset, RunId, SeedLabel, SubmissionId, Task};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
@@ -12,6 +12,8 @@ use sqlx::{SqliteConnection, types::Text};
 pub struct Run {
     /// Part of the artifact keys of its recordings.
     pub id: RunId,
+    /// By which rules.
+    pub ruleset: Ruleset,
     /// What is played.
     pub plan: RunPlan,
     /// On which episodes.
@@ -41,10 +43,11 @@ pub(crate) async fn insert(
 ) -> Result<()> {
     let (id, plan) = (Text(run.id), &run.plan);
     let (profile, seed, tasks) = (Text(plan.profile), Text(run.seed), Json(&plan.tasks));
+    let ruleset = Text(run.ruleset);
     sqlx::query!(
         "INSERT INTO runs (id, profile, seed, tasks, episodes_per_task, episodes_per_shard, max_faults,
-                           keeps_recordings, state)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, 'queued')",
+                           keeps_recordings, ruleset, state)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, 'queued')",
         id,
         profile,
         seed,
@@ -53,6 +56,7 @@ pub(crate) async fn insert(
         plan.episodes_per_shard,
         plan.max_faults,
         run.keeps_recordings,
+        ruleset,
     )
     .execute(&mut *connection)
     .await?;
@@ -76,7 +80,7 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: RunId) -> Result
         r#"SELECT profile AS "profile: Text<Profile>", seed AS "seed: Text<SeedLabel>",
                   tasks AS "tasks: Json<Vec<Task>>", episodes_per_task AS "episodes_per_task: u32",
                   episodes_per_shard AS "episodes_per_shard: u32", max_faults AS "max_faults: u32",
-                  keeps_recordings AS "keeps_recordings: bool"
+                  keeps_recordings AS "keeps_recordings: bool", ruleset AS "ruleset: Text<Ruleset>"
            FROM runs WHERE id = ?"#,
         id_text,
     )
@@ -85,6 +89,7 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: RunId) -> Result
     .ok_or(StoreError::NotFound("run"))?;
     Ok(Run {
         id,
+        ruleset: row.ruleset.0,
         plan: RunPlan {
             profile: row.profile.0,
             tasks: row.tasks.0,

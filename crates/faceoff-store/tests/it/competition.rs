@@ -76,7 +76,7 @@ async fn a_submission_travels_from_upload_to_board() {
     );
 
     assert_eq!(f.state(evaluation.id).await, EvaluationState::Finalising);
-    assert!(f.store.board().await.unwrap().is_empty());
+    assert!(f.store.board(Ruleset::CURRENT).await.unwrap().is_empty());
     let Some(Claimed {
         claim,
         work:
@@ -115,7 +115,7 @@ async fn a_submission_travels_from_upload_to_board() {
         }
     );
 
-    let board = f.store.board().await.unwrap();
+    let board = f.store.board(Ruleset::CURRENT).await.unwrap();
     assert_eq!(board.len(), 1);
     assert_eq!(board[0].team, team);
     assert_eq!(board[0].submission, submission.id);

@@ -2,7 +2,7 @@
 
 use crate::fixture::*;
 use faceoff_store::*;
-use faceoff_types::{SmokeOutcome, SubmissionId};
+use faceoff_types::{Ruleset, SmokeOutcome, SubmissionId};
 use jiff::civil::date;
 
 fn had_its_cut<T: std::fmt::Debug>(result: Result<T, StoreError>) -> jiff::civil::Date {
@@ -355,7 +355,7 @@ async fn the_board_shows_each_teams_newest_finished_day() {
             }
         }
     }
-    let board = f.store.board().await.unwrap();
+    let board = f.store.board(Ruleset::CURRENT).await.unwrap();
     let rows: Vec<_> = board
         .iter()
         .map(|r| (r.team.name.as_str(), r.day, r.result.score))

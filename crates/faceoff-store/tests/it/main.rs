@@ -16,4 +16,6 @@ mod opening;
 mod queries;
 mod queue;
 mod releases;
+mod retries;
+mod rulesets;
 mod teams;

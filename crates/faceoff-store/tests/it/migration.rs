@@ -466,7 +466,7 @@ async fn every_old_row_is_there_and_says_what_it_said() {
     assert_eq!(f.store.outcomes(run).await.unwrap().len(), 12);
     let summaries = f.store.episode_summaries(&[run], 7).await.unwrap();
     assert_eq!(summaries[&run], "{\"old\":1}");
-    let board = f.store.board().await.unwrap();
+    let board = f.store.board(Ruleset::First).await.unwrap();
     assert_eq!((board.len(), board[0].evaluation), (1, id(1400)));
     // faults and log are those of the shards, which were kept
     let failed = f.store.evaluation(id(1500)).await.unwrap();
@@ -657,7 +657,7 @@ async fn work_goes_on_where_the_old_program_left_it() {
     }
     let ablation = f.store.newest_ablation(id(11)).await.unwrap().unwrap();
     assert!(matches!(ablation.state, AblationState::Finished { .. }));
-    assert_eq!(f.store.board().await.unwrap().len(), 4);
+    assert_eq!(f.store.board(Ruleset::First).await.unwrap().len(), 4);
     // its last evaluation released the day, which has had its cut
     assert_eq!(
         f.store.newest_day().await.unwrap().unwrap().released_at,

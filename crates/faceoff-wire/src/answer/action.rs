@@ -1,8 +1,10 @@
 use super::marks;
+use faceoff_types::ACTION_LIMIT;
 use serde::de::{DeserializeSeed, Deserializer, Error as _, SeqAccess, Visitor};
 use std::fmt;
 
-/// Reads nested arrays of exactly `shape` into `out`, row-major.
+/// Reads nested arrays of exactly `shape` into `out`, row-major, and refuses numbers beyond
+/// [`ACTION_LIMIT`].
 ///
 /// Recursion ends with the shape: an array where a number belongs is refused before it is entered.
 pub(super) struct ActionSeed<'s> {
@@ -33,6 +35,13 @@ impl<'de> Visitor<'de> for ActionSeed<'_> {
                 let Some(Number(value)) = seq.next_element()? else {
                     return Err(A::Error::custom(marks::SHAPE));
                 };
+                if value.abs() > ACTION_LIMIT {
+                    return Err(A::Error::custom(format_args!(
+                        "{}{} {value:?}",
+                        marks::TOO_LARGE,
+                        self.out.len()
+                    )));
+                }
                 self.out.push(value);
             }
         } else {

@@ -2,8 +2,14 @@
 
 use super::marks;
 use crate::protocol::MAX_LINE_BYTES;
-use faceoff_types::{AgentFaultKind, Interpolation};
+use faceoff_types::{ACTION_LIMIT, AgentFaultKind, Interpolation};
 use serde_json::Value;
+
+/// Characters of a repeated key that are shown.
+const QUOTED_KEY_CHARS: usize = 60;
+
+/// Characters of the parser's words that are kept, but for the place that they end with.
+const DETAIL_CHARS: usize = 200;
 
 /// The fault of a line longer than the protocol allows.
 #[must_use]
@@ -21,15 +27,15 @@ pub(super) fn diagnose(
 ) -> AgentFaultKind {
     let message = error.to_string();
     if let Some(rest) = message.strip_prefix(marks::TWICE) {
-        let key = rest.split(' ').next().unwrap_or_default();
-        return AgentFaultKind::NotJson {
-            detail: format!("the key {key:?} is given twice"),
-        };
+        return twice(rest.split(' ').next().unwrap_or_default());
     }
-    if let Some(code) = interpolation
-        && message.contains(marks::SHAPE)
-    {
-        return wrong_shape(text, code);
+    if let Some(code) = interpolation {
+        if let Some(found) = message.strip_prefix(marks::TOO_LARGE) {
+            return too_large(found, code);
+        }
+        if message.contains(marks::SHAPE) {
+            return wrong_shape(text, code);
+        }
     }
     if message.starts_with("number out of range") || has_non_finite_word(text) {
         return AgentFaultKind::NonFinite;
@@ -41,7 +47,46 @@ pub(super) fn diagnose(
     }
     // A line is line 1 of itself: the column alone helps.
     let detail = message.replace(" at line 1 column ", " at character ");
-    AgentFaultKind::NotJson { detail }
+    AgentFaultKind::NotJson {
+        detail: cut(&detail),
+    }
+}
+
+/// The fault of an object with a repeated key.
+pub(super) fn twice(key: &str) -> AgentFaultKind {
+    let key: String = key.chars().take(QUOTED_KEY_CHARS).collect();
+    AgentFaultKind::NotJson {
+        detail: format!("the key {key:?} is given twice"),
+    }
+}
+
+/// The parser quotes what it did not expect, which may be all of a line.
+fn cut(detail: &str) -> String {
+    match detail.char_indices().nth(DETAIL_CHARS) {
+        None => detail.to_owned(),
+        Some((end, _)) => {
+            let place = detail.rfind(" at character ").unwrap_or(end).max(end);
+            format!("{}…{}", &detail[..end], &detail[place..])
+        }
+    }
+}
+
+/// `found` is the number's index in the action and its value.
+fn too_large(found: &str, code: Interpolation) -> AgentFaultKind {
+    let mut words = found.split(' ');
+    let mut index: usize = words.next().and_then(|word| word.parse().ok()).unwrap_or(0);
+    let value = words.next().and_then(|word| word.parse().ok());
+    let mut place = Vec::new();
+    for len in code.shape().iter().rev() {
+        place.push(index % len);
+        index /= len;
+    }
+    place.reverse();
+    AgentFaultKind::TooLarge {
+        place: format!("action{}", shape_text(&place)),
+        value: value.unwrap_or(f64::MAX),
+        limit: ACTION_LIMIT,
+    }
 }
 
 fn wrong_shape(text: &str, code: Interpolation) -> AgentFaultKind {

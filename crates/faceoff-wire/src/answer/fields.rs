@@ -1,4 +1,4 @@
-use super::{action::ActionSeed, diagnosis, marks, scalar::Scalar};
+use super::{action::ActionSeed, diagnosis, marks, repeated_keys, scalar::Scalar};
 use crate::protocol::MAX_LINE_BYTES;
 use faceoff_types::{AgentFaultKind, Interpolation};
 use serde::{
@@ -19,6 +19,8 @@ pub(super) struct Fields<'a> {
     pub version: Option<Scalar<'a>>,
     /// The action was read into the caller's buffer.
     pub has_action: bool,
+    /// Something was skipped: its keys have not been looked at.
+    has_skipped: bool,
 }
 
 /// Where an expected action goes.
@@ -35,9 +37,14 @@ impl<'a> Fields<'a> {
         })?;
         let interpolation = sink.as_ref().map(|(code, _)| *code);
         let mut json = serde_json::Deserializer::from_str(text);
-        json.deserialize_map(FieldsVisitor { sink })
+        let fields = json
+            .deserialize_map(FieldsVisitor { sink })
             .and_then(|fields| json.end().map(|()| fields))
-            .map_err(|error| diagnosis::diagnose(text, &error, interpolation))
+            .map_err(|error| diagnosis::diagnose(text, &error, interpolation))?;
+        if fields.has_skipped {
+            repeated_keys::refuse(text)?;
+        }
+        Ok(fields)
     }
 
     /// Is this what the hot path hopes for?
@@ -119,16 +126,20 @@ impl<'de> Visitor<'de> for FieldsVisitor<'_> {
                         continue;
                     }
                     None => {
+                        fields.has_skipped = true;
                         map.next_value::<IgnoredAny>()?;
                         continue;
                     }
                 },
                 Key::Unknown => {
+                    fields.has_skipped = true;
                     map.next_value::<IgnoredAny>()?;
                     continue;
                 }
             };
-            if field.replace(map.next_value()?).is_some() {
+            let value = map.next_value()?;
+            fields.has_skipped |= matches!(value, Scalar::Array | Scalar::Object);
+            if field.replace(value).is_some() {
                 return Err(A::Error::custom(format_args!(
                     "{}{}",
                     marks::TWICE,

@@ -64,7 +64,7 @@ fn an_action_is_read_row_major_with_its_bits() {
 #[test]
 fn order_spaces_and_extra_fields_do_not_matter() {
     let line = format!(
-        " {{ \"note\" : {{\"deep\":[[[1e999,\"NaN\"]]]}}, \"action\":[{},{}],\"x\":1,\"x\":2,\
+        " {{ \"note\" : {{\"deep\":[[[1e999,\"NaN\"]]]}}, \"action\":[{},{}],\"x\":1,\"y\":2,\
          \"step\":4,\"type\":\"a\\u0063t\"}} \r",
         row("1"),
         row("2e0"),
@@ -148,19 +148,61 @@ fn what_is_not_finite_is_refused_however_it_is_written() {
         assert_eq!(parse(&line), Err(AgentFaultKind::NonFinite), "{word}");
     }
     assert_eq!(parse(&act("4", "NaN")), Err(AgentFaultKind::NonFinite));
-    // Tiny numbers are zero, huge integers are numbers.
-    let line = act(
-        "4",
-        &format!(
-            "[{},{}]",
-            row("1e-999"),
-            row("123456789012345678901234567890")
-        ),
-    );
+    let endless = "9".repeat(5000);
     assert_eq!(
-        parse(&line).unwrap()[6..8],
-        [0.0, 123_456_789_012_345_678_901_234_567_890.0]
+        parse(&act("4", &format!("[{},{}]", row("0"), row(&endless)))),
+        Err(AgentFaultKind::NonFinite)
     );
+}
+
+#[test]
+fn a_number_that_no_action_needs_is_refused_with_its_place() {
+    let too_large = |text: &str, expected_value: f64| {
+        let mut second = vec!["0.5"; 7];
+        second[3] = text;
+        let action = format!("[{},[{}]]", row("-1"), second.join(","));
+        assert_eq!(
+            parse(&act("4", &action)),
+            Err(AgentFaultKind::TooLarge {
+                place: "action[1][3]".to_owned(),
+                value: expected_value,
+                limit: 1e4,
+            }),
+            "{text}"
+        );
+    };
+    for text in [
+        "1.7e308",
+        "-1.7e308",
+        "1e5",
+        "10000.000001",
+        "-10001",
+        "123456789012345678901234567890",
+    ] {
+        too_large(text, text.parse().unwrap());
+    }
+    let null = Interpolation::from_code(None).unwrap();
+    let step = format!("[{0},{0},{0}]", row("0"));
+    let last = format!("[{0},{0},{1}]", row("0"), row("2e4"));
+    let trajectory = [vec![&*step; 19], vec![&*last]].concat().join(",");
+    let line = act("4", &format!("[{trajectory}]"));
+    let fault = parse_act(line.as_bytes(), 4, null, &mut Vec::new()).unwrap_err();
+    assert_eq!(
+        fault.to_string(),
+        "action[19][2][0] is 20000.0: expected numbers between -10000 and 10000 (rad, rad/s, rad/s²)"
+    );
+    // At the bound, denormal, vanishing, and with more digits than a number holds.
+    let digits = format!("0.{}1", "0".repeat(4000));
+    for (text, value) in [
+        ("10000", 1e4),
+        ("-1e4", -1e4),
+        ("5e-324", 5e-324),
+        ("1e-999", 0.0),
+        (&*digits, 0.0),
+    ] {
+        let line = act("4", &format!("[{},{}]", row("0"), row(text)));
+        assert_eq!(parse(&line).unwrap()[13], value, "{text}");
+    }
 }
 
 #[test]
@@ -176,6 +218,12 @@ fn rubbish_is_not_json() {
     not_json("{'type':'act'}", "key must be a string");
     not_json("{\"type\":NaNsense}", "at character 9");
     not_json("loss: NaN", "at character 1");
+    let long = format!("\"{}\"", "é".repeat(20_000));
+    not_json(&long, "… at character 40002");
+    let Err(AgentFaultKind::NotJson { detail }) = parse(&long) else {
+        panic!("it is no object");
+    };
+    assert!(detail.chars().count() < 260, "{detail}");
     let mut action = Vec::new();
     let fault =
         parse_act(b"{\"type\":\"\xff\"}", 0, Interpolation::Cubic, &mut action).unwrap_err();
@@ -203,6 +251,51 @@ fn a_key_given_twice_is_refused() {
             1,
         );
         not_json(&line, &format!("the key \"{key}\" is given twice"));
+    }
+}
+
+#[test]
+fn a_key_given_twice_is_refused_at_any_depth_and_however_it_is_written() {
+    for (extra, key) in [
+        (r#""x":1,"x":2"#, "x"),
+        (r#""x":1,"y":{"a":[]},"x":{}"#, "x"),
+        (r#""x":{"b":1,"a":{"b":2},"b":3}"#, "b"),
+        (r#""x":[[0,[{"":1,"":1}]]]"#, ""),
+        (r#""x":{"a":1,"\u0061":1}"#, "a"),
+        (r#""x":{"\"}{":1,"\"}{":1}"#, "\"}{"),
+        (r#""x":{"type":"act","type":"act"}"#, "type"),
+        (r#""name":{"a":0,"a":0}"#, "a"),
+        (r#""version":[{"a":0,"a":0}]"#, "a"),
+    ] {
+        let line = good().replacen('{', &format!("{{{extra},"), 1);
+        not_json(&line, &format!("the key {key:?} is given twice"));
+        let ready = format!(r#"{{"type":"ready","protocol":1,"interpolation":3,{extra}}}"#);
+        let fault = parse_ready(ready.as_bytes());
+        assert!(
+            matches!(fault, Err(AgentFaultKind::NotJson { .. })),
+            "{ready}"
+        );
+    }
+    not_json(
+        &good().replacen('{', r#"{"x":{"\ud800":1},"#, 1),
+        "a key cannot be read",
+    );
+    // An action that is not due is skipped, and looked at.
+    let ready = r#"{"type":"ready","episode":1,"action":[{"a":1,"a":2}]}"#;
+    assert!(matches!(
+        parse_reset_ready(ready.as_bytes(), 1),
+        Err(AgentFaultKind::NotJson { .. })
+    ));
+    // The same word elsewhere is no repetition.
+    for extra in [
+        r#""x":{"a":1},"y":{"a":1}"#,
+        r#""x":["a","a","a"]"#,
+        r#""x":{"a":"a","b":"a"}"#,
+        r#""x":[{"a":1},{"a":1}]"#,
+        r#""x":{"a\\":1,"a":"\"a\":1,"}"#,
+    ] {
+        let line = good().replacen('{', &format!("{{{extra},"), 1);
+        assert!(parse(&line).is_ok(), "{line}");
     }
 }
 

@@ -47,6 +47,8 @@ fn shard(recording: Option<&str>) -> Assignment {
         part_of: Uuid::from_u128(3),
         agent: agent(),
         spec: ShardSpec {
+            ruleset: Ruleset::CURRENT,
+            platform_retries: 1,
             task: Task::Defend,
             episodes: 100..u32::MAX,
             profile: Profile::TrackingLoss,
@@ -67,7 +69,7 @@ fn every_order_round_trips() {
             seed: Seed::from_number(7),
             mismatch_seed: Seed::from_number(8),
             agent: "striker".into(),
-            ruleset: RULESET.into(),
+            ruleset: Ruleset::CURRENT,
         },
         recordings: vec!["recordings/a".into(), "recordings/b".into()],
         dataset: "datasets/c.zip".into(),

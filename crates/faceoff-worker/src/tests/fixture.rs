@@ -159,7 +159,7 @@ impl Evaluator for Scripted {
 
 pub(super) fn result(meta: &EvaluationMeta) -> EvaluationResult {
     EvaluationResult {
-        ruleset: meta.ruleset.clone(),
+        ruleset: meta.ruleset.to_string(),
         profile: meta.profile,
         seed: meta.seed,
         tasks: BTreeMap::new(),

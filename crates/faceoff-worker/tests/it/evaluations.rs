@@ -58,7 +58,7 @@ async fn play_day(
             server.store.outcomes(evaluation.run).await.unwrap(),
         ));
     }
-    assert_eq!(server.store.board().await.unwrap().len(), 2);
+    assert_eq!(server.store.board(Ruleset::CURRENT).await.unwrap().len(), 2);
     worker.stop().await;
     outcomes
 }

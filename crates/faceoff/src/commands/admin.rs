@@ -1,5 +1,4 @@
 //! `faceoff admin`: organises a running competition through its API.
-#![expect(clippy::print_stdout, reason = "a command talks to the terminal")]
 
 use super::serve::ADMIN_TOKEN_FILE;
 use crate::{client::Client, config::Config};

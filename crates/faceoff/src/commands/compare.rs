@@ -1,6 +1,5 @@
 //! `faceoff compare`: two evaluations on the same episodes, with the tests that say whether their
 //! difference is more than luck.
-#![expect(clippy::print_stdout, reason = "a command talks to the terminal")]
 
 mod table;
 

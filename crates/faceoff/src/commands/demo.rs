@@ -63,7 +63,6 @@ impl DemoCommand {
             .block_on(self.play())
     }
 
-    #[expect(clippy::print_stdout, reason = "a demo talks to its audience")]
     async fn play(self) -> anyhow::Result<()> {
         // Before anything is removed: another server's port would make the demo talk to that server.
         TcpListener::bind(self.listen).with_context(|| {

@@ -1,5 +1,4 @@
 //! `faceoff eval`: the server's evaluator, run locally.
-#![expect(clippy::print_stdout, reason = "a command talks to the terminal")]
 
 mod ablation;
 mod files;

@@ -16,10 +16,6 @@ pub mod verify;
 use std::process::ExitCode;
 
 /// Success, or the error with its causes on standard error and status 1.
-#[expect(
-    clippy::print_stderr,
-    reason = "this is where a command's error meets the terminal"
-)]
 pub fn exit_code(outcome: anyhow::Result<()>) -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

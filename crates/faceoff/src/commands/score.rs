@@ -1,5 +1,6 @@
 //! `faceoff score`: scoring alone, for organisers who score again by hand.
 
+use crate::terminal;
 use anyhow::{Context as _, bail, ensure};
 use clap::{Args, Subcommand};
 use faceoff_scoring::{
@@ -50,9 +51,9 @@ impl ScoreCommand {
             self.stage.name(),
             self.stage.file()
         );
-        let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+        let mut out = terminal::stdout();
         self.stage
-            .score(stdin.lock(), &mut out, &mut std::io::stderr())?;
+            .score(stdin.lock(), &mut out, &mut terminal::stderr())?;
         out.flush().context("standard output")
     }
 }

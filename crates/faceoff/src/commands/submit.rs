@@ -1,5 +1,4 @@
 //! `faceoff submit`: uploads an agent and says whether it starts.
-#![expect(clippy::print_stdout, reason = "a command talks to the terminal")]
 
 use crate::client::Client;
 use anyhow::{Context, bail};

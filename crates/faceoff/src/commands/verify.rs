@@ -1,9 +1,4 @@
 //! `faceoff verify`: does a published dataset give its published score?
-#![expect(
-    clippy::print_stdout,
-    clippy::print_stderr,
-    reason = "a command talks to the terminal"
-)]
 
 use anyhow::{Context, anyhow};
 use clap::Args;

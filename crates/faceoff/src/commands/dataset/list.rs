@@ -1,9 +1,7 @@
+use crate::terminal;
 use clap::Args;
 use faceoff_dataset::Dataset;
-use std::{
-    io::{BufWriter, Write, stdout},
-    path::PathBuf,
-};
+use std::{io::Write, path::PathBuf};
 
 /// Prints a row per episode.
 #[derive(Debug, Args)]
@@ -18,7 +16,7 @@ pub struct ListArgs {
 impl ListArgs {
     pub fn run(self) -> anyhow::Result<()> {
         let episodes = Dataset::open_unread(&self.dataset)?.episodes()?;
-        let mut out = BufWriter::new(stdout().lock());
+        let mut out = terminal::stdout();
         if !self.json {
             writeln!(
                 out,

@@ -1,3 +1,4 @@
+use crate::terminal;
 use anyhow::Context;
 use arrow_array::{
     Array, RecordBatch,
@@ -11,7 +12,7 @@ use faceoff_types::Task;
 use serde_json::{Map, Value};
 use std::{
     fs::File,
-    io::{BufWriter, Write, stdout},
+    io::{BufWriter, Write},
     ops::Range,
     path::PathBuf,
     str::FromStr,
@@ -87,7 +88,7 @@ impl SliceArgs {
             Some(path) => Box::new(BufWriter::new(
                 File::create(path).with_context(|| format!("creating {}", path.display()))?,
             )),
-            None => Box::new(BufWriter::new(stdout().lock())),
+            None => Box::new(terminal::stdout()),
         };
         if self.format == Format::Csv {
             writeln!(out, "{}", names.join(","))?;

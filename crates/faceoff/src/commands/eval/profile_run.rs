@@ -7,7 +7,7 @@ use super::{
 use anyhow::{Context, bail};
 use faceoff_dataset::{ARCHIVE_FILE, Assembled, assemble};
 use faceoff_runner::{AgentEnvironment, bundle::Bundle};
-use faceoff_types::{AgentFault, EpisodeOutcome, EvaluationResult, Profile, RULESET, Seed, Task};
+use faceoff_types::{AgentFault, EpisodeOutcome, EvaluationResult, Profile, Ruleset, Seed, Task};
 use faceoff_wire::work::{EvaluationMeta, ShardSpec};
 use std::{
     fs,
@@ -68,7 +68,7 @@ pub(super) fn play(setup: &EvalSetup, profile: Profile, out: &Path) -> anyhow::R
         seed: setup.seed,
         mismatch_seed: setup.mismatch_seed,
         agent: setup.bundle.manifest.name.clone(),
-        ruleset: RULESET.to_owned(),
+        ruleset: Ruleset::CURRENT,
     };
     let Assembled { result, archive } =
         assemble(&meta, &dirs, &out.join(ARCHIVE_FILE)).context("joining the recordings")?;
@@ -95,6 +95,8 @@ fn jobs(setup: &EvalSetup, profile: Profile) -> Vec<Job> {
             jobs.push(Job {
                 out: setup.scratch.join(format!("{profile}-{task}-{start}")),
                 spec: ShardSpec {
+                    ruleset: Ruleset::CURRENT,
+                    platform_retries: 0,
                     task: *task,
                     episodes: start..end,
                     profile,

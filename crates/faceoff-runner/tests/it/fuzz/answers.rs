@@ -1,0 +1,118 @@
+use super::{assert_met, fuzz, mutation::mutate};
+use faceoff_types::{ACTION_LIMIT, AgentFaultKind, Interpolation, harmless};
+use faceoff_wire::{
+    MAX_LINE_BYTES,
+    answer::{parse_act, parse_ready, parse_reset_ready},
+    quote_line,
+};
+use serde_json::Value;
+
+const WORDS: [&str; 24] = [
+    "NaN",
+    "-Infinity",
+    "1e999",
+    "1.7e308",
+    "-10001",
+    "1e4",
+    "5e-324",
+    "-0",
+    "7",
+    "null",
+    "true",
+    "\"\"",
+    "{}",
+    "[]",
+    "{\"a\":1,\"a\":2}",
+    "\"x\":{\"y\":[]},",
+    "\"step\":7,",
+    "\"type\":\"act\",",
+    "ready",
+    "act",
+    "\\u0061",
+    "\\ud800",
+    "\u{202e}",
+    "\u{1b}[2J",
+];
+
+fn act(interpolation: Interpolation) -> String {
+    fn nest(shape: &[usize], numbers: &mut impl Iterator<Item = String>) -> String {
+        match shape.split_first() {
+            None => numbers.next().unwrap(),
+            Some((len, inner)) => {
+                let parts: Vec<_> = (0..*len).map(|_| nest(inner, numbers)).collect();
+                format!("[{}]", parts.join(","))
+            }
+        }
+    }
+    let mut numbers = (0..interpolation.len()).map(|i| format!("{}", i as f64 / 16.0 - 3.0));
+    let action = nest(interpolation.shape(), &mut numbers);
+    format!(
+        "{{\"type\":\"act\",\"step\":7,\"action\":{action},\"note\":{{\"a\":[1,{{\"b\":2}}]}}}}"
+    )
+}
+
+/// What is told of a fault is text that can be shown.
+fn label(fault: &AgentFaultKind) -> String {
+    let told = harmless(&fault.to_string()).into_owned();
+    assert!(told.chars().count() < 1000, "{told}");
+    let name = format!("{fault:?}");
+    name.split([' ', '{']).next().unwrap().to_owned()
+}
+
+#[test]
+fn answers_are_whole_or_the_agents_fault() {
+    let codes: Vec<_> = [1, 2, 3, 4, 5, -1]
+        .map(Some)
+        .into_iter()
+        .chain([None])
+        .map(|code| Interpolation::from_code(code).unwrap())
+        .collect();
+    let met = fuzz("answers", 60_000, |draws| {
+        let interpolation = *draws.pick(&codes);
+        let kind = draws.below(6);
+        let mut line = match kind {
+            0 => br#"{"type":"ready","protocol":1,"interpolation":3,"name":"a","version":"1"}"#
+                .to_vec(),
+            1 => br#"{"type":"ready","episode":7}"#.to_vec(),
+            _ => act(interpolation).into_bytes(),
+        };
+        mutate(&mut line, &WORDS, draws);
+        assert!(quote_line(&line).chars().count() <= 400);
+        let outcome = match kind {
+            0 => parse_ready(&line).map(drop),
+            1 => parse_reset_ready(&line, 7),
+            _ => {
+                let mut action = Vec::new();
+                let parsed = parse_act(&line, 7, interpolation, &mut action);
+                if parsed.is_ok() {
+                    assert_eq!(action.len(), interpolation.len());
+                    assert!(action.iter().all(|number| number.abs() <= ACTION_LIMIT));
+                }
+                parsed
+            }
+        };
+        match outcome {
+            Ok(()) => {
+                assert!(line.len() <= MAX_LINE_BYTES);
+                // Whatever else it holds: this much another reader agrees to, unless it overflows.
+                if let Ok(value) = serde_json::from_slice::<Value>(&line) {
+                    assert_eq!(value["type"], if kind < 2 { "ready" } else { "act" });
+                }
+                "accepted".to_owned()
+            }
+            Err(fault) => label(&fault),
+        }
+    });
+    assert_met(
+        &met,
+        &[
+            "accepted",
+            "NotJson",
+            "WrongMessage",
+            "WrongShape",
+            "NonFinite",
+            "TooLarge",
+            "LineTooLong",
+        ],
+    );
+}

@@ -1,0 +1,220 @@
+use super::{assert_met, draws::Draws, fuzz, mutation::mutate};
+use faceoff_dataset::{
+    Dataset, DatasetError, Recorder, ShardFolder, ShardReport, assemble,
+    verify::{VerifyError, verify},
+};
+use faceoff_episode::{Answered, Arena, Course, StepSink};
+use faceoff_types::{Interpolation, Phase, Profile, Ruleset, Seed, Task};
+use faceoff_wire::{
+    dataset::DatasetManifest,
+    work::{EvaluationMeta, ShardSpec},
+};
+use std::{
+    collections::BTreeMap,
+    fs::{self, File},
+    num::NonZero,
+    path::Path,
+};
+use tempfile::TempDir;
+use zip::ZipArchive;
+
+const WORDS: [&str; 16] = [
+    "null",
+    "-1",
+    "1e999",
+    "4294967296",
+    "\"\"",
+    "{}",
+    "[]",
+    "faceoff-dataset/2",
+    "faceoff-dataset/1",
+    "airhockey-2023.1",
+    "airhockey-1999",
+    "PAR1",
+    "hit",
+    "prepare",
+    "00",
+    "\u{202e}",
+];
+
+/// The dataset of two short episodes.
+fn recorded(dir: &Path) {
+    let seed = Seed::from_number(5);
+    let spec = ShardSpec {
+        ruleset: Ruleset::CURRENT,
+        platform_retries: 0,
+        task: Task::Defend,
+        episodes: 0..2,
+        profile: Profile::Evaluation,
+        seed,
+        mismatch_seed: seed.model_mismatch(),
+        max_faults: 9,
+    };
+    let shard = dir.join("shard");
+    let folder = ShardFolder::create(&shard).unwrap();
+    let mut recorder = Recorder::create(&folder, spec.task).unwrap();
+    let arena = Arena::by(spec.ruleset, spec.profile, spec.seed, spec.mismatch_seed);
+    let mut outcomes = Vec::new();
+    for episode in spec.episodes.clone() {
+        let interpolation = Some(Interpolation::Linear);
+        let mut course = Course::begin(&arena, spec.task, episode, interpolation, &mut recorder);
+        let outcome = loop {
+            let question = course.question().unwrap();
+            if question.step == 30 {
+                let line = Some("oops".to_owned());
+                let fault = faceoff_types::AgentFaultKind::NonFinite;
+                break course.failed(Phase::Step, fault, line);
+            }
+            let action = question.observation[6..13].to_vec();
+            let answered = Answered {
+                computation_time_s: 0.001,
+                cpu_time_s: None,
+            };
+            if let Some(outcome) = course.answer(&action, answered).unwrap() {
+                break outcome;
+            }
+        };
+        recorder.end(&outcome, 0).unwrap();
+        outcomes.push(outcome);
+    }
+    recorder.finish().unwrap();
+    let report = ShardReport {
+        outcomes,
+        log: "goodbye\n".to_owned(),
+        stopped_by_faults: false,
+        timing: Default::default(),
+    };
+    folder.commit(&spec, &report).unwrap();
+    let meta = EvaluationMeta {
+        profile: spec.profile,
+        seed: spec.seed,
+        mismatch_seed: spec.mismatch_seed,
+        agent: "test".into(),
+        ruleset: spec.ruleset,
+    };
+    assemble(&meta, &[shard], &dir.join("dataset.zip")).unwrap();
+}
+
+/// The dataset's files by name, and the archive.
+struct Valid {
+    files: BTreeMap<String, Vec<u8>>,
+    archive: Vec<u8>,
+}
+
+impl Valid {
+    fn of(archive: &Path, scratch: &Path) -> Self {
+        let folder = scratch.join("unpacked");
+        ZipArchive::new(File::open(archive).unwrap())
+            .unwrap()
+            .extract(&folder)
+            .unwrap();
+        let files = fs::read_dir(&folder)
+            .unwrap()
+            .map(|entry| {
+                let entry = entry.unwrap();
+                let name = entry.file_name().into_string().unwrap();
+                (name, fs::read(entry.path()).unwrap())
+            })
+            .collect();
+        fs::remove_dir_all(&folder).unwrap();
+        Self {
+            files,
+            archive: fs::read(archive).unwrap(),
+        }
+    }
+
+    /// Writes a changed dataset and returns what is to be opened.
+    fn changed(&self, dir: &Path, draws: &mut Draws) -> std::path::PathBuf {
+        if draws.once_in(3) {
+            let mut archive = self.archive.clone();
+            mutate(&mut archive, &WORDS, draws);
+            let path = dir.join("dataset.zip");
+            fs::write(&path, archive).unwrap();
+            return path;
+        }
+        let mut files = self.files.clone();
+        let names: Vec<_> = files.keys().cloned().collect();
+        let name = draws.pick(&names);
+        match draws.below(10) {
+            0 => drop(files.remove(name)),
+            1 => drop(files.insert("extra".to_owned(), Vec::new())),
+            _ => mutate(files.get_mut(name).unwrap(), &WORDS, draws),
+        }
+        // A forger makes the hashes fit.
+        let manifest = files.get("manifest.json").map(Vec::as_slice);
+        let manifest = manifest.map(serde_json::from_slice::<DatasetManifest>);
+        if let Some(Ok(mut manifest)) = manifest
+            && !draws.once_in(4)
+        {
+            for (name, digest) in &mut manifest.files {
+                if let Some(bytes) = files.get(name) {
+                    digest.bytes = bytes.len() as u64;
+                    digest.blake3 = blake3::hash(bytes).to_hex().to_string();
+                }
+            }
+            let bytes = serde_json::to_vec(&manifest).unwrap();
+            files.insert("manifest.json".to_owned(), bytes);
+        }
+        for (name, bytes) in &files {
+            fs::write(dir.join(name), bytes).unwrap();
+        }
+        dir.to_owned()
+    }
+}
+
+/// Reads all of it, as far as it goes.
+fn read(path: &Path, draws: &mut Draws) -> Result<(), VerifyError> {
+    let dataset = if draws.once_in(2) {
+        Dataset::open(path)?
+    } else {
+        Dataset::open_unread(path)?
+    };
+    dataset.results()?;
+    dataset.calibration()?;
+    dataset.episodes()?;
+    let episode = *draws.pick(&[0, 1, 7]);
+    dataset.episode(*draws.pick(&[Task::Defend, Task::Hit]), episode, None)?;
+    verify(&dataset, NonZero::<usize>::MIN, &|| ()).map(drop)
+}
+
+#[test]
+fn a_dataset_is_read_or_refused() {
+    let scratch = TempDir::new().unwrap();
+    recorded(scratch.path());
+    let fixture = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/fixtures/dataset-layout-2.zip"
+    );
+    let valid = [
+        Valid::of(&scratch.path().join("dataset.zip"), scratch.path()),
+        Valid::of(Path::new(fixture), scratch.path()),
+    ];
+    let met = fuzz("datasets", 1500, |draws| {
+        let dir = scratch.path().join("changed");
+        fs::create_dir(&dir).unwrap();
+        // The larger one is simulated now and then only.
+        let valid = &valid[usize::from(draws.once_in(20))];
+        let path = valid.changed(&dir, draws);
+        let label = match read(&path, draws) {
+            Ok(()) => "read",
+            Err(VerifyError::Differs(_)) => "differs",
+            Err(VerifyError::Dataset(DatasetError::Io(_))) => "io",
+            Err(VerifyError::Dataset(DatasetError::Unreadable(_))) => "unreadable",
+            Err(VerifyError::Dataset(DatasetError::Foreign(_))) => "foreign",
+            Err(VerifyError::Dataset(DatasetError::Altered(_))) => "altered",
+            Err(VerifyError::Dataset(DatasetError::Absent(_))) => "absent",
+            Err(VerifyError::Workers(error)) => panic!("{error}"),
+        };
+        fs::remove_dir_all(&dir).unwrap();
+        label.to_owned()
+    });
+    let kinds = [
+        "read",
+        "differs",
+        "unreadable",
+        "foreign",
+        "altered",
+        "absent",
+    ];
+    assert_met(&met, &kinds);
+}

@@ -1,0 +1,107 @@
+use super::{assert_met, fuzz, mutation::mutate};
+use faceoff_types::is_harmless;
+use faceoff_wire::{Manifest, ManifestError};
+
+const VALID: [&str; 2] = [
+    "name = \"striker\"\ncommand = [\"python3\", \"agent.py\"]\nruntime = \"python3\"\n\
+     interpolation = 3\n[env]\nOMP_NUM_THREADS = \"1\"\nA = \"b\"\n",
+    "# a comment\nname = 'x'\ncommand = ['''./agent''']\nruntime = \"native\"\nenv = { A = \"\\u0061\" }\n",
+];
+
+const WORDS: [&str; 24] = [
+    "\"\"",
+    "''",
+    "[]",
+    "{}",
+    "[\"\"]",
+    "0",
+    "-1",
+    "99",
+    "true",
+    "inf",
+    "\\u0000",
+    "\\u202e",
+    "\u{202e}",
+    "../x",
+    "a b",
+    "=",
+    "\n",
+    "[env]",
+    "name = \"y\"\n",
+    "\"A=B\" = \"c\"\n",
+    "1 = \"c\"\n",
+    "interpolation",
+    "command = [\"\"]\n",
+    "\u{1b}[2J",
+];
+
+#[test]
+fn an_agent_toml_is_read_or_its_key_is_named() {
+    let met = fuzz("manifests", 30_000, |draws| {
+        let mut text = draws.pick(&VALID).as_bytes().to_vec();
+        mutate(&mut text, &WORDS, draws);
+        let text = String::from_utf8_lossy(&text);
+        match Manifest::parse(&text) {
+            Ok(manifest) => {
+                assert!(manifest.name.chars().all(is_harmless));
+                let again = Manifest::parse(&toml_of(&manifest)).unwrap();
+                assert_eq!(again, manifest);
+                "accepted".to_owned()
+            }
+            Err(error) => {
+                let told = error.to_string();
+                assert!(
+                    told.chars().all(|c| is_harmless(c) || "\n\t\r".contains(c)),
+                    "{told:?}"
+                );
+                match error {
+                    ManifestError::Toml(_) => "not toml".to_owned(),
+                    ManifestError::Value { key, .. } => {
+                        let key = key.split_once('.').map_or(&*key, |(table, _)| table);
+                        format!("value of {key}")
+                    }
+                }
+            }
+        }
+    });
+    assert_met(
+        &met,
+        &[
+            "accepted",
+            "not toml",
+            "value of name",
+            "value of command",
+            "value of runtime",
+            "value of interpolation",
+            "value of env",
+        ],
+    );
+}
+
+/// TOML's basic strings are JSON's, but for one character.
+fn toml_of(manifest: &Manifest) -> String {
+    fn json<T: serde::Serialize>(value: &T) -> String {
+        serde_json::to_string(value)
+            .unwrap()
+            .replace('\u{7f}', "\\u007f")
+    }
+    let Manifest {
+        name,
+        command,
+        runtime,
+        interpolation,
+        env,
+    } = manifest;
+    let mut lines = vec![
+        format!("name = {}", json(name)),
+        format!("command = {}", json(command)),
+        format!("runtime = {}", json(runtime)),
+    ];
+    lines.extend(interpolation.map(|code| format!("interpolation = {code}")));
+    lines.push("[env]".to_owned());
+    lines.extend(
+        env.iter()
+            .map(|(name, value)| format!("{name} = {}", json(value))),
+    );
+    lines.join("\n")
+}

@@ -1,0 +1,152 @@
+//! Where a world stops being one: beyond these bounds a millisecond is too long a step, and numbers
+//! grow without limit or stop being numbers.
+
+use super::arm::Arm;
+use crate::{
+    model::{DOFS, JOINTS, LINKS},
+    table::puck::Puck,
+};
+use faceoff_types::Ruleset;
+use std::{f64::consts::FRAC_PI_2, fmt};
+
+/// The bounds of what is simulated, far beyond what robot and puck do. A world that is about to leave
+/// them stands still from then on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// How far a joint may be beyond its stop, rad.
+    pub beyond_stop_rad: f64,
+    /// How fast a joint may turn, rad/s.
+    pub joint_rad_s: f64,
+    /// How fast the puck may move along x and y, m/s.
+    pub puck_m_s: f64,
+    /// How fast the puck may turn, rad/s.
+    pub puck_rad_s: f64,
+}
+
+/// A joint that turns this many times faster than its drive may is beyond what any command asks for
+/// that the robot can follow: the robot that is so first is to blame for what comes of it.
+const RUNAWAY: f64 = 10.0;
+
+impl Bounds {
+    /// Half a turn beyond a stop; a radian, and ten metres, in a millisecond.
+    pub const WIDE: Self = Self {
+        beyond_stop_rad: std::f64::consts::PI,
+        joint_rad_s: 1e3,
+        puck_m_s: 1e4,
+        puck_rad_s: 1e6,
+    };
+
+    /// Anything that is a number.
+    pub const FINITE: Self = Self {
+        beyond_stop_rad: f64::MAX,
+        joint_rad_s: f64::MAX,
+        puck_m_s: f64::MAX,
+        puck_rad_s: f64::MAX,
+    };
+
+    /// Those of a ruleset.
+    #[must_use]
+    pub const fn of(ruleset: Ruleset) -> Self {
+        match ruleset {
+            Ruleset::First => Self::FINITE,
+            Ruleset::Second => Self::WIDE,
+        }
+    }
+
+    /// The joint of an arm that is out of bounds, one that is not a number included.
+    pub(super) fn joint_beyond(&self, arm: &Arm) -> Option<usize> {
+        (0..DOFS).find(|&i| {
+            let range = LINKS.get(i).map_or(FRAC_PI_2, |link| link.range_rad);
+            let inside = arm.dq[i].abs() <= self.joint_rad_s
+                && arm.q[i].abs() - range <= self.beyond_stop_rad;
+            !inside
+        })
+    }
+
+    /// Is the puck out of bounds, or no number?
+    pub(super) fn puck_beyond(&self, puck: &Puck) -> bool {
+        let [vx, vy, yaw_rate] = puck.velocity;
+        let inside = vx.abs() <= self.puck_m_s
+            && vy.abs() <= self.puck_m_s
+            && yaw_rate.abs() <= self.puck_rad_s
+            && puck.pose.iter().all(|x| x.is_finite());
+        !inside
+    }
+}
+
+/// Is everything about an arm as it is in ordinary play? The one question of every substep.
+#[inline(always)]
+pub(super) fn is_ordinary(arm: &Arm) -> bool {
+    let mut ordinary = true;
+    for i in 0..JOINTS {
+        ordinary &= arm.dq[i].abs() <= RUNAWAY * LINKS[i].velocity_limit_rad_s
+            && arm.q[i].abs() <= LINKS[i].range_rad + FRAC_PI_2;
+    }
+    for i in JOINTS..DOFS {
+        ordinary &=
+            arm.dq[i].abs() <= Bounds::WIDE.joint_rad_s && arm.q[i].abs() <= 2.0 * FRAC_PI_2;
+    }
+    ordinary
+}
+
+/// As [`is_ordinary`], of the puck: tasks and games take a faster one as gone.
+#[inline(always)]
+pub(super) fn is_ordinary_puck(puck: &Puck) -> bool {
+    let [vx, vy, yaw_rate] = puck.velocity;
+    vx.abs() <= 100.0 && vy.abs() <= 100.0 && yaw_rate.abs() <= 1e4
+}
+
+/// Does a driven joint turn as no command asks for that the robot can follow?
+pub(super) fn is_runaway(arm: &Arm) -> bool {
+    (0..JOINTS).any(|i| {
+        let ordinary = arm.dq[i].abs() <= RUNAWAY * LINKS[i].velocity_limit_rad_s;
+        !ordinary
+    })
+}
+
+/// A world that came to the end of its bounds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Divergence {
+    /// The robots (0 and 1) whose command or state left its bounds first; both only if in the same
+    /// millisecond.
+    pub by: [bool; 2],
+    /// What was about to leave the bounds.
+    pub what: Runaway,
+}
+
+/// What leaves the bounds of a world.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Runaway {
+    /// A joint of a robot: 0 to 6 are driven, 7 and 8 hold the mallet.
+    Joint {
+        /// 0 or 1.
+        robot: usize,
+        /// From 0.
+        joint: usize,
+    },
+    /// The puck.
+    Puck,
+}
+
+impl fmt::Display for Runaway {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Bounds {
+            joint_rad_s,
+            puck_m_s,
+            ..
+        } = Bounds::WIDE;
+        match self {
+            Self::Joint { joint, .. } if *joint < JOINTS => write!(
+                f,
+                "joint {} came to turn faster than {joint_rad_s} rad/s, or half a turn beyond its stop",
+                joint + 1
+            ),
+            Self::Joint { .. } => write!(
+                f,
+                "the mallet's universal joint came to turn faster than {joint_rad_s} rad/s, or half a \
+                 turn beyond its stop"
+            ),
+            Self::Puck => write!(f, "the puck came to move faster than {puck_m_s} m/s"),
+        }
+    }
+}

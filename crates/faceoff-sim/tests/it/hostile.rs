@@ -1,0 +1,287 @@
+//! Agents that want the world to break: whatever they command within the protocol's bounds, all numbers
+//! stay finite, and if the world diverges it is their fault.
+
+use faceoff_sim::{
+    Bounds, Command, Episode, Game, GameSetup, Interpolation, JOINTS, PerturbationSettings, Plant,
+    RallyEnd, model::INITIAL_Q, stream::Stream,
+};
+use faceoff_types::{ACTION_LIMIT, EpisodeEnd, Factors, Seed, Task};
+
+/// How an agent chooses its numbers.
+#[derive(Debug, Clone, Copy)]
+enum Habit {
+    /// The same everywhere.
+    Constant,
+    /// The sign changes with each step.
+    Swinging,
+    /// The sign changes with each number.
+    Chequered,
+    /// Only one kind of row (position, velocity, acceleration) is large, its sign changing each step;
+    /// the others hold.
+    OneRow(usize),
+    /// Any sign and any power of ten, down to what is too small for a number.
+    Drawn,
+    /// Twenty steps of rest, then one blow, and so on.
+    Blows,
+    /// Always the way that the joint turns already.
+    Pumping,
+}
+
+const HABITS: [Habit; 9] = [
+    Habit::Constant,
+    Habit::Swinging,
+    Habit::Chequered,
+    Habit::OneRow(0),
+    Habit::OneRow(1),
+    Habit::OneRow(2),
+    Habit::Drawn,
+    Habit::Blows,
+    Habit::Pumping,
+];
+
+/// All that `ready` may say.
+fn interpolations() -> impl Iterator<Item = Interpolation> {
+    let codes = [1, 2, 3, 4, 5, -1].map(Some).into_iter().chain([None]);
+    codes.map(|code| Interpolation::from_code(code).unwrap())
+}
+
+fn action(
+    habit: Habit,
+    size: f64,
+    interpolation: Interpolation,
+    step: u32,
+    observation: &[f64],
+    stream: &mut Stream,
+) -> Vec<f64> {
+    let (q, dq) = (&observation[6..13], &observation[13..20]);
+    let held: [f64; JOINTS] = std::array::from_fn(|i| q[i]);
+    let held = interpolation.held(&held);
+    let alternating = |n: usize| if n.is_multiple_of(2) { size } else { -size };
+    (0..interpolation.len())
+        .map(|i| {
+            let number = match habit {
+                Habit::Constant => size,
+                Habit::Swinging => alternating(step as usize),
+                Habit::Chequered => alternating(i + step as usize),
+                Habit::OneRow(row) if i / JOINTS % 3 == row => alternating(step as usize),
+                Habit::OneRow(_) => held[i],
+                Habit::Drawn => {
+                    let exponent = stream.uniform(-330.0, 4.0).max(stream.uniform(-330.0, 4.0));
+                    let sign = if stream.unit() < 0.5 { -1.0 } else { 1.0 };
+                    sign * libm::pow(10.0, exponent) * size / ACTION_LIMIT
+                }
+                Habit::Blows if step % 21 == 20 => alternating(i),
+                Habit::Blows => held[i],
+                Habit::Pumping => size.copysign(dq[i % JOINTS]),
+            };
+            assert!(number.abs() <= ACTION_LIMIT);
+            number
+        })
+        .collect()
+}
+
+fn assert_finite(what: &str, numbers: &[f64]) {
+    assert!(numbers.iter().all(|x| x.is_finite()), "{what}: {numbers:?}");
+}
+
+/// Plays an episode; did its world diverge?
+fn diverges(
+    bounds: Bounds,
+    plant: &Plant,
+    task: Task,
+    interpolation: Interpolation,
+    habit: Habit,
+    size: f64,
+) -> bool {
+    let settings = PerturbationSettings::default();
+    let seed = Seed::from_number(11);
+    let mut episode = Episode::new(
+        task,
+        interpolation,
+        Factors::ALL,
+        &settings,
+        plant,
+        seed.episode(task, 0),
+    )
+    .within(bounds);
+    let what = format!("{task}, interpolation {interpolation}, {habit:?}, {size}");
+    let mut stream = Stream::new(&seed, &what);
+    loop {
+        assert_finite(&what, episode.observation());
+        let step = episode.steps();
+        let seen = episode.observation();
+        let action = action(habit, size, interpolation, step, seen, &mut stream);
+        let outcome = episode.step(&action);
+        let state = episode.state();
+        assert_finite(&what, episode.observation());
+        assert_finite(&what, &state.puck);
+        assert_finite(&what, &state.q);
+        assert_finite(&what, &state.dq);
+        let c = outcome.constraints;
+        assert_finite(&what, &[c.joint_pos, c.joint_vel, c.ee, c.link]);
+        let diverged = episode.divergence();
+        assert_eq!(
+            diverged.is_some(),
+            outcome.end == Some(EpisodeEnd::AgentFault),
+            "{what}"
+        );
+        if let Some(divergence) = diverged {
+            assert_eq!(divergence.by, [true, false], "{what}: {divergence:?}");
+        }
+        if outcome.end.is_some() || step >= 120 {
+            return diverged.is_some();
+        }
+    }
+}
+
+/// What many commands bring about, so that the tests see what a diverging world does. The ruleset's own
+/// bounds are ten times as wide.
+const NARROW: Bounds = Bounds {
+    joint_rad_s: 100.0,
+    ..Bounds::WIDE
+};
+
+#[test]
+fn no_episode_breaks_whatever_is_commanded() {
+    let settings = PerturbationSettings::default();
+    let mismatch_seed = Seed::from_number(11).model_mismatch();
+    let plant = Plant::under(Factors::ALL, &settings, mismatch_seed);
+    let count = |bounds: Bounds| {
+        let (mut diverged, mut played) = (0, 0);
+        for task in Task::ALL {
+            for interpolation in interpolations() {
+                for habit in HABITS {
+                    for size in [ACTION_LIMIT, 30.0] {
+                        if diverges(bounds, &plant, task, interpolation, habit, size) {
+                            diverged += 1;
+                        } else {
+                            played += 1;
+                        }
+                    }
+                }
+            }
+        }
+        println!("{bounds:?}: {diverged} worlds diverged, {played} did not");
+        (diverged, played)
+    };
+    let (diverged, played) = count(NARROW);
+    // Both happen, or the test says nothing.
+    assert!(diverged > 0 && played > 0);
+    assert!(count(Bounds::WIDE).1 > played);
+}
+
+#[test]
+fn in_a_game_the_robot_that_first_left_its_bounds_is_to_blame() {
+    let settings = PerturbationSettings::default();
+    let seed = Seed::from_number(12);
+    let plant = Plant::under(Factors::ALL, &settings, seed.model_mismatch());
+    let mut rallies = 0;
+    for interpolation in interpolations() {
+        for habit in HABITS {
+            for hostile in 0..2 {
+                let mut game = Game::new(GameSetup {
+                    interpolation: [interpolation; 2],
+                    factors: Factors::ALL,
+                    plant: plant.clone(),
+                    settings: settings.clone(),
+                    seed,
+                })
+                .within(NARROW);
+                let what = format!("interpolation {interpolation}, {habit:?}, robot {hostile}");
+                let mut stream = Stream::new(&seed, &what);
+                for step in 0..60 {
+                    let actions = [0, 1].map(|robot| {
+                        let seen = game.observation(robot);
+                        if robot == hostile {
+                            action(habit, ACTION_LIMIT, interpolation, step, seen, &mut stream)
+                        } else {
+                            interpolation.held(&INITIAL_Q)[..interpolation.len()].to_vec()
+                        }
+                    });
+                    let outcome = game.step(actions.each_ref().map(|a| Command::Act(a)));
+                    for robot in 0..2 {
+                        assert_finite(&what, game.observation(robot));
+                    }
+                    if let Some(RallyEnd::Diverged { by }) = outcome.rally_end {
+                        assert_eq!(by, [0, 1].map(|robot| robot == hostile), "{what}");
+                        assert_eq!(game.referee().score(), [0, 0], "{what}");
+                        rallies += 1;
+                        break;
+                    }
+                }
+            }
+        }
+    }
+    assert!(rallies > 0);
+}
+
+#[test]
+fn a_diverged_world_stands_still() {
+    let settings = PerturbationSettings::default();
+    let seed = Seed::from_number(13);
+    let interpolation = Interpolation::Trajectory;
+    let mut episode = Episode::new(
+        Task::Prepare,
+        interpolation,
+        Factors::NONE,
+        &settings,
+        &Plant::nominal(),
+        seed,
+    )
+    .within(NARROW);
+    let mut stream = Stream::new(&seed, "unused");
+    let mut push = |episode: &mut Episode| {
+        let seen = episode.observation();
+        let action = action(
+            Habit::Pumping,
+            ACTION_LIMIT,
+            interpolation,
+            0,
+            seen,
+            &mut stream,
+        );
+        episode.step(&action)
+    };
+    while episode.divergence().is_none() {
+        assert!(episode.steps() < 500, "it does not diverge");
+        push(&mut episode);
+    }
+    let (state, divergence) = (episode.state(), episode.divergence());
+    assert!(state.dq.iter().all(|dq| dq.abs() <= NARROW.joint_rad_s));
+    push(&mut episode);
+    assert_eq!((episode.state(), episode.divergence()), (state, divergence));
+}
+
+/// Commands that are no numbers cannot come through the protocol; the controller holds all the same.
+#[test]
+fn commands_that_are_no_numbers_leave_a_world_of_numbers() {
+    let settings = PerturbationSettings::default();
+    for interpolation in interpolations() {
+        for number in [
+            f64::NAN,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::MAX,
+            f64::MIN,
+        ] {
+            let mut episode = Episode::new(
+                Task::Hit,
+                interpolation,
+                Factors::NONE,
+                &settings,
+                &Plant::nominal(),
+                Seed::from_number(14),
+            );
+            let action = vec![number; interpolation.len()];
+            for _ in 0..20 {
+                if episode.step(&action).end.is_some() {
+                    break;
+                }
+            }
+            let state = episode.state();
+            assert_finite("joints", &state.q);
+            assert_finite("velocities", &state.dq);
+            assert_finite("puck", &state.puck);
+        }
+    }
+}
