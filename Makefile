@@ -25,15 +25,20 @@ setup:
 setup-test:
 	@docker/setup.sh test
 
-# The bundles that the demo uploads: folders a team could copy.
+# The bundles that the demo uploads: folders a team could copy. Built by itself, striker needs other
+# features of its dependencies than beside the server: the demo builds both at once.
 agents: setup
 	$(CARGO) build --release --locked --package striker
-	mkdir -p $(TARGET_DIR)/bundles/striker
-	cp agents/striker/agent.toml $(RELEASE)/striker $(TARGET_DIR)/bundles/striker/
+	$(PACK_AGENTS)
+
+define PACK_AGENTS
+mkdir -p $(TARGET_DIR)/bundles/striker
+cp agents/striker/agent.toml $(RELEASE)/striker $(TARGET_DIR)/bundles/striker/
+endef
 
 demo: setup
 	$(CARGO) build --release --locked --package faceoff --package striker
-	$(MAKE) --no-print-directory agents
+	$(PACK_AGENTS)
 	$(RELEASE)/faceoff demo --episodes $(EPISODES) --listen $(LISTEN) --data-dir $(DEMO_DIR) \
 	    --bundle agents/hold --bundle $(TARGET_DIR)/bundles/striker --bundle agents/reckless \
 	    $(if $(filter 0,$(SERVE)),--no-serve)

@@ -66,7 +66,7 @@ fn a_silent_agent_meets_its_deadline_and_can_still_answer_later() {
         .read_line(LINE_CAP, Instant::now() + Duration::from_millis(250))
         .unwrap();
     assert!(matches!(outcome, ReadLine::TimedOut));
-    assert_eq!(agent.diagnose_end(Duration::ZERO), None);
+    assert_eq!(agent.diagnose_end(Duration::ZERO).unwrap(), None);
     expect_echo(&mut agent, "still there");
     subject.finish(agent);
 }
