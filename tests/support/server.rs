@@ -143,7 +143,6 @@ impl Server {
     }
 
     /// A request of any kind, to be sent by the caller.
-    #[must_use]
     pub fn request(&self, method: Method, path: &str, token: &str) -> RequestBuilder {
         let url = format!("{}{path}", self.url);
         self.client.request(method, url).bearer_auth(token)

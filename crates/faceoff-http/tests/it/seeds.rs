@@ -65,6 +65,7 @@ async fn a_team_that_finishes_early_learns_nothing_of_the_episodes_while_others_
 
     // The other team's evaluation is queued, then running.
     for _ in 0..2 {
+        let events = site.store.events_after(0, 1000).await.unwrap();
         for token in [&*first.token, ADMIN] {
             let refused = site.get(&dataset, Some(token)).await;
             let problem = refused.problem(409, "not-yet", &["1 evaluations of 2026-03-01"]);
@@ -81,6 +82,8 @@ async fn a_team_that_finishes_early_learns_nothing_of_the_episodes_while_others_
         ] {
             assert!(!shown.contains(part), "{part}");
         }
+        let after = site.store.events_after(0, 1000).await.unwrap();
+        assert_eq!(after, events, "asking changes nothing");
         let (claim, ..) = site.claim_shard().await;
         site.store.release(&claim, site.now()).await.unwrap();
     }
