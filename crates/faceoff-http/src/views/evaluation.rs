@@ -268,7 +268,7 @@ impl EvaluationView {
                 reason,
             } => EvaluationStatus::PlatformFailed {
                 finished_at,
-                reason,
+                reason: shown(reason),
             },
             EvaluationState::Cancelled {
                 finished_at,
