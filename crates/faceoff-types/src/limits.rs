@@ -127,7 +127,8 @@ impl TimeLimits {
     /// How many of so many episodes may be played again because of the host.
     #[must_use]
     pub fn host_noise_reruns_of(&self, episodes: u32) -> u32 {
-        let reruns = (u64::from(episodes) * u64::from(self.host_noise_reruns_per_100)).div_ceil(100);
+        let reruns =
+            (u64::from(episodes) * u64::from(self.host_noise_reruns_per_100)).div_ceil(100);
         u32::try_from(reruns).unwrap_or(u32::MAX)
     }
 

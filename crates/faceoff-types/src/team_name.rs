@@ -47,10 +47,8 @@ impl FromStr for TeamName {
         if !(1..=Self::MAX_CHARS).contains(&chars) {
             return Err(InvalidTeamName::Length(chars));
         }
-        if let Some(bad) = s
-            .chars()
-            .find(|c| !(c.is_alphanumeric() && is_harmless(*c)) && !" ._-".contains(*c))
-        {
+        let allowed = |c: &char| " ._-".contains(*c) || (c.is_alphanumeric() && is_harmless(*c));
+        if let Some(bad) = s.chars().find(|c| !allowed(c)) {
             return Err(InvalidTeamName::Character(bad));
         }
         if s.starts_with(' ') || s.ends_with(' ') {

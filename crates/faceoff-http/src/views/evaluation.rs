@@ -277,7 +277,7 @@ impl EvaluationView {
                 reason,
             } => EvaluationStatus::PlatformFailed {
                 finished_at,
-                reason,
+                reason: shown(reason),
             },
             EvaluationState::Cancelled {
                 finished_at,

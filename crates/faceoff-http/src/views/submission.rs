@@ -100,7 +100,10 @@ impl SubmissionView {
                     log: log.map(shown),
                 },
                 SubmissionState::ValidationError { reason } => {
-                    SubmissionStatus::ValidationError { reason }
+                    // It may name a file of the bundle.
+                    SubmissionStatus::ValidationError {
+                        reason: shown(reason),
+                    }
                 }
             },
         }

@@ -158,7 +158,7 @@ fn what_is_not_finite_is_refused_however_it_is_written() {
 #[test]
 fn a_number_that_no_action_needs_is_refused_with_its_place() {
     let too_large = |text: &str, expected_value: f64| {
-        let mut second = vec!["0.5"; 7];
+        let mut second = ["0.5"; 7];
         second[3] = text;
         let action = format!("[{},[{}]]", row("-1"), second.join(","));
         assert_eq!(

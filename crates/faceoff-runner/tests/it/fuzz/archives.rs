@@ -84,7 +84,7 @@ fn entries(draws: &mut Draws) -> Vec<Entry> {
     ];
     for _ in 0..draws.below(4) {
         let at = draws.below(entries.len() + 1);
-        let mut entry = file(*draws.pick(&NAMES), b"x");
+        let mut entry = file(draws.pick::<&str>(&NAMES), b"x");
         entry.kind = *draws.pick(&[
             EntryType::Regular,
             EntryType::Directory,
