@@ -61,6 +61,16 @@ def vectored(flags):
     return call(327, board, ctypes.addressof(vector), 1, 0, 0, flags)
 
 
+def forks():
+    """Does the host's count of all processes that were ever started show one more?"""
+    before = open("/proc/stat").read()
+    child = os.fork()
+    if child == 0:
+        os._exit(0)
+    os.waitpid(child, 0)
+    return "same" if open("/proc/stat").read() == before else "counted"
+
+
 calls = {
     "flock": lambda: call(73, board, fcntl.LOCK_EX | fcntl.LOCK_NB),
     "lock": lambda: control(fcntl.F_SETLK),
@@ -99,6 +109,7 @@ calls = {
     "locks_of_all": lambda: attempt(lambda: open("/proc/locks").read()),
     "counters_of_memory": lambda: attempt(lambda: open("/proc/vmstat").read()),
     "settings_of_the_host": lambda: attempt(lambda: " ".join(os.listdir("/proc/sys"))),
+    "forks_of_all": forks,
     "keys": lambda: call(250, 0, -3, 1),
     "kcmp": lambda: call(312, os.getpid(), os.getpid(), 0, 0, 0),
     "shared_segments": lambda: attempt(lambda: str(len(open("/proc/sysvipc/shm").readlines()) - 1)),

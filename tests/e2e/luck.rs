@@ -99,6 +99,7 @@ fn what_one_teams_agent_leaves_another_teams_agent_does_not_find() {
         ("semaphores", "0"),
         ("queues", "0"),
         ("named_queue_left", "gone"),
+        ("forks_of_all", "same"),
         ("files_left", ""),
         ("locks_of_all", "EACCES"),
     ] {

@@ -28,8 +28,7 @@ const GROUP: &str = "agent:x:1000:\n";
 /// Settings and counters of the whole host (asynchronous input, terminals, open files …), and terminals
 /// themselves, whose number all agents share.
 const HIDDEN_FOLDERS: [&str; 4] = ["/proc/sys", "/proc/pressure", "/proc/fs", "/dev/pts"];
-/// Counters of the whole host, locks among them. Those that ordinary libraries read stay: `cpuinfo`,
-/// `meminfo`, `stat`, `uptime`, `loadavg`.
+/// Counters of the whole host, locks among them.
 const HIDDEN_FILES: [&str; 17] = [
     "/proc/locks",
     "/proc/vmstat",
@@ -48,6 +47,15 @@ const HIDDEN_FILES: [&str; 17] = [
     "/proc/timer_list",
     "/proc/allocinfo",
     "/proc/swaps",
+];
+
+/// What ordinary libraries read of the host's counters: agents see them as they were before the first agent,
+/// for they also count what agents do (the processes that were ever started, say).
+const FROZEN_FILES: [&str; 4] = [
+    "/proc/stat",
+    "/proc/meminfo",
+    "/proc/loadavg",
+    "/proc/uptime",
 ];
 
 /// An installed bubblewrap and what it can do.
@@ -163,6 +171,7 @@ impl Bubblewrap {
         }
         line.args(["--proc", "/proc", "--dev", "/dev"]);
         line.hide_counters();
+        line.freeze_counters()?;
         let scratch = spec.limits.scratch_bytes.max(4096).to_string();
         for folder in ["/dev/shm", "/tmp"] {
             line.args(["--perms", "0700", "--size", &scratch, "--tmpfs", folder]);
@@ -248,6 +257,21 @@ impl CommandLine {
         for file in HIDDEN_FILES.into_iter().filter(|path| is_there(path)) {
             self.args(["--ro-bind", "/dev/null", file]);
         }
+    }
+
+    fn freeze_counters(&mut self) -> Result<(), SandboxError> {
+        static FROZEN: OnceLock<Vec<(&str, Vec<u8>)>> = OnceLock::new();
+        let frozen = FROZEN.get_or_init(|| {
+            let read = |path| Some((path, fs::read(path).ok()?));
+            FROZEN_FILES.into_iter().filter_map(read).collect()
+        });
+        for (path, content) in frozen {
+            let fd = memory_file(content)?;
+            self.args(["--perms", "0444"]);
+            self.fd("--ro-bind-data", fd);
+            self.args([*path]);
+        }
+        Ok(())
     }
 
     fn file(&mut self, inside: &str, content: &[u8]) -> Result<(), SandboxError> {

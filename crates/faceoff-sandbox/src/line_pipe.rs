@@ -9,7 +9,7 @@ use rustix::{
 };
 use std::{
     io,
-    os::fd::{BorrowedFd, OwnedFd},
+    os::fd::{AsFd, BorrowedFd, OwnedFd},
     time::Instant,
 };
 
@@ -126,7 +126,12 @@ impl LinePipe {
             if let Some(outcome) = self.take_line(max_bytes) {
                 return Ok(outcome);
             }
-            if !wait_for_any(&mut self.awaited(), deadline)? {
+            let ready = if self.is_all_sent() {
+                wait_for(self.output.as_fd(), PollFlags::IN, deadline)?
+            } else {
+                wait_for_any(&mut self.awaited(), deadline)?
+            };
+            if !ready {
                 return Ok(ReadLine::TimedOut);
             }
             if !self.fill()? {

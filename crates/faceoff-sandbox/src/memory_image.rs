@@ -4,7 +4,9 @@
 //! it read, the names that it looked up, and another finds out by the time that the same costs it. Of a
 //! file system in memory all pages and all names are there at all times.
 
-use crate::{Runtime, SandboxError, bubblewrap::mount_order, error::IoContext, owner::Owner};
+use crate::{
+    Runtime, SandboxError, bubblewrap::mount_order, error::IoContext, owner::Owner, runtime::inside,
+};
 use rustix::fs::{StatVfs, statvfs};
 use std::{
     collections::BTreeMap,
@@ -104,11 +106,6 @@ impl MemoryImage {
     pub fn folder(&self) -> &Path {
         self.folder.path()
     }
-}
-
-/// Where the image holds the host's `path`.
-pub(crate) fn inside(image: &Path, path: &Path) -> PathBuf {
-    image.join(path.strip_prefix("/").unwrap_or(path))
 }
 
 /// All paths of all runtimes, none inside another.

@@ -1,4 +1,4 @@
-use crate::{SandboxError, error::IoContext, memory_image};
+use crate::{SandboxError, error::IoContext};
 use serde::{Deserialize, Serialize};
 use std::{
     fs,
@@ -105,7 +105,7 @@ impl Runtime {
     /// Where the files of one of its paths are. A symbolic link is shown as the same link.
     pub(crate) fn source(&self, path: &Path) -> PathBuf {
         match &self.image {
-            Some(image) if !path.is_symlink() => memory_image::inside(image, path),
+            Some(image) if !path.is_symlink() => inside(image, path),
             _ => path.to_owned(),
         }
     }
@@ -117,6 +117,11 @@ impl Runtime {
             .map(|folder| Path::new(folder).join("python3"))
             .find(|path| path.is_file())
     }
+}
+
+/// Where an image of the host's files holds `path`.
+pub(crate) fn inside(image: &Path, path: &Path) -> PathBuf {
+    image.join(path.strip_prefix("/").unwrap_or(path))
 }
 
 /// Where an interpreter keeps its files, as it says itself.

