@@ -126,6 +126,7 @@ async fn the_newest_valid_upload_is_active_until_the_team_chooses() {
     assert_eq!(active().await, first);
     let outcome = SmokeOutcome::Valid {
         agent_name: "second".into(),
+        timing: Vec::new(),
         log: String::new(),
     };
     site.smoke(outcome).await;
@@ -158,6 +159,7 @@ async fn what_agents_wrote_is_shown_as_text() {
     let team = site.team("Alpha").await;
     let id = text(&site.upload(&team.token, GZIP.to_vec()).await.json(201)["id"]);
     let outcome = SmokeOutcome::Invalid {
+        timing: Vec::new(),
         agent_name: Some("a\u{202e}b".into()),
         reason: "expected act, got \u{2066}\u{1b}[2J".into(),
         log: "\u{9b}31m red\n".into(),

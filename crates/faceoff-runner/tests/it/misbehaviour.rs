@@ -224,7 +224,7 @@ fn a_number_that_no_action_needs_is_named() {
             limit: 1e4
         }
     );
-    assert!(report.fault.unwrap().line.unwrap().contains("1.7e+308"));
+    assert!(fault(&report).line.unwrap().contains("1.7e+308"));
 }
 
 #[test]

@@ -116,6 +116,7 @@ async fn an_upload_takes_its_place_when_it_is_valid_unless_a_newer_one_or_a_choi
     assert!(quick.active);
     let valid = || SmokeOutcome::Valid {
         agent_name: "late".into(),
+        timing: Vec::new(),
         log: String::new(),
     };
     let late = f.store.commit_smoke(&slow_claim, valid(), f.now).await;

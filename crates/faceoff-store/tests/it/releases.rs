@@ -1,6 +1,6 @@
 use crate::fixture::*;
 use faceoff_store::*;
-use faceoff_types::EvaluationId;
+use faceoff_types::{EvaluationId, Ruleset};
 use jiff::civil::date;
 
 async fn rerun(f: &Fixture, id: EvaluationId) -> Result<Evaluation, StoreError> {
@@ -39,7 +39,7 @@ async fn a_day_is_released_by_the_end_of_its_last_evaluation() {
     for id in evaluations {
         assert_eq!(f.store.evaluation(id).await.unwrap().released_at, Some(end));
     }
-    for record in f.store.board().await.unwrap() {
+    for record in f.store.board(Ruleset::CURRENT).await.unwrap() {
         assert_eq!(record.released_at, Some(end));
     }
     let events = f.store.events_after(0, 1000).await.unwrap();
@@ -138,7 +138,10 @@ async fn a_try_that_succeeds_releases_the_day() {
     let finished = f.store.evaluation(finished).await.unwrap();
     assert_eq!(finished.rerun_of, Some(broken));
     assert_eq!(finished.released_at, Some(f.now));
-    assert_eq!(f.store.board().await.unwrap()[0].evaluation, finished.id);
+    assert_eq!(
+        f.store.board(Ruleset::CURRENT).await.unwrap()[0].evaluation,
+        finished.id
+    );
 }
 
 #[tokio::test]

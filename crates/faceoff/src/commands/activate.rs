@@ -1,5 +1,4 @@
 //! `faceoff activate`: chooses which submission plays next.
-#![expect(clippy::print_stdout, reason = "a command talks to the terminal")]
 
 use super::submit::next_cut;
 use crate::client::Client;

@@ -68,6 +68,7 @@ fn recorded(dir: &Path) {
             let action = question.observation[6..13].to_vec();
             let answered = Answered {
                 computation_time_s: 0.001,
+                host_time_s: 0.0,
                 cpu_time_s: None,
             };
             if let Some(outcome) = course.answer(&action, answered).unwrap() {
