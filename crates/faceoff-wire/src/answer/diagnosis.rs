@@ -10,6 +10,8 @@ const QUOTED_KEY_CHARS: usize = 60;
 
 /// Characters of the parser's words that are kept, but for the place that they end with.
 const DETAIL_CHARS: usize = 200;
+/// Longest such place.
+const PLACE_BYTES: usize = 40;
 
 /// The fault of a line longer than the protocol allows.
 #[must_use]
@@ -60,15 +62,14 @@ pub(super) fn twice(key: &str) -> AgentFaultKind {
     }
 }
 
-/// The parser quotes what it did not expect, which may be all of a line.
+/// The parser quotes what it did not expect, which may be all of a line, and ends with the place.
 fn cut(detail: &str) -> String {
-    match detail.char_indices().nth(DETAIL_CHARS) {
-        None => detail.to_owned(),
-        Some((end, _)) => {
-            let place = detail.rfind(" at character ").unwrap_or(end).max(end);
-            format!("{}…{}", &detail[..end], &detail[place..])
-        }
-    }
+    let Some((end, _)) = detail.char_indices().nth(DETAIL_CHARS) else {
+        return detail.to_owned();
+    };
+    let place = detail[end..].rfind(" at ").map(|at| &detail[end + at..]);
+    let place = place.filter(|place| place.len() <= PLACE_BYTES);
+    format!("{}…{}", &detail[..end], place.unwrap_or_default())
 }
 
 /// `found` is the number's index in the action and its value.

@@ -1,6 +1,6 @@
 use super::{action::ActionSeed, diagnosis, marks, repeated_keys, scalar::Scalar};
 use crate::protocol::MAX_LINE_BYTES;
-use faceoff_types::{AgentFaultKind, Interpolation};
+use faceoff_types::{AgentFaultKind, Interpolation, harmless};
 use serde::{
     Deserializer as _,
     de::{Error as _, IgnoredAny, MapAccess, Visitor},
@@ -57,7 +57,10 @@ impl<'a> Fields<'a> {
     pub fn require_type(&self, kind: &str, expected: &str) -> Result<(), AgentFaultKind> {
         let got = match &self.kind {
             Some(Scalar::Text(got)) if got == kind => return Ok(()),
-            Some(Scalar::Text(got)) => got.chars().take(60).collect(),
+            Some(Scalar::Text(got)) => {
+                let head: String = got.chars().take(60).collect();
+                harmless(&head).into_owned()
+            }
             Some(other) => format!("an object whose type is {other}"),
             None => "an object without type".to_owned(),
         };

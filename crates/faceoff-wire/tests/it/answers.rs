@@ -220,10 +220,13 @@ fn rubbish_is_not_json() {
     not_json("loss: NaN", "at character 1");
     let long = format!("\"{}\"", "é".repeat(20_000));
     not_json(&long, "… at character 40002");
-    let Err(AgentFaultKind::NotJson { detail }) = parse(&long) else {
-        panic!("it is no object");
-    };
-    assert!(detail.chars().count() < 260, "{detail}");
+    let at_an_end = format!("\"{} at {}\"", "é".repeat(300), "é".repeat(300));
+    for line in [long.clone(), format!("\n{long}"), at_an_end] {
+        let Err(AgentFaultKind::NotJson { detail }) = parse(&line) else {
+            panic!("it is no object");
+        };
+        assert!(detail.chars().count() < 260, "{detail}");
+    }
     let mut action = Vec::new();
     let fault =
         parse_act(b"{\"type\":\"\xff\"}", 0, Interpolation::Cubic, &mut action).unwrap_err();

@@ -53,7 +53,8 @@ fn act(interpolation: Interpolation) -> String {
 
 /// What is told of a fault is text that can be shown.
 fn label(fault: &AgentFaultKind) -> String {
-    let told = harmless(&fault.to_string()).into_owned();
+    let told = fault.to_string();
+    assert_eq!(harmless(&told), told);
     assert!(told.chars().count() < 1000, "{told}");
     let name = format!("{fault:?}");
     name.split([' ', '{']).next().unwrap().to_owned()

@@ -210,6 +210,7 @@ fn a_dataset_is_read_or_refused() {
         label.to_owned()
     });
     let kinds = [
+        "io",
         "read",
         "differs",
         "unreadable",
