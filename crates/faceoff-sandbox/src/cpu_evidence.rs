@@ -6,6 +6,8 @@
 //! Version 2 tells only the agent's own time; what all did is then taken from `/proc/stat`, in ticks
 //! of 10 ms. What such a tick leaves open is always read in the host's disfavour.
 
+use crate::cpu_waits::Waits;
+use rustix::process::Pid;
 use std::{
     fs::{self, File},
     os::unix::fs::FileExt,
@@ -43,6 +45,8 @@ pub struct CpuReading {
     all: Duration,
     throttled: Duration,
     ticks: Vec<Ticks>,
+    /// Of the agent's threads, where the kernel tells.
+    waits: Option<Waits>,
 }
 
 /// What one CPU did since the host's start, in ticks.
@@ -65,14 +69,14 @@ enum First {
 
 impl CpuEvidence {
     /// The counters now, as the beginning of a span; `None` if the host does not tell.
-    pub(crate) fn begin(&self) -> Option<CpuReading> {
-        self.read(First::Agent)
+    pub(crate) fn begin(&self, agent: &[Pid]) -> Option<CpuReading> {
+        self.read(First::Agent, agent)
     }
 
-    /// For how much of the time since `begun` nothing of the agent can have run, because everything that it
+    /// For how much of the time since `begun` the agent was kept from running, because everything that it
     /// may run on ran something else.
-    pub(crate) fn taken_since(&self, begun: &CpuReading) -> Option<Duration> {
-        let now = self.read(First::Others)?;
+    pub(crate) fn taken_since(&self, begun: &CpuReading, agent: &[Pid]) -> Option<Duration> {
+        let now = self.read(First::Others, agent)?;
         Some(taken(
             begun,
             &now,
@@ -80,7 +84,7 @@ impl CpuEvidence {
         ))
     }
 
-    fn read(&self, first: First) -> Option<CpuReading> {
+    fn read(&self, first: First, processes: &[Pid]) -> Option<CpuReading> {
         let mut at = Instant::now();
         let mut agent = Duration::ZERO;
         if first == First::Agent {
@@ -106,6 +110,7 @@ impl CpuEvidence {
             all,
             throttled: throttled.unwrap_or_default(),
             ticks,
+            waits: Waits::read(processes),
         })
     }
 
@@ -135,6 +140,11 @@ fn taken(from: &CpuReading, to: &CpuReading, precise: bool) -> Duration {
             .sum::<u64>();
         stolen += at_least(from.stolen, to.stolen);
     }
+    // Who sleeps is kept from nothing. A machine that stands still as a whole tells of no waits.
+    let waited = match (&from.waits, &to.waits) {
+        (Some(from), Some(to)) => to.longest_since(from, wall),
+        _ => wall,
+    };
     let cpus = u32::try_from(to.ticks.len()).unwrap_or(u32::MAX);
     let (busy, idle, stolen) = (ticks(busy), ticks(idle), ticks(stolen));
     let others = if precise {
@@ -153,6 +163,7 @@ fn taken(from: &CpuReading, to: &CpuReading, precise: bool) -> Duration {
     others
         .saturating_sub(wall * cpus.saturating_sub(1))
         .saturating_sub(to.throttled.saturating_sub(from.throttled))
+        .min(stolen.saturating_add(waited))
         .min(wall)
 }
 
@@ -224,6 +235,7 @@ mod tests {
             all: MS(all),
             throttled: Duration::ZERO,
             ticks: ticks.to_vec(),
+            waits: None,
         }
     }
 

@@ -18,6 +18,7 @@ mod child_setup;
 mod command_check;
 mod cpu_clock;
 mod cpu_evidence;
+mod cpu_waits;
 mod end;
 mod error;
 mod isolation;

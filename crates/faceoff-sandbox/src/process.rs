@@ -212,17 +212,18 @@ impl AgentProcess {
 
     /// The counters of the agent's CPUs, as the beginning of a span; `None` without a cgroup.
     pub fn read_cpus(&self) -> Option<CpuReading> {
-        self.tree.cgroup.as_ref()?.cpu_evidence.as_ref()?.begin()
+        let evidence = self.tree.cgroup.as_ref()?.cpu_evidence.as_ref()?;
+        evidence.begin(&self.tree.processes())
     }
 
-    /// For how much of the time since `begun` the agent cannot have run, because all CPUs that it may use
-    /// ran something outside of its cgroup, or were held up by a machine below this one. Never more than
+    /// For how much of the time since `begun` the agent wanted to run and could not, because all CPUs that
+    /// it may use ran something outside of its cgroup, or were held up by a machine below this one. Never more than
     /// the kernel's counters prove, if the agent was waited for since 10 ms before `begun`, the longest
     /// that they lag behind: with version 1 of the cgroup interface in nanoseconds, with version 2 in
     /// ticks of 10 ms, of which a few may be missing.
     pub fn taken_from_it_since(&self, begun: &CpuReading) -> Option<Duration> {
         let evidence = self.tree.cgroup.as_ref()?.cpu_evidence.as_ref()?;
-        evidence.taken_since(begun)
+        evidence.taken_since(begun, &self.tree.processes())
     }
 
     /// Closes the agent's input, waits up to `grace` for it to exit, then kills the tree; always reaps.

@@ -88,7 +88,7 @@ async fn two_teams_meet_the_same_episodes_however_the_work_is_shared_out() {
 async fn an_agent_that_breaks_off_is_told_why() {
     let server = Server::new().await;
     let worker = server.work(1);
-    let broken = server.upload("Broken", "FAULTY_FROM = \"0\"").await;
+    let broken = server.upload("Broken", "GOOD_EPISODES = \"0\"").await;
     let state = server.settled(broken).await;
     let SubmissionState::Invalid { reason } = &state else {
         panic!("{state:?}")
@@ -97,10 +97,16 @@ async fn an_agent_that_breaks_off_is_told_why() {
     let log = server.store.submission_log(broken).await.unwrap();
     assert!(log.unwrap().contains("an agent's log"));
 
-    // well in its smoke run, but not later: the faults of all shards add up
-    let late = server.upload("Late", "FAULTY_FROM = \"1\"").await;
+    // for longer than a smoke run, of at most 500 control steps and the rest of an episode, it is well; the
+    // faults of all shards add up
+    let late = server.upload("Late", "GOOD_EPISODES = \"15\"").await;
     assert!(matches!(server.settled(late).await, SubmissionState::Valid));
-    let evaluation = server.start_day(&plan(1), Timestamp::now()).await.remove(0);
+    let plan = RunPlan {
+        tasks: vec![Task::Defend],
+        episodes_per_task: 60,
+        ..plan(20)
+    };
+    let evaluation = server.start_day(&plan, Timestamp::now()).await.remove(0);
     assert_eq!(evaluation.submission, late);
     let state = server.over(evaluation.id).await;
     assert!(
@@ -108,11 +114,8 @@ async fn an_agent_that_breaks_off_is_told_why() {
         "{state:?}"
     );
     let RunFaults { faults, log } = server.store.run_faults(evaluation.run).await.unwrap();
-    assert_eq!(faults.len(), 3);
-    assert!(
-        faults.iter().all(|fault| fault.episode == Some(1)),
-        "{faults:?}"
-    );
+    let episodes: Vec<Option<u32>> = faults.iter().map(|fault| fault.episode).collect();
+    assert_eq!(episodes, [Some(15), Some(35), Some(55)]);
     assert!(log.contains("an agent's log"), "{log}");
     worker.stop().await;
 }
