@@ -3,6 +3,7 @@ use crate::{
     player::Player,
 };
 use faceoff_episode::{Arena, EpisodeStart, RecordError, StepRow, StepSink};
+use faceoff_sandbox::affinity::PinnedElsewhere;
 use faceoff_scoring::computation_time_penalty;
 use faceoff_sim::EPISODE_STEPS;
 use faceoff_types::{AgentFault, EpisodeOutcome, Profile, SmokeTiming, Task};
@@ -68,6 +69,7 @@ pub fn smoke(
     env: &AgentEnvironment,
     cancelled: &dyn Fn() -> bool,
 ) -> Result<SmokeReport, PlatformFault> {
+    let _pinned = PinnedElsewhere::than(&env.agent_cpus);
     let arena = Arena::new(Profile::Evaluation, spec.seed, spec.mismatch_seed);
     let mut timing = Vec::with_capacity(Task::ALL.len());
     let mut log = Log::new(env.limits.stderr_tail_bytes);
