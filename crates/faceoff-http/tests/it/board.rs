@@ -258,7 +258,7 @@ async fn an_evaluations_page_shows_results_violations_and_times_to_everybody() {
     }
     let facts = texts(&html, ".facts").join(" ");
     for part in [
-        "Longest stall of the server30 ms",
+        "Most that the host took of one answer30 ms",
         "played again for it2",
         "begun again after a fault of ours1",
     ] {
