@@ -1,7 +1,6 @@
 //! `faceoff activate`: chooses which submission plays next.
 
-use super::submit::next_cut;
-use crate::client::Client;
+use super::{submit::next_cut, team_server::TeamServer};
 use anyhow::Context;
 use clap::Args;
 use faceoff_types::SubmissionId;
@@ -12,17 +11,8 @@ use faceoff_types::SubmissionId;
 pub struct ActivateCommand {
     /// The submission's id, as `faceoff submit` printed it
     submission: SubmissionId,
-    /// The server
-    #[arg(
-        long,
-        value_name = "URL",
-        env = "FACEOFF_SERVER",
-        default_value = "http://127.0.0.1:8080"
-    )]
-    server: String,
-    /// The team's token
-    #[arg(long, env = "FACEOFF_TOKEN", hide_env_values = true)]
-    token: String,
+    #[command(flatten)]
+    server: TeamServer,
 }
 
 impl ActivateCommand {
@@ -39,7 +29,7 @@ impl ActivateCommand {
     }
 
     async fn activate(self) -> anyhow::Result<()> {
-        let client = Client::new(&self.server, Some(self.token.trim()))?;
+        let client = self.server.client()?;
         let active = client.activate(self.submission).await?;
         println!("active: {} ({})", active.file_name, active.id);
         println!("{}", next_cut(&client.me().await?, active.id));

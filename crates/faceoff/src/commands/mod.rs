@@ -11,6 +11,7 @@ pub mod score;
 pub mod serve;
 pub mod sim;
 pub mod submit;
+mod team_server;
 pub mod verify;
 
 use std::process::ExitCode;

@@ -1,5 +1,6 @@
 //! `faceoff submit`: uploads an agent and says whether it starts.
 
+use super::team_server::TeamServer;
 use crate::client::Client;
 use anyhow::{Context, bail};
 use clap::Args;
@@ -19,17 +20,8 @@ const POLL: Duration = Duration::from_millis(500);
 pub struct SubmitCommand {
     /// The agent: a .tar.gz, .tar.zst or .zip, or a folder with agent.toml, which is packed
     bundle: PathBuf,
-    /// The server
-    #[arg(
-        long,
-        value_name = "URL",
-        env = "FACEOFF_SERVER",
-        default_value = "http://127.0.0.1:8080"
-    )]
-    server: String,
-    /// The team's token
-    #[arg(long, env = "FACEOFF_TOKEN", hide_env_values = true)]
-    token: String,
+    #[command(flatten)]
+    server: TeamServer,
 }
 
 impl SubmitCommand {
@@ -46,7 +38,7 @@ impl SubmitCommand {
     }
 
     async fn submit(self) -> anyhow::Result<()> {
-        let client = Client::new(&self.server, Some(self.token.trim()))?;
+        let client = self.server.client()?;
         let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template(
             "uploading {bar:40} {bytes}/{total_bytes}",
         )?);

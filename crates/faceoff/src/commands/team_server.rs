@@ -1,0 +1,28 @@
+use crate::client::Client;
+use clap::Args;
+
+/// Where a team's commands go, and as whom.
+#[derive(Debug, Args)]
+pub struct TeamServer {
+    /// The server
+    #[arg(
+        long,
+        value_name = "URL",
+        env = "FACEOFF_SERVER",
+        default_value = "http://127.0.0.1:8080"
+    )]
+    server: String,
+    /// The team's token
+    #[arg(long, env = "FACEOFF_TOKEN", hide_env_values = true)]
+    token: String,
+}
+
+impl TeamServer {
+    /// A client that speaks for the team.
+    ///
+    /// # Errors
+    /// If the address is none.
+    pub fn client(&self) -> anyhow::Result<Client> {
+        Client::new(&self.server, Some(self.token.trim()))
+    }
+}
