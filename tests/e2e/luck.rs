@@ -74,7 +74,9 @@ fn no_agent_gets_at_the_ends_of_its_channel() {
 #[test]
 fn what_one_teams_agent_leaves_another_teams_agent_does_not_find() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    // Its runtimes in memory, as an organiser would have them.
+    let config = CONFIG.replace("resident_bytes = 0", "");
+    let server = Server::start(&scratch.path().join("data"), &config);
     // Locks, leases, hints, notices, advice, reads without waiting, counters, terminals, objects of the
     // kernel, files: each on a file that both see. The first leaves what it can, the second looks.
     let board = "library";
@@ -188,6 +190,61 @@ fn a_storm_of_the_agents_own_is_no_excuse() {
             "{name}: {result:#}"
         );
     }
+}
+
+#[test]
+fn a_slow_answer_that_costs_points_tells_whose_time_it_was() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let config = CONFIG.replace("episodes_per_task = 4", "episodes_per_task = 8");
+    let server = Server::start(&scratch.path().join("data"), &config);
+    let team = Team::create(&server, "Hesitant");
+    // Two ways to be slow, one that computes and one that sleeps.
+    let source = python_agent(
+        "if message['step'] == 3:\n    \
+         until = time.process_time() + 0.25\n    \
+         if TIMES % 2: time.sleep(0.25)\n    \
+         while TIMES % 2 == 0 and time.process_time() < until: pass\n    \
+         TIMES += 1\n\
+         say(hold)",
+    );
+    let source = format!("TIMES = 0\n{source}");
+    let folder = python_bundle(scratch.path(), "hesitant", &source);
+    let submission = team.submit(&server, &folder);
+    assert_eq!(submission["state"], "valid", "{submission:#}");
+    let path = team.evaluate(&server, &submission);
+    let finished = team.finished(&server, &path);
+    assert_eq!(finished["state"], "finished", "{finished:#}");
+    let violations = server
+        .get(&format!("{path}/violations"), Some(&team.token))
+        .json::<Value>()
+        .expect("the API speaks JSON");
+    let (mut computed, mut slept) = (0, 0);
+    for (task, of_task) in violations["tasks"].as_object().expect("there are tasks") {
+        let slow = of_task["computation_time"].as_array().expect("a list");
+        assert_eq!(slow.len(), 8, "{task}: {of_task:#}");
+        for episode in slow {
+            let slowest = &episode["slowest"];
+            let of = |field: &str| slowest[field].as_f64().expect("a time");
+            let counted = episode["max_s"].as_f64().expect("a time");
+            assert!(of("wall_s") >= 0.25, "{episode:#}");
+            assert!((of("wall_s") - of("host_s") - counted).abs() < 1e-6);
+            match of("cpu_s") {
+                _ if slowest["step"] != 3 => {}
+                cpu_s if cpu_s >= 0.25 => computed += 1,
+                _ => slept += 1,
+            }
+        }
+    }
+    assert!(computed > 0 && slept > 0, "{computed} and {slept}");
+
+    // Beyond the worst twenty the page tells where all are.
+    let page = server.get(&path.replace("/api/v1", ""), None);
+    let page = page.text().expect("a page is text");
+    assert!(page.contains("The worst 20 of 24 episodes"), "{page}");
+    assert!(page.contains(&format!("{path}/violations")));
+    let other = Team::create(&server, "Other");
+    let foreign = server.get(&format!("{path}/violations"), Some(&other.token));
+    assert_eq!(foreign.status(), 404);
 }
 
 /// Shrinks its pipe where no filter keeps it, leaves a byte of each question unread, and thinks when the

@@ -18,7 +18,8 @@ use faceoff_tests::{bundle, server::Server};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// A configuration for tests: few episodes, small shards, one slot, time for every answer.
+/// A configuration for tests: few episodes, small shards, one slot, time for every answer. No server of a
+/// test copies this host's libraries into memory, but the one that is asked what agents find there.
 const CONFIG: &str = concat!(
     include_str!("../patient.toml"),
     r#"
@@ -27,6 +28,8 @@ episodes_per_task = 4
 episodes_per_shard = 2
 [workers]
 slots = 1
+[sandbox]
+resident_bytes = 0
 "#
 );
 

@@ -4,6 +4,7 @@ mod by_index;
 mod container;
 mod episodes;
 mod file_range;
+mod footer;
 mod layout;
 mod seal;
 mod steps;
@@ -27,7 +28,7 @@ use crate::{
 use arrow_array::RecordBatch;
 use container::Container;
 use faceoff_types::{EvaluationResult, Task};
-use faceoff_wire::dataset::{CalibrationFile, DatasetManifest, FileDigest};
+use faceoff_wire::dataset::{CalibrationFile, DatasetManifest, FileDigest, ViolationsFile};
 use fs_err as fs;
 use serde::Deserialize;
 use std::{
@@ -154,6 +155,15 @@ impl Dataset {
     pub fn results(&self) -> Result<EvaluationResult, DatasetError> {
         serde_json::from_slice(&self.bytes(RESULTS_FILE)?)
             .map_err(DatasetError::unreadable(RESULTS_FILE))
+    }
+
+    /// Where each constraint was broken, and what was slow.
+    ///
+    /// # Errors
+    /// [`DatasetError::Unreadable`] if `violations.json` is nothing of the kind.
+    pub fn violations(&self) -> Result<ViolationsFile, DatasetError> {
+        serde_json::from_slice(&self.bytes(VIOLATIONS_FILE)?)
+            .map_err(DatasetError::unreadable(VIOLATIONS_FILE))
     }
 
     /// What the slots measured of themselves.

@@ -5,7 +5,11 @@ use jiff::Timestamp;
 use object_store::{
     ObjectStore, ObjectStoreExt, WriteMultipart, local::LocalFileSystem, path::Path as Key,
 };
-use std::{path::Path, sync::Arc, time::SystemTime};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::SystemTime,
+};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
 /// The bytes of an artifact, in order.
@@ -86,6 +90,14 @@ impl Artifacts {
                 "{key}: {written} of {bytes} bytes read"
             )))
         }
+    }
+
+    /// Where an artifact lies, for whoever reads parts of it. It must not be written to.
+    ///
+    /// # Errors
+    /// [`StoreError::Artifacts`] if `key` is none.
+    pub fn path_of(&self, key: &str) -> Result<PathBuf> {
+        Ok(self.folder.join(parse(key)?.as_ref()))
     }
 
     /// Length and bytes of an artifact, for a download.

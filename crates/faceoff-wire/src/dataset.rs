@@ -65,6 +65,7 @@ pub struct ViolationsFile {
 
 /// The violations of one task, per constraint.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct TaskViolations {
     /// End-effector position, metres beyond the bound.
     pub ee: Vec<ConstraintViolation>,
@@ -80,6 +81,7 @@ pub struct TaskViolations {
 
 /// A constraint broken in one episode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ConstraintViolation {
     /// Index within the evaluation, from 0.
     pub episode: u32,
@@ -93,6 +95,7 @@ pub struct ConstraintViolation {
 
 /// An episode with penalty points for computation time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct SlowEpisode {
     /// Index within the evaluation, from 0.
     pub episode: u32,
@@ -109,6 +112,7 @@ pub struct SlowEpisode {
 
 /// The slowest answer of an episode: what it took, and whose time that was.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct SlowStep {
     /// The control step, from 0; the first of those that took equally long.
     pub step: u32,

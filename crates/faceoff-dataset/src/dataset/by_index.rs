@@ -2,7 +2,7 @@
 //! `episode`, rows by these two columns, pages by the index of pages. Tables without bounds or index
 //! are read all the same, only more of them.
 
-use super::steps::reader;
+use super::{footer, steps::reader};
 use crate::{error::DatasetError, files::STEPS_FILE};
 use arrow_array::{
     BooleanArray, RecordBatch, RecordBatchReader, StringArray, UInt32Array, cast::AsArray,
@@ -69,6 +69,7 @@ fn row_groups<R: ChunkReader>(
     episode: u32,
 ) -> Result<(ArrowReaderMetadata, Vec<usize>)> {
     let metadata = ParquetMetaDataReader::new().parse_and_finish(table)?;
+    footer::check(&metadata, table.len())?;
     let groups: Vec<usize> = metadata
         .row_groups()
         .iter()

@@ -1,4 +1,4 @@
-use super::{file_range::FileRange, steps::has_columns};
+use super::{file_range::FileRange, footer, steps::has_columns};
 use crate::{error::DatasetError, files::EPISODES_FILE, table::EpisodeRows};
 use arrow_array::{
     Array, BooleanArray, Float64Array, RecordBatch, StringArray, UInt32Array,
@@ -30,7 +30,12 @@ pub struct EpisodeRecord {
 
 /// The table as it is, in batches, its columns checked.
 pub(super) fn batches(table: FileRange) -> Result<Vec<RecordBatch>, DatasetError> {
+    let bytes = table.bytes;
     let builder = ParquetRecordBatchReaderBuilder::try_new(table)
+        .and_then(|builder| {
+            footer::check(builder.metadata(), bytes)?;
+            Ok(builder)
+        })
         .map_err(DatasetError::unreadable(EPISODES_FILE))?;
     has_columns(EPISODES_FILE, builder.schema(), EpisodeRows::new().schema())?;
     let reader = builder

@@ -1,4 +1,4 @@
-use super::file_range::FileRange;
+use super::{file_range::FileRange, footer};
 use crate::{
     error::DatasetError,
     files::STEPS_FILE,
@@ -107,6 +107,10 @@ pub struct StepTable {
 impl StepTable {
     pub(crate) fn open(table: FileRange) -> Result<Self, DatasetError> {
         let metadata = ArrowReaderMetadata::load(&table, Default::default())
+            .and_then(|metadata| {
+                footer::check(metadata.metadata(), table.bytes)?;
+                Ok(metadata)
+            })
             .map_err(DatasetError::unreadable(STEPS_FILE))?;
         Ok(Self { table, metadata })
     }

@@ -1,4 +1,4 @@
-//! Downloads of recorded datasets.
+//! Recorded datasets: the archive, and what of it is read without a download.
 
 use crate::{
     app::App,
@@ -6,14 +6,16 @@ use crate::{
     extract::PathParam,
     problem::{Problem, ProblemKind},
     release::check_released,
+    views::violations::ViolationsView,
 };
 use axum::{
+    Json,
     body::Body,
     extract::State,
     http::{HeaderValue, header},
     response::{IntoResponse, Response},
 };
-use faceoff_store::EvaluationState;
+use faceoff_store::{Evaluation, EvaluationState};
 use faceoff_types::EvaluationId;
 use jiff::civil::Date;
 
@@ -35,31 +37,64 @@ pub(crate) async fn dataset(
     State(app): State<App>,
     PathParam(id): PathParam<EvaluationId>,
 ) -> Result<Response, Problem> {
+    let (evaluation, dataset) = released(caller, &app, id).await?;
+    // A dataset that a finished evaluation names must be there: without it, we lost it.
+    let (bytes, stream) = app
+        .store
+        .artifacts()
+        .read(&dataset)
+        .await
+        .map_err(Problem::internal)?;
+    let team = app.store.team(evaluation.team).await?;
+    let name = download_name(team.name.as_str(), evaluation.day);
+    let disposition = HeaderValue::try_from(format!("attachment; filename=\"{name}\""))
+        .map_err(Problem::internal)?;
+    let headers = [
+        (
+            header::CONTENT_TYPE,
+            HeaderValue::from_static("application/zip"),
+        ),
+        (header::CONTENT_LENGTH, HeaderValue::from(bytes)),
+        (header::CONTENT_DISPOSITION, disposition),
+    ];
+    Ok((headers, Body::from_stream(stream)).into_response())
+}
+
+/// Where each constraint was broken and which answers were slow, by episode: `violations.json` of the dataset,
+/// for its team and the organiser, once the day is released. A slow answer tells what it took, what of it the
+/// host took, and the agent's CPU time meanwhile.
+#[utoipa::path(
+    get, path = "/evaluations/{id}/violations", tag = "team",
+    security(("team" = []), ("organiser" = [])),
+    params(("id" = EvaluationId, Path)),
+    responses(
+        (status = 200, body = ViolationsView),
+        (status = 404),
+        (status = 409, description = "not finished yet, or failed, or its day is not released"),
+    )
+)]
+pub(crate) async fn violations(
+    caller: Caller,
+    State(app): State<App>,
+    PathParam(id): PathParam<EvaluationId>,
+) -> Result<Json<ViolationsView>, Problem> {
+    let (_, dataset) = released(caller, &app, id).await?;
+    ViolationsView::read(&app, &dataset).await.map(Json)
+}
+
+/// A finished evaluation whose day is released, and its dataset's name among the artifacts.
+async fn released(
+    caller: Caller,
+    app: &App,
+    id: EvaluationId,
+) -> Result<(Evaluation, String), Problem> {
     let found = app.store.evaluation(id).await;
     let evaluation = caller.visible("evaluation", found, |evaluation| evaluation.team)?;
     let why_not = match &evaluation.state {
         EvaluationState::Finished { dataset, .. } => {
-            check_released(&app, &evaluation).await?;
-            // A dataset that a finished evaluation names must be there: without it, we lost it.
-            let (bytes, stream) = app
-                .store
-                .artifacts()
-                .read(dataset)
-                .await
-                .map_err(Problem::internal)?;
-            let team = app.store.team(evaluation.team).await?;
-            let name = download_name(team.name.as_str(), evaluation.day);
-            let disposition = HeaderValue::try_from(format!("attachment; filename=\"{name}\""))
-                .map_err(Problem::internal)?;
-            let headers = [
-                (
-                    header::CONTENT_TYPE,
-                    HeaderValue::from_static("application/zip"),
-                ),
-                (header::CONTENT_LENGTH, HeaderValue::from(bytes)),
-                (header::CONTENT_DISPOSITION, disposition),
-            ];
-            return Ok((headers, Body::from_stream(stream)).into_response());
+            check_released(app, &evaluation).await?;
+            let dataset = dataset.clone();
+            return Ok((evaluation, dataset));
         }
         EvaluationState::Queued | EvaluationState::Running { .. } | EvaluationState::Finalising => {
             "the evaluation is not finished; follow it until its state is “finished”"

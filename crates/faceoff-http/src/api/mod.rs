@@ -46,6 +46,7 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(evaluations::cancel_evaluation))
         .routes(routes!(evaluations::rerun_evaluation))
         .routes(routes!(datasets::dataset))
+        .routes(routes!(datasets::violations))
         .routes(routes!(comparisons::compare))
         .layer(middleware::from_fn_with_state(patience, layers::time_out))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES));

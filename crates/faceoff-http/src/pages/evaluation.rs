@@ -15,12 +15,15 @@ use crate::{
         season::SeasonHead,
         submission::SubmissionView,
         task::TaskView,
+        violations::ViolationsView,
     },
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
 use faceoff_scoring::{EpisodeSummary, TIER_CHANGE_RESAMPLES};
+use faceoff_store::EvaluationState;
 use faceoff_types::{EvaluationId, Profile, RoundTrips, SlotTiming, Task};
+use faceoff_wire::dataset::SlowEpisode;
 use figures::Rate;
 use jiff::{Timestamp, civil};
 
@@ -107,6 +110,102 @@ struct Finished {
     /// Evaluations that met the same episodes.
     others: Vec<Other>,
     timing: Option<TimingFigures>,
+    slow: SlowAnswers,
+}
+
+/// The answers that cost points, those that cost most first; once the day is released.
+#[derive(Default)]
+struct SlowAnswers {
+    shown: Vec<SlowAnswer>,
+    /// Of how many episodes, those that are not shown included.
+    episodes: usize,
+    /// They are in the dataset, which cannot be read.
+    lost: bool,
+}
+
+/// The slowest answer of an episode that lost points by slow answers; times in milliseconds.
+struct SlowAnswer {
+    task: Task,
+    episode: u32,
+    points: String,
+    mean_ms: String,
+    max_ms: String,
+    /// What is known of the slowest answer; nothing in datasets of older versions.
+    step: Option<SlowStepFigures>,
+}
+
+struct SlowStepFigures {
+    step: u32,
+    wall_ms: String,
+    host_ms: String,
+    /// `None` where the host did not tell.
+    cpu_ms: Option<String>,
+}
+
+impl SlowAnswers {
+    /// A page is no list; the API tells of all.
+    const SHOWN: usize = 20;
+
+    async fn of(app: &App, view: &EvaluationView, result: &ResultView) -> Result<Self, Problem> {
+        let of_task = |task: &TaskView| task.violations.is_some_and(|v| v.computation_time > 0);
+        if !result.tasks.values().any(of_task) {
+            return Ok(Self::default());
+        }
+        let evaluation = app.store.evaluation(view.id).await?;
+        let EvaluationState::Finished { dataset, .. } = &evaluation.state else {
+            return Ok(Self::default());
+        };
+        Ok(match ViolationsView::read(app, dataset).await {
+            Ok(violations) => Self::worst(violations),
+            // It is logged; the rest of the page is not worse for it.
+            Err(_) => Self {
+                lost: true,
+                ..Self::default()
+            },
+        })
+    }
+
+    fn worst(violations: ViolationsView) -> Self {
+        let mut slow: Vec<(Task, SlowEpisode)> = violations
+            .tasks
+            .into_iter()
+            .flat_map(|(task, of_task)| {
+                let episodes = of_task.computation_time.into_iter();
+                episodes.map(move |episode| (task, episode))
+            })
+            .collect();
+        slow.sort_by(|(_, a), (_, b)| {
+            let by_points = b.points.total_cmp(&a.points);
+            by_points.then_with(|| b.max_s.total_cmp(&a.max_s))
+        });
+        Self {
+            episodes: slow.len(),
+            shown: slow
+                .into_iter()
+                .take(Self::SHOWN)
+                .map(|(task, episode)| SlowAnswer::of(task, &episode))
+                .collect(),
+            lost: false,
+        }
+    }
+}
+
+impl SlowAnswer {
+    fn of(task: Task, episode: &SlowEpisode) -> Self {
+        Self {
+            task,
+            episode: episode.episode,
+            points: figures::one(episode.points),
+            mean_ms: figures::milliseconds(episode.mean_s),
+            max_ms: figures::milliseconds(episode.max_s),
+            step: episode.slowest.map(|slowest| SlowStepFigures {
+                step: slowest.step,
+                wall_ms: figures::milliseconds(slowest.wall_s),
+                host_ms: figures::milliseconds(slowest.host_s),
+                cpu_ms: slowest.cpu_s.map(figures::milliseconds),
+            }),
+        }
+    }
 }
 
 /// Another team's evaluation of the same episodes.
@@ -195,6 +294,7 @@ pub(super) async fn page(
             Some(Finished {
                 dataset_blake3: dataset_blake3.clone(),
                 others,
+                slow: SlowAnswers::of(&app, &view, result).await?,
                 ..Finished::of(result, *finished_at, &summary)
             })
         }
@@ -284,6 +384,7 @@ impl Finished {
                 .collect(),
             dataset_blake3: None,
             others: Vec::new(),
+            slow: SlowAnswers::default(),
             timing: result.timing.as_ref().map(TimingFigures::of),
         }
     }

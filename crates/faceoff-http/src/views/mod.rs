@@ -14,6 +14,7 @@ pub mod season;
 pub mod submission;
 pub mod task;
 pub mod team;
+pub mod violations;
 
 /// Text of agents as API and pages show it; what older versions have stored may hold anything.
 fn shown(text: String) -> String {

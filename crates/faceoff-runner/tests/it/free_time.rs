@@ -12,8 +12,8 @@ use faceoff_types::{AgentFaultKind, Task};
 /// Reads its standard input by itself and leaves the end of each question unread, so that sooner or later
 /// the next one does not fit into a pipe that was made small; then it thinks, and says so in its log.
 const LEAVES_UNREAD: &str = r#"
-import array, fcntl, json, os, sys, termios, time
-SHRINK, LEFT = 1031, 1
+import array, fcntl, json, os, sys, termios, threading, time
+SHRINK, LEFT = 1031, 0 if WHO == "drains" else 1
 THOUGHTS = 6
 
 def unread():
@@ -54,9 +54,27 @@ def question():
     left = 0 if text.endswith(b"\n") else LEFT
     return json.loads(text.lstrip(b"\n"))
 
+def drained():
+    """The next question, which a thread takes byte by byte."""
+    global THOUGHTS
+    text = []
+    def drain():
+        while text[-1:] != [b"\n"]:
+            text.append(os.read(0, 1))
+            time.sleep(0.001)
+    reader = threading.Thread(target=drain)
+    reader.start()
+    reader.join()
+    print("thought", file=sys.stderr, flush=True)
+    THOUGHTS -= 1
+    return json.loads(b"".join(text))
+
 left, held = 0, None
 while True:
-    message = question()
+    if WHO == "drains" and held and THOUGHTS > 0:
+        message = drained()
+    else:
+        message = question()
     kind = message["type"]
     if kind == "hello":
         if SHRINKS:
@@ -128,6 +146,29 @@ fn in_the_sandbox_the_pipe_keeps_its_size_and_an_unread_byte_delays_nothing() {
 
     let left = run(&spec, &leaves_unread(false, ""), &sandboxed(), out.path()).unwrap();
     assert_eq!(left.outcomes[0].fault, None);
+}
+
+#[test]
+fn a_question_that_a_thread_takes_slowly_is_on_the_agents_time() {
+    for (env, shrinks) in [(sandboxed(), false), (without_filter(), true)] {
+        let out = tempfile::tempdir().unwrap();
+        let agent = leaves_unread(shrinks, "drains");
+        let report = run(&spec(Task::Hit, 0..1), &agent, &env, out.path()).unwrap();
+        assert_eq!(report.outcomes[0].fault, None, "{}", report.log);
+        assert_eq!(report.log.matches("thought").count(), 6);
+        let steps = read(&out.path().join("steps.parquet"));
+        let (counted, host) = (
+            seconds(&steps, "computation_time_ns"),
+            seconds(&steps, "host_time_ns"),
+        );
+        // A millisecond for each byte of a question, of which there are some hundred.
+        let slow = counted
+            .iter()
+            .zip(&host)
+            .filter(|(counted, host)| **counted + **host >= 0.3)
+            .count();
+        assert_eq!(slow, 6);
+    }
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! `faceoff serve`: API, pages, worker slots and the daily schedule in one process.
 
-use crate::config::Config;
+use crate::{config::Config, log::LogFormat};
 use anyhow::{Context, bail};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use faceoff_http::{
     HttpConfig, HttpLimits,
     token::{Token, TokenKind, hash_token},
@@ -15,7 +15,7 @@ use jiff::Timestamp;
 use std::{
     collections::BTreeMap,
     fs::{self, OpenOptions},
-    io::{IsTerminal as _, Write as _},
+    io::Write as _,
     net::SocketAddr,
     num::NonZeroU32,
     os::unix::fs::{DirBuilderExt, OpenOptionsExt},
@@ -24,7 +24,6 @@ use std::{
 };
 use tokio::{net::TcpListener, signal::unix::SignalKind, task::JoinSet};
 use tokio_util::sync::CancellationToken;
-use tracing_subscriber::EnvFilter;
 
 /// The file in the data folder that holds the organiser's token.
 pub const ADMIN_TOKEN_FILE: &str = "admin-token";
@@ -48,22 +47,13 @@ pub struct ServeCommand {
     log_format: LogFormat,
 }
 
-/// How log lines look.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum LogFormat {
-    /// For people.
-    Text,
-    /// One JSON object per line.
-    Json,
-}
-
 impl ServeCommand {
     /// Serves until SIGINT or SIGTERM.
     ///
     /// # Errors
     /// If the configuration, the data folder, the address or the sandbox is not as it must be.
     pub fn run(self) -> anyhow::Result<()> {
-        start_log(self.log_format);
+        self.log_format.start()?;
         let mut config = Config::load(self.config.as_deref())?;
         if let Some(listen) = self.listen {
             config.server.listen = listen;
@@ -79,18 +69,6 @@ impl ServeCommand {
             .build()
             .context("starting the async runtime")?
             .block_on(serve(config))
-    }
-}
-
-fn start_log(format: LogFormat) {
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
-    let log = tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal());
-    match format {
-        LogFormat::Text => log.init(),
-        LogFormat::Json => log.json().init(),
     }
 }
 

@@ -1,0 +1,91 @@
+//! A table's footer says where its columns lie. The library takes that for granted, so it is looked at before
+//! anything is read by it.
+
+use parquet::{
+    errors::{ParquetError, Result},
+    file::metadata::{ColumnChunkMetaData, ParquetMetaData},
+};
+
+/// Refuses counts below zero and columns that do not lie within the table's `bytes`.
+pub(super) fn check(footer: &ParquetMetaData, bytes: u64) -> Result<()> {
+    for (number, group) in footer.row_groups().iter().enumerate() {
+        let columns = group.columns().iter();
+        if group.num_rows() < 0 || !columns.into_iter().all(|column| lies_within(column, bytes)) {
+            return Err(ParquetError::General(format!(
+                "the columns of row group {number} do not lie within the table"
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn lies_within(column: &ColumnChunkMetaData, bytes: u64) -> bool {
+    let first = column.dictionary_page_offset();
+    let start = first.unwrap_or(column.data_page_offset());
+    let end = start.checked_add(column.compressed_size());
+    let counts = [
+        start,
+        column.data_page_offset(),
+        column.compressed_size(),
+        column.uncompressed_size(),
+        column.num_values(),
+    ];
+    counts.iter().all(|count| *count >= 0)
+        && end.is_some_and(|end| end.unsigned_abs() <= bytes)
+        && column.data_page_offset().unsigned_abs() <= bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use parquet::{
+        basic::Type as PhysicalType,
+        file::metadata::{FileMetaData, RowGroupMetaData},
+        schema::types::{SchemaDescriptor, Type},
+    };
+    use std::sync::Arc;
+
+    /// A footer of one column, at `start` and of `length` bytes.
+    fn footer(rows: i64, start: i64, length: i64, dictionary: Option<i64>) -> ParquetMetaData {
+        let field = Type::primitive_type_builder("puck_x", PhysicalType::DOUBLE)
+            .build()
+            .unwrap();
+        let schema = Type::group_type_builder("steps")
+            .with_fields(vec![Arc::new(field)])
+            .build()
+            .unwrap();
+        let schema = Arc::new(SchemaDescriptor::new(Arc::new(schema)));
+        let column = ColumnChunkMetaData::builder(schema.column(0))
+            .set_data_page_offset(start)
+            .set_dictionary_page_offset(dictionary)
+            .set_total_compressed_size(length)
+            .build()
+            .unwrap();
+        let group = RowGroupMetaData::builder(Arc::clone(&schema))
+            .set_num_rows(rows)
+            .add_column_metadata(column)
+            .build()
+            .unwrap();
+        let file = FileMetaData::new(2, rows, None, None, schema, None);
+        ParquetMetaData::new(file, vec![group])
+    }
+
+    #[test]
+    fn a_column_lies_within_its_table() {
+        assert!(check(&footer(3, 4, 96, None), 100).is_ok());
+        assert!(check(&footer(3, 50, 96, Some(4)), 100).is_ok());
+        for (rows, start, length, dictionary) in [
+            (3, -1, 50, None),
+            (3, 4, -1, None),
+            (3, 4, 97, None),
+            (3, i64::MAX, 1, None),
+            (3, 4, i64::MAX, None),
+            (3, 50, 10, Some(-4)),
+            (3, 101, 10, Some(4)),
+            (-3, 4, 96, None),
+        ] {
+            let refused = check(&footer(rows, start, length, dictionary), 100);
+            assert!(refused.is_err(), "{rows} {start} {length} {dictionary:?}");
+        }
+    }
+}
