@@ -8,7 +8,7 @@ use faceoff_http::{
     token::{Token, TokenKind, hash_token},
 };
 use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime, probe_host};
-use faceoff_store::{Actor, Store};
+use faceoff_store::{Actor, Room, Store};
 use faceoff_types::Clock;
 use faceoff_worker::{DailyPlan, WorkerConfig};
 use jiff::Timestamp;
@@ -87,6 +87,9 @@ fn start_log(format: LogFormat) {
     let log = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
+        // A line that cannot be written would be told of on the same standard error, whose failure is a
+        // panic: a full disk under the log would end the slots.
+        .log_internal_errors(false)
         .with_ansi(std::io::stderr().is_terminal());
     match format {
         LogFormat::Text => log.init(),
@@ -104,9 +107,11 @@ async fn serve(config: Config) -> anyhow::Result<()> {
     private_folder(&scratch_dir)?;
     let admin_token_hash = admin_token(&data_dir)?;
 
+    let watched = vec![data_dir.clone(), scratch_dir.clone()];
     let store = Store::open(&data_dir)
         .await
-        .with_context(|| format!("opening the data folder {}", data_dir.display()))?;
+        .with_context(|| format!("opening the data folder {}", data_dir.display()))?
+        .with_room(Room::new(watched, config.server.min_free_bytes));
     if let Some(name) = &config.season.name {
         store
             .name_season(Actor::Organiser, name, jiff::Timestamp::now())
