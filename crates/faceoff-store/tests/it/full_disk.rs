@@ -11,7 +11,8 @@ const ROLLS_BACK: &str = "CREATE TRIGGER full BEFORE INSERT ON teams WHEN NEW.na
 #[tokio::test]
 async fn a_write_that_sqlite_rolled_back_does_not_wedge_the_writer() {
     let f = Fixture::new().await;
-    f.connection().await.execute(ROLLS_BACK).await.unwrap();
+    let mut past_the_store = f.connection().await;
+    past_the_store.execute(ROLLS_BACK).await.unwrap();
     for attempt in 0..3 {
         let failed = f.store.create_team(
             Actor::Organiser,
