@@ -14,13 +14,12 @@ async fn a_write_that_sqlite_rolled_back_does_not_wedge_the_writer() {
     let mut past_the_store = f.connection().await;
     past_the_store.execute(ROLLS_BACK).await.unwrap();
     for attempt in 0..3 {
-        let failed = f.store.create_team(
-            Actor::Organiser,
-            &"Full".parse().unwrap(),
-            [attempt; 32],
-            f.now,
-        );
-        assert!(failed.await.is_err());
+        let name = "Full".parse().unwrap();
+        let failed = f
+            .store
+            .create_team(Actor::Organiser, &name, [attempt; 32], f.now)
+            .await;
+        assert!(failed.is_err());
         f.team(&format!("After {attempt}")).await;
     }
     assert_eq!(f.store.teams().await.unwrap().len(), 3);
