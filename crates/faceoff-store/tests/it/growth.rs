@@ -17,11 +17,12 @@ fn log_bytes(f: &Fixture) -> u64 {
     fs::metadata(log_file(f)).map_or(0, |found| found.len())
 }
 
-/// Writes half a megabyte.
-async fn write(f: &Fixture, run: faceoff_types::RunId, version: u32) {
-    let summary = format!("\"{}\"", "x".repeat(512 << 10));
+/// Writes half a megabyte: another one each time, since SQLite does not write what is there already.
+async fn write(f: &Fixture, run: faceoff_types::RunId, number: u8) {
+    let text = char::from(b'a' + number % 26).to_string();
+    let summary = format!("\"{}\"", text.repeat(512 << 10));
     f.store
-        .keep_episode_summary(run, version, &summary, f.now)
+        .keep_episode_summary(run, 1, &summary, f.now)
         .await
         .unwrap();
 }
@@ -51,10 +52,10 @@ async fn readers_that_never_pause_do_not_let_the_log_grow() {
     }
     let mut longest = 0;
     // five times the bound
-    for _ in 0..160 {
+    for number in 0..160 {
         // between two writes there are always readers
         reads.acquire_many(4).await.unwrap().forget();
-        write(&f, run, 1).await;
+        write(&f, run, number).await;
         longest = longest.max(log_bytes(&f));
     }
     readers.shutdown().await;
@@ -80,7 +81,7 @@ async fn a_log_that_another_process_has_held_is_emptied_when_it_lets_go() {
     let mut other = long_reader(&f).await;
     let mut written = 0;
     while log_bytes(&f) <= LOG_BOUND_BYTES {
-        write(&f, run, 1).await;
+        write(&f, run, written).await;
         written += 1;
         assert!(written < 200, "the reader should hold the log");
     }
@@ -114,8 +115,8 @@ async fn what_is_streamed_holds_no_reader() {
         downloads.push(f.store.artifacts().read("datasets/a").await.unwrap());
     }
     let run = run(&f).await;
-    for _ in 0..64 {
-        write(&f, run, 1).await;
+    for number in 0..64 {
+        write(&f, run, number).await;
     }
     f.store.season().await.unwrap();
     assert!(log_bytes(&f) <= LOG_BOUND_BYTES + SLACK_BYTES);
