@@ -2,9 +2,11 @@ use crate::{
     error::{Result, StoreError},
     log::{LOG_BOUND_BYTES, Log},
 };
+use futures::future::BoxFuture;
 use sqlx::{
-    Connection, Sqlite, SqlitePool, Transaction,
+    Connection, Sqlite, SqliteConnection, SqlitePool, Transaction,
     migrate::Migrator,
+    pool::PoolConnectionMetadata,
     sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous},
 };
 use std::{path::Path, sync::Arc, time::Duration};
@@ -16,6 +18,20 @@ pub(crate) const BUSY_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// Readers at a time; a board is read in well under a millisecond.
 pub(crate) const READERS: u32 = 4;
+
+/// May a connection that comes back be used again? SQLite rolls back by itself when the disk is full. The
+/// library's own rollback fails then, it believes in the transaction for good, and no other can begin:
+/// such a connection is replaced.
+fn is_sound(
+    connection: &mut SqliteConnection,
+    _: PoolConnectionMetadata,
+) -> BoxFuture<'_, sqlx::Result<bool>> {
+    Box::pin(async move {
+        // after the rollback that a dropped transaction has sent ahead
+        connection.ping().await?;
+        Ok(!connection.is_in_transaction())
+    })
+}
 
 /// The pools: readers see the last committed state and never wait for the writer.
 #[derive(Debug, Clone)]
@@ -46,16 +62,7 @@ impl Database {
             .max_connections(1)
             // writers queue here rather than in SQLite's polling busy handler
             .acquire_timeout(2 * BUSY_TIMEOUT)
-            .after_release(|connection, _| {
-                Box::pin(async move {
-                    // after the rollback that a dropped transaction has sent ahead
-                    connection.ping().await?;
-                    // SQLite rolls back by itself when the disk is full. The library's own rollback
-                    // fails then, it believes in the transaction for good, and no other can begin:
-                    // such a connection is replaced.
-                    Ok(!connection.is_in_transaction())
-                })
-            })
+            .after_release(is_sound)
             .connect_with(options.clone())
             .await?;
         MIGRATIONS
@@ -64,6 +71,7 @@ impl Database {
             .map_err(|error| StoreError::Database(error.into()))?;
         let read = SqlitePoolOptions::new()
             .max_connections(READERS)
+            .after_release(is_sound)
             .connect_with(options.create_if_missing(false).pragma("query_only", "ON"))
             .await?;
         let mut log = file.as_os_str().to_owned();
