@@ -5,6 +5,8 @@ mod browser;
 mod crash;
 mod cut;
 mod demo;
+mod full_disk;
+mod growth;
 mod house;
 mod kills;
 mod luck;
@@ -14,9 +16,11 @@ mod told_text;
 mod upgrade;
 mod void_at_will;
 
-use faceoff_tests::{bundle, server::Server};
+use bytes::Bytes;
+use faceoff_tests::{bundle, program, repository, server::Server};
 use serde_json::{Value, json};
-use std::path::Path;
+use std::{fs, io::Cursor, path::Path, process::Command};
+use zip::ZipArchive;
 
 /// A configuration for tests: few episodes, small shards, one slot, time for every answer. No server of a
 /// test copies this host's libraries into memory, but the one that is asked what agents find there.
@@ -71,6 +75,11 @@ impl Team {
             .to_owned()
     }
 
+    fn verdict_so_far(&self, server: &Server, submission: &str) -> Value {
+        let path = format!("/api/v1/submissions/{submission}");
+        server.poll(&path, &self.token, |_| true)
+    }
+
     fn verdict(&self, server: &Server, submission: &str) -> Value {
         server.poll(
             &format!("/api/v1/submissions/{submission}"),
@@ -111,6 +120,45 @@ fn path_of(day: &Value, submission: &Value) -> String {
         "/api/v1/evaluations/{}",
         id.as_str().expect("an evaluation has an id")
     )
+}
+
+/// A finished evaluation's dataset.
+fn dataset(server: &Server, evaluation: &str, token: &str) -> ZipArchive<Cursor<Bytes>> {
+    let answer = server.get(&format!("{evaluation}/dataset"), Some(token));
+    assert_eq!(answer.status(), 200, "the dataset of {evaluation}");
+    let bytes = answer.bytes().expect("the download completes");
+    ZipArchive::new(Cursor::new(bytes)).expect("a dataset is a zip")
+}
+
+/// A file of a dataset.
+fn entry(dataset: &mut ZipArchive<Cursor<Bytes>>, name: &str) -> Value {
+    let file = dataset.by_name(name).expect("every dataset has it");
+    serde_json::from_reader(file).expect("it is JSON")
+}
+
+/// What the local evaluator makes of a bundle, with the seeds that a dataset's manifest publishes, the
+/// episodes of [`CONFIG`] and another number of workers.
+fn scored_locally(bundle: &Path, manifest: &Value, out: &Path) -> Value {
+    let seed = |name: &str| manifest[name].as_str().expect("the manifest names it");
+    let local = Command::new(program("faceoff"))
+        .arg("eval")
+        .arg(bundle)
+        .args(["--task", "hit,defend,prepare", "--episodes", "4"])
+        .args(["--profile", "evaluation", "--seed", seed("seed")])
+        .args(["--mismatch-seed", seed("mismatch_seed"), "--workers", "2"])
+        .arg("--config")
+        .arg(repository().join("tests/patient.toml"))
+        .arg("--out")
+        .arg(out)
+        .output()
+        .expect("the program can be started");
+    assert!(
+        local.status.success(),
+        "{}",
+        String::from_utf8_lossy(&local.stderr)
+    );
+    let result = fs::read(out.join("results.json")).expect("the evaluator writes its result");
+    serde_json::from_slice(&result).expect("it is JSON")
 }
 
 /// A result without what no run can repeat: computation times and the points that follow from them.

@@ -60,7 +60,7 @@ fn get(server: &Server, path: &str, token: &str) -> Value {
 }
 
 /// Downloads a dataset and simulates it again.
-fn verify(server: &Server, evaluation: &str, token: &str, folder: &Path) {
+pub(crate) fn verify(server: &Server, evaluation: &str, token: &str, folder: &Path) {
     let answer = server.get(&format!("{evaluation}/dataset"), Some(token));
     assert_eq!(answer.status(), 200, "the dataset of {evaluation}");
     let file = folder.join("dataset.zip");

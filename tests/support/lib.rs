@@ -3,6 +3,7 @@
 
 pub mod bundle;
 pub mod server;
+pub mod small_disk;
 
 use std::path::PathBuf;
 

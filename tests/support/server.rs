@@ -9,9 +9,9 @@ use serde_json::Value;
 use std::{
     fs,
     io::{self, BufRead, BufReader},
-    path::Path,
+    path::{Path, PathBuf},
     process::{Child, Command, Stdio},
-    sync::mpsc,
+    sync::{Arc, Mutex},
     thread,
     time::{Duration, Instant},
 };
@@ -37,7 +37,8 @@ impl Drop for Process {
 /// A running server. Dropping it ends the process at once, as a power cut would (SIGKILL).
 #[derive(Debug)]
 pub struct Server {
-    _process: Process,
+    process: Process,
+    log: Log,
     /// `http://127.0.0.1:PORT`
     pub url: String,
     /// The organiser's bearer token.
@@ -53,10 +54,16 @@ impl Server {
     /// If it does not start; the panic shows its log.
     #[must_use]
     pub fn start(data_dir: &Path, config: &str) -> Self {
-        let child = command(data_dir, config).stdout(Stdio::piped()).spawn();
+        Self::answering(command(data_dir, config), |_| data_dir.to_owned())
+    }
+
+    /// Waits until the started program answers. `data_dir` tells of its process where this one sees
+    /// its data folder.
+    pub(crate) fn answering(mut command: Command, data_dir: impl Fn(u32) -> PathBuf) -> Self {
+        let child = command.stdout(Stdio::piped()).spawn();
         let mut process = Process(child.expect("the program can be started"));
         let child = &mut process.0;
-        let log = collect(child.stderr.take().expect("standard error is piped"));
+        let log = Log::collect(child.stderr.take().expect("standard error is piped"));
         let client = Client::builder()
             .timeout(PATIENCE)
             .build()
@@ -66,20 +73,50 @@ impl Server {
             BufReader::new(child.stdout.take().expect("standard output is piped")).lines();
         let Some(url) = told.next().transpose().expect("a pipe can be read") else {
             let status = child.wait().expect("a child can be reaped");
-            panic!(
-                "the server ended with {status}:\n{}",
-                log.recv().unwrap_or_default()
-            );
+            panic!("the server ended with {status}:\n{}", log.whole());
         };
-        let admin_token = fs::read_to_string(data_dir.join("admin-token"))
+        let admin_token = fs::read_to_string(data_dir(child.id()).join("admin-token"))
             .expect("the server leaves the organiser's token in its folder")
             .trim()
             .to_owned();
         Self {
-            _process: process,
+            process,
+            log,
             url,
             admin_token,
             client,
+        }
+    }
+
+    /// The id of its process.
+    #[must_use]
+    pub fn process_id(&self) -> u32 {
+        self.process.0.id()
+    }
+
+    /// What it has logged so far.
+    ///
+    /// # Panics
+    /// If the thread that reads the log did.
+    #[must_use]
+    pub fn log(&self) -> String {
+        self.log.so_far()
+    }
+
+    /// Waits until the log has `words`, `times` times.
+    ///
+    /// # Panics
+    /// After [`PATIENCE`], with the log.
+    pub fn wait_for_log(&self, words: &str, times: usize) {
+        let started = Instant::now();
+        while self.log().matches(words).count() < times {
+            assert!(
+                started.elapsed() < PATIENCE,
+                "still waiting for {words:?}:\n{}",
+                self.log()
+            );
+            // A log is looked at, as people do.
+            thread::sleep(Duration::from_millis(20));
         }
     }
 
@@ -208,28 +245,58 @@ fn command(data_dir: &Path, config: &str) -> Command {
     let config_file = data_dir.join("faceoff.toml");
     fs::write(&config_file, config).expect("a scratch file can be written");
     let mut command = Command::new(program("faceoff"));
+    serve(&mut command, data_dir, &config_file);
+    command
+}
+
+/// The arguments of the program.
+pub(crate) fn serve(command: &mut Command, data_dir: &Path, config_file: &Path) {
     command
         .arg("serve")
         .args(["--listen", "127.0.0.1:0"])
         .arg("--data-dir")
         .arg(data_dir)
         .arg("--config")
-        .arg(&config_file)
+        .arg(config_file)
         .stdin(Stdio::null())
         .stderr(Stdio::piped());
-    command
 }
 
-/// Drains a child's log so that it never blocks, and hands it over when the child ends.
-fn collect(stderr: impl std::io::Read + Send + 'static) -> mpsc::Receiver<String> {
-    let (sender, receiver) = mpsc::channel();
-    thread::spawn(move || {
-        let mut log = String::new();
-        for line in BufReader::new(stderr).lines().map_while(Result::ok) {
-            log.push_str(&line);
-            log.push('\n');
-        }
-        let _ = sender.send(log);
-    });
-    receiver
+/// A child's log, drained so that the child never blocks.
+#[derive(Debug)]
+struct Log {
+    text: Arc<Mutex<String>>,
+    reader: thread::JoinHandle<()>,
+}
+
+impl Log {
+    fn collect(stderr: impl std::io::Read + Send + 'static) -> Self {
+        let text = Arc::new(Mutex::new(String::new()));
+        let reader = thread::spawn({
+            let text = Arc::clone(&text);
+            move || {
+                for line in BufReader::new(stderr).lines().map_while(Result::ok) {
+                    let mut text = text.lock().expect("nobody panics with the log");
+                    text.push_str(&line);
+                    text.push('\n');
+                }
+            }
+        });
+        Self { text, reader }
+    }
+
+    fn so_far(&self) -> String {
+        self.text
+            .lock()
+            .expect("nobody panics with the log")
+            .clone()
+    }
+
+    /// Of a child that has ended.
+    fn whole(self) -> String {
+        let Self { text, reader } = self;
+        reader.join().expect("the log is read to its end");
+        let text = text.lock().expect("nobody panics with the log");
+        text.clone()
+    }
 }

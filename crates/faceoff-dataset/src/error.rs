@@ -1,4 +1,5 @@
-use std::{fmt::Display, io};
+use faceoff_types::tells_of_full_disk;
+use std::{error::Error, fmt::Display, io};
 
 /// A recording that could not be made or joined; never the agent's fault.
 #[derive(Debug, thiserror::Error)]
@@ -6,6 +7,9 @@ pub enum RecordingError {
     /// A file could not be read or written; the error names it.
     #[error(transparent)]
     Io(#[from] io::Error),
+    /// There was no room for it; the text says for what.
+    #[error("the disk is full: {0}")]
+    FullDisk(String),
     /// What was recorded is damaged, incomplete, or belongs elsewhere.
     #[error("{0}")]
     Unusable(String),
@@ -13,8 +17,15 @@ pub enum RecordingError {
 
 impl RecordingError {
     /// What was attempted, and why it failed.
-    pub(crate) fn unusable<E: Display>(what: impl Display) -> impl FnOnce(E) -> Self {
-        move |error| Self::Unusable(format!("{what}: {error}"))
+    pub(crate) fn unusable<E: Error + 'static>(what: impl Display) -> impl FnOnce(E) -> Self {
+        move |error| {
+            let text = format!("{what}: {error}");
+            if tells_of_full_disk(&error) {
+                Self::FullDisk(text)
+            } else {
+                Self::Unusable(text)
+            }
+        }
     }
 }
 

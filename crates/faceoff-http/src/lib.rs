@@ -18,6 +18,7 @@ mod paths;
 pub mod problem;
 mod release;
 pub mod requests;
+mod room;
 mod summaries;
 pub mod token;
 pub mod views;

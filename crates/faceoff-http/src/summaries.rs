@@ -75,9 +75,13 @@ impl Summaries {
             .map_err(Problem::internal)?
             .map_err(|error| Problem::internal(format_args!("run {run}: {error}")))?;
         let json = serde_json::to_string(&summary).map_err(Problem::internal)?;
-        self.store
-            .keep_episode_summary(run, EpisodeSummary::VERSION, &json, self.clock.now())
-            .await?;
+        let kept =
+            self.store
+                .keep_episode_summary(run, EpisodeSummary::VERSION, &json, self.clock.now());
+        // It can be made again, and memory has it: no page fails for want of a disk.
+        if let Err(error) = kept.await {
+            tracing::warn!(%run, %error, "a summary could not be kept");
+        }
         Ok(summary)
     }
 

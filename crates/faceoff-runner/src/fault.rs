@@ -1,6 +1,7 @@
+use faceoff_dataset::RecordingError;
 use faceoff_episode::{NotFinite, RecordError};
 use faceoff_sandbox::SandboxError;
-use faceoff_types::AgentFaultKind;
+use faceoff_types::{AgentFaultKind, tells_of_full_disk};
 use std::io;
 
 /// What ended a conversation.
@@ -61,6 +62,9 @@ pub enum PlatformFault {
         /// Why it failed.
         source: io::Error,
     },
+    /// There was no room for a recording; the text says for what.
+    #[error("the disk is full: {0}")]
+    FullDisk(String),
     /// A recording could not be made, or is not what was recorded.
     #[error("recording: {0}")]
     Recording(String),
@@ -74,18 +78,24 @@ pub enum PlatformFault {
 
 impl From<RecordError> for PlatformFault {
     fn from(error: RecordError) -> Self {
-        Self::Recording(error.to_string())
+        let recording = error.source.downcast_ref();
+        if matches!(recording, Some(RecordingError::FullDisk(_))) || tells_of_full_disk(&error) {
+            Self::FullDisk(error.to_string())
+        } else {
+            Self::Recording(error.to_string())
+        }
     }
 }
 
-impl From<faceoff_dataset::RecordingError> for PlatformFault {
-    fn from(error: faceoff_dataset::RecordingError) -> Self {
+impl From<RecordingError> for PlatformFault {
+    fn from(error: RecordingError) -> Self {
         match error {
-            faceoff_dataset::RecordingError::Io(source) => Self::Io {
+            RecordingError::Io(source) => Self::Io {
                 what: "recording".to_owned(),
                 source,
             },
-            faceoff_dataset::RecordingError::Unusable(what) => Self::Recording(what),
+            RecordingError::FullDisk(what) => Self::FullDisk(what),
+            RecordingError::Unusable(what) => Self::Recording(what),
         }
     }
 }

@@ -46,7 +46,7 @@ impl Artifacts {
     /// Stores a copy of a file under `key`, replacing what was there. It appears whole or not at all,
     /// whenever the process is killed.
     pub async fn put_file(&self, key: &str, file: &Path) -> Result<()> {
-        let failed = |error| StoreError::Artifacts(format!("{}: {error}", file.display()));
+        let failed = |error: std::io::Error| StoreError::artifact(file.display(), &error);
         let mut source = tokio::fs::File::open(file).await.map_err(failed)?;
         let upload = self
             .objects
@@ -75,7 +75,7 @@ impl Artifacts {
     /// Copies an artifact to a new file and flushes it to disk.
     pub async fn get_to_file(&self, key: &str, file: &Path) -> Result<()> {
         let (bytes, mut stream) = self.read(key).await?;
-        let failed = |error| StoreError::Artifacts(format!("{}: {error}", file.display()));
+        let failed = |error: std::io::Error| StoreError::artifact(file.display(), &error);
         let mut target = tokio::fs::File::create(file).await.map_err(failed)?;
         let mut written = 0;
         while let Some(piece) = stream.try_next().await? {
@@ -121,7 +121,7 @@ impl Artifacts {
 
     /// Stores every file directly in `folder` as `prefix/NAME`.
     pub async fn put_folder(&self, prefix: &str, folder: &Path) -> Result<()> {
-        let failed = |error| StoreError::Artifacts(format!("{}: {error}", folder.display()));
+        let failed = |error: std::io::Error| StoreError::artifact(folder.display(), &error);
         let mut entries = tokio::fs::read_dir(folder).await.map_err(failed)?;
         while let Some(entry) = entries.next_entry().await.map_err(failed)? {
             let name = entry.file_name();
@@ -218,6 +218,6 @@ fn parse(key: &str) -> Result<Key> {
 fn artifact_error(error: object_store::Error) -> StoreError {
     match error {
         object_store::Error::NotFound { .. } => StoreError::NotFound("artifact"),
-        error => StoreError::Artifacts(error.to_string()),
+        error => StoreError::artifact("storing or reading", &error),
     }
 }

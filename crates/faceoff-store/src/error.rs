@@ -1,4 +1,7 @@
+use faceoff_types::tells_of_full_disk;
 use jiff::{Timestamp, civil::Date};
+use sqlx::error::DatabaseError;
+use std::{error::Error, fmt::Display};
 
 /// Why the store could not do what was asked.
 #[derive(Debug, thiserror::Error)]
@@ -26,6 +29,9 @@ pub enum StoreError {
     /// What was asked does not fit the entity's state; the text says what does.
     #[error("{0}")]
     Conflict(String),
+    /// A disk is full: what was asked is not done, or may not be, and can be once there is room.
+    #[error("the disk is full: {0}")]
+    FullDisk(String),
     /// SQLite failed.
     #[error("database: {0}")]
     Database(#[source] sqlx::Error),
@@ -46,12 +52,31 @@ impl From<sqlx::Error> for StoreError {
             sqlx::Error::ColumnDecode { index, source } => {
                 Self::Damaged(format!("column {index}: {source}"))
             }
+            sqlx::Error::Database(error) if is_full(&*error) => Self::FullDisk(error.to_string()),
             error => Self::Database(error),
         }
     }
 }
 
+/// SQLITE_FULL; and SQLITE_IOERR_SHMSIZE: the index of the log could not grow.
+fn is_full(error: &dyn DatabaseError) -> bool {
+    const CODES: [&str; 2] = ["13", "4874"];
+    error
+        .code()
+        .is_some_and(|code| CODES.contains(&code.as_ref()))
+}
+
 impl StoreError {
+    /// An artifact that could not be read or written, and why.
+    pub(crate) fn artifact(what: impl Display, error: &(dyn Error + 'static)) -> Self {
+        let text = format!("{what}: {error}");
+        if tells_of_full_disk(error) {
+            Self::FullDisk(text)
+        } else {
+            Self::Artifacts(text)
+        }
+    }
+
     /// Was a uniqueness constraint broken, one whose columns contain `column`?
     pub(crate) fn is_duplicate(error: &sqlx::Error, column: &str) -> bool {
         error

@@ -19,13 +19,18 @@
 //! (`--check` compares instead of writing).
 
 mod artifacts;
+mod checkpoint;
 mod column;
 mod database;
 mod error;
 mod event;
+mod health;
+mod log;
 mod operations;
+mod pulse;
 mod queue;
 mod reads;
+mod room;
 mod signals;
 mod store;
 mod tables;
@@ -34,6 +39,8 @@ mod write;
 pub use artifacts::{ArtifactStream, Artifacts};
 pub use error::StoreError;
 pub use event::{Actor, Change, Event, EventRecord, ParseEventError, Subject};
+pub use health::{Health, QueueHealth};
+pub use log::LOG_BOUND_BYTES;
 pub use operations::{
     claim::{Claimed, MAX_LEASES, RunSeeds, Work},
     commit::Committed,
@@ -44,6 +51,7 @@ pub use operations::{
 };
 pub use queue::Claim;
 pub use reads::{board::BoardRecord, runs::RunFaults};
+pub use room::Room;
 pub use store::Store;
 pub use tables::{
     ablations::{Ablation, AblationState},

@@ -1,4 +1,7 @@
-use crate::{artifacts::Artifacts, database::Database, event::Change, signals::Signals};
+use crate::{
+    artifacts::Artifacts, database::Database, error::Result, event::Change, pulse::Pulse,
+    room::Room, signals::Signals,
+};
 use std::sync::Arc;
 use tokio::sync::{broadcast, watch};
 
@@ -9,9 +12,33 @@ pub struct Store {
     pub(crate) database: Database,
     pub(crate) signals: Arc<Signals>,
     pub(crate) artifacts: Artifacts,
+    pub(crate) room: Arc<Room>,
+    pub(crate) pulse: Arc<Pulse>,
 }
 
 impl Store {
+    /// With other disks to watch, or more to keep free, than nothing of the data folder's.
+    #[must_use]
+    pub fn with_room(self, room: Room) -> Self {
+        Self {
+            room: Arc::new(room),
+            ..self
+        }
+    }
+
+    /// Is there room for more work and uploads? The store stores what it is given; workers and the web
+    /// side ask.
+    #[must_use]
+    pub fn room(&self) -> &Room {
+        &self.room
+    }
+
+    /// Copies the database's log into the database, as far as nobody must wait for it. Run it now and
+    /// then; a log that grows too long is emptied without it.
+    pub async fn checkpoint(&self) -> Result<()> {
+        self.database.checkpoint().await
+    }
+
     /// Bundles, recordings and datasets.
     #[must_use]
     pub const fn artifacts(&self) -> &Artifacts {

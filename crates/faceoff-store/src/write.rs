@@ -126,6 +126,7 @@ impl Store {
         for change in told {
             self.signals.changed(change);
         }
+        self.database.log_has_grown();
         Ok(done)
     }
 }

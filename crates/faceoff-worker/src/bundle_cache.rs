@@ -44,7 +44,15 @@ impl BundleCache {
             return Ok(Unpacked::Bundle(held.clone()));
         }
         self.held = None;
-        let unpacked = self.fetch(agent, evaluator, server)?;
+        let fetched = self.fetch(agent, evaluator, server);
+        // What is of no use must not keep the room that the next one needs.
+        if !matches!(fetched, Ok(Unpacked::Bundle(_)))
+            && self.folder.exists()
+            && let Err(error) = fs::remove_dir_all(&self.folder)
+        {
+            tracing::warn!(%error, "a part of a bundle is left");
+        }
+        let unpacked = fetched?;
         if let Unpacked::Bundle(bundle) = &unpacked {
             self.held = Some((agent.bundle.blake3.clone(), bundle.clone()));
         }

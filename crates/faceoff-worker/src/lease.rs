@@ -102,6 +102,7 @@ fn keep(
     let due_every = Duration::from_secs(lease.duration_s.into()) / 3;
     let mut told = 0;
     let mut renewed_at = Instant::now();
+    let mut failing = false;
     loop {
         server.wait(over, due_every.min(PROGRESS_TICK), None);
         if shutdown.is_cancelled() {
@@ -122,6 +123,7 @@ fn keep(
             Ok(Holding::Held) => {
                 told = done;
                 renewed_at = Instant::now();
+                failing = false;
             }
             Ok(Holding::Lost) => {
                 progress.stop.cancel();
@@ -129,7 +131,10 @@ fn keep(
             }
             // The next tick tries again. Should the lease end meanwhile, the commit finds out.
             Err(error) => {
-                tracing::warn!(unit = %lease.unit, cause = format!("{error:#}"), "the lease was not renewed");
+                if !failing {
+                    tracing::warn!(unit = %lease.unit, cause = format!("{error:#}"), "the lease was not renewed; trying again");
+                }
+                failing = true;
             }
         }
     }

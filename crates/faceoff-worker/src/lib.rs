@@ -14,6 +14,7 @@ mod bundle_cache;
 mod cpus;
 mod evaluator;
 mod executor;
+mod full_disk;
 mod lease;
 mod local;
 mod schedule;

@@ -1,7 +1,10 @@
 //! The server of the slots of its own process: the one place of this crate that works the store's
 //! queue.
 
-use crate::server::{Claimed, GivenBack, Holding, QueueMark, WorkServer};
+use crate::{
+    full_disk::{self, Pause},
+    server::{Claimed, GivenBack, Holding, QueueMark, WorkServer},
+};
 use faceoff_store::{
     Claim, Claimed as Leased, Committed, RunOwner, ShardCommit, Store, StoreError, Work,
 };
@@ -26,6 +29,7 @@ pub(crate) struct LocalServer {
     /// How long a claim lasts without renewal, seconds.
     pub(crate) lease_s: u32,
     pub(crate) limits: AgentLimits,
+    pub(crate) pause: Pause,
 }
 
 impl LocalServer {
@@ -34,11 +38,15 @@ impl LocalServer {
         self.store.end_leases_of(worker, self.clock.now()).await
     }
 
-    /// Removes recordings that are no longer needed and what kills left half written.
+    /// Removes recordings that are no longer needed and what kills left half written, and keeps the
+    /// database's log short.
     pub(crate) async fn tidy(&self) {
         let now = self.clock.now();
         if let Err(error) = self.store.remove_old_recordings(now).await {
             tracing::warn!(%error, "old recordings could not be removed");
+        }
+        if let Err(error) = self.store.checkpoint().await {
+            tracing::warn!(%error, "the database's log could not be copied");
         }
         let abandoned = self.store.artifacts().remove_abandoned(now - LONGEST_WRITE);
         if let Err(error) = abandoned.await {
@@ -168,7 +176,12 @@ impl WorkServer for LocalServer {
         let queue = QueueMark(*self.store.work_signal().borrow());
         self.runtime.block_on(async {
             let now = self.clock.now();
-            Ok(match self.store.claim(slot, self.lease_s, now).await? {
+            if self.pause.holds(&self.store, self.lease_s, now).await? {
+                return Ok(Claimed::Nothing { queue });
+            }
+            let claimed = self.store.claim(slot, self.lease_s, now).await?;
+            self.store.looked_for_work(now);
+            Ok(match claimed {
                 Some(leased) => Claimed::Order(Box::new(self.order(leased))),
                 None => Claimed::Nothing { queue },
             })
@@ -225,11 +238,17 @@ impl WorkServer for LocalServer {
         Ok(self.runtime.block_on(async {
             match why {
                 GivenBack::Shutdown => self.store.release(&claim, now).await,
+                GivenBack::FullDisk => self.store.release_full(&claim, now).await,
                 GivenBack::PlatformFault(reason) => {
                     self.store.release_failed(&claim, reason, now).await
                 }
             }
         })?)
+    }
+
+    fn met_full_disk(&self, error: &anyhow::Error) -> bool {
+        // Whatever fails while there is no room may fail for that: it is to be tried again with room.
+        full_disk::is_told_by(error) || self.store.room().is_short()
     }
 
     fn wait(&self, stop: &CancellationToken, at_most: Duration, queue: Option<QueueMark>) {
@@ -260,8 +279,17 @@ impl WorkServer for LocalServer {
     }
 
     fn store_recording(&self, key: &str, folder: &Path) -> anyhow::Result<()> {
-        let stored = self.store.artifacts().put_folder(key, folder);
-        Ok(self.runtime.block_on(stored)?)
+        let artifacts = self.store.artifacts();
+        self.runtime.block_on(async {
+            let stored = artifacts.put_folder(key, folder).await;
+            // Nobody will name a part of a recording, and it takes room that may be wanting.
+            if stored.is_err()
+                && let Err(error) = artifacts.delete_folder(key).await
+            {
+                tracing::warn!(key, %error, "a part of a recording is left");
+            }
+            Ok(stored?)
+        })
     }
 
     fn store_dataset(&self, key: &str, archive: &Path) -> anyhow::Result<()> {

@@ -22,6 +22,9 @@ pub(crate) trait WorkServer: Send + Sync {
     /// Puts a unit back into the queue. Of a lost lease nothing is recorded.
     fn give_back(&self, lease: &Lease, why: GivenBack<'_>) -> anyhow::Result<()>;
 
+    /// Was it a full disk that made this fail, the slot's or the server's? Then nobody failed.
+    fn met_full_disk(&self, error: &anyhow::Error) -> bool;
+
     /// Waits until `stop` is cancelled, `at_most` has passed or, given a mark, the queue has grown
     /// since.
     fn wait(&self, stop: &CancellationToken, at_most: Duration, queue: Option<QueueMark>);
@@ -68,6 +71,8 @@ pub(crate) enum Holding {
 pub(crate) enum GivenBack<'a> {
     /// The slot is asked to end; the attempt does not count.
     Shutdown,
+    /// There was no room for it; it is tried again once there is, and the attempt does not count.
+    FullDisk,
     /// A fault of ours, in words for the team; after several the unit is given up.
     PlatformFault(&'a str),
 }

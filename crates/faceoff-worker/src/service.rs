@@ -3,6 +3,7 @@ use crate::{
     cpus::{self, CpuLayout, SlotCpus},
     evaluator::{Evaluator, Runner},
     executor::{AgentHost, Executor},
+    full_disk::Pause,
     local::LocalServer,
     scratch::Scratch,
     server::WorkServer,
@@ -10,7 +11,7 @@ use crate::{
 };
 use anyhow::Context as _;
 use faceoff_runner::{AgentEnvironment, bundle::BundleLimits};
-use faceoff_store::Store;
+use faceoff_store::{Store, StoreError};
 use faceoff_types::{AgentLimits, Clock};
 use std::{path::PathBuf, sync::Arc, thread, time::Duration};
 use tokio::{runtime::Handle, sync::oneshot, task::JoinSet};
@@ -85,6 +86,7 @@ impl WorkerConfig {
             runtime: Handle::current(),
             clock,
             lease_s: self.lease_s,
+            pause: Pause::default(),
             limits: AgentLimits {
                 bundle: self.bundle_limits,
                 resources: self.agent.limits.clone(),
@@ -108,9 +110,14 @@ pub(crate) async fn run_with(
     let folder = config.scratch_dir.clone();
     let scratch = tokio::task::spawn_blocking(move || Scratch::take(&folder)).await??;
 
-    let ended = server.end_leases_of(scratch.worker()).await?;
-    if ended > 0 {
-        tracing::info!(units = ended, "taken over from this worker's last life");
+    match server.end_leases_of(scratch.worker()).await {
+        Ok(0) => {}
+        Ok(ended) => tracing::info!(units = ended, "taken over from this worker's last life"),
+        // they end by themselves, if later
+        Err(error @ StoreError::FullDisk(_)) => {
+            tracing::warn!(%error, "the leases of this worker's last life stay until they run out");
+        }
+        Err(error) => return Err(error.into()),
     }
 
     let stop = shutdown.child_token();

@@ -1,10 +1,10 @@
 use crate::{
     executor::Executor,
-    lease::LeaseKeeper,
+    lease::{LeaseKeeper, Progress},
     server::{Claimed, GivenBack, Holding, WorkServer},
 };
 use faceoff_runner::PlatformFault;
-use faceoff_wire::work::WorkOrder;
+use faceoff_wire::work::{WorkOrder, WorkReport};
 use std::{panic::AssertUnwindSafe, sync::Arc, time::Duration};
 use tokio_util::sync::CancellationToken;
 
@@ -22,18 +22,27 @@ pub(crate) struct Slot {
 impl Slot {
     /// Works until the shutdown.
     pub(crate) fn run(mut self) {
+        // The log is told of a change, not of every try.
+        let mut failing = false;
         while !self.shutdown.is_cancelled() {
             let queue = match self.server.claim(&self.name) {
                 Ok(Claimed::Order(order)) => {
+                    failing = false;
                     self.work_on(&order);
                     continue;
                 }
-                Ok(Claimed::Nothing { queue }) => Some(queue),
+                Ok(Claimed::Nothing { queue }) => {
+                    failing = false;
+                    Some(queue)
+                }
                 Err(error) => {
-                    tracing::error!(
-                        cause = format!("{error:#}"),
-                        "cannot claim work; trying again"
-                    );
+                    if !failing {
+                        tracing::error!(
+                            cause = format!("{error:#}"),
+                            "cannot claim work; trying again"
+                        );
+                    }
+                    failing = true;
                     None
                 }
             };
@@ -67,7 +76,7 @@ impl Slot {
         let committed = self
             .executor
             .report(&order.assignment, &progress)
-            .and_then(|report| self.server.commit(&order.lease, report));
+            .and_then(|report| self.commit(order, &report, &progress));
         match committed {
             // no fault: the unit was given back, or is another's
             Err(error) if progress.stopped() => {
@@ -78,17 +87,58 @@ impl Slot {
         }
     }
 
-    /// Our fault.
+    /// Commits; while a full disk is in the way, again and again: what was played need not be played
+    /// twice for that.
+    fn commit(
+        &self,
+        order: &WorkOrder,
+        report: &WorkReport,
+        progress: &Progress,
+    ) -> anyhow::Result<Holding> {
+        let unit = order.lease.unit;
+        let mut told = false;
+        loop {
+            let committed = self.server.commit(&order.lease, report.clone());
+            match committed {
+                Err(error) if self.server.met_full_disk(&error) && !progress.stopped() => {
+                    if !told {
+                        tracing::warn!(%unit, cause = format!("{error:#}"), "no room to commit; waiting for it");
+                        told = true;
+                    }
+                    self.server.wait(&self.shutdown, self.idle_poll, None);
+                }
+                committed => return committed,
+            }
+        }
+    }
+
+    /// Our fault, or a full disk's.
     fn give_back(&self, order: &WorkOrder, error: &anyhow::Error) {
         let unit = order.lease.unit;
-        tracing::error!(%unit, work = %order.assignment, cause = format!("{error:#}"), "platform fault");
+        let cause = format!("{error:#}");
         // The cause names folders of this host; a team is told enough to ask about it.
         let reason = format!("{} (in the server's log: unit {unit})", outside(error));
-        let given_back = self
-            .server
-            .give_back(&order.lease, GivenBack::PlatformFault(&reason));
-        if let Err(error) = given_back {
-            tracing::error!(%unit, cause = format!("{error:#}"), "the unit could not be given back; its lease will end");
+        let why = if self.server.met_full_disk(error) {
+            tracing::warn!(%unit, work = %order.assignment, cause, "no room for the unit: it is given back");
+            GivenBack::FullDisk
+        } else {
+            tracing::error!(%unit, work = %order.assignment, cause, "platform fault");
+            GivenBack::PlatformFault(&reason)
+        };
+        loop {
+            match self.server.give_back(&order.lease, why) {
+                Ok(()) => return,
+                // Without this its lease would end, and that would count against it.
+                Err(error)
+                    if self.server.met_full_disk(&error) && !self.shutdown.is_cancelled() =>
+                {
+                    self.server.wait(&self.shutdown, self.idle_poll, None);
+                }
+                Err(error) => {
+                    tracing::error!(%unit, cause = format!("{error:#}"), "the unit could not be given back; its lease will end");
+                    return;
+                }
+            }
         }
     }
 }
@@ -98,7 +148,9 @@ fn outside(error: &anyhow::Error) -> &'static str {
     match error.downcast_ref::<PlatformFault>() {
         Some(PlatformFault::Sandbox(_)) => "the sandbox could not be set up",
         Some(PlatformFault::Io { .. }) => "a file could not be read or written",
-        Some(PlatformFault::Recording(_)) => "the recording could not be made",
+        Some(PlatformFault::FullDisk(_) | PlatformFault::Recording(_)) => {
+            "the recording could not be made"
+        }
         Some(PlatformFault::Simulation(_)) => "the simulator failed",
         Some(PlatformFault::Cancelled) | None => "the evaluator failed",
     }

@@ -3,6 +3,7 @@
 
 mod between;
 mod fixture;
+mod full_disk;
 mod interrupted;
 mod orders;
 mod slots;

@@ -53,6 +53,9 @@ pub struct ServerConfig {
     pub listen: SocketAddr,
     /// Folder of the database, the artifacts and the organiser's token.
     pub data_dir: PathBuf,
+    /// Bytes that must stay free on the disks of `data_dir` and `workers.scratch_dir`; below, the queue
+    /// pauses and uploads are refused. 0: never.
+    pub min_free_bytes: u64,
 }
 
 impl Default for ServerConfig {
@@ -60,6 +63,7 @@ impl Default for ServerConfig {
         Self {
             listen: SocketAddr::from(([127, 0, 0, 1], 8080)),
             data_dir: PathBuf::from("faceoff-data"),
+            min_free_bytes: 1 << 30,
         }
     }
 }

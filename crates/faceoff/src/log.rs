@@ -35,6 +35,9 @@ impl LogFormat {
         };
         let lines = tracing_subscriber::fmt::layer()
             .with_writer(io::stderr)
+            // A line that cannot be written would be told of on the same standard error, whose failure is a
+            // panic: a full disk under the log would end the slots.
+            .log_internal_errors(false)
             .with_ansi(io::stderr().is_terminal());
         let lines: Box<dyn Layer<Registry> + Send + Sync> = match self {
             Self::Text => lines.boxed(),

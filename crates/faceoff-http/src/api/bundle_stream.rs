@@ -1,7 +1,10 @@
 //! Receives a bundle: streamed to a file, counted, hashed, and recognised by its first bytes. It is
 //! never held in memory and never unpacked here.
 
-use crate::problem::{Problem, ProblemKind};
+use crate::{
+    problem::{Problem, ProblemKind},
+    room,
+};
 use axum::{
     body::{Body, BodyDataStream},
     http::HeaderValue,
@@ -30,7 +33,7 @@ pub(crate) struct Uploaded {
 /// # Errors
 /// `TooLarge` beyond `max_bytes`, whether or not a length was announced; `UnsupportedMediaType` when
 /// the first bytes are no archive's; `RequestTimeout` after a pause of `patience`; `InvalidRequest`
-/// when the body is empty or breaks off; `Internal` when the disk fails.
+/// when the body is empty or breaks off; `StorageFull` when the disk is, `Internal` when it fails.
 pub(crate) async fn receive(
     body: Body,
     announced: Option<&HeaderValue>,
@@ -48,7 +51,7 @@ pub(crate) async fn receive(
     let file = tempfile::Builder::new()
         .prefix("upload-")
         .tempfile_in(dir)
-        .map_err(Problem::internal)?;
+        .map_err(room::unwritten)?;
     let mut writer = tokio::fs::File::from_std(file.reopen().map_err(Problem::internal)?);
     let mut hasher = blake3::Hasher::new();
     let mut head = Vec::with_capacity(ArchiveFormat::LONGEST_MAGIC);
@@ -70,7 +73,10 @@ pub(crate) async fn receive(
             }
         }
         hasher.update(&chunk);
-        writer.write_all(&chunk).await.map_err(Problem::internal)?;
+        if let Err(error) = writer.write_all(&chunk).await {
+            drain(&mut stream, announced.unwrap_or(DRAIN_BYTES), patience).await;
+            return Err(room::unwritten(error));
+        }
     }
     if bytes == 0 {
         return Err(Problem::new(
@@ -80,7 +86,7 @@ pub(crate) async fn receive(
     }
     let format = format.ok_or_else(|| not_an_archive(&head))?;
     // The artifact is copied from this file by name; all of it must have left the writer's buffer.
-    writer.flush().await.map_err(Problem::internal)?;
+    writer.flush().await.map_err(room::unwritten)?;
     Ok(Uploaded {
         file,
         bytes,
@@ -108,6 +114,11 @@ async fn next(
             ),
         )),
     }
+}
+
+/// Throws a body away that is refused before it is looked at.
+pub(crate) async fn discard(body: Body, patience: Duration) {
+    drain(&mut body.into_data_stream(), DRAIN_BYTES, patience).await;
 }
 
 /// Throws away what the client still sends, up to [`DRAIN_BYTES`].

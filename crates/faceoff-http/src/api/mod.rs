@@ -28,6 +28,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 pub(crate) fn router(patience: Duration) -> Router<App> {
     let resources = OpenApiRouter::with_openapi(Document::openapi())
         .routes(routes!(health::health))
+        .routes(routes!(health::live))
         .routes(routes!(season::season))
         .routes(routes!(season::close_season))
         .routes(routes!(board::board))

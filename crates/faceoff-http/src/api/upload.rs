@@ -7,6 +7,7 @@ use crate::{
     extract::QueryParams,
     paths,
     problem::{Problem, ProblemKind},
+    room,
     views::submission::SubmissionView,
 };
 use axum::{
@@ -57,6 +58,7 @@ const ARCHIVE_TYPES: [&str; 8] = [
         (status = 413, description = "larger than max_bundle_bytes"),
         (status = 415, description = "not one of the archive formats"),
         (status = 429, description = "several uploads wait for their smoke run"),
+        (status = 507, description = "the server's disk has too little room"),
     )
 )]
 pub(crate) async fn create_submission(
@@ -67,6 +69,10 @@ pub(crate) async fn create_submission(
     body: Body,
 ) -> Result<impl IntoResponse, Problem> {
     check_media_type(&headers)?;
+    if let Err(refused) = room::check(&app) {
+        bundle_stream::discard(body, app.config.limits.upload_pause).await;
+        return Err(refused);
+    }
     let _slot = app.uploads.try_acquire().map_err(|_| {
         Problem::new(
             ProblemKind::Busy,

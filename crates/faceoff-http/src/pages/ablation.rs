@@ -102,7 +102,7 @@ pub(super) async fn page(
         AblationStatus::Open { .. } | AblationStatus::Failed { .. } => Vec::new(),
     };
     render(&Page {
-        frame: Frame::new(season.name, ""),
+        frame: Frame::of(&app, season.name, ""),
         team: team.name.to_string(),
         agent: submission.agent_name,
         episodes_per_task: view.episodes_per_task,

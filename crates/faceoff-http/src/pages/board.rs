@@ -153,7 +153,7 @@ pub(super) async fn overall(State(app): State<App>) -> Result<Response, PageProb
     let board = BoardView::newest(&app, None).await?;
     let setting = common_setting(&board.rows);
     let page = OverallPage {
-        frame: Frame::new(season.name, "/"),
+        frame: Frame::of(&app, season.name, "/"),
         today,
         daily_at: app
             .config
@@ -270,7 +270,7 @@ pub(super) async fn by_task(
     let tiers = by_tier(&board, |row| {
         TaskRow::of(row, &row.tasks[&task], setting.as_ref())
     });
-    let frame = Frame::new(season.name, format!("/tasks/{task}"));
+    let frame = Frame::of(&app, season.name, format!("/tasks/{task}"));
     render(&TaskPage {
         frame,
         title,

@@ -94,7 +94,7 @@ pub(super) async fn page(
         .collect();
     let of = &view.overall;
     render(&Page {
-        frame: Frame::new(season.name, ""),
+        frame: Frame::of(&app, season.name, ""),
         rows,
         score_a: figures::one(of.score_a),
         score_b: figures::one(of.score_b),

@@ -301,7 +301,7 @@ pub(super) async fn page(
         _ => None,
     };
     render(&Page {
-        frame: Frame::new(season.name, ""),
+        frame: Frame::of(&app, season.name, ""),
         id,
         team: view.team_name.to_string(),
         agent: submission.agent_name,

@@ -1,5 +1,5 @@
 use super::assets;
-use crate::problem::Problem;
+use crate::{app::AppState, problem::Problem};
 use askama::Template;
 use axum::response::{Html, IntoResponse, Response};
 use faceoff_types::RULESET;
@@ -10,6 +10,8 @@ pub(super) struct Frame {
     /// The season's name; empty where the page does not know it.
     pub(super) season: String,
     pub(super) ruleset: &'static str,
+    /// Something is amiss that everybody who waits should know of.
+    pub(super) notice: Option<&'static str>,
     /// Path of the navigation entry that this page is.
     pub(super) current: String,
     pub(super) style: &'static str,
@@ -17,9 +19,23 @@ pub(super) struct Frame {
 }
 
 impl Frame {
+    /// Of a page that shows what the store holds.
+    pub(super) fn of(app: &AppState, season: String, current: impl Into<String>) -> Self {
+        let short = app.store.room().is_short();
+        Self {
+            notice: short.then_some(
+                "The server's disk has too little room: the queue pauses and uploads are refused. Nothing \
+                 is lost; work goes on by itself when there is room again.",
+            ),
+            ..Self::new(season, current)
+        }
+    }
+
+    /// Of a page about nothing that moves.
     pub(super) fn new(season: String, current: impl Into<String>) -> Self {
         Self {
             season,
+            notice: None,
             ruleset: RULESET,
             current: current.into(),
             style: assets::style_url(),

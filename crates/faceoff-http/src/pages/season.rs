@@ -20,7 +20,7 @@ pub(super) async fn page(State(app): State<App>) -> Result<Response, PageProblem
     let season = SeasonView::now(&app).await?;
     let instant = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M:%S UTC").to_string();
     render(&Page {
-        frame: Frame::new(season.name.clone(), "/season"),
+        frame: Frame::of(&app, season.name.clone(), "/season"),
         opened: instant(season.created_at),
         closed: season.closed_at.map(instant),
         season,

@@ -31,7 +31,10 @@ impl Problem {
                 HeaderValue::from_static("Bearer realm=\"faceoff\""),
             )],
             ProblemKind::Busy => vec![(header::RETRY_AFTER, HeaderValue::from_static("2"))],
-            ProblemKind::TooManyPending | ProblemKind::NotYet => {
+            ProblemKind::TooManyPending
+            | ProblemKind::NotYet
+            | ProblemKind::StorageFull
+            | ProblemKind::NotReady => {
                 vec![(header::RETRY_AFTER, HeaderValue::from_static("30"))]
             }
             _ => Vec::new(),

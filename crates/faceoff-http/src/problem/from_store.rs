@@ -27,6 +27,14 @@ impl From<StoreError> for Problem {
                 ),
             )
             .with("closed_at", closed_at.to_string()),
+            error @ StoreError::FullDisk(_) => {
+                tracing::warn!(%error, "the disk is full");
+                Self::new(
+                    ProblemKind::StorageFull,
+                    "the server's disk is full, so that this could not be stored; nothing is wrong with what \
+                     you sent. Look whether it was done after all, and try again later",
+                )
+            }
             StoreError::Conflict(detail) => Self::new(ProblemKind::Conflict, detail),
             error @ (StoreError::Database(_)
             | StoreError::Artifacts(_)

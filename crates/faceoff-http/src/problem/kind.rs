@@ -78,6 +78,12 @@ kinds! {
     Busy "busy" SERVICE_UNAVAILABLE
         "The server is busy"
         "Try again after the seconds stated in the header “Retry-After”."
+    StorageFull "storage-full" INSUFFICIENT_STORAGE
+        "No room on the server's disk"
+        "Our fault, and nobody's verdict: what was asked needs room that the server's disk does not have. Nothing was stored. Try again after the seconds stated in the header “Retry-After”."
+    NotReady "not-ready" SERVICE_UNAVAILABLE
+        "The server is not ready"
+        "It answers, but something that it needs is missing: “database”, “queue” and “room” say what. It goes on by itself once that is back."
     Internal "internal" INTERNAL_SERVER_ERROR
         "The server failed"
         "Our fault. Try again; if it stays, send the organiser the header “X-Request-Id” of the answer."

@@ -12,6 +12,7 @@ mod days;
 mod evaluations;
 mod openapi;
 mod problems;
+mod room;
 mod season;
 mod seeds;
 mod site;

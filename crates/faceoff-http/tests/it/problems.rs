@@ -143,9 +143,15 @@ async fn a_broken_store_is_our_fault_and_keeps_its_cause_to_itself() {
     let site = Site::start().await;
     site.get("/api/v1/health", None).await.json(200);
     site.store.close().await;
-    let broken = site.get("/api/v1/health", None).await;
+    let broken = site.get("/api/v1/season", None).await;
     broken.problem(500, "internal", &["x-request-id"]);
-    assert!(!broken.body.to_lowercase().contains("sql") && !broken.body.contains("pool"));
+    site.later(1); // one probe a second
+    let not_ready = site.get("/api/v1/health", None).await;
+    not_ready.problem(503, "not-ready", &["the database cannot be written"]);
+    for answer in [&broken, &not_ready] {
+        assert!(!answer.body.to_lowercase().contains("sql") && !answer.body.contains("pool"));
+    }
+    site.get("/api/v1/health/live", None).await.json(200);
 }
 
 #[tokio::test]

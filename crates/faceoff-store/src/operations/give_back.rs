@@ -21,6 +21,10 @@ use uuid::Uuid;
 /// Failures of ours after which a unit of work is given up.
 pub const MAX_ATTEMPTS: u32 = 5;
 
+/// How long a unit that met a full disk rests, seconds: so that one that needs more than there is does not
+/// take every slot's time.
+const FULL_DISK_REST_S: u32 = 10;
+
 /// What a unit's events are about.
 pub(crate) async fn subject(
     connection: &mut SqliteConnection,
@@ -92,12 +96,31 @@ impl Store {
     /// Shutdown: gives the unit back at once; the attempt does not count. Of a lost lease nothing is
     /// recorded.
     pub async fn release(&self, claim: &Claim, now: Timestamp) -> Result<()> {
+        self.release_resting(claim, 0, now).await
+    }
+
+    /// A full disk: the unit goes back to the queue to rest for a while. That is nobody's failure: the
+    /// attempt does not count. Of a lost lease nothing is recorded.
+    pub async fn release_full(&self, claim: &Claim, now: Timestamp) -> Result<()> {
+        self.release_resting(claim, FULL_DISK_REST_S, now).await
+    }
+
+    /// Gives all leases `lease_s` seconds from now on: they may have run out only because nothing could
+    /// be written.
+    pub async fn renew_all_leases(&self, lease_s: u32, now: Timestamp) -> Result<()> {
+        self.write(Actor::Server, now, async |tx| {
+            queue::renew_all(tx, lease_s, now).await
+        })
+        .await
+    }
+
+    async fn release_resting(&self, claim: &Claim, rest_s: u32, now: Timestamp) -> Result<()> {
         let actor = Actor::Worker(claim.worker.clone());
         self.write(actor, now, async |tx| {
             let Hold::Held { kind } = queue::hold(tx, claim).await? else {
                 return Ok(());
             };
-            queue::release(tx, claim).await?;
+            queue::release(tx, claim, rest_s).await?;
             let purpose = purpose::of_unit(tx, claim.unit, &kind).await?;
             let subject = subject(tx, &purpose).await?;
             tx.advanced(subject);

@@ -2,6 +2,8 @@ use crate::{
     artifacts::Artifacts,
     database::Database,
     error::{Result, StoreError},
+    pulse::Pulse,
+    room::Room,
     signals::Signals,
     store::Store,
     tables::season,
@@ -23,6 +25,8 @@ impl Store {
             database,
             signals: Arc::new(Signals::new()),
             artifacts,
+            room: Arc::new(Room::new(vec![data_dir.to_owned()], 0)),
+            pulse: Arc::new(Pulse::new()),
         })
     }
 }

@@ -119,14 +119,30 @@ pub(crate) async fn requeue_failed(
     Ok(failures)
 }
 
-/// Queues a held unit again, claimable at once; the attempt does not count.
-pub(crate) async fn release(tx: &mut Tx, claim: &Claim) -> Result<()> {
-    let (id, now) = (Text(claim.unit), Instant(tx.now));
+/// Gives all leases a new time of `lease_s` seconds, whether it had run out or not.
+pub(crate) async fn renew_all(
+    connection: &mut SqliteConnection,
+    lease_s: u32,
+    now: Timestamp,
+) -> Result<()> {
+    let until = Instant(after(now, lease_s));
+    sqlx::query!(
+        "UPDATE units SET claimable_at = ?1 WHERE state = 'leased' AND claimable_at < ?1",
+        until,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Queues a held unit again, claimable after a rest; the attempt does not count.
+pub(crate) async fn release(tx: &mut Tx, claim: &Claim, rest_s: u32) -> Result<()> {
+    let (id, from) = (Text(claim.unit), Instant(after(tx.now, rest_s)));
     sqlx::query!(
         "UPDATE units SET state = 'queued', worker = NULL, nonce = NULL, progress = 0,
                           attempts = attempts - 1, claimable_at = ?
          WHERE id = ?",
-        now,
+        from,
         id,
     )
     .execute(&mut **tx)

@@ -6,5 +6,7 @@ mod lease;
 mod units;
 
 pub use lease::Claim;
-pub(crate) use lease::{Hold, hold, mark_done, release, renew, requeue_failed};
-pub(crate) use units::{Leased, NewUnit, claim_next, drop_units, end_leases_of, insert};
+pub(crate) use lease::{Hold, hold, mark_done, release, renew, renew_all, requeue_failed};
+pub(crate) use units::{
+    Leased, NewUnit, Standing, claim_next, drop_units, end_leases_of, insert, standing,
+};

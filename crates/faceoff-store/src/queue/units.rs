@@ -98,3 +98,36 @@ pub(crate) async fn end_leases_of(tx: &mut Tx, worker: &str) -> Result<u64> {
     }
     Ok(ended)
 }
+
+/// How the queue stands.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Standing {
+    /// Units under a lease that runs.
+    pub(crate) running: u32,
+    /// Units that could be claimed now.
+    pub(crate) waiting: u32,
+    /// Since when the first of them.
+    pub(crate) waiting_since: Option<Timestamp>,
+}
+
+/// How the queue stands now.
+pub(crate) async fn standing(
+    connection: &mut SqliteConnection,
+    now: Timestamp,
+) -> Result<Standing> {
+    let now = Instant(now);
+    let row = sqlx::query!(
+        r#"SELECT COUNT(*) FILTER (WHERE state = 'leased' AND claimable_at > ?1) AS "running!: u32",
+                  COUNT(*) FILTER (WHERE claimable_at <= ?1) AS "waiting!: u32",
+                  MIN(claimable_at) FILTER (WHERE claimable_at <= ?1) AS "since?: Instant"
+           FROM units WHERE state IN ('queued', 'leased')"#,
+        now,
+    )
+    .fetch_one(connection)
+    .await?;
+    Ok(Standing {
+        running: row.running,
+        waiting: row.waiting,
+        waiting_since: row.since.map(|since| since.0),
+    })
+}

@@ -8,6 +8,8 @@ mod days;
 mod events;
 mod faults;
 mod fixture;
+mod full_disk;
+mod growth;
 mod interleavings;
 mod kill;
 mod migration;

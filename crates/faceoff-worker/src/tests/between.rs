@@ -56,6 +56,10 @@ impl WorkServer for Between {
         self.server.give_back(lease, why)
     }
 
+    fn met_full_disk(&self, error: &anyhow::Error) -> bool {
+        self.server.met_full_disk(error)
+    }
+
     fn wait(&self, stop: &CancellationToken, at_most: Duration, queue: Option<QueueMark>) {
         self.server.wait(stop, at_most, queue);
     }

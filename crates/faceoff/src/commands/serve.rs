@@ -8,7 +8,7 @@ use faceoff_http::{
     token::{Token, TokenKind, hash_token},
 };
 use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime, probe_host};
-use faceoff_store::{Actor, Store};
+use faceoff_store::{Actor, Room, Store};
 use faceoff_types::Clock;
 use faceoff_worker::{DailyPlan, WorkerConfig};
 use jiff::Timestamp;
@@ -82,9 +82,11 @@ async fn serve(config: Config) -> anyhow::Result<()> {
     private_folder(&scratch_dir)?;
     let admin_token_hash = admin_token(&data_dir)?;
 
+    let watched = vec![data_dir.clone(), scratch_dir.clone()];
     let store = Store::open(&data_dir)
         .await
-        .with_context(|| format!("opening the data folder {}", data_dir.display()))?;
+        .with_context(|| format!("opening the data folder {}", data_dir.display()))?
+        .with_room(Room::new(watched, config.server.min_free_bytes));
     if let Some(name) = &config.season.name {
         store
             .name_season(Actor::Organiser, name, jiff::Timestamp::now())
