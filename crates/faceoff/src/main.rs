@@ -6,6 +6,7 @@ mod terminal;
 mod client;
 mod commands;
 mod config;
+mod descriptors;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;

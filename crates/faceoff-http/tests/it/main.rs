@@ -17,3 +17,4 @@ mod seeds;
 mod site;
 mod submissions;
 mod teams;
+mod uploads;
