@@ -9,6 +9,7 @@ use serde_json::Value;
 use std::{
     fs,
     io::{self, BufRead, BufReader},
+    net::SocketAddrV4,
     path::Path,
     process::{Child, Command, Stdio},
     sync::mpsc,
@@ -37,7 +38,7 @@ impl Drop for Process {
 /// A running server. Dropping it ends the process at once, as a power cut would (SIGKILL).
 #[derive(Debug)]
 pub struct Server {
-    _process: Process,
+    process: Process,
     /// `http://127.0.0.1:PORT`
     pub url: String,
     /// The organiser's bearer token.
@@ -53,7 +54,31 @@ impl Server {
     /// If it does not start; the panic shows its log.
     #[must_use]
     pub fn start(data_dir: &Path, config: &str) -> Self {
-        let child = command(data_dir, config).stdout(Stdio::piped()).spawn();
+        Self::run(data_dir, &mut command(data_dir, config))
+    }
+
+    /// Starts it on a host that allows it so many file descriptors and no more.
+    ///
+    /// # Panics
+    /// As [`start`](Self::start).
+    #[must_use]
+    pub fn start_with_descriptors(data_dir: &Path, config: &str, descriptors: u32) -> Self {
+        let server = command(data_dir, config);
+        let mut shell = Command::new("sh");
+        shell
+            .args([
+                "-c",
+                &format!("ulimit -n {descriptors}; exec \"$0\" \"$@\""),
+            ])
+            .arg(server.get_program())
+            .args(server.get_args())
+            .stdin(Stdio::null())
+            .stderr(Stdio::piped());
+        Self::run(data_dir, &mut shell)
+    }
+
+    fn run(data_dir: &Path, command: &mut Command) -> Self {
+        let child = command.stdout(Stdio::piped()).spawn();
         let mut process = Process(child.expect("the program can be started"));
         let child = &mut process.0;
         let log = collect(child.stderr.take().expect("standard error is piped"));
@@ -76,11 +101,41 @@ impl Server {
             .trim()
             .to_owned();
         Self {
-            _process: process,
+            process,
             url,
             admin_token,
             client,
         }
+    }
+
+    /// How many sockets it has open: connections, and the one that listens.
+    ///
+    /// # Panics
+    /// If the system does not tell.
+    #[must_use]
+    pub fn sockets(&self) -> usize {
+        let folder = format!("/proc/{}/fd", self.process.0.id());
+        let open = fs::read_dir(folder).expect("the server runs");
+        let is_socket = |entry: &io::Result<fs::DirEntry>| {
+            // One that was closed meanwhile is none.
+            let target = entry.as_ref().ok().map(|entry| fs::read_link(entry.path()));
+            target
+                .and_then(Result::ok)
+                .is_some_and(|target| target.to_string_lossy().starts_with("socket:"))
+        };
+        open.filter(is_socket).count()
+    }
+
+    /// The server's address and port.
+    ///
+    /// # Panics
+    /// If it listens on anything but IPv4.
+    #[must_use]
+    pub fn address(&self) -> SocketAddrV4 {
+        let address = self.url.trim_start_matches("http://");
+        address
+            .parse()
+            .expect("it listens on the loopback interface")
     }
 
     /// Ends the server, as dropping it does.
