@@ -12,8 +12,11 @@ mod kills;
 mod luck;
 mod privacy;
 mod real_time;
+mod strangers;
 mod told_text;
+mod undisturbed;
 mod upgrade;
+mod uploads;
 mod void_at_will;
 
 use bytes::Bytes;

@@ -9,6 +9,7 @@ use serde_json::Value;
 use std::{
     fs,
     io::{self, BufRead, BufReader},
+    net::SocketAddrV4,
     path::{Path, PathBuf},
     process::{Child, Command, Stdio},
     sync::{Arc, Mutex},
@@ -55,6 +56,26 @@ impl Server {
     #[must_use]
     pub fn start(data_dir: &Path, config: &str) -> Self {
         Self::answering(command(data_dir, config), |_| data_dir.to_owned())
+    }
+
+    /// Starts it on a host that allows it so many file descriptors and no more.
+    ///
+    /// # Panics
+    /// As [`start`](Self::start).
+    #[must_use]
+    pub fn start_with_descriptors(data_dir: &Path, config: &str, descriptors: u32) -> Self {
+        let server = command(data_dir, config);
+        let mut shell = Command::new("sh");
+        shell
+            .args([
+                "-c",
+                &format!("ulimit -n {descriptors}; exec \"$0\" \"$@\""),
+            ])
+            .arg(server.get_program())
+            .args(server.get_args())
+            .stdin(Stdio::null())
+            .stderr(Stdio::piped());
+        Self::answering(shell, |_| data_dir.to_owned())
     }
 
     /// Waits until the started program answers. `data_dir` tells of its process where this one sees
@@ -118,6 +139,36 @@ impl Server {
             // A log is looked at, as people do.
             thread::sleep(Duration::from_millis(20));
         }
+    }
+
+    /// How many sockets it has open: connections, and the one that listens.
+    ///
+    /// # Panics
+    /// If the system does not tell.
+    #[must_use]
+    pub fn sockets(&self) -> usize {
+        let folder = format!("/proc/{}/fd", self.process.0.id());
+        let open = fs::read_dir(folder).expect("the server runs");
+        let is_socket = |entry: &io::Result<fs::DirEntry>| {
+            // One that was closed meanwhile is none.
+            let target = entry.as_ref().ok().map(|entry| fs::read_link(entry.path()));
+            target
+                .and_then(Result::ok)
+                .is_some_and(|target| target.to_string_lossy().starts_with("socket:"))
+        };
+        open.filter(is_socket).count()
+    }
+
+    /// The server's address and port.
+    ///
+    /// # Panics
+    /// If it listens on anything but IPv4.
+    #[must_use]
+    pub fn address(&self) -> SocketAddrV4 {
+        let address = self.url.trim_start_matches("http://");
+        address
+            .parse()
+            .expect("it listens on the loopback interface")
     }
 
     /// Ends the server, as dropping it does.

@@ -1,4 +1,4 @@
-use crate::{config::HttpConfig, summaries::Summaries};
+use crate::{config::HttpConfig, summaries::Summaries, uploads::Uploads};
 use faceoff_store::Store;
 use std::sync::Arc;
 use tokio::sync::Semaphore;
@@ -8,17 +8,23 @@ use tokio::sync::Semaphore;
 pub(crate) struct AppState {
     pub(crate) store: Store,
     pub(crate) config: HttpConfig,
-    /// One permit per upload under way.
-    pub(crate) uploads: Semaphore,
+    /// Uploads under way.
+    pub(crate) uploads: Arc<Uploads>,
+    /// One permit per upload that is copied to where it stays.
+    pub(crate) storing: Semaphore,
     pub(crate) summaries: Summaries,
 }
+
+/// The disk is no faster for more of them, and each holds files open.
+const STORING: usize = 4;
 
 pub(crate) type App = Arc<AppState>;
 
 impl AppState {
     pub(crate) fn new(store: Store, config: HttpConfig) -> Self {
         Self {
-            uploads: Semaphore::new(config.limits.uploads),
+            uploads: Arc::new(Uploads::new(config.limits.team_uploads)),
+            storing: Semaphore::new(STORING),
             summaries: Summaries::new(store.clone(), config.clock.clone()),
             store,
             config,

@@ -1,4 +1,5 @@
-use faceoff_store::RunPlan;
+use crate::pace::LeastRate;
+use faceoff_store::{RunPlan, UploadQuota};
 use faceoff_types::Clock;
 use jiff::civil;
 use std::{path::PathBuf, time::Duration};
@@ -8,24 +9,30 @@ use std::{path::PathBuf, time::Duration};
 pub struct HttpLimits {
     /// Requests being answered at the same time; more are told to come back.
     pub requests: usize,
-    /// Uploads at the same time; each one writes to disk.
-    pub uploads: usize,
+    /// Uploads of one team at the same time; each one writes to disk.
+    pub team_uploads: usize,
     /// Longest time to answer a request that is no upload.
     pub answer: Duration,
-    /// Longest pause inside an upload.
-    pub upload_pause: Duration,
+    /// How fast the body of an upload must come.
+    pub upload_rate: LeastRate,
     /// Uploads of one team that may wait for their smoke run.
     pub pending_submissions: usize,
+    /// How much a team may upload and keep.
+    pub upload_quota: UploadQuota,
 }
 
 impl Default for HttpLimits {
     fn default() -> Self {
         Self {
             requests: 512,
-            uploads: 16,
+            team_uploads: 2,
             answer: Duration::from_secs(30),
-            upload_pause: Duration::from_secs(30),
+            upload_rate: LeastRate {
+                bytes_per_s: 16 << 10,
+                grace: Duration::from_secs(30),
+            },
             pending_submissions: 5,
+            upload_quota: UploadQuota::default(),
         }
     }
 }

@@ -13,24 +13,28 @@ mod auth;
 mod config;
 mod extract;
 mod layers;
+mod pace;
 mod pages;
 mod paths;
 pub mod problem;
 mod release;
 pub mod requests;
 mod room;
+mod serve;
 mod summaries;
 pub mod token;
+mod uploads;
 pub mod views;
 
 pub use axum::Router;
 pub use config::{HttpConfig, HttpLimits};
+pub use pace::LeastRate;
 pub use paths::API_BASE;
+pub use serve::{ConnectionLimits, serve};
 
 use app::AppState;
 use faceoff_store::Store;
-use std::{io, sync::Arc};
-use tokio::net::TcpListener;
+use std::sync::Arc;
 
 /// The whole site: pages at `/`, API under `/api/v1`.
 ///
@@ -45,18 +49,4 @@ pub fn router(store: Store, config: HttpConfig) -> Router {
         .method_not_allowed_fallback(pages::unknown_method)
         .with_state(Arc::new(AppState::new(store, config)));
     layers::around(site, limits.requests)
-}
-
-/// Answers requests until `until` ends, and after that the ones that are under way.
-///
-/// # Errors
-/// The listener failed.
-pub async fn serve(
-    listener: TcpListener,
-    router: Router,
-    until: impl Future<Output = ()> + Send + 'static,
-) -> io::Result<()> {
-    axum::serve(listener, router)
-        .with_graceful_shutdown(until)
-        .await
 }

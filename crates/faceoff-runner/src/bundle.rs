@@ -1,6 +1,7 @@
 //! A team's bundle: an archive is unpacked without trusting a byte of it, a developer's folder is
 //! opened as it is.
 
+mod budget;
 mod error;
 mod folder;
 mod links;
@@ -12,12 +13,14 @@ mod zip_archive;
 pub use error::BundleError;
 pub use faceoff_types::BundleLimits;
 
+use budget::{Budget, Members, Watched};
 use faceoff_types::ArchiveFormat;
 use faceoff_wire::{MANIFEST_MAX_BYTES, Manifest};
 use fs_err::File;
 use std::{
     io::{self, BufReader, Read, Seek, SeekFrom},
     path::{Path, PathBuf},
+    time::Instant,
 };
 use tree::Tree;
 
@@ -38,14 +41,33 @@ pub struct Bundle {
 ///
 /// Files become 0644, or 0755 where the archive has an executable bit; symbolic links stay links
 /// if they lead to a place inside the bundle. Limits hold while bytes stream, so that a
-/// decompression bomb is stopped at the limit whatever its headers claim. After an error `into`
-/// holds a part of the archive; the caller removes it.
+/// decompression bomb is stopped at the limit whatever its headers claim, and count all that an
+/// archive is made of: headers, long names, padding, directories and streams one after another as well as
+/// the files. `cancelled` is asked for every piece. After an error `into` holds a part of the archive;
+/// the caller removes it.
 ///
 /// # Errors
 /// [`BundleError::Invalid`] with the entry's name for links that leave the bundle, absolute or
 /// `..` paths, devices, set-id bits, duplicate names, a broken archive, a limit met, a missing or
-/// wrong `agent.toml`; [`BundleError::Io`] where reading or writing the disk fails.
-pub fn unpack(archive: &Path, into: &Path, limits: &BundleLimits) -> Result<Bundle, BundleError> {
+/// wrong `agent.toml`; [`BundleError::Io`] where reading or writing the disk fails, or takes longer
+/// than [`BundleLimits::unpack_s`]; [`BundleError::Cancelled`] when `cancelled` said so.
+pub fn unpack(
+    archive: &Path,
+    into: &Path,
+    limits: &BundleLimits,
+    cancelled: &dyn Fn() -> bool,
+) -> Result<Bundle, BundleError> {
+    let now = Instant::now;
+    let budget = Budget::new(limits, &now, cancelled);
+    budget.verdict(unpack_within(archive, into, &budget))
+}
+
+fn unpack_within<'a>(
+    archive: &Path,
+    into: &Path,
+    budget: &'a Budget<'a>,
+) -> Result<Bundle, BundleError> {
+    let limits = budget.limits();
     let mut file = File::open(archive)?;
     let packed = file.metadata()?.len();
     if packed > limits.packed_bytes {
@@ -60,17 +82,25 @@ pub fn unpack(archive: &Path, into: &Path, limits: &BundleLimits) -> Result<Bund
         .read_to_end(&mut head)?;
     file.seek(SeekFrom::Start(0))?;
 
-    let mut tree = Tree::new(into, limits)?;
-    let file = BufReader::with_capacity(64 << 10, file.into_file());
+    let mut tree = Tree::new(into, budget)?;
+    let buffered = 64 << 10;
+    let watched =
+        |file: File| BufReader::with_capacity(buffered, Watched::new(file.into_file(), budget));
     match ArchiveFormat::detect(&head) {
         Some(ArchiveFormat::TarGz) => {
-            tar_archive::unpack(flate2::bufread::MultiGzDecoder::new(file), &mut tree)?;
+            let streams: Members<'_, _, flate2::bufread::GzDecoder<_>> =
+                Members::new(watched(file), budget).map_err(BundleError::reading(""))?;
+            tar_archive::unpack(streams, &mut tree, budget)?;
         }
         Some(ArchiveFormat::TarZst) => {
-            let decoder = zstd::Decoder::with_buffer(file).map_err(BundleError::reading(""))?;
-            tar_archive::unpack(decoder, &mut tree)?;
+            let streams: Members<'_, _, zstd::Decoder<'static, _>> =
+                Members::new(watched(file), budget).map_err(BundleError::reading(""))?;
+            tar_archive::unpack(streams, &mut tree, budget)?;
         }
-        Some(ArchiveFormat::Zip) => zip_archive::unpack(file, &mut tree)?,
+        Some(ArchiveFormat::Zip) => {
+            let file = BufReader::with_capacity(buffered, file.into_file());
+            zip_archive::unpack(file, packed, &mut tree, budget)?;
+        }
         None => {
             return Err(BundleError::Invalid(
                 "the bundle is no archive that is accepted: expected .tar.gz, .tar.zst or .zip"
@@ -98,7 +128,7 @@ pub fn open(path: &Path, scratch: &Path, limits: &BundleLimits) -> Result<Bundle
     if metadata.is_dir() {
         open_dir(path)
     } else {
-        unpack(path, &scratch.join("bundle"), limits)
+        unpack(path, &scratch.join("bundle"), limits, &|| false)
     }
 }
 
@@ -108,11 +138,16 @@ pub fn open(path: &Path, scratch: &Path, limits: &BundleLimits) -> Result<Bundle
 /// # Errors
 /// As [`unpack`].
 pub fn copy(folder: &Path, into: &Path, limits: &BundleLimits) -> Result<Bundle, BundleError> {
-    let mut tree = Tree::new(into, limits)?;
-    folder::copy(folder, &mut tree)?;
-    let root = tree.bundle_root(MANIFEST_NAME).ok_or_else(no_manifest)?;
-    tree.finish(&root)?;
-    open_dir(&into.join(root))
+    let (now, never) = (Instant::now, || false);
+    let budget = Budget::new(limits, &now, &never);
+    let copied = || {
+        let mut tree = Tree::new(into, &budget)?;
+        folder::copy(folder, &mut tree)?;
+        let root = tree.bundle_root(MANIFEST_NAME).ok_or_else(no_manifest)?;
+        tree.finish(&root)?;
+        open_dir(&into.join(root))
+    };
+    budget.verdict(copied())
 }
 
 fn open_dir(path: &Path) -> Result<Bundle, BundleError> {

@@ -153,6 +153,20 @@ impl Artifacts {
         Ok(())
     }
 
+    /// The keys of all artifacts under `prefix/` that were stored at `until` or earlier.
+    pub(crate) async fn stored_until(&self, prefix: &str, until: Timestamp) -> Result<Vec<String>> {
+        let until = until.as_millisecond();
+        self.objects
+            .list(Some(&parse(prefix)?))
+            .try_filter(|object| {
+                std::future::ready(object.last_modified.timestamp_millis() <= until)
+            })
+            .map_ok(|object| object.location.to_string())
+            .try_collect()
+            .await
+            .map_err(artifact_error)
+    }
+
     /// Removes every artifact under `prefix/`.
     pub async fn delete_folder(&self, prefix: &str) -> Result<()> {
         self.delete_others(prefix, "").await

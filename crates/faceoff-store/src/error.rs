@@ -26,6 +26,28 @@ pub enum StoreError {
         /// When.
         closed_at: Timestamp,
     },
+    /// The team has uploaded as much as it may on one UTC day.
+    #[error(
+        "{used_bytes} of {limit_bytes} bytes of the day are used; the bundle has {bundle_bytes}"
+    )]
+    DayQuotaSpent {
+        /// Of a day.
+        limit_bytes: u64,
+        /// Used today.
+        used_bytes: u64,
+        /// Asked for.
+        bundle_bytes: u64,
+    },
+    /// The team's bundles fill the room that it has.
+    #[error("{used_bytes} of {limit_bytes} bytes are stored; the bundle has {bundle_bytes}")]
+    StoredQuotaSpent {
+        /// At a time.
+        limit_bytes: u64,
+        /// Stored by now.
+        used_bytes: u64,
+        /// Asked for.
+        bundle_bytes: u64,
+    },
     /// What was asked does not fit the entity's state; the text says what does.
     #[error("{0}")]
     Conflict(String),

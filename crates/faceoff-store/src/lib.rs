@@ -47,7 +47,7 @@ pub use operations::{
     give_back::MAX_ATTEMPTS,
     rerun::RERUN_PAUSES_S,
     runs::RunOwner,
-    tidy::RECORDINGS_KEPT,
+    tidy::{RECORDINGS_KEPT, UNCHECKED_KEPT},
 };
 pub use queue::Claim;
 pub use reads::{board::BoardRecord, runs::RunFaults};
@@ -55,6 +55,7 @@ pub use room::Room;
 pub use store::Store;
 pub use tables::{
     ablations::{Ablation, AblationState},
+    bundles::{UploadQuota, UploadUsage},
     days::Day,
     evaluations::{Evaluation, EvaluationState},
     plan::RunPlan,

@@ -25,6 +25,9 @@ pub struct BundleLimits {
     pub unpacked_bytes: u64,
     /// Most files and links; folders are counted separately, against the same number.
     pub files: u64,
+    /// Longest time to unpack it, in seconds. What the other limits let through takes a fraction of it on
+    /// any host that works, so whoever meets this one has our fault.
+    pub unpack_s: u32,
 }
 
 impl Default for BundleLimits {
@@ -33,6 +36,7 @@ impl Default for BundleLimits {
             packed_bytes: 512 << 20,
             unpacked_bytes: 2 << 30,
             files: 50_000,
+            unpack_s: 600,
         }
     }
 }

@@ -1,6 +1,9 @@
-use crate::{evaluator::Evaluator, server::WorkServer};
+use crate::{evaluator::Evaluator, lease::Progress, server::WorkServer};
 use anyhow::Context as _;
-use faceoff_runner::bundle::{Bundle, BundleError};
+use faceoff_runner::{
+    PlatformFault,
+    bundle::{Bundle, BundleError},
+};
 use faceoff_wire::work::AgentOrder;
 use fs_err as fs;
 use std::path::{Path, PathBuf};
@@ -31,12 +34,13 @@ impl BundleCache {
 
     /// The unpacked bundle, fetched if it is not the one held. Its bytes are the ones that were
     /// uploaded: the hash is checked on every fetch, and agents see the folder read-only. An error is
-    /// ours.
+    /// ours, or `progress` has stopped.
     pub(crate) fn get(
         &mut self,
         agent: &AgentOrder,
         evaluator: &dyn Evaluator,
         server: &dyn WorkServer,
+        progress: &Progress,
     ) -> anyhow::Result<Unpacked> {
         if let Some((hash, held)) = &self.held
             && *hash == agent.bundle.blake3
@@ -44,7 +48,7 @@ impl BundleCache {
             return Ok(Unpacked::Bundle(held.clone()));
         }
         self.held = None;
-        let fetched = self.fetch(agent, evaluator, server);
+        let fetched = self.fetch(agent, evaluator, server, progress);
         // What is of no use must not keep the room that the next one needs.
         if !matches!(fetched, Ok(Unpacked::Bundle(_)))
             && self.folder.exists()
@@ -64,6 +68,7 @@ impl BundleCache {
         agent: &AgentOrder,
         evaluator: &dyn Evaluator,
         server: &dyn WorkServer,
+        progress: &Progress,
     ) -> anyhow::Result<Unpacked> {
         if self.folder.exists() {
             fs::remove_dir_all(&self.folder)?;
@@ -78,9 +83,17 @@ impl BundleCache {
             blake3_of(&archive)? == agent.bundle.blake3,
             "the stored bundle is not the uploaded one"
         );
-        let bundle = match evaluator.unpack(&archive, &unpacked, &agent.limits.bundle) {
+        let opened = evaluator.unpack(&archive, &unpacked, &agent.limits.bundle, &|| {
+            progress.stopped()
+        });
+        let bundle = match opened {
             Ok(bundle) => bundle,
-            Err(BundleError::Invalid(reason)) => return Ok(Unpacked::Invalid(reason)),
+            Err(BundleError::Invalid(reason)) => {
+                // What was refused is not kept until the next bundle comes.
+                fs::remove_dir_all(&self.folder)?;
+                return Ok(Unpacked::Invalid(reason));
+            }
+            Err(BundleError::Cancelled) => return Err(PlatformFault::Cancelled.into()),
             Err(error @ BundleError::Io { .. }) => {
                 return Err(error).context("unpacking the bundle");
             }

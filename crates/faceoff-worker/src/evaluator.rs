@@ -8,12 +8,13 @@ use std::path::{Path, PathBuf};
 /// What a slot does with its units. One implementation, the runner; tests put faults of ours in its
 /// place, which cannot be had from a healthy machine.
 pub(crate) trait Evaluator: Send + Sync {
-    /// Unpacks an uploaded archive.
+    /// Unpacks an uploaded archive, unless `cancelled`.
     fn unpack(
         &self,
         archive: &Path,
         into: &Path,
         limits: &BundleLimits,
+        cancelled: &dyn Fn() -> bool,
     ) -> Result<Bundle, BundleError>;
 
     /// Does the agent start, answer and keep time?
@@ -54,8 +55,9 @@ impl Evaluator for Runner {
         archive: &Path,
         into: &Path,
         limits: &BundleLimits,
+        cancelled: &dyn Fn() -> bool,
     ) -> Result<Bundle, BundleError> {
-        bundle::unpack(archive, into, limits)
+        bundle::unpack(archive, into, limits, cancelled)
     }
 
     fn smoke(

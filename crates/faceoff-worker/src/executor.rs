@@ -76,13 +76,14 @@ impl Executor {
         }
     }
 
-    fn bundle(&mut self, agent: &AgentOrder) -> anyhow::Result<Unpacked> {
-        self.bundles.get(agent, &*self.evaluator, &*self.server)
+    fn bundle(&mut self, agent: &AgentOrder, progress: &Progress) -> anyhow::Result<Unpacked> {
+        self.bundles
+            .get(agent, &*self.evaluator, &*self.server, progress)
     }
 
     /// The bundle of a valid submission: it passed its smoke run, so that the archive is not to blame.
-    fn valid_bundle(&mut self, agent: &AgentOrder) -> anyhow::Result<Bundle> {
-        match self.bundle(agent)? {
+    fn valid_bundle(&mut self, agent: &AgentOrder, progress: &Progress) -> anyhow::Result<Bundle> {
+        match self.bundle(agent, progress)? {
             Unpacked::Bundle(bundle) => Ok(bundle),
             Unpacked::Invalid(reason) => anyhow::bail!(reason),
         }
@@ -103,7 +104,7 @@ impl Executor {
         spec: &SmokeSpec,
         progress: &Progress,
     ) -> anyhow::Result<SmokeOutcome> {
-        let bundle = match self.bundle(agent)? {
+        let bundle = match self.bundle(agent, progress)? {
             Unpacked::Bundle(bundle) => bundle,
             Unpacked::Invalid(reason) => {
                 return Ok(SmokeOutcome::Invalid {
@@ -142,7 +143,7 @@ impl Executor {
         recording: Option<&str>,
         mut progress: Progress,
     ) -> anyhow::Result<WorkReport> {
-        let bundle = self.valid_bundle(agent)?;
+        let bundle = self.valid_bundle(agent, &progress)?;
         let environment = self.host.environment(&agent.limits);
         let out = self.folder("recording")?;
         let played = self

@@ -52,6 +52,25 @@ impl LocalServer {
         if let Err(error) = abandoned.await {
             tracing::warn!(%error, "half-written artifacts could not be removed");
         }
+        self.remove_refused().await;
+        match self
+            .store
+            .remove_orphaned_bundles(now - LONGEST_WRITE)
+            .await
+        {
+            Ok(0) => {}
+            Ok(bundles) => tracing::info!(bundles, "bundles of no submission were removed"),
+            Err(error) => tracing::warn!(%error, "bundles of no submission could not be removed"),
+        }
+    }
+
+    /// Removes the bundles that were found invalid. What fails is done by the next call.
+    async fn remove_refused(&self) {
+        match self.store.remove_refused_bundles(self.clock.now()).await {
+            Ok(0) => {}
+            Ok(bundles) => tracing::info!(bundles, "refused bundles were removed"),
+            Err(error) => tracing::warn!(%error, "refused bundles could not be removed"),
+        }
     }
 
     fn order(&self, leased: Leased) -> WorkOrder {
@@ -204,9 +223,11 @@ impl WorkServer for LocalServer {
         let (claim, now) = (claim(lease), self.clock.now());
         self.runtime.block_on(async {
             match report {
-                WorkReport::Smoke(outcome) => Ok(holding(
-                    self.store.commit_smoke(&claim, outcome, now).await?,
-                )),
+                WorkReport::Smoke(outcome) => {
+                    let holding = holding(self.store.commit_smoke(&claim, outcome, now).await?);
+                    self.remove_refused().await;
+                    Ok(holding)
+                }
                 WorkReport::Play {
                     outcomes,
                     log,

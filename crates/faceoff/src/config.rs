@@ -5,15 +5,16 @@
 //! cannot state different ones.
 
 use anyhow::{Context, bail, ensure};
+use faceoff_http::{ConnectionLimits, HttpLimits, LeastRate};
 use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::BundleLimits};
 use faceoff_sandbox::{Isolation, Layer, Limits, Runtime};
-use faceoff_store::RunPlan;
+use faceoff_store::{RunPlan, UploadQuota};
 use faceoff_types::{MAX_EPISODES_PER_TASK, Profile, Task};
 use jiff::civil::Time;
 use serde::{Deserialize, Serialize};
 use std::{
     collections::{BTreeMap, BTreeSet},
-    net::SocketAddr,
+    net::{IpAddr, SocketAddr},
     path::{Path, PathBuf},
 };
 
@@ -38,6 +39,10 @@ pub struct Config {
     pub time: TimeLimits,
     /// What a bundle may hold.
     pub bundle: BundleLimits,
+    /// How much a team may upload, and how slowly.
+    pub uploads: UploadsConfig,
+    /// How much of the server a stranger may hold.
+    pub connections: ConnectionsConfig,
     /// What is not enforced.
     pub sandbox: SandboxConfig,
     /// Runtimes by the name that `agent.toml` gives; added to `python3` and `native`, or in their
@@ -138,6 +143,114 @@ impl Default for WorkersConfig {
     }
 }
 
+/// `[uploads]`
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct UploadsConfig {
+    /// Uploads of one team under way at the same time.
+    pub at_once: usize,
+    /// How fast the body of an upload must come, in the mean.
+    pub least_bytes_per_s: u64,
+    /// How many seconds it may be behind that.
+    pub grace_s: f64,
+    /// How much a team may upload on a UTC day, in bytes.
+    pub day_bytes: u64,
+    /// How much is kept of a team at the same time, in bytes.
+    pub stored_bytes: u64,
+}
+
+impl Default for UploadsConfig {
+    fn default() -> Self {
+        let HttpLimits {
+            team_uploads,
+            upload_rate,
+            upload_quota,
+            ..
+        } = HttpLimits::default();
+        Self {
+            at_once: team_uploads,
+            least_bytes_per_s: upload_rate.bytes_per_s,
+            grace_s: upload_rate.grace.as_secs_f64(),
+            day_bytes: upload_quota.day_bytes,
+            stored_bytes: upload_quota.stored_bytes,
+        }
+    }
+}
+
+impl UploadsConfig {
+    /// As the web side takes them.
+    #[must_use]
+    pub fn limits(&self) -> HttpLimits {
+        HttpLimits {
+            team_uploads: self.at_once,
+            upload_rate: LeastRate {
+                bytes_per_s: self.least_bytes_per_s,
+                grace: TimeLimits::duration(self.grace_s),
+            },
+            upload_quota: UploadQuota {
+                day_bytes: self.day_bytes,
+                stored_bytes: self.stored_bytes,
+            },
+            ..HttpLimits::default()
+        }
+    }
+}
+
+/// `[connections]`
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ConnectionsConfig {
+    /// Open at the same time, where there are descriptors for so many.
+    pub most: usize,
+    /// Of one address, or IPv6 network of 64 bits; a quarter of all at most.
+    pub per_address: usize,
+    /// Addresses without a bound of their own: proxies'.
+    pub exempt: Vec<IpAddr>,
+    /// Seconds to send the head of a request, or to be idle before the next.
+    pub head_s: f64,
+    /// What a reader must take of an answer, in the mean.
+    pub least_bytes_per_s: u64,
+    /// How many seconds it may be behind that.
+    pub grace_s: f64,
+}
+
+impl Default for ConnectionsConfig {
+    fn default() -> Self {
+        let ConnectionLimits {
+            open,
+            per_address,
+            exempt,
+            head,
+            reading,
+        } = ConnectionLimits::default();
+        Self {
+            most: open,
+            per_address,
+            exempt,
+            head_s: head.as_secs_f64(),
+            least_bytes_per_s: reading.bytes_per_s,
+            grace_s: reading.grace.as_secs_f64(),
+        }
+    }
+}
+
+impl ConnectionsConfig {
+    /// As the web side takes them, if there are descriptors for all.
+    #[must_use]
+    pub fn limits(&self) -> ConnectionLimits {
+        ConnectionLimits {
+            open: self.most,
+            per_address: self.per_address,
+            exempt: self.exempt.clone(),
+            head: TimeLimits::duration(self.head_s),
+            reading: LeastRate {
+                bytes_per_s: self.least_bytes_per_s,
+                grace: TimeLimits::duration(self.grace_s),
+            },
+        }
+    }
+}
+
 /// `[sandbox]`
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -234,6 +347,32 @@ impl Config {
             ensure!(
                 (1..=80).contains(&chars),
                 "season.name: expected 1 to 80 characters, got {chars}"
+            );
+        }
+        for (name, value) in [
+            ("uploads.at_once", self.uploads.at_once as u64),
+            ("uploads.least_bytes_per_s", self.uploads.least_bytes_per_s),
+            ("connections.most", self.connections.most as u64),
+            (
+                "connections.per_address",
+                self.connections.per_address as u64,
+            ),
+            (
+                "connections.least_bytes_per_s",
+                self.connections.least_bytes_per_s,
+            ),
+            ("bundle.unpack_s", self.bundle.unpack_s.into()),
+        ] {
+            ensure!(value >= 1, "{name}: expected at least 1, got 0");
+        }
+        for (name, seconds) in [
+            ("uploads.grace_s", self.uploads.grace_s),
+            ("connections.head_s", self.connections.head_s),
+            ("connections.grace_s", self.connections.grace_s),
+        ] {
+            ensure!(
+                seconds.is_finite() && seconds > 0.0 && seconds <= 3600.0,
+                "{name}: expected more than 0 and at most 3600, got {seconds}"
             );
         }
         for (name, seconds) in [

@@ -6,6 +6,7 @@ mod terminal;
 mod client;
 mod commands;
 mod config;
+mod descriptors;
 mod log;
 
 use clap::{Parser, Subcommand};

@@ -2,6 +2,7 @@
 //! never held in memory and never unpacked here.
 
 use crate::{
+    pace::{LeastRate, Pace},
     problem::{Problem, ProblemKind},
     room,
 };
@@ -11,9 +12,9 @@ use axum::{
 };
 use faceoff_types::ArchiveFormat;
 use futures::StreamExt;
-use std::{path::Path, time::Duration};
+use std::path::Path;
 use tempfile::NamedTempFile;
-use tokio::io::AsyncWriteExt;
+use tokio::{io::AsyncWriteExt, time::Instant};
 
 /// After a refusal we read on and throw away this much, so that a client that is still sending gets
 /// the answer instead of a broken connection.
@@ -28,24 +29,39 @@ pub(crate) struct Uploaded {
     pub(crate) format: ArchiveFormat,
 }
 
+/// How large a bundle may be, and what is said to a larger one. It is told the number of its bytes, where
+/// that was announced.
+pub(crate) struct Allowance {
+    pub(crate) max_bytes: u64,
+    pub(crate) beyond: Box<dyn Fn(Option<u64>) -> Problem + Send + Sync>,
+}
+
+/// A body that must come at a rate.
+struct Incoming {
+    stream: BodyDataStream,
+    rate: LeastRate,
+    pace: Pace,
+}
+
 /// Streams `body` into a file under `dir`.
 ///
 /// # Errors
-/// `TooLarge` beyond `max_bytes`, whether or not a length was announced; `UnsupportedMediaType` when
-/// the first bytes are no archive's; `RequestTimeout` after a pause of `patience`; `InvalidRequest`
+/// What `allowance` says beyond it, whether or not a length was announced; `UnsupportedMediaType` when
+/// the first bytes are no archive's; `RequestTimeout` when it comes slower than `rate`; `InvalidRequest`
 /// when the body is empty or breaks off; `StorageFull` when the disk is, `Internal` when it fails.
 pub(crate) async fn receive(
     body: Body,
     announced: Option<&HeaderValue>,
     dir: &Path,
-    max_bytes: u64,
-    patience: Duration,
+    allowance: &Allowance,
+    rate: LeastRate,
 ) -> Result<Uploaded, Problem> {
+    let max_bytes = allowance.max_bytes;
     let announced: Option<u64> = announced.and_then(|value| value.to_str().ok()?.parse().ok());
-    let mut stream = body.into_data_stream();
+    let mut incoming = Incoming::new(body, rate);
     if let Some(bytes) = announced.filter(|bytes| *bytes > max_bytes) {
-        drain(&mut stream, bytes, patience).await;
-        return Err(too_large(max_bytes, Some(bytes)));
+        incoming.drain(bytes).await;
+        return Err((allowance.beyond)(Some(bytes)));
     }
 
     let file = tempfile::Builder::new()
@@ -57,18 +73,18 @@ pub(crate) async fn receive(
     let mut head = Vec::with_capacity(ArchiveFormat::LONGEST_MAGIC);
     let mut format = None;
     let mut bytes = 0;
-    while let Some(chunk) = next(&mut stream, patience).await? {
+    while let Some(chunk) = incoming.next().await? {
         bytes += chunk.len() as u64;
         if bytes > max_bytes {
-            drain(&mut stream, DRAIN_BYTES, patience).await;
-            return Err(too_large(max_bytes, None));
+            incoming.drain(DRAIN_BYTES).await;
+            return Err((allowance.beyond)(None));
         }
         if format.is_none() {
             let missing = ArchiveFormat::LONGEST_MAGIC - head.len();
             head.extend_from_slice(&chunk[..missing.min(chunk.len())]);
             format = ArchiveFormat::detect(&head);
             if format.is_none() && head.len() == ArchiveFormat::LONGEST_MAGIC {
-                drain(&mut stream, announced.unwrap_or(DRAIN_BYTES), patience).await;
+                incoming.drain(announced.unwrap_or(DRAIN_BYTES)).await;
                 return Err(not_an_archive(&head));
             }
         }
@@ -95,44 +111,64 @@ pub(crate) async fn receive(
     })
 }
 
-async fn next(
-    stream: &mut BodyDataStream,
-    patience: Duration,
-) -> Result<Option<axum::body::Bytes>, Problem> {
-    match tokio::time::timeout(patience, stream.next()).await {
-        Ok(None) => Ok(None),
-        Ok(Some(Ok(chunk))) => Ok(Some(chunk)),
-        Ok(Some(Err(error))) => Err(Problem::new(
-            ProblemKind::InvalidRequest,
-            format!("the upload broke off ({error}); nothing was stored, send it again"),
-        )),
-        Err(_) => Err(Problem::new(
-            ProblemKind::RequestTimeout,
-            format!(
-                "nothing came for {} s in the middle of the upload; nothing was stored, send it again",
-                patience.as_secs_f64()
-            ),
-        )),
-    }
-}
-
 /// Throws a body away that is refused before it is looked at.
-pub(crate) async fn discard(body: Body, patience: Duration) {
-    drain(&mut body.into_data_stream(), DRAIN_BYTES, patience).await;
+pub(crate) async fn discard(body: Body, rate: LeastRate) {
+    Incoming::new(body, rate).drain(DRAIN_BYTES).await;
 }
 
-/// Throws away what the client still sends, up to [`DRAIN_BYTES`].
-async fn drain(stream: &mut BodyDataStream, at_most: u64, patience: Duration) {
-    let mut left = at_most.min(DRAIN_BYTES);
-    while left > 0 {
-        match next(stream, patience).await {
-            Ok(Some(chunk)) => left = left.saturating_sub(chunk.len() as u64),
-            Ok(None) | Err(_) => return,
+impl Incoming {
+    fn new(body: Body, rate: LeastRate) -> Self {
+        Self {
+            stream: body.into_data_stream(),
+            rate,
+            pace: Pace::new(rate),
+        }
+    }
+
+    async fn next(&mut self) -> Result<Option<axum::body::Bytes>, Problem> {
+        let asked = Instant::now();
+        let came = tokio::time::timeout(self.pace.left(), self.stream.next()).await;
+        self.pace.waited(asked.elapsed());
+        match came {
+            Ok(None) => Ok(None),
+            Ok(Some(Ok(chunk))) => {
+                self.pace.moved(chunk.len());
+                Ok(Some(chunk))
+            }
+            Ok(Some(Err(error))) => Err(Problem::new(
+                ProblemKind::InvalidRequest,
+                format!("the upload broke off ({error}); nothing was stored, send it again"),
+            )),
+            Err(_) => Err(too_slow(self.rate)),
+        }
+    }
+
+    /// Throws away what the client still sends, up to [`DRAIN_BYTES`].
+    async fn drain(&mut self, at_most: u64) {
+        let mut left = at_most.min(DRAIN_BYTES);
+        while left > 0 {
+            match self.next().await {
+                Ok(Some(chunk)) => left = left.saturating_sub(chunk.len() as u64),
+                Ok(None) | Err(_) => return,
+            }
         }
     }
 }
 
-fn too_large(max_bytes: u64, announced: Option<u64>) -> Problem {
+fn too_slow(rate: LeastRate) -> Problem {
+    let LeastRate { bytes_per_s, grace } = rate;
+    Problem::new(
+        ProblemKind::RequestTimeout,
+        format!(
+            "the upload was more than {} s behind the least rate of {bytes_per_s} bytes per second; nothing \
+             was stored, send it again over a faster connection",
+            grace.as_secs_f64()
+        ),
+    )
+    .with("least_bytes_per_s", bytes_per_s)
+}
+
+pub(crate) fn too_large(max_bytes: u64, announced: Option<u64>) -> Problem {
     let came = announced.map_or_else(|| "more came".to_owned(), |n| format!("{n} were announced"));
     Problem::new(
         ProblemKind::TooLarge,

@@ -1,6 +1,6 @@
 //! Uploading an agent.
 
-use super::bundle_stream;
+use super::bundle_stream::{self, Allowance, Uploaded};
 use crate::{
     app::App,
     auth::TeamCaller,
@@ -8,6 +8,7 @@ use crate::{
     paths,
     problem::{Problem, ProblemKind},
     room,
+    uploads::Place,
     views::submission::SubmissionView,
 };
 use axum::{
@@ -17,8 +18,9 @@ use axum::{
     http::{HeaderMap, HeaderName, StatusCode, header},
     response::{AppendHeaders, IntoResponse},
 };
-use faceoff_store::{Actor, StoreError};
+use faceoff_store::{Actor, StoreError, Submission, Team, UploadUsage};
 use faceoff_types::{ArchiveFormat, BundleRef};
+use jiff::{Timestamp, tz::TimeZone};
 use serde::Deserialize;
 use utoipa::IntoParams;
 use uuid::Uuid;
@@ -54,10 +56,11 @@ const ARCHIVE_TYPES: [&str; 8] = [
     request_body(content = Vec<u8>, content_type = "application/octet-stream"),
     responses(
         (status = 201, body = SubmissionView),
-        (status = 409, description = "the season is closed"),
+        (status = 408, description = "the body stalled, or came too slowly"),
+        (status = 409, description = "the season is closed, or the team's storage is full"),
         (status = 413, description = "larger than max_bundle_bytes"),
         (status = 415, description = "not one of the archive formats"),
-        (status = 429, description = "several uploads wait for their smoke run"),
+        (status = 429, description = "several uploads are under way or wait for their smoke run, or the day's quota is spent"),
         (status = 507, description = "the server's disk has too little room"),
     )
 )]
@@ -70,14 +73,16 @@ pub(crate) async fn create_submission(
 ) -> Result<impl IntoResponse, Problem> {
     check_media_type(&headers)?;
     if let Err(refused) = room::check(&app) {
-        bundle_stream::discard(body, app.config.limits.upload_pause).await;
+        bundle_stream::discard(body, app.config.limits.upload_rate).await;
         return Err(refused);
     }
-    let _slot = app.uploads.try_acquire().map_err(|_| {
+    let place = app.uploads.enter(team.id).ok_or_else(|| {
+        let most = app.config.limits.team_uploads;
         Problem::new(
-            ProblemKind::Busy,
-            "the server takes as many uploads as it may at once; try again in 2 s",
+            ProblemKind::TooManyUploads,
+            format!("{most} uploads of your team are under way already; wait until one has ended"),
         )
+        .with("limit", most)
     })?;
     // before the bundle travels in vain; the store looks again
     if let Some(closed_at) = app.store.season().await?.closed_at {
@@ -101,6 +106,8 @@ pub(crate) async fn create_submission(
         ));
     }
 
+    let now = app.config.clock.now();
+    let used = app.store.upload_usage(team.id, now).await?;
     let claimed_name = query
         .file_name
         .or_else(|| Some(headers.get(FILE_NAME)?.to_str().ok()?.to_owned()))
@@ -109,10 +116,60 @@ pub(crate) async fn create_submission(
         body,
         headers.get(header::CONTENT_LENGTH),
         &app.config.upload_dir,
-        app.config.max_bundle_bytes,
-        limits.upload_pause,
+        &allowance(&app, used, now),
+        limits.upload_rate,
     )
     .await?;
+    // A client that goes away ends this handler; what is on disk is brought to its end all the same.
+    let stored = tokio::spawn(store(app, team, uploaded, claimed_name, place));
+    let submission = stored.await.map_err(Problem::internal)??;
+    let location = [(header::LOCATION, paths::submission(submission.id))];
+    let view = SubmissionView::new(submission, None);
+    Ok((StatusCode::CREATED, AppendHeaders(location), Json(view)))
+}
+
+/// What a bundle may have: as much as any, or what is left of the team's quota.
+fn allowance(app: &App, used: UploadUsage, now: Timestamp) -> Allowance {
+    let quota = app.config.limits.upload_quota;
+    let largest = app.config.max_bundle_bytes;
+    let left = quota.left(used);
+    Allowance {
+        max_bytes: left.min(largest),
+        beyond: Box::new(move |announced| {
+            let bytes = announced.unwrap_or(left.saturating_add(1));
+            match quota.check(used, bytes) {
+                Err(spent) if left < largest => over_quota(spent, now),
+                _ => bundle_stream::too_large(largest, announced),
+            }
+        }),
+    }
+}
+
+/// Says when a day's quota begins anew.
+fn over_quota(error: StoreError, now: Timestamp) -> Problem {
+    let is_of_day = matches!(error, StoreError::DayQuotaSpent { .. });
+    let problem = Problem::from(error);
+    let tomorrow = now
+        .to_zoned(TimeZone::UTC)
+        .tomorrow()
+        .and_then(|tomorrow| tomorrow.start_of_day());
+    match tomorrow {
+        Ok(tomorrow) if is_of_day => {
+            let seconds = tomorrow.timestamp().duration_since(now).as_secs();
+            problem.retry_after(seconds.unsigned_abs().max(1))
+        }
+        _ => problem,
+    }
+}
+
+/// Makes a submission of what came.
+async fn store(
+    app: App,
+    team: Team,
+    uploaded: Uploaded,
+    claimed_name: String,
+    _place: Place,
+) -> Result<Submission, Problem> {
     let bundle = BundleRef {
         key: format!(
             "bundles/{}/{}.{}",
@@ -124,33 +181,30 @@ pub(crate) async fn create_submission(
         blake3: uploaded.blake3.to_string(),
         file_name: file_name(&claimed_name, uploaded.format),
     };
-    app.store
-        .artifacts()
+    let _storing = app.storing.acquire().await.map_err(Problem::internal)?;
+    let artifacts = app.store.artifacts();
+    artifacts
         .put_file(&bundle.key, uploaded.file.path())
         .await?;
     let key = bundle.key.clone();
-    let submission = match app
+    let now = app.config.clock.now();
+    let quota = &app.config.limits.upload_quota;
+    let created = app
         .store
-        .create_submission(
-            Actor::Team(team.id),
-            team.id,
-            bundle,
-            app.config.clock.now(),
-        )
-        .await
-    {
-        Ok(submission) => submission,
+        .create_submission(Actor::Team(team.id), team.id, bundle, quota, now)
+        .await;
+    match created {
+        Ok(submission) => {
+            tracing::info!(team = %team.name, submission = %submission.id, bytes = uploaded.bytes, "uploaded");
+            Ok(submission)
+        }
         Err(error) => {
-            if let Err(left) = app.store.artifacts().delete(&key).await {
+            if let Err(left) = artifacts.delete(&key).await {
                 tracing::warn!(key, %left, "an artifact without a submission is left behind");
             }
-            return Err(error.into());
+            Err(over_quota(error, now))
         }
-    };
-    tracing::info!(team = %team.name, submission = %submission.id, bytes = uploaded.bytes, "uploaded");
-    let location = [(header::LOCATION, paths::submission(submission.id))];
-    let view = SubmissionView::new(submission, None);
-    Ok((StatusCode::CREATED, AppendHeaders(location), Json(view)))
+    }
 }
 
 fn check_media_type(headers: &HeaderMap) -> Result<(), Problem> {

@@ -37,6 +37,9 @@ impl Problem {
             | ProblemKind::NotReady => {
                 vec![(header::RETRY_AFTER, HeaderValue::from_static("30"))]
             }
+            ProblemKind::TooManyUploads | ProblemKind::TooManyConnections => {
+                vec![(header::RETRY_AFTER, HeaderValue::from_static("10"))]
+            }
             _ => Vec::new(),
         };
         Self {
@@ -51,6 +54,15 @@ impl Problem {
     #[must_use]
     pub fn with(mut self, name: &str, value: impl Into<Value>) -> Self {
         self.members.insert(name.to_owned(), value.into());
+        self
+    }
+
+    /// To be tried again after so many seconds.
+    pub(crate) fn retry_after(mut self, seconds: u64) -> Self {
+        let value = (header::RETRY_AFTER, HeaderValue::from(seconds));
+        self.headers
+            .retain(|(name, _)| *name != header::RETRY_AFTER);
+        self.headers.push(value);
         self
     }
 
@@ -113,15 +125,42 @@ pub(crate) struct ProblemBody<'a> {
     members: &'a Map<String, Value>,
 }
 
-impl IntoResponse for Problem {
-    fn into_response(self) -> Response {
-        let body = ProblemBody {
+impl Problem {
+    fn body(&self) -> ProblemBody<'_> {
+        ProblemBody {
             r#type: format!("/problems#{}", self.kind.slug()),
             title: self.kind.title(),
             status: self.kind.status().as_u16(),
             detail: &self.detail,
             members: &self.members,
-        };
+        }
+    }
+
+    /// The whole answer in bytes, for a connection that is closed before it has asked anything.
+    pub(crate) fn as_http1(&self) -> Vec<u8> {
+        let body = serde_json::to_string(&self.body()).unwrap_or_default();
+        let mut answer = format!(
+            "HTTP/1.1 {}\r\ncontent-type: {}\r\ncontent-length: {}\r\nconnection: close\r\n",
+            self.kind.status(),
+            Self::MEDIA_TYPE,
+            body.len()
+        )
+        .into_bytes();
+        for (name, value) in &self.headers {
+            answer.extend_from_slice(name.as_str().as_bytes());
+            answer.extend_from_slice(b": ");
+            answer.extend_from_slice(value.as_bytes());
+            answer.extend_from_slice(b"\r\n");
+        }
+        answer.extend_from_slice(b"\r\n");
+        answer.extend_from_slice(body.as_bytes());
+        answer
+    }
+}
+
+impl IntoResponse for Problem {
+    fn into_response(self) -> Response {
+        let body = self.body();
         let media_type = (
             header::CONTENT_TYPE,
             HeaderValue::from_static(Self::MEDIA_TYPE),

@@ -35,6 +35,34 @@ impl From<StoreError> for Problem {
                      you sent. Look whether it was done after all, and try again later",
                 )
             }
+            StoreError::DayQuotaSpent {
+                limit_bytes,
+                used_bytes,
+                bundle_bytes,
+            } => Self::new(
+                ProblemKind::DayQuotaSpent,
+                format!(
+                    "a team uploads at most {limit_bytes} bytes on a UTC day; yours has uploaded \
+                     {used_bytes} today, and this bundle has {bundle_bytes} or more. Send it after \
+                     midnight UTC, or leave out what the agent does not need to run"
+                ),
+            )
+            .with("limit_bytes", limit_bytes)
+            .with("used_bytes", used_bytes),
+            StoreError::StoredQuotaSpent {
+                limit_bytes,
+                used_bytes,
+                bundle_bytes,
+            } => Self::new(
+                ProblemKind::StoredQuotaSpent,
+                format!(
+                    "at most {limit_bytes} bytes of bundles are kept for a team; {used_bytes} are kept of \
+                     yours, and this one has {bundle_bytes} or more. Ask the organiser for more room \
+                     (uploads.stored_bytes in the server's configuration)"
+                ),
+            )
+            .with("limit_bytes", limit_bytes)
+            .with("used_bytes", used_bytes),
             StoreError::Conflict(detail) => Self::new(ProblemKind::Conflict, detail),
             error @ (StoreError::Database(_)
             | StoreError::Artifacts(_)

@@ -50,7 +50,7 @@ kinds! {
         "The detail and “limit_bytes” state the limit. Leave data out of the bundle that the agent does not need."
     RequestTimeout "request-timeout" REQUEST_TIMEOUT
         "The body stopped coming"
-        "The upload stalled for too long. Nothing was stored; send it again."
+        "The upload stalled, or came slower than the server waits for; the detail states the rate. Nothing was stored; send it again."
     TeamNameTaken "team-name-taken" CONFLICT
         "The name is taken"
         "Another team has this name. Choose another one, or ask for a new token for the existing team."
@@ -75,6 +75,18 @@ kinds! {
     TooManyPending "too-many-pending" TOO_MANY_REQUESTS
         "Too many uploads are waiting"
         "Several uploads of the team are not validated yet. Wait until one has its verdict."
+    TooManyUploads "too-many-uploads" TOO_MANY_REQUESTS
+        "Too many uploads at once"
+        "The team has several uploads under way. Wait until one has ended; nothing of another team's takes these places."
+    DayQuotaSpent "day-quota-spent" TOO_MANY_REQUESTS
+        "The day's quota of uploads is spent"
+        "A team uploads so many bytes on a UTC day. “limit_bytes” and “used_bytes” state how many; “Retry-After” is the time to midnight UTC."
+    StoredQuotaSpent "stored-quota-spent" CONFLICT
+        "The team's storage is full"
+        "The bundles that are kept of the team fill its room; “limit_bytes” and “used_bytes” state how much. Ask the organiser for more."
+    TooManyConnections "too-many-connections" TOO_MANY_REQUESTS
+        "Too many connections"
+        "An address has so many connections at a time. Close some, or send several requests over one."
     Busy "busy" SERVICE_UNAVAILABLE
         "The server is busy"
         "Try again after the seconds stated in the header “Retry-After”."

@@ -18,3 +18,4 @@ mod seeds;
 mod site;
 mod submissions;
 mod teams;
+mod uploads;

@@ -1,7 +1,9 @@
 //! A running site: axum on a loopback port, SQLite in a temporary folder, a clock that tests turn,
 //! and the steps that a worker would take.
 
-use faceoff_http::{HttpConfig, HttpLimits, router, token::hash_token};
+use faceoff_http::{
+    ConnectionLimits, HttpConfig, HttpLimits, LeastRate, router, token::hash_token,
+};
 use faceoff_store::*;
 use faceoff_types::*;
 use jiff::{SignedDuration, Timestamp};
@@ -100,7 +102,10 @@ impl Answer {
 pub fn patient() -> HttpLimits {
     HttpLimits {
         answer: Duration::from_secs(600),
-        upload_pause: Duration::from_secs(600),
+        upload_rate: LeastRate {
+            bytes_per_s: 1,
+            grace: Duration::from_secs(600),
+        },
         ..HttpLimits::default()
     }
 }
@@ -424,14 +429,24 @@ impl Site {
 /// How an agent played.
 pub type Played<'a> = &'a dyn Fn(Task, u32) -> EpisodeOutcome;
 
+/// A patience that only a dead machine wears out.
+fn connections() -> ConnectionLimits {
+    ConnectionLimits {
+        head: Duration::from_secs(600),
+        reading: LeastRate {
+            bytes_per_s: 1,
+            grace: Duration::from_secs(600),
+        },
+        ..ConnectionLimits::default()
+    }
+}
+
 async fn serve(store: &Store, config: &HttpConfig) -> (String, JoinHandle<()>) {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let url = format!("http://{}", listener.local_addr().unwrap());
     let site = router(store.clone(), config.clone());
     let server = tokio::spawn(async move {
-        faceoff_http::serve(listener, site, std::future::pending())
-            .await
-            .unwrap();
+        faceoff_http::serve(listener, site, connections(), std::future::pending()).await;
     });
     (url, server)
 }

@@ -1,6 +1,6 @@
 use crate::site::{ADMIN, Answer, GZIP, MAX_BUNDLE, Site, patient, text};
 use bytes::Bytes;
-use faceoff_http::HttpLimits;
+use faceoff_http::{HttpLimits, LeastRate};
 use faceoff_types::SmokeOutcome;
 use reqwest::{Body, Method};
 use serde_json::json;
@@ -244,7 +244,10 @@ async fn what_is_no_archive_is_refused_at_once() {
 #[tokio::test]
 async fn an_upload_that_stalls_is_given_up() {
     let limits = HttpLimits {
-        upload_pause: Duration::from_millis(50),
+        upload_rate: LeastRate {
+            bytes_per_s: 1000,
+            grace: Duration::from_millis(50),
+        },
         ..patient()
     };
     let site = Site::start_with(limits).await;
@@ -252,9 +255,11 @@ async fn an_upload_that_stalls_is_given_up() {
     use futures::StreamExt;
     let first = futures::stream::iter([Ok::<_, Infallible>(Bytes::from_static(&GZIP))]);
     let body = Body::wrap_stream(first.chain(futures::stream::pending()));
-    site.upload(&team.token, body)
-        .await
-        .problem(408, "request-timeout", &["send it again"]);
+    site.upload(&team.token, body).await.problem(
+        408,
+        "request-timeout",
+        &["send it again", "1000 bytes per second"],
+    );
     assert_eq!(uploads_left(&site), 0);
 }
 

@@ -7,9 +7,12 @@ pub enum BundleError {
     /// the entry and is shown to the team.
     #[error("{0}")]
     Invalid(String),
-    /// Ours: the disk did not do what it should.
+    /// Ours: the disk did not do what it should, or all of it took too long.
     #[error(transparent)]
     Io(#[from] io::Error),
+    /// Nobody wants to know any more.
+    #[error("cancelled")]
+    Cancelled,
 }
 
 impl BundleError {

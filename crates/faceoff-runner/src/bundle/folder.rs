@@ -6,7 +6,7 @@ use std::{
 };
 
 /// Brings everything below `folder` into the tree, in order of the names.
-pub(super) fn copy(folder: &Path, tree: &mut Tree) -> Result<(), BundleError> {
+pub(super) fn copy(folder: &Path, tree: &mut Tree<'_>) -> Result<(), BundleError> {
     let place = fs::metadata(tree.place_on_disk())?;
     copy_below(folder, "", (place.dev(), place.ino()), tree)
 }
@@ -18,7 +18,7 @@ fn copy_below(
     folder: &Path,
     prefix: &str,
     copy: (u64, u64),
-    tree: &mut Tree,
+    tree: &mut Tree<'_>,
 ) -> Result<(), BundleError> {
     let mut entries = fs::read_dir(folder)?.collect::<Result<Vec<_>, _>>()?;
     entries.sort_by_key(fs::DirEntry::file_name);

@@ -1,4 +1,4 @@
-use super::node::Node;
+use super::{error::BundleError, node::Node};
 use std::collections::BTreeMap;
 
 /// As many links as Linux follows on one path.
@@ -6,19 +6,21 @@ const MOST_LINKS: usize = 40;
 
 /// Follows the link at `path` through the tree as the system would. A step above the bundle's
 /// folder `root` (a path in the tree, empty for its top) is an escape, even if the path returns.
-/// A target that does not exist is harmless as long as it would be inside.
+/// A target that does not exist is harmless as long as it would be inside. `followed` is told how long each
+/// name is that is looked up, and ends a walk that is too long.
 pub(super) fn check(
     nodes: &BTreeMap<String, Node>,
     root: &str,
     path: &str,
     target: &str,
+    followed: &mut dyn FnMut(usize) -> Result<(), BundleError>,
 ) -> Result<(), String> {
     let leaves = || format!("is a link that leaves the bundle: {target:?}");
     let inside =
         |path: &[String]| root.is_empty() || path.first().is_some_and(|first| first == root);
     let mut at: Vec<String> = path.split('/').map(str::to_owned).collect();
     at.pop();
-    let mut followed = 1;
+    let mut links = 1;
     // What is still to be walked, the next part last.
     let mut todo: Vec<String> = parts(target).ok_or_else(leaves)?;
     while let Some(part) = todo.pop() {
@@ -29,9 +31,11 @@ pub(super) fn check(
             continue;
         }
         at.push(part);
-        if let Some(Node::Link { target: next }) = nodes.get(&at.join("/")) {
-            followed += 1;
-            if followed > MOST_LINKS {
+        let name = at.join("/");
+        followed(name.len()).map_err(|error| error.to_string())?;
+        if let Some(Node::Link { target: next }) = nodes.get(&name) {
+            links += 1;
+            if links > MOST_LINKS {
                 return Err(format!("is a link that leads in a circle: {target:?}"));
             }
             at.pop();
@@ -72,7 +76,7 @@ mod tests {
         let nodes = tree(links);
         links
             .iter()
-            .all(|(path, target)| check(&nodes, root, path, target).is_ok())
+            .all(|(path, target)| check(&nodes, root, path, target, &mut |_| Ok(())).is_ok())
     }
 
     #[test]

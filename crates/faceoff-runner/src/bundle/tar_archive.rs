@@ -1,4 +1,8 @@
-use super::{error::BundleError, tree::Tree};
+use super::{
+    budget::{Budget, Metered},
+    error::BundleError,
+    tree::Tree,
+};
 use std::io::Read;
 use tar::{Archive, EntryType, Header, PaxExtensions};
 
@@ -16,9 +20,13 @@ struct Extensions {
 /// Unpacks a decompressed tar stream.
 ///
 /// The headers are read raw, since the library would hold an extension header of any size in
-/// memory.
-pub(super) fn unpack(reader: impl Read, tree: &mut Tree) -> Result<(), BundleError> {
-    let mut archive = Archive::new(reader);
+/// memory. What follows the archive's end is not read.
+pub(super) fn unpack<'a>(
+    reader: impl Read,
+    tree: &mut Tree<'a>,
+    budget: &'a Budget<'a>,
+) -> Result<(), BundleError> {
+    let mut archive = Archive::new(Metered::new(reader, budget));
     let mut extensions = Extensions::default();
     for entry in archive
         .entries()
@@ -26,6 +34,7 @@ pub(super) fn unpack(reader: impl Read, tree: &mut Tree) -> Result<(), BundleErr
         .raw(true)
     {
         let mut entry = entry.map_err(BundleError::reading(""))?;
+        budget.entry()?;
         let kind = entry.header().entry_type();
         match kind {
             EntryType::GNULongName => extensions.path = Some(read_extension(&mut entry)?),
@@ -51,6 +60,7 @@ pub(super) fn unpack(reader: impl Read, tree: &mut Tree) -> Result<(), BundleErr
                         tree.folder(&name, mode)?;
                     }
                     EntryType::Regular | EntryType::Continuous => {
+                        budget.allow(entry.size());
                         tree.file(&name, mode, &mut entry)?;
                     }
                     EntryType::Directory => tree.folder(&name, mode)?,

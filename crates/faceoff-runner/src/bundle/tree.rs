@@ -1,5 +1,4 @@
-use super::{error::BundleError, links, node::Node};
-use faceoff_types::BundleLimits;
+use super::{budget::Budget, error::BundleError, links, node::Node};
 use fs_err::{self as fs, OpenOptions, os::unix::fs::symlink};
 use std::{
     collections::BTreeMap,
@@ -11,14 +10,12 @@ use std::{
 
 /// The folder that grows while an archive is read. What is in it is known from memory, never asked
 /// back from the disk, and symbolic links are made last: nothing can be written through one.
-#[derive(Debug)]
-pub(super) struct Tree {
+pub(super) struct Tree<'a> {
     into: PathBuf,
-    limits: BundleLimits,
+    budget: &'a Budget<'a>,
     nodes: BTreeMap<String, Node>,
     files: u64,
     folders: u64,
-    bytes: u64,
 }
 
 /// Set whatever the service's umask: agents run as another user when the service is root.
@@ -33,9 +30,9 @@ fn invalid(entry: &str, problem: impl std::fmt::Display) -> BundleError {
     BundleError::Invalid(format!("entry {shown:?} {problem}"))
 }
 
-impl Tree {
+impl<'a> Tree<'a> {
     /// An empty tree in the folder `into`.
-    pub fn new(into: &Path, limits: &BundleLimits) -> Result<Self, BundleError> {
+    pub fn new(into: &Path, budget: &'a Budget<'a>) -> Result<Self, BundleError> {
         fs::create_dir_all(into)?;
         fs::set_permissions(into, Permissions::from_mode(FOLDER_MODE))?;
         if fs::read_dir(into)?.next().is_some() {
@@ -44,11 +41,10 @@ impl Tree {
         }
         Ok(Self {
             into: into.to_owned(),
-            limits: *limits,
+            budget,
             nodes: BTreeMap::new(),
             files: 0,
             folders: 0,
-            bytes: 0,
         })
     }
 
@@ -106,10 +102,10 @@ impl Tree {
             return Err(invalid(entry, "is in the archive twice"));
         }
         self.files += 1;
-        if self.files > self.limits.files {
+        let most = self.budget.limits().files;
+        if self.files > most {
             return Err(BundleError::Invalid(format!(
-                "the archive has more than {} files",
-                self.limits.files
+                "the archive has more than {most} files"
             )));
         }
         let target = self.into.join(&path);
@@ -144,10 +140,10 @@ impl Tree {
             self.make_folder(entry, parent, false)?;
         }
         self.folders += 1;
-        if self.folders > self.limits.files {
+        let most = self.budget.limits().files;
+        if self.folders > most {
             return Err(BundleError::Invalid(format!(
-                "the archive has more than {} folders",
-                self.limits.files
+                "the archive has more than {most} folders"
             )));
         }
         let place = self.into.join(path);
@@ -190,13 +186,7 @@ impl Tree {
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
                 Err(error) => return Err(BundleError::reading(entry)(error)),
             };
-            self.bytes += read as u64;
-            if self.bytes > self.limits.unpacked_bytes {
-                return Err(BundleError::Invalid(format!(
-                    "the archive unpacks to more than {} bytes (stopped at entry {entry:?})",
-                    self.limits.unpacked_bytes
-                )));
-            }
+            self.budget.content(entry, read)?;
             file.write_all(&buffer[..read])?;
         }
     }
@@ -258,8 +248,10 @@ impl Tree {
     pub fn finish(self, root: &str) -> Result<(), BundleError> {
         for (path, node) in &self.nodes {
             if let Node::Link { target } = node {
-                links::check(&self.nodes, root, path, target)
-                    .map_err(|problem| invalid(path, problem))?;
+                links::check(&self.nodes, root, path, target, &mut |bytes| {
+                    self.budget.followed(bytes)
+                })
+                .map_err(|problem| invalid(path, problem))?;
             }
         }
         for (path, node) in &self.nodes {

@@ -1,4 +1,8 @@
-use super::{error::BundleError, tree::Tree};
+use super::{
+    budget::{Budget, Metered},
+    error::BundleError,
+    tree::Tree,
+};
 use std::{
     fs::File,
     io::{BufReader, Read},
@@ -19,13 +23,25 @@ const LINK_MAX_BYTES: u64 = 4096;
 /// Unpacks a zip archive, entry by entry as its central directory lists them: the directory is
 /// never held in memory, and two entries of one name are both seen. (The library's indexed reader
 /// does neither; its iterating one may change between versions, which the lock file pins.)
-pub(super) fn unpack(file: BufReader<File>, tree: &mut Tree) -> Result<(), BundleError> {
+///
+/// What is read of the file is counted, since its entries may overlap: each of them could have the same
+/// bytes decompressed again, which need not come to anything.
+pub(super) fn unpack<'a>(
+    file: BufReader<File>,
+    packed: u64,
+    tree: &mut Tree<'a>,
+    budget: &'a Budget<'a>,
+) -> Result<(), BundleError> {
+    // Each byte is needed about once.
+    budget.allow(2 * packed);
+    let file = Metered::new(file, budget);
     let mut archive = ZipIterable::try_new(file, Config::default())
         .map_err(|error| damaged("", error))?
         .enforce_header_consistency(true);
     let files = archive.files().map_err(|error| damaged("", error))?;
     while let Some(entry) = files.next() {
         let entry = entry.map_err(|error| damaged("", error))?;
+        budget.entry()?;
         let name = std::str::from_utf8(entry.name_raw())
             .map_err(|_| {
                 BundleError::Invalid(format!(

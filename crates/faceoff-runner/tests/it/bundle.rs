@@ -11,7 +11,7 @@ use tempfile::TempDir;
 fn try_unpack(bytes: &[u8], limits: BundleLimits) -> (TempDir, Result<Bundle, BundleError>) {
     let dir = tempfile::tempdir().unwrap();
     let archive = write(dir.path(), "upload", bytes);
-    let result = unpack(&archive, &dir.path().join("out"), &limits);
+    let result = unpack(&archive, &dir.path().join("out"), &limits, &|| false);
     (dir, result)
 }
 
@@ -366,6 +366,7 @@ fn bombs_are_stopped_while_they_stream() {
         packed_bytes: 1 << 20,
         unpacked_bytes: 1 << 20,
         files: 100,
+        ..BundleLimits::default()
     };
     let bomb = vec![0; 40 << 20];
     for bytes in [
@@ -451,13 +452,14 @@ fn what_fails_on_our_side_is_not_the_teams_affair() {
     fs::create_dir(dir.path().join("full")).unwrap();
     fs::write(dir.path().join("full/file"), "").unwrap();
     for into in [dir.path().join("full"), archive.clone()] {
-        let result = unpack(&archive, &into, &BundleLimits::default());
+        let result = unpack(&archive, &into, &BundleLimits::default(), &|| false);
         assert!(matches!(result, Err(BundleError::Io { .. })), "{result:?}");
     }
     let missing = unpack(
         &dir.path().join("nothing"),
         &dir.path().join("out"),
         &BundleLimits::default(),
+        &|| false,
     );
     assert!(
         matches!(missing, Err(BundleError::Io { .. })),

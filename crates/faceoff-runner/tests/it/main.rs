@@ -4,6 +4,7 @@
 
 mod agents;
 mod archives;
+mod budget;
 mod bundle;
 mod dataset;
 mod free_time;

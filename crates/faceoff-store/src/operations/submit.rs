@@ -5,27 +5,44 @@ use crate::{
     queue,
     store::Store,
     tables::{
+        bundles::{self, UploadQuota, UploadUsage},
         season, smoke_runs,
         submissions::{self, Submission},
         teams,
     },
 };
 use faceoff_types::{BundleRef, SubmissionId, TeamId};
-use jiff::Timestamp;
+use jiff::{Timestamp, tz::TimeZone};
+
+/// When the UTC day of an instant began.
+fn day_of(now: Timestamp) -> Timestamp {
+    let day = now.to_zoned(TimeZone::UTC).start_of_day();
+    // UTC has no day without a beginning; the first one of all may have begun before time did.
+    day.map_or(Timestamp::MIN, |began| began.timestamp())
+}
 
 impl Store {
+    /// What a team has used of its quota by `now`.
+    pub async fn upload_usage(&self, team: TeamId, now: Timestamp) -> Result<UploadUsage> {
+        bundles::usage(&mut *self.database.read.acquire().await?, team, day_of(now)).await
+    }
+
     /// Records an uploaded bundle whose bytes are an artifact already, and queues its smoke run.
-    /// [`StoreError::SeasonClosed`](crate::StoreError::SeasonClosed) once the season is over.
+    /// [`StoreError::SeasonClosed`](crate::StoreError::SeasonClosed) once the season is over;
+    /// [`DayQuotaSpent`](crate::StoreError::DayQuotaSpent) or
+    /// [`StoredQuotaSpent`](crate::StoreError::StoredQuotaSpent) beyond the team's quota.
     pub async fn create_submission(
         &self,
         actor: Actor,
         team: TeamId,
         bundle: BundleRef,
+        quota: &UploadQuota,
         now: Timestamp,
     ) -> Result<Submission> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
             teams::find(tx, team).await?;
+            quota.check(bundles::usage(tx, team, day_of(now)).await?, bundle.bytes)?;
             let id = SubmissionId::new();
             submissions::insert(tx, id, team, &bundle, now).await?;
             let unit = queue::insert(tx, purpose::SMOKE).await?;

@@ -1,4 +1,10 @@
-use crate::{error::Result, event::Actor, queue::Claim, store::Store, tables::runs};
+use crate::{
+    error::Result,
+    event::Actor,
+    queue::Claim,
+    store::Store,
+    tables::{bundles, runs},
+};
 use faceoff_types::RunId;
 use jiff::{SignedDuration, Timestamp};
 
@@ -7,6 +13,9 @@ use jiff::{SignedDuration, Timestamp};
 /// database names must still be there when the copy comes to it. Restored, that evaluation may have
 /// to be played on or scored.
 pub const RECORDINGS_KEPT: SignedDuration = SignedDuration::from_hours(24);
+
+/// For how long the archive of an upload is kept that we failed to check: it may tell why.
+pub const UNCHECKED_KEPT: SignedDuration = SignedDuration::from_hours(24);
 
 /// Artifact key prefix of all recordings of a run.
 fn recordings_of(run: RunId) -> String {
@@ -41,5 +50,37 @@ impl Store {
             .await?;
         }
         Ok(old.len())
+    }
+
+    /// Removes the archives of uploads that were refused: at once those that are invalid, after
+    /// [`UNCHECKED_KEPT`] those that we failed to check. Reason and log stay. Returns how many. A kill half
+    /// way is made up for by the next call, and so is what older programs kept.
+    pub async fn remove_refused_bundles(&self, now: Timestamp) -> Result<usize> {
+        let before = now.saturating_sub(UNCHECKED_KEPT).unwrap_or(Timestamp::MIN);
+        let mut connection = self.database.read.acquire().await?;
+        let refused = bundles::refused(&mut connection, before).await?;
+        drop(connection);
+        for (id, key) in &refused {
+            self.artifacts().delete(key).await?;
+            self.write(Actor::Server, now, async |tx| {
+                bundles::set_removed(tx, *id, now).await
+            })
+            .await?;
+        }
+        Ok(refused.len())
+    }
+
+    /// Removes archives that no submission names and that were stored at `before` or earlier: a process
+    /// was killed between the one and the other. Returns how many.
+    pub async fn remove_orphaned_bundles(&self, before: Timestamp) -> Result<usize> {
+        // In this order: what is named after the first look is none of those that it found.
+        let stored = self.artifacts().stored_until("bundles", before).await?;
+        let kept = bundles::kept(&mut *self.database.read.acquire().await?).await?;
+        let mut removed = 0;
+        for key in stored.iter().filter(|key| !kept.contains(*key)) {
+            self.artifacts().delete(key).await?;
+            removed += 1;
+        }
+        Ok(removed)
     }
 }

@@ -3,6 +3,7 @@
 
 pub(crate) mod ablations;
 pub(crate) mod active_submissions;
+pub(crate) mod bundles;
 pub(crate) mod days;
 pub(crate) mod episode_summaries;
 pub(crate) mod evaluations;

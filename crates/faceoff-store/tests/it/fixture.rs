@@ -59,7 +59,13 @@ impl Fixture {
 
     pub async fn upload(&self, team: &Team) -> Submission {
         self.store
-            .create_submission(Actor::Team(team.id), team.id, bundle(), self.now)
+            .create_submission(
+                Actor::Team(team.id),
+                team.id,
+                bundle(),
+                &UploadQuota::default(),
+                self.now,
+            )
             .await
             .unwrap()
     }

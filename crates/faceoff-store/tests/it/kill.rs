@@ -47,7 +47,13 @@ async fn child() {
             .unwrap();
         tell(format!("team {}", team.id));
         store
-            .create_submission(Actor::Organiser, team.id, bundle(), now)
+            .create_submission(
+                Actor::Organiser,
+                team.id,
+                bundle(),
+                &UploadQuota::default(),
+                now,
+            )
             .await
             .unwrap();
         let small = RunPlan {

@@ -3,6 +3,7 @@
 
 mod ablations;
 mod artifacts;
+mod bundles;
 mod competition;
 mod days;
 mod events;

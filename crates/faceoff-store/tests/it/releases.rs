@@ -224,9 +224,14 @@ async fn a_closed_season_takes_nothing_more_and_stays_closed() {
             .await
             .unwrap_err(),
     );
-    let upload =
-        site.store
-            .create_submission(Actor::Organiser, submission.team, bundle(), site.now);
+    let quota = UploadQuota::default();
+    let upload = site.store.create_submission(
+        Actor::Organiser,
+        submission.team,
+        bundle(),
+        &quota,
+        site.now,
+    );
     closed(upload.await.unwrap_err());
     let plan = plan();
     let rerun = site

@@ -84,7 +84,13 @@ async fn unknown_ids_are_not_found() {
     ));
     let upload = f
         .store
-        .create_submission(Actor::Organiser, id, bundle(), f.now)
+        .create_submission(
+            Actor::Organiser,
+            id,
+            bundle(),
+            &UploadQuota::default(),
+            f.now,
+        )
         .await;
     assert!(matches!(upload, Err(StoreError::NotFound("team"))));
     let submission = uuid::Uuid::now_v7().into();

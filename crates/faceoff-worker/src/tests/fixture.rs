@@ -36,6 +36,8 @@ pub(super) struct Scripted {
     play: Box<Play>,
     pub(super) played: Mutex<Vec<(Task, u32)>>,
     pub(super) assembled: Mutex<Vec<String>>,
+    /// Told when an archive is unpacked that has no end.
+    pub(super) endless: tokio::sync::Notify,
 }
 
 impl Scripted {
@@ -49,6 +51,7 @@ impl Scripted {
             play: Box::new(play),
             played: Mutex::default(),
             assembled: Mutex::default(),
+            endless: tokio::sync::Notify::new(),
         })
     }
 }
@@ -72,9 +75,18 @@ impl Evaluator for Scripted {
         archive: &Path,
         into: &Path,
         _limits: &BundleLimits,
+        cancelled: &dyn Fn() -> bool,
     ) -> Result<Bundle, BundleError> {
-        if std::fs::read(archive).unwrap() != b"archive" {
-            return Err(BundleError::Invalid("agent.toml is missing".into()));
+        match std::fs::read(archive).unwrap().as_slice() {
+            b"archive" => {}
+            b"endless" => {
+                self.endless.notify_one();
+                while !cancelled() {
+                    std::thread::yield_now();
+                }
+                return Err(BundleError::Cancelled);
+            }
+            _ => return Err(BundleError::Invalid("agent.toml is missing".into())),
         }
         let manifest = faceoff_wire::Manifest {
             name: "scripted".into(),
@@ -247,7 +259,13 @@ impl Server {
             .await
             .unwrap();
         self.store
-            .create_submission(Actor::Team(team.id), team.id, bundle, now)
+            .create_submission(
+                Actor::Team(team.id),
+                team.id,
+                bundle,
+                &UploadQuota::default(),
+                now,
+            )
             .await
             .unwrap()
     }
@@ -341,6 +359,7 @@ impl Server {
                 packed_bytes: 1,
                 unpacked_bytes: 1,
                 files: 1,
+                unpack_s: 1,
             },
         }
     }

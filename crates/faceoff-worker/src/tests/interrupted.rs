@@ -83,6 +83,26 @@ async fn a_shutdown_does_not_stop_a_slot_before_its_unit_was_given_back() {
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_shutdown_ends_an_archive_that_is_being_unpacked() {
+    let server = Server::new().await;
+    let submission = server.upload("Alpha", b"endless").await;
+    let evaluator = Scripted::new(|_, _| Ok(()));
+    let running = server.work(1, &evaluator);
+    evaluator.endless.notified().await;
+    running.stop().await;
+    // Given back at once, and nobody's fault.
+    let work = server.store.claim("next", LEASE_S, server.now()).await;
+    let Some(Work::Smoke {
+        submission: next, ..
+    }) = work.unwrap().map(|claimed| claimed.work)
+    else {
+        panic!("the slot has left its unit to its lease")
+    };
+    assert_eq!(next.id, submission.id);
+    assert_eq!(next.state, SubmissionState::Validating);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn a_cancelled_evaluation_stops_its_slots() {
     let server = Server::new().await;
     let id = server.evaluation().await;

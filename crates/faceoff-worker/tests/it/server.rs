@@ -121,7 +121,13 @@ impl Server {
             .await
             .unwrap();
         self.store
-            .create_submission(Actor::Team(team.id), team.id, bundle, now)
+            .create_submission(
+                Actor::Team(team.id),
+                team.id,
+                bundle,
+                &UploadQuota::default(),
+                now,
+            )
             .await
             .unwrap()
             .id

@@ -2,7 +2,7 @@
 
 use super::*;
 use faceoff_http::{
-    HttpConfig, HttpLimits,
+    ConnectionLimits, HttpConfig, HttpLimits,
     token::hash_token,
     views::{evaluation::EvaluationStatus, submission::SubmissionStatus},
 };
@@ -48,6 +48,7 @@ async fn site(max_bundle_bytes: u64) -> Site {
     tokio::spawn(faceoff_http::serve(
         listener,
         router,
+        ConnectionLimits::default(),
         std::future::pending(),
     ));
     Site {

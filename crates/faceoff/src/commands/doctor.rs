@@ -1,6 +1,6 @@
 //! `faceoff doctor`: what this host offers to agents and their sandbox, what is missing, and the cure.
 
-use crate::config::Config;
+use crate::{config::Config, descriptors::Descriptors};
 use anyhow::{Context as _, bail};
 use clap::Args;
 use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime, probe_host};
@@ -27,6 +27,16 @@ struct Findings {
     runtimes: Vec<RuntimeFound>,
     in_memory: InMemory,
     cpus: Cpus,
+    descriptors: DescriptorsFound,
+}
+
+/// How `serve` would divide the descriptors that it gets from this shell.
+#[derive(Debug, Serialize)]
+struct DescriptorsFound {
+    /// `None`: too few.
+    divided: Option<Descriptors>,
+    found: String,
+    cure: Option<String>,
 }
 
 /// Will the runtimes' files be kept in memory, where they tell no agent what another has read?
@@ -120,6 +130,7 @@ impl Findings {
             runtimes: runtimes(config),
             in_memory: in_memory(config),
             cpus: cpus(config),
+            descriptors: descriptors(config),
         }
     }
 
@@ -159,7 +170,10 @@ impl Findings {
             "  {} usable, {} worker slot(s), agents on: {bound}",
             cpus.usable, cpus.slots
         )?;
-        print_cure(out, cpus.advice.as_deref())
+        print_cure(out, cpus.advice.as_deref())?;
+        writeln!(out, "Descriptors")?;
+        writeln!(out, "  {}", self.descriptors.found)?;
+        print_cure(out, self.descriptors.cure.as_deref())
     }
 }
 
@@ -250,6 +264,39 @@ fn cpus(config: &Config) -> Cpus {
     }
 }
 
+fn descriptors(config: &Config) -> DescriptorsFound {
+    let wanted = config.connections.limits();
+    match Descriptors::divide(Descriptors::available(), config.slots(), &wanted) {
+        Ok(divided) => {
+            let Descriptors {
+                limit,
+                reserved,
+                connections,
+                per_address,
+            } = divided;
+            let cure = (connections < wanted.open).then(|| {
+                format!(
+                    "for all {} of connections.most raise the limit: ulimit -n, or LimitNOFILE= of systemd",
+                    wanted.open
+                )
+            });
+            DescriptorsFound {
+                divided: Some(divided),
+                found: format!(
+                    "{limit} at most, {reserved} of them for evaluations: {connections} connections, \
+                     {per_address} of one address"
+                ),
+                cure,
+            }
+        }
+        Err(error) => DescriptorsFound {
+            divided: None,
+            found: error.to_string(),
+            cure: None,
+        },
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -267,6 +314,7 @@ mod tests {
             runtimes: Vec::new(),
             in_memory: in_memory(&Config::default()),
             cpus: cpus(&Config::default()),
+            descriptors: descriptors(&Config::default()),
         }
     }
 

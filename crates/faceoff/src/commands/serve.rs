@@ -1,10 +1,10 @@
 //! `faceoff serve`: API, pages, worker slots and the daily schedule in one process.
 
-use crate::{config::Config, log::LogFormat};
+use crate::{config::Config, descriptors::Descriptors, log::LogFormat};
 use anyhow::{Context, bail};
 use clap::Args;
 use faceoff_http::{
-    HttpConfig, HttpLimits,
+    ConnectionLimits, HttpConfig,
     token::{Token, TokenKind, hash_token},
 };
 use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime, probe_host};
@@ -63,16 +63,32 @@ impl ServeCommand {
         }
         // Before anything is opened: a host that cannot hold agents must not look as if it could.
         check_sandbox(&probe_host(), &config.sandbox.given_up)?;
+        let connections = config.connections.limits();
+        let descriptors = Descriptors::divide(Descriptors::raise(), config.slots(), &connections)?;
+        tracing::info!(
+            limit = descriptors.limit,
+            reserved = descriptors.reserved,
+            connections = descriptors.connections,
+            per_address = descriptors.per_address,
+            "file descriptors are divided"
+        );
+        if descriptors.connections < connections.open {
+            tracing::warn!(
+                wanted = connections.open,
+                "fewer connections than connections.most; raise the limit of descriptors (ulimit -n, LimitNOFILE=)"
+            );
+        }
+        let connections = descriptors.limits(connections);
         tokio::runtime::Builder::new_multi_thread()
             .enable_all()
             .thread_name("http")
             .build()
             .context("starting the async runtime")?
-            .block_on(serve(config))
+            .block_on(serve(config, connections))
     }
 }
 
-async fn serve(config: Config) -> anyhow::Result<()> {
+async fn serve(config: Config, connections: ConnectionLimits) -> anyhow::Result<()> {
     let data_dir = config.server.data_dir.clone();
     private_folder(&data_dir)?;
     let upload_dir = data_dir.join("uploads");
@@ -115,7 +131,7 @@ async fn serve(config: Config) -> anyhow::Result<()> {
             upload_dir,
             daily_at: config.evaluation.at,
             clock: clock.clone(),
-            limits: HttpLimits::default(),
+            limits: config.uploads.limits(),
         },
     );
     let mut agent = config.agent_environment();
@@ -157,7 +173,7 @@ async fn serve(config: Config) -> anyhow::Result<()> {
             shutdown.clone(),
         ));
     }
-    parts.spawn(answer(listener, router, shutdown.clone()));
+    parts.spawn(answer(listener, router, connections, shutdown.clone()));
     // For the program that started this one, whatever is logged: from now on a connection is answered,
     // and a port that the system chose is known. That nobody listens is no fault.
     let _ = writeln!(std::io::stdout(), "http://{address}");
@@ -203,16 +219,19 @@ fn ended_early(part: Result<anyhow::Result<()>, tokio::task::JoinError>) -> anyh
 async fn answer(
     listener: TcpListener,
     router: faceoff_http::Router,
+    connections: ConnectionLimits,
     shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
     let asked = shutdown.clone();
-    let serving = faceoff_http::serve(listener, router, async move { asked.cancelled().await });
+    let serving = faceoff_http::serve(listener, router, connections, async move {
+        asked.cancelled().await;
+    });
     let late = async {
         shutdown.cancelled().await;
         tokio::time::sleep(GRACE).await;
     };
     tokio::select! {
-        served = serving => served.context("serving HTTP"),
+        () = serving => Ok(()),
         () = late => {
             tracing::warn!("connections still open after {} s are cut", GRACE.as_secs());
             Ok(())

@@ -1,4 +1,5 @@
 use super::*;
+use std::time::Duration;
 
 fn error(text: &str) -> String {
     format!("{:#}", Config::parse(text).unwrap_err())
@@ -36,6 +37,11 @@ fn every_section_is_read() {
         step_s = 0.5
         [bundle]
         files = 10
+        [uploads]
+        day_bytes = 7
+        [connections]
+        exempt = ["10.0.0.1"]
+        head_s = 5
         [sandbox]
         given_up = ["cgroup-memory"]
         [runtimes.julia]
@@ -53,6 +59,10 @@ fn every_section_is_read() {
     assert_eq!(config.limits.pids, 9);
     assert_eq!(config.limits.open_files, Limits::default().open_files);
     assert_eq!(config.bundle.files, 10);
+    assert_eq!(config.uploads.limits().upload_quota.day_bytes, 7);
+    let connections = config.connections.limits();
+    assert_eq!(connections.head, Duration::from_secs(5));
+    assert_eq!(connections.exempt, [IpAddr::from([10, 0, 0, 1])]);
     let environment = config.agent_environment();
     assert_eq!(
         environment.isolation,
@@ -79,6 +89,8 @@ fn an_error_names_the_field() {
     assert!(error("[workers]\nlease_s = 1").contains("workers.lease_s"));
     assert!(error("[time]\nstep_s = -1.0").contains("time.step_s"));
     assert!(error("[limits]\npid = 1").contains("pid"));
+    assert!(error("[uploads]\nat_once = 0").contains("uploads.at_once"));
+    assert!(error("[connections]\nhead_s = 0.0").contains("connections.head_s"));
     assert!(error("[sandbox]\ngiven_up = [\"everything\"]").contains("everything"));
 }
 

@@ -1,0 +1,263 @@
+//! Archives that are small, hold little and take long to read, unless what reading them costs is counted.
+
+use crate::archives::{Tar, write};
+use faceoff_runner::bundle::{BundleError, BundleLimits, unpack};
+use flate2::{Compression, Crc, write::GzEncoder};
+use std::{cell::Cell, io::Write};
+use tar::EntryType;
+
+const MIB: usize = 1 << 20;
+/// The reason of all that is more reading than files.
+const TOO_MUCH: &str = "more than its files explain";
+
+/// What is said of an archive.
+fn verdict(bytes: &[u8]) -> Result<(), BundleError> {
+    verdict_unless(bytes, &|| false)
+}
+
+fn verdict_unless(bytes: &[u8], cancelled: &dyn Fn() -> bool) -> Result<(), BundleError> {
+    let dir = tempfile::tempdir().unwrap();
+    let archive = write(dir.path(), "upload", bytes);
+    let limits = BundleLimits::default();
+    unpack(&archive, &dir.path().join("out"), &limits, cancelled).map(drop)
+}
+
+#[track_caller]
+fn refused(bytes: &[u8], needle: &str) {
+    match verdict(bytes) {
+        Err(BundleError::Invalid(told)) => assert!(told.contains(needle), "{told:?}"),
+        other => panic!("expected a refusal with {needle:?}, got {other:?}"),
+    }
+}
+
+/// A comment of about a MiB, as an extension header has it.
+fn pax_comment() -> Vec<u8> {
+    let length = MIB - 8;
+    let mut record = format!("{length} comment=").into_bytes();
+    record.resize(length - 1, b'x');
+    record.push(b'\n');
+    record
+}
+
+/// An archive of this entry, over and over.
+fn repeated(kind: EntryType, content: &[u8], times: usize) -> Tar {
+    (0..times).fold(Tar::with_manifest(), |tar, _| {
+        tar.entry(kind, "repeated", 0o644, "agent.toml", content)
+    })
+}
+
+#[test]
+fn headers_that_describe_nothing_are_counted() {
+    let comment = pax_comment();
+    for kind in [EntryType::XHeader, EntryType::XGlobalHeader] {
+        let bomb = repeated(kind, &comment, 20).gz();
+        assert!(bomb.len() < MIB, "{} bytes", bomb.len());
+        refused(&bomb, TOO_MUCH);
+    }
+    for kind in [EntryType::GNULongName, EntryType::GNULongLink] {
+        refused(&repeated(kind, &vec![b'n'; MIB], 20).gz(), TOO_MUCH);
+        refused(&repeated(kind, &vec![b'n'; MIB], 20).zst(), TOO_MUCH);
+    }
+}
+
+#[test]
+fn what_an_entry_carries_and_nobody_reads_is_counted() {
+    // The library skips it, by reading it.
+    for kind in [EntryType::Directory, EntryType::Symlink] {
+        refused(&repeated(kind, &vec![0; 30 * MIB], 1).gz(), TOO_MUCH);
+    }
+    // Sparse files are refused by what they claim, before their content.
+    let sparse = repeated(EntryType::GNUSparse, &[0; 512], 1).gz();
+    refused(&sparse, "sparse");
+    let sparse = Tar::with_manifest()
+        .entry(
+            EntryType::XHeader,
+            "x",
+            0o644,
+            "",
+            b"22 GNU.sparse.major=1\n",
+        )
+        .file("x", 0o644, b"");
+    refused(&sparse.gz(), "sparse");
+}
+
+#[test]
+fn entries_that_become_nothing_are_counted() {
+    // The archive's own root is no folder that could be there twice.
+    let roots = (0..200_001).fold(Tar::with_manifest(), |tar, _| tar.folder("./"));
+    refused(&roots.gz(), "more than 200000 entries");
+}
+
+#[test]
+fn streams_that_hold_nothing_are_counted() {
+    let empty_gzip = GzEncoder::new(Vec::new(), Compression::fast())
+        .finish()
+        .unwrap();
+    let empty_zstd = zstd::encode_all(&b""[..], 1).unwrap();
+    let tar = || Tar::with_manifest().file("agent.py", 0o644, b"print()");
+    for (empty, whole) in [(empty_gzip, tar().gz()), (empty_zstd, tar().zst())] {
+        let mut bomb = empty.repeat((1 << 16) + 1);
+        bomb.extend_from_slice(&whole);
+        refused(&bomb, "more than 65536 compressed streams");
+        let mut some = empty.repeat(100);
+        some.extend_from_slice(&whole);
+        verdict(&some).unwrap();
+    }
+}
+
+#[test]
+fn an_archive_in_several_streams_and_with_padding_behind_it_is_as_good_as_any() {
+    let whole = Tar::with_manifest()
+        .file("weights", 0o644, &vec![7; MIB])
+        .bytes();
+    let gzip = |piece: &[u8]| {
+        let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+        encoder.write_all(piece).unwrap();
+        encoder.finish().unwrap()
+    };
+    let pieces: Vec<u8> = whole.chunks(10_000).flat_map(gzip).collect();
+    verdict(&pieces).unwrap();
+    let pieces: Vec<u8> = whole
+        .chunks(10_000)
+        .flat_map(|piece| zstd::encode_all(piece, 1).unwrap())
+        .collect();
+    verdict(&pieces).unwrap();
+    let mut padded = whole;
+    padded.resize(100 * MIB, 0);
+    verdict(&gzip(&padded)).unwrap();
+}
+
+#[test]
+fn many_honest_files_with_all_that_can_describe_them_pass() {
+    let described = (0..3000).fold(Tar::with_manifest(), |tar, i| {
+        let name = format!("{}/{i}", "long".repeat(40));
+        let record = format!(" path={name}\n");
+        let length = record.len() + 3;
+        let record = format!("{length}{record}");
+        assert_eq!(record.len(), length);
+        tar.entry(EntryType::XHeader, "x", 0o644, "", record.as_bytes())
+            .file("short", 0o644, &[7; 700])
+    });
+    verdict(&described.gz()).unwrap();
+}
+
+#[test]
+fn a_cancelled_archive_ends_whatever_it_is_in_the_middle_of() {
+    let large = || Tar::with_manifest().file("large", 0o644, &vec![7; 3 * MIB]);
+    let headers = repeated(EntryType::XHeader, &pax_comment(), 10).gz();
+    let quoted = quoting_zip(50, MIB);
+    for bytes in [large().gz(), large().zst(), headers, quoted] {
+        for at in [0, 3, 20] {
+            let asked = Cell::new(0);
+            let cancelled = || {
+                asked.set(asked.get() + 1);
+                asked.get() > at
+            };
+            let told = verdict_unless(&bytes, &cancelled);
+            assert!(matches!(told, Err(BundleError::Cancelled)), "{told:?}");
+            assert_eq!(asked.get(), at + 1, "it goes on after it was cancelled");
+        }
+    }
+}
+
+/// An archive of files that share their bytes: each is compressed as “the head of the next one, literally, and
+/// then what that one is”, and the last holds `tail` bytes that decompress to nothing. Reading every file reads
+/// the tail again.
+fn quoting_zip(files: usize, tail: usize) -> Vec<u8> {
+    let stored = |last: bool, bytes: &[u8]| {
+        let length = u16::try_from(bytes.len()).unwrap();
+        let mut block = vec![u8::from(last)];
+        block.extend_from_slice(&length.to_le_bytes());
+        block.extend_from_slice(&(!length).to_le_bytes());
+        block.extend_from_slice(bytes);
+        block
+    };
+    let name = |file: usize| {
+        if file == 0 {
+            "agent.toml".to_owned()
+        } else {
+            format!("f{file:08}")
+        }
+    };
+    // version, flags, method, time, date, CRC, sizes, lengths: as both kinds of header have them
+    let fields = |file: usize, crc: u32, packed: usize, unpacked: usize| {
+        let mut fields = vec![20, 0, 0, 0, 8, 0, 0, 0, 0x21, 0];
+        fields.extend_from_slice(&crc.to_le_bytes());
+        fields.extend_from_slice(&u32::try_from(packed).unwrap().to_le_bytes());
+        fields.extend_from_slice(&u32::try_from(unpacked).unwrap().to_le_bytes());
+        fields.extend_from_slice(&u16::try_from(name(file).len()).unwrap().to_le_bytes());
+        fields.extend_from_slice(&[0, 0]);
+        fields
+    };
+    // From the last file to the first; `data` is what a file is compressed to.
+    let mut data = stored(false, b"").repeat(tail / 5);
+    data.extend_from_slice(&stored(true, b""));
+    let mut contents: Vec<u8> = Vec::new();
+    let mut directory = Vec::new();
+    let mut heads = Vec::new();
+    for file in (0..files).rev() {
+        let mut crc = Crc::new();
+        crc.update(&contents);
+        let fields = fields(file, crc.sum(), data.len(), contents.len());
+        let mut head = b"PK\x03\x04".to_vec();
+        head.extend_from_slice(&fields);
+        head.extend_from_slice(name(file).as_bytes());
+        heads.push((file, fields, head.len() + data.len()));
+        if file == 0 {
+            head.extend_from_slice(&data);
+            data = head;
+        } else {
+            let mut quoting = stored(false, &head);
+            quoting.extend_from_slice(&data);
+            data = quoting;
+            head.extend_from_slice(&contents);
+            contents = head;
+        }
+    }
+    for (file, fields, from_end) in heads.iter().rev() {
+        directory.extend_from_slice(b"PK\x01\x02\x14\x03");
+        directory.extend_from_slice(fields);
+        // comment, disk, attributes, place
+        directory.extend_from_slice(&[0; 6]);
+        directory.extend_from_slice(&(0o100_644_u32 << 16).to_le_bytes());
+        let place = u32::try_from(data.len() - from_end).unwrap();
+        directory.extend_from_slice(&place.to_le_bytes());
+        directory.extend_from_slice(name(*file).as_bytes());
+    }
+    let mut zip = data;
+    let place = u32::try_from(zip.len()).unwrap();
+    let (files, length) = (
+        u16::try_from(files).unwrap(),
+        u32::try_from(directory.len()).unwrap(),
+    );
+    zip.extend_from_slice(&directory);
+    zip.extend_from_slice(b"PK\x05\x06\0\0\0\0");
+    zip.extend_from_slice(&files.to_le_bytes());
+    zip.extend_from_slice(&files.to_le_bytes());
+    zip.extend_from_slice(&length.to_le_bytes());
+    zip.extend_from_slice(&place.to_le_bytes());
+    zip.extend_from_slice(&[0, 0]);
+    zip
+}
+
+#[test]
+fn a_zip_whose_files_share_their_bytes_is_read_about_once() {
+    // Three files of it are a proper archive, but for its manifest.
+    refused(&quoting_zip(3, 1000), "agent.toml: ");
+    let bomb = quoting_zip(200, MIB);
+    assert!(bomb.len() < MIB + MIB / 8, "{} bytes", bomb.len());
+    refused(&bomb, TOO_MUCH);
+}
+
+#[test]
+fn links_that_take_long_to_follow_are_counted() {
+    let target = "a/".repeat(500);
+    let links = |count: usize| {
+        (0..count).fold(Tar::with_manifest(), |tar, link| {
+            tar.entry(EntryType::GNULongLink, "l", 0o644, "", target.as_bytes())
+                .symlink(&format!("l{link}"), "")
+        })
+    };
+    verdict(&links(20).gz()).unwrap();
+    refused(&links(1000).gz(), "lead through too many others");
+}

@@ -1,0 +1,174 @@
+//! What is kept of uploads, and how much a team may keep.
+
+use crate::fixture::*;
+use faceoff_store::*;
+use faceoff_types::*;
+use jiff::{SignedDuration, Timestamp};
+
+/// An upload whose archive is stored under a key of its own.
+async fn stored(f: &Fixture, team: &Team, name: &str, bytes: u64) -> Submission {
+    let key = format!("bundles/{}/{name}", team.id);
+    let file = f.folder.path().join("upload");
+    std::fs::write(&file, "an archive").unwrap();
+    f.store.artifacts().put_file(&key, &file).await.unwrap();
+    let bundle = BundleRef {
+        key,
+        bytes,
+        ..bundle()
+    };
+    let quota = UploadQuota::default();
+    f.store
+        .create_submission(Actor::Team(team.id), team.id, bundle, &quota, f.now)
+        .await
+        .unwrap()
+}
+
+async fn is_kept(f: &Fixture, submission: &Submission) -> bool {
+    f.store
+        .artifacts()
+        .read(&submission.bundle.key)
+        .await
+        .is_ok()
+}
+
+async fn refuse(f: &Fixture) {
+    let (claim, _) = f.claim_smoke().await;
+    let outcome = SmokeOutcome::Invalid {
+        agent_name: None,
+        reason: "there is no agent.toml".into(),
+        timing: Vec::new(),
+        log: "its log\n".into(),
+    };
+    f.store.commit_smoke(&claim, outcome, f.now).await.unwrap();
+}
+
+/// Ends the next smoke run by our fault.
+async fn give_up(f: &mut Fixture) {
+    for _ in 0..MAX_ATTEMPTS {
+        let (claim, _) = f.claim_smoke().await;
+        f.store
+            .release_failed(&claim, "no disk", f.now)
+            .await
+            .unwrap();
+        f.later(3600);
+    }
+}
+
+#[tokio::test]
+async fn a_refused_bundle_goes_and_its_reason_and_log_stay() {
+    let f = Fixture::new().await;
+    let team = f.team("Alpha").await;
+    let valid = stored(&f, &team, "valid", 100).await;
+    f.validate().await;
+    let invalid = stored(&f, &team, "invalid", 1000).await;
+    assert_eq!(f.store.remove_refused_bundles(f.now).await.unwrap(), 0);
+    refuse(&f).await;
+    let waiting = stored(&f, &team, "waiting", 10).await;
+    let used = f.store.upload_usage(team.id, f.now).await.unwrap();
+    assert_eq!((used.day_bytes, used.stored_bytes), (1110, 1110));
+
+    assert_eq!(f.store.remove_refused_bundles(f.now).await.unwrap(), 1);
+    assert_eq!(f.store.remove_refused_bundles(f.now).await.unwrap(), 0);
+    assert!(!is_kept(&f, &invalid).await);
+    assert!(is_kept(&f, &valid).await && is_kept(&f, &waiting).await);
+    let told = f.store.submission(invalid.id).await.unwrap();
+    assert!(
+        matches!(told.state, SubmissionState::Invalid { reason } if reason.contains("agent.toml"))
+    );
+    let log = f.store.submission_log(invalid.id).await.unwrap();
+    assert_eq!(log.as_deref(), Some("its log\n"));
+    let used = f.store.upload_usage(team.id, f.now).await.unwrap();
+    assert_eq!((used.day_bytes, used.stored_bytes), (1110, 110));
+}
+
+#[tokio::test]
+async fn what_we_failed_to_check_is_kept_for_a_day_and_costs_the_team_nothing_of_its_day() {
+    let mut f = Fixture::new().await;
+    let team = f.team("Alpha").await;
+    let unchecked = stored(&f, &team, "unchecked", 1000).await;
+    let uploaded_at = f.now;
+    give_up(&mut f).await;
+    let used = f.store.upload_usage(team.id, f.now).await.unwrap();
+    assert_eq!((used.day_bytes, used.stored_bytes), (0, 1000));
+    assert_eq!(f.store.remove_refused_bundles(f.now).await.unwrap(), 0);
+    let later = uploaded_at + UNCHECKED_KEPT;
+    assert_eq!(f.store.remove_refused_bundles(later).await.unwrap(), 1);
+    assert!(!is_kept(&f, &unchecked).await);
+}
+
+#[tokio::test]
+async fn what_a_run_or_another_upload_needs_is_not_removed() {
+    let f = Fixture::new().await;
+    let team = f.team("Alpha").await;
+    // One archive under two submissions, as no upload makes it.
+    let valid = stored(&f, &team, "shared", 100).await;
+    f.validate().await;
+    stored(&f, &team, "shared", 100).await;
+    refuse(&f).await;
+    assert_eq!(f.store.remove_refused_bundles(f.now).await.unwrap(), 0);
+    assert!(is_kept(&f, &valid).await);
+}
+
+#[tokio::test]
+async fn archives_of_no_submission_go_once_nobody_can_be_about_to_name_them() {
+    let f = Fixture::new().await;
+    let team = f.team("Alpha").await;
+    let named = stored(&f, &team, "named", 100).await;
+    let orphan = format!("bundles/{}/orphan", team.id);
+    let file = f.folder.path().join("upload");
+    f.store.artifacts().put_file(&orphan, &file).await.unwrap();
+    let hour = SignedDuration::from_hours(1);
+    // The files' times are the host's.
+    let (before, after) = (Timestamp::now() - hour, Timestamp::now() + hour);
+    assert_eq!(f.store.remove_orphaned_bundles(before).await.unwrap(), 0);
+    assert_eq!(f.store.remove_orphaned_bundles(after).await.unwrap(), 1);
+    assert!(f.store.artifacts().read(&orphan).await.is_err());
+    assert!(is_kept(&f, &named).await);
+}
+
+#[tokio::test]
+async fn a_quota_is_the_teams_own_and_the_last_word_is_the_transactions() {
+    let mut f = Fixture::new().await;
+    let (one, other) = (f.team("One").await, f.team("Other").await);
+    let quota = UploadQuota {
+        day_bytes: 1000,
+        stored_bytes: 1500,
+    };
+    let upload = async |f: &Fixture, team: &Team, bytes: u64| {
+        let bundle = BundleRef { bytes, ..bundle() };
+        f.store
+            .create_submission(Actor::Team(team.id), team.id, bundle, &quota, f.now)
+            .await
+    };
+    upload(&f, &one, 600).await.unwrap();
+    let error = upload(&f, &one, 500).await.unwrap_err();
+    assert!(
+        matches!(
+            error,
+            StoreError::DayQuotaSpent {
+                limit_bytes: 1000,
+                used_bytes: 600,
+                bundle_bytes: 500
+            }
+        ),
+        "{error}"
+    );
+    upload(&f, &one, 400).await.unwrap();
+    upload(&f, &other, 1000).await.unwrap();
+    let error = upload(&f, &one, u64::MAX).await.unwrap_err();
+    assert!(matches!(error, StoreError::DayQuotaSpent { .. }), "{error}");
+    // Midnight, UTC.
+    f.later(14 * 3600);
+    let error = upload(&f, &one, 600).await.unwrap_err();
+    assert!(
+        matches!(
+            error,
+            StoreError::StoredQuotaSpent {
+                used_bytes: 1000,
+                ..
+            }
+        ),
+        "{error}"
+    );
+    upload(&f, &one, 500).await.unwrap();
+}
