@@ -100,6 +100,7 @@ fn outside(error: &anyhow::Error) -> &'static str {
         Some(PlatformFault::Io { .. }) => "a file could not be read or written",
         Some(PlatformFault::Recording(_)) => "the recording could not be made",
         Some(PlatformFault::Simulation(_)) => "the simulator failed",
+        Some(PlatformFault::HostBusy(_)) => "the host kept the agent from answering",
         Some(PlatformFault::Cancelled) | None => "the evaluator failed",
     }
 }
