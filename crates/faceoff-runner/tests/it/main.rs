@@ -9,6 +9,7 @@ mod dataset;
 mod free_time;
 mod fuzz;
 mod host_noise;
+mod host_share;
 mod misbehaviour;
 mod recording;
 mod shard;
