@@ -11,7 +11,7 @@ use std::{
     io::{self, BufRead, BufReader},
     path::Path,
     process::{Child, Command, Stdio},
-    sync::mpsc,
+    sync::{Arc, Mutex, PoisonError, mpsc},
     thread,
     time::{Duration, Instant},
 };
@@ -37,13 +37,17 @@ impl Drop for Process {
 /// A running server. Dropping it ends the process at once, as a power cut would (SIGKILL).
 #[derive(Debug)]
 pub struct Server {
-    _process: Process,
+    process: Process,
     /// `http://127.0.0.1:PORT`
     pub url: String,
     /// The organiser's bearer token.
     pub admin_token: String,
     client: Client,
+    log: Log,
 }
+
+/// What a server has logged so far.
+type Log = Arc<Mutex<String>>;
 
 impl Server {
     /// Starts the server on a free port with `config` (the text of a configuration file) and waits
@@ -56,7 +60,7 @@ impl Server {
         let child = command(data_dir, config).stdout(Stdio::piped()).spawn();
         let mut process = Process(child.expect("the program can be started"));
         let child = &mut process.0;
-        let log = collect(child.stderr.take().expect("standard error is piped"));
+        let (log, ended) = collect(child.stderr.take().expect("standard error is piped"));
         let client = Client::builder()
             .timeout(PATIENCE)
             .build()
@@ -66,21 +70,33 @@ impl Server {
             BufReader::new(child.stdout.take().expect("standard output is piped")).lines();
         let Some(url) = told.next().transpose().expect("a pipe can be read") else {
             let status = child.wait().expect("a child can be reaped");
-            panic!(
-                "the server ended with {status}:\n{}",
-                log.recv().unwrap_or_default()
-            );
+            // Its last words come with its end.
+            let _ = ended.recv();
+            panic!("the server ended with {status}:\n{}", so_far(&log));
         };
         let admin_token = fs::read_to_string(data_dir.join("admin-token"))
             .expect("the server leaves the organiser's token in its folder")
             .trim()
             .to_owned();
         Self {
-            _process: process,
+            process,
             url,
             admin_token,
             client,
+            log,
         }
+    }
+
+    /// What it has logged so far.
+    #[must_use]
+    pub fn log(&self) -> String {
+        so_far(&self.log)
+    }
+
+    /// Its process id.
+    #[must_use]
+    pub fn pid(&self) -> u32 {
+        self.process.0.id()
     }
 
     /// Ends the server, as dropping it does.
@@ -220,16 +236,22 @@ fn command(data_dir: &Path, config: &str) -> Command {
     command
 }
 
-/// Drains a child's log so that it never blocks, and hands it over when the child ends.
-fn collect(stderr: impl std::io::Read + Send + 'static) -> mpsc::Receiver<String> {
-    let (sender, receiver) = mpsc::channel();
+/// Drains a child's log so that it never blocks; the receiver hears of its end.
+fn collect(stderr: impl io::Read + Send + 'static) -> (Log, mpsc::Receiver<()>) {
+    let (ending, ended) = mpsc::channel::<()>();
+    let log = Log::default();
+    let collected = Arc::clone(&log);
     thread::spawn(move || {
-        let mut log = String::new();
+        let _ending = ending;
         for line in BufReader::new(stderr).lines().map_while(Result::ok) {
+            let mut log = collected.lock().unwrap_or_else(PoisonError::into_inner);
             log.push_str(&line);
             log.push('\n');
         }
-        let _ = sender.send(log);
     });
-    receiver
+    (log, ended)
+}
+
+fn so_far(log: &Log) -> String {
+    log.lock().unwrap_or_else(PoisonError::into_inner).clone()
 }
