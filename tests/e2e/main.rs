@@ -2,9 +2,11 @@
 
 mod bad_agents;
 mod browser;
+mod busy_host;
 mod crash;
 mod cut;
 mod demo;
+mod fair_shares;
 mod full_disk;
 mod growth;
 mod house;

@@ -6,6 +6,7 @@ use crate::{
     config::AgentEnvironment,
     fault::{PlatformFault, Trouble},
     host_watch::{Evidence, HostWatch, Over, Wait},
+    waited::Waited,
 };
 use faceoff_sandbox::{AgentProcess, ReadLine, SpawnError, SpawnSpec, WriteError, affinity};
 use faceoff_types::{AgentFaultKind, Phase, TimeLimits};
@@ -38,12 +39,8 @@ pub(crate) struct Sent {
 /// The line that came back.
 pub(crate) struct Answer {
     pub bytes: Vec<u8>,
-    /// From the first attempt to write the question to the answer's last byte.
-    pub wall: Duration,
-    /// What the host took of that.
-    pub host: Duration,
-    /// CPU time of the process tree since its answer before, in seconds, where the host tells.
-    pub cpu_time_s: Option<f64>,
+    /// To the answer's last byte.
+    pub waited: Waited,
 }
 
 impl Answer {
@@ -99,26 +96,32 @@ impl<'w> Exchange<'w> {
         })
     }
 
-    /// Asks a question without waiting; to write it and to be answered share one limit of `limit_s`, which
-    /// runs from `limit_from` on, or from now.
+    /// Asks a question without waiting; to write it and to be answered share one limit of `limit_s`.
     pub fn send(
         &mut self,
         message: &Message<'_>,
         phase: Phase,
         limit_s: f64,
-        limit_from: Option<Instant>,
     ) -> Result<Sent, Trouble> {
         // During start-up anything counts as an answer: the agent runs before `hello` is sent.
         if phase != Phase::StartUp && self.process.has_pending_output()? {
             return Err(self.early(phase));
         }
         message.write_line(&mut self.line);
+        if phase != Phase::Step {
+            self.process.know_threads();
+        }
+        let before = self.process.glance_at_cpus();
         match self.process.send_line(&self.line) {
-            Ok(at) => Ok(Sent {
-                phase,
-                limit_s,
-                wait: Wait::begin(at, limit_from.unwrap_or(at), TimeLimits::duration(limit_s)),
-            }),
+            Ok(asked) => {
+                let limit = TimeLimits::duration(limit_s);
+                let wait = Wait::begin(before, asked, Instant::now(), limit);
+                Ok(Sent {
+                    phase,
+                    limit_s,
+                    wait,
+                })
+            }
             Err(WriteError::Closed) => Err(self.closed()),
             Err(WriteError::Platform(error)) => Err(error.into()),
         }
@@ -179,14 +182,9 @@ impl<'w> Exchange<'w> {
 
     fn answer(&mut self, sent: &Sent, bytes: Vec<u8>, at: Instant) -> Answer {
         let cpu_time_s = self.process.cpu_time_s();
-        let used_s = used_s(self.cpu_time_s, cpu_time_s);
+        let waited = self.waited(sent, at, used_s(self.cpu_time_s, cpu_time_s));
         self.cpu_time_s = cpu_time_s;
-        Answer {
-            bytes,
-            wall: at.saturating_duration_since(sent.wait.asked),
-            host: self.taken_by_host(sent, at, used_s),
-            cpu_time_s: used_s,
-        }
+        Answer { bytes, waited }
     }
 
     /// Nothing has come when the evaluator wanted to be woken.
@@ -194,34 +192,45 @@ impl<'w> Exchange<'w> {
         let (now, wait) = (Instant::now(), &mut sent.wait);
         if now >= wait.deadline {
             let used_s = used_s(self.cpu_time_s, self.process.cpu_time_s());
-            let taken = self.taken_by_host(sent, now, used_s);
+            let waited = self.waited(sent, now, used_s);
             let fault = AgentFaultKind::TimedOut {
                 phase: sent.phase,
                 limit_s: sent.limit_s,
             };
-            return match sent.wait.extend(now, taken) {
+            let (over, waited) = (sent.wait.extend(now, waited.host), Box::new(waited));
+            return match over {
                 Over::No => Ok(()),
-                Over::ByTheAgent => Err(fault.into()),
-                Over::ByTheHost => Err(Trouble::Host { fault }),
+                Over::ByTheAgent => Err(Trouble::Late { fault, waited }),
+                Over::ByTheHost => Err(Trouble::Host { fault, waited }),
             };
         }
         if wait.is_newly_late(now) {
             wait.became_late(self.process.read_cpus());
         }
         if now >= wait.wake {
-            wait.sleep_on(Instant::now());
+            // From when it was seen that nothing is there: an evaluator that is held up after that is late.
+            wait.sleep_on(now);
         }
         Ok(())
+    }
+
+    /// The wait for an answer until `now`; `agent_ran_s` is the CPU time since the answer before.
+    fn waited(&self, sent: &Sent, now: Instant, agent_ran_s: Option<f64>) -> Waited {
+        Waited {
+            wall: now.saturating_duration_since(sent.wait.asked),
+            host: self.taken_by_host(sent, now, agent_ran_s),
+            cpu_time_s: agent_ran_s,
+        }
     }
 
     fn taken_by_host(&self, sent: &Sent, now: Instant, agent_ran_s: Option<f64>) -> Duration {
         if !sent.wait.is_late(now) {
             return Duration::ZERO;
         }
-        let others_ran = match sent.wait.first_reading() {
-            Some(begun) => self.process.taken_from_it_since(begun),
-            None => self.process.read_cpus().map(|_| Duration::ZERO),
-        };
+        let wait = &sent.wait;
+        let others_ran = self
+            .process
+            .taken_from_it_since(wait.first_reading(), wait.before());
         let evidence = Evidence {
             now,
             others_ran,

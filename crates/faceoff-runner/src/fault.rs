@@ -1,3 +1,4 @@
+use crate::waited::Waited;
 use faceoff_dataset::RecordingError;
 use faceoff_episode::{NotFinite, RecordError};
 use faceoff_sandbox::SandboxError;
@@ -14,11 +15,20 @@ pub enum Trouble {
         /// The offending line, cut, where there was one.
         line: Option<String>,
     },
+    /// No answer came within a hard limit, and the host does not explain that.
+    Late {
+        /// What it is.
+        fault: AgentFaultKind,
+        /// Whose time it was.
+        waited: Box<Waited>,
+    },
     /// No answer came within a hard limit that was extended by what the host took, and the host explains
     /// it.
     Host {
         /// What it is if the try is not played again.
         fault: AgentFaultKind,
+        /// Whose time it was.
+        waited: Box<Waited>,
     },
     /// The platform failed.
     Platform(PlatformFault),
@@ -71,6 +81,10 @@ pub enum PlatformFault {
     /// The simulator's world stopped being finite.
     #[error(transparent)]
     Simulation(#[from] NotFinite),
+    /// The host kept an agent from answering, again and again, in a run that is for nothing but a verdict
+    /// on the agent.
+    #[error("the host kept the agent from answering ({0})")]
+    HostBusy(Waited),
     /// The observer asked to stop.
     #[error("cancelled")]
     Cancelled,

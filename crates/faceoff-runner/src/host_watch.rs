@@ -1,5 +1,6 @@
 //! What did the host take of the time of an answer? Only what the kernel's counters prove, and only of
-//! answers that are late: to look costs some ten microseconds, so it is not done before.
+//! answers that are late: before that there is no more than a glance at them, which costs some
+//! microseconds.
 
 use faceoff_sandbox::CpuReading;
 use std::time::{Duration, Instant};
@@ -38,6 +39,10 @@ pub(crate) struct Wait {
     /// From when on the time counts.
     pub asked: Instant,
     limit: Duration,
+    /// What the counters said right before, at a glance.
+    before: Option<CpuReading>,
+    /// By how much too long it took the evaluator to write the question.
+    held_up: Duration,
     /// The answer is late, and this is what the counters said first.
     late: Option<Option<CpuReading>>,
     /// When the evaluator wants to be woken.
@@ -59,12 +64,20 @@ pub(crate) struct Evidence {
 }
 
 impl Wait {
-    /// The wait for an answer to what was asked at `asked`, whose limit runs from `limit_from` on.
-    pub fn begin(asked: Instant, limit_from: Instant, limit: Duration) -> Self {
-        let deadline = limit_from + limit;
+    /// The wait for an answer to what was asked at `asked`, whose limit runs from then on; the attempt to
+    /// write it, which waits for nothing, was over at `written`.
+    pub fn begin(
+        before: Option<CpuReading>,
+        asked: Instant,
+        written: Instant,
+        limit: Duration,
+    ) -> Self {
+        let deadline = asked + limit;
         Self {
             asked,
-            limit: deadline.saturating_duration_since(asked),
+            limit,
+            before,
+            held_up: lateness(asked, written),
             late: None,
             wake: (asked + FIRST_LOOK).min(deadline),
             deadline,
@@ -84,6 +97,11 @@ impl Wait {
     /// The counters when the answer was found to be late.
     pub fn became_late(&mut self, reading: Option<CpuReading>) {
         self.late = Some(reading);
+    }
+
+    /// What the counters said at a glance before the question.
+    pub const fn before(&self) -> Option<&CpuReading> {
+        self.before.as_ref()
     }
 
     /// What the counters said when the answer was found to be late.
@@ -106,10 +124,10 @@ impl Wait {
         } = evidence;
         let wall = now.saturating_duration_since(self.asked);
         // An answer that lay there when the evaluator woke late may have come at any time since it wanted
-        // to; its CPUs being out of the agent's reach, that it did not wake is nobody's fault here.
-        let overslept = now.saturating_duration_since(self.wake);
+        // to, and a question that it was held up with may not have been there to be answered. Its CPUs
+        // being out of the agent's reach, that is nobody's fault here.
         let overslept = match others_ran {
-            Some(_) if apart && overslept > ORDINARY_LATENESS => overslept,
+            Some(_) if apart => self.held_up + lateness(self.wake, now),
             _ => Duration::ZERO,
         };
         let proven = others_ran
@@ -134,6 +152,16 @@ impl Wait {
         self.deadline = (now + (self.limit - own)).min(last);
         self.sleep_on(now);
         Over::No
+    }
+}
+
+/// By how much an evaluator was late, if more than is ordinary.
+fn lateness(due: Instant, now: Instant) -> Duration {
+    let late = now.saturating_duration_since(due);
+    if late > ORDINARY_LATENESS {
+        late
+    } else {
+        Duration::ZERO
     }
 }
 
@@ -163,7 +191,7 @@ mod tests {
     #[test]
     fn what_the_agent_ran_itself_is_never_the_hosts() {
         let asked = Instant::now();
-        let wait = Wait::begin(asked, asked, MS(1000));
+        let wait = Wait::begin(None, asked, asked, MS(1000));
         let taken =
             |others, agent| wait.taken(&Counters, evidence(asked + MS(10), others, agent, false));
         assert_eq!(taken(4, 1), MS(4));
@@ -188,7 +216,7 @@ mod tests {
     #[test]
     fn an_evaluator_that_wakes_late_beyond_the_agents_reach_is_the_hosts_doing() {
         let asked = Instant::now();
-        let mut wait = Wait::begin(asked, asked, MS(1000));
+        let mut wait = Wait::begin(None, asked, asked, MS(1000));
         let taken =
             |wait: &Wait, at, apart| wait.taken(&Counters, evidence(asked + MS(at), 0, 1, apart));
         assert_eq!(taken(&wait, 9, true), MS(0));
@@ -205,10 +233,25 @@ mod tests {
     }
 
     #[test]
+    fn an_evaluator_that_is_held_up_while_it_asks_is_the_hosts_doing_too() {
+        let asked = Instant::now();
+        let taken = |written, at, apart| {
+            let mut wait = Wait::begin(None, asked, asked + MS(written), MS(1000));
+            // Nothing was there when it came to look.
+            wait.sleep_on(asked + MS(written));
+            wait.taken(&Counters, evidence(asked + MS(at), 0, 1, apart))
+        };
+        assert_eq!(taken(40, 42, true), MS(40));
+        assert_eq!(taken(40, 42, false), MS(0), "it may have run meanwhile");
+        assert_eq!(taken(1, 12, true), MS(6), "that is ordinary");
+        assert_eq!(taken(40, 41, true), MS(40), "but never what it ran");
+    }
+
+    #[test]
     fn a_limit_goes_on_while_the_host_explains_it_and_not_for_ever() {
         let asked = Instant::now();
         let at = |ms| asked + MS(ms);
-        let mut wait = Wait::begin(asked, asked, MS(1000));
+        let mut wait = Wait::begin(None, asked, asked, MS(1000));
         assert_eq!((wait.wake, wait.deadline), (at(10), at(1000)));
         assert_eq!(wait.extend(at(1000), MS(0)), Over::ByTheAgent);
         assert_eq!(wait.extend(at(1000), MS(300)), Over::No);
@@ -218,8 +261,5 @@ mod tests {
         assert_eq!(wait.deadline, at(5000));
         assert_eq!(wait.extend(at(5000), MS(4001)), Over::ByTheHost);
         assert_eq!(wait.extend(at(5000), MS(4000)), Over::ByTheAgent);
-        // A limit that began before, as the start-up's does.
-        let wait = Wait::begin(at(400), asked, MS(1000));
-        assert_eq!((wait.wake, wait.deadline), (at(410), at(1000)));
     }
 }

@@ -21,6 +21,7 @@ mod player;
 mod session;
 mod shard;
 mod smoke;
+mod waited;
 mod wire_env;
 
 pub use config::AgentEnvironment;
@@ -31,4 +32,5 @@ pub use fault::{PlatformFault, Trouble};
 pub use host_watch::HostWatch;
 pub use session::Session;
 pub use shard::{Observer, run_shard, run_shard_watched};
-pub use smoke::{SMOKE_STEPS, SmokeDefect, SmokeReport, smoke};
+pub use smoke::{SMOKE_STEPS, SmokeDefect, SmokeReport, smoke, smoke_watched};
+pub use waited::Waited;

@@ -6,6 +6,7 @@ use crate::{
     host_watch::HostWatch,
     log::Log,
     session::Session,
+    waited::Waited,
 };
 use faceoff_episode::{Arena, Course, Question, StepSink};
 use faceoff_types::{AgentFaultKind, EpisodeOutcome, Phase, Task};
@@ -26,6 +27,18 @@ pub(crate) struct Player<'a> {
     replays: Replays,
     /// The most that the host took of one answer, in seconds.
     longest_stall_s: f64,
+    /// Of the last episode: whose time it was that ended it.
+    waited: Option<Waited>,
+    if_the_host_wins: IfTheHostWins,
+}
+
+/// What becomes of an episode that the host ends again and again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum IfTheHostWins {
+    /// The last try counts (RULES).
+    LastTryCounts,
+    /// It is a fault of ours: all is to be begun anew, later.
+    OurFault,
 }
 
 /// Tries that were dropped and played again because the host kept the agent from answering.
@@ -40,17 +53,44 @@ struct Replays {
 /// One try of an episode.
 struct Try {
     outcome: EpisodeOutcome,
-    /// Did the host keep the agent from answering?
-    ended_by_host: bool,
+    blame: Blame,
 }
 
-/// The agent's fault, the line that shows it, and what its process has left on standard error.
-struct StartUpFault {
-    kind: AgentFaultKind,
+/// Whose doing is the end of a try?
+#[derive(Debug, Clone, Copy)]
+enum Blame {
+    /// The agent's: by its answers.
+    Agent,
+    /// The agent's: by one that did not come.
+    AgentsDelay(Waited),
+    /// The host kept the agent from answering.
+    Host(Waited),
+}
+
+/// A fault, and the line that shows it.
+struct Ended {
+    fault: AgentFaultKind,
     line: Option<String>,
+    blame: Blame,
+}
+
+impl Ended {
+    /// What is not the platform's.
+    fn by(trouble: Trouble) -> Result<Self, PlatformFault> {
+        let (fault, line, blame) = match trouble {
+            Trouble::Platform(fault) => return Err(fault),
+            Trouble::Agent { fault, line } => (fault, line, Blame::Agent),
+            Trouble::Late { fault, waited } => (fault, None, Blame::AgentsDelay(*waited)),
+            Trouble::Host { fault, waited } => (fault, None, Blame::Host(*waited)),
+        };
+        Ok(Self { fault, line, blame })
+    }
+}
+
+/// What ended a process at its start, and what it has left on standard error.
+struct StartUpFault {
+    ended: Ended,
     stderr: String,
-    /// Did the host keep it from starting in time?
-    ended_by_host: bool,
 }
 
 /// An episode under way, wherever it is recorded.
@@ -66,6 +106,7 @@ impl<'a> Player<'a> {
         episodes: u32,
         arena: Arena,
         watch: &'a dyn HostWatch,
+        if_the_host_wins: IfTheHostWins,
     ) -> Self {
         Self {
             bundle,
@@ -82,7 +123,14 @@ impl<'a> Player<'a> {
                 per_episode: env.time.host_noise_reruns,
             },
             longest_stall_s: 0.0,
+            waited: None,
+            if_the_host_wins,
         }
+    }
+
+    /// Whose time it was that ended the last episode, if that ended by an answer that did not come.
+    pub const fn waited(&self) -> Option<Waited> {
+        self.waited
     }
 
     /// Tries that were dropped so far because the host kept the agent from answering.
@@ -109,20 +157,26 @@ impl<'a> Player<'a> {
     ) -> Result<EpisodeOutcome, PlatformFault> {
         let mut reruns = 0;
         loop {
-            let Try {
-                outcome,
-                ended_by_host,
-            } = self.attempt(episode, max_steps, sink, cancelled)?;
-            let replays = &mut self.replays;
-            if ended_by_host && reruns < replays.per_episode && replays.played < replays.limit {
-                reruns += 1;
-                replays.played += 1;
-                tracing::warn!(task = %self.task, episode, reruns, "the host kept the agent from answering: the episode is played again");
-                self.log.add(
-                    "",
-                    Some("not counted: the host kept the agent from answering; the episode is played again, by a new process"),
-                );
-                continue;
+            let Try { outcome, blame } = self.attempt(episode, max_steps, sink, cancelled)?;
+            self.waited = match blame {
+                Blame::Agent => None,
+                Blame::AgentsDelay(waited) | Blame::Host(waited) => Some(waited),
+            };
+            if let Blame::Host(waited) = blame {
+                let replays = &mut self.replays;
+                if reruns < replays.per_episode && replays.played < replays.limit {
+                    reruns += 1;
+                    replays.played += 1;
+                    tracing::warn!(task = %self.task, episode, reruns, %waited, "the host kept the agent from answering: the episode is played again");
+                    self.log.add(
+                        "",
+                        Some("not counted: the host kept the agent from answering; the episode is played again, by a new process"),
+                    );
+                    continue;
+                }
+                if self.if_the_host_wins == IfTheHostWins::OurFault {
+                    return Err(PlatformFault::HostBusy(waited));
+                }
             }
             sink.end(&outcome, reruns)?;
             return Ok(outcome);
@@ -145,42 +199,34 @@ impl<'a> Player<'a> {
             Course::begin(&self.arena, self.task, episode, interpolation, sink).at_most(max_steps);
         let mut session = match session {
             Ok(session) => session,
-            Err(StartUpFault {
-                kind,
-                line,
-                stderr,
-                ended_by_host,
-            }) => {
-                let outcome = course.failed(Phase::StartUp, kind, line);
-                self.note(&stderr, &outcome);
-                return Ok(Try {
-                    outcome,
-                    ended_by_host,
-                });
+            Err(StartUpFault { ended, stderr }) => {
+                return Ok(self.failed(course, Phase::StartUp, ended, &stderr));
             }
         };
-        let (phase, fault, line, ended_by_host) =
-            match self.converse(&mut session, episode, &mut course, cancelled) {
-                Ok(outcome) => {
-                    self.session = Some(session);
-                    return Ok(Try {
-                        outcome,
-                        ended_by_host: false,
-                    });
-                }
-                Err((_, Trouble::Platform(fault))) => {
-                    self.session = Some(session);
-                    return Err(fault);
-                }
-                Err((phase, Trouble::Host { fault })) => (phase, fault, None, true),
-                Err((phase, Trouble::Agent { fault, line })) => (phase, fault, line, false),
-            };
+        let (phase, trouble) = match self.converse(&mut session, episode, &mut course, cancelled) {
+            Ok(outcome) => {
+                self.session = Some(session);
+                return Ok(Try {
+                    outcome,
+                    blame: Blame::Agent,
+                });
+            }
+            Err(ended) => ended,
+        };
+        match Ended::by(trouble) {
+            Ok(ended) => Ok(self.failed(course, phase, ended, &session.abort())),
+            Err(fault) => {
+                self.session = Some(session);
+                Err(fault)
+            }
+        }
+    }
+
+    fn failed(&mut self, course: CourseTo<'_>, phase: Phase, ended: Ended, stderr: &str) -> Try {
+        let Ended { fault, line, blame } = ended;
         let outcome = course.failed(phase, fault, line);
-        self.note(&session.abort(), &outcome);
-        Ok(Try {
-            outcome,
-            ended_by_host,
-        })
+        self.note(stderr, &outcome, blame);
+        Try { outcome, blame }
     }
 
     /// Says goodbye to the agent and returns the log of all its processes.
@@ -202,18 +248,13 @@ impl<'a> Player<'a> {
 
     fn start(&self) -> Result<Result<Session<'a>, StartUpFault>, PlatformFault> {
         let started = Session::start_watched(self.bundle, self.env, self.task.into(), self.watch);
-        let (kind, line, stderr, ended_by_host) = match started {
-            Ok(session) => return Ok(Ok(session)),
-            Err((Trouble::Platform(fault), _)) => return Err(fault),
-            Err((Trouble::Host { fault }, stderr)) => (fault, None, stderr, true),
-            Err((Trouble::Agent { fault, line }, stderr)) => (fault, line, stderr, false),
-        };
-        Ok(Err(StartUpFault {
-            kind,
-            line,
-            stderr,
-            ended_by_host,
-        }))
+        match started {
+            Ok(session) => Ok(Ok(session)),
+            Err((trouble, stderr)) => {
+                let ended = Ended::by(trouble)?;
+                Ok(Err(StartUpFault { ended, stderr }))
+            }
+        }
     }
 
     /// The conversation of one episode; trouble comes with what the agent was asked for.
@@ -234,12 +275,18 @@ impl<'a> Player<'a> {
             .map_err(|trouble| (Phase::Step, trouble))
     }
 
-    /// Announces an episode; the wait for the answer counts also if none came.
+    /// Announces an episode; the wait for the answer, less what the host took, counts also if none came.
     fn reset(&mut self, session: &mut Session<'_>, episode: u32) -> Result<(), Trouble> {
         self.resets.check()?;
         let asked = Instant::now();
         let answered = session.reset(episode);
-        self.resets.spend(asked.elapsed().as_secs_f64());
+        self.resets.spend(match &answered {
+            Ok(answered) => answered.computation_time_s,
+            Err(Trouble::Late { waited, .. } | Trouble::Host { waited, .. }) => {
+                waited.of_the_agent().as_secs_f64()
+            }
+            Err(Trouble::Agent { .. } | Trouble::Platform(_)) => asked.elapsed().as_secs_f64(),
+        });
         answered?;
         Ok(self.resets.check()?)
     }
@@ -266,8 +313,11 @@ impl<'a> Player<'a> {
     }
 
     /// Notes what an agent has left, and the fault that ended it.
-    fn note(&mut self, stderr: &str, outcome: &EpisodeOutcome) {
-        let fault = outcome.fault.as_ref().map(ToString::to_string);
+    fn note(&mut self, stderr: &str, outcome: &EpisodeOutcome, blame: Blame) {
+        let fault = outcome.fault.as_ref().map(|fault| match blame {
+            Blame::Agent => fault.to_string(),
+            Blame::AgentsDelay(waited) | Blame::Host(waited) => format!("{fault} ({waited})"),
+        });
         self.log.add(stderr, fault.as_deref());
     }
 }

@@ -61,11 +61,10 @@ impl<'w> Session<'w> {
         contest: Contest,
         watch: &'w dyn HostWatch,
     ) -> Result<Self, (Trouble, String)> {
-        let started = Instant::now();
         let mut exchange =
             Exchange::start(bundle, env, watch).map_err(|trouble| (trouble, String::new()))?;
         let stated = bundle.manifest.interpolation;
-        match hello(&mut exchange, contest, stated, env.time.startup_s, started) {
+        match hello(&mut exchange, contest, stated, env.time.startup_s) {
             Ok(interpolation) => Ok(Self {
                 exchange,
                 time: env.time.clone(),
@@ -87,9 +86,9 @@ impl<'w> Session<'w> {
     ///
     /// # Errors
     /// The agent's fault or the platform's.
-    pub fn reset(&mut self, episode: u32) -> Result<(), Trouble> {
+    pub fn reset(&mut self, episode: u32) -> Result<Answered, Trouble> {
         self.send_reset(episode)?;
-        self.wait().map(drop)
+        self.wait()
     }
 
     /// Asks for the action of a step and waits for it.
@@ -130,7 +129,7 @@ impl<'w> Session<'w> {
             Question::Step { .. } => (Phase::Step, self.time.step_s),
         };
         self.asked = None;
-        let sent = self.exchange.send(message, phase, limit_s, None)?;
+        let sent = self.exchange.send(message, phase, limit_s)?;
         self.asked = Some(Asked { question, sent });
         Ok(())
     }
@@ -183,10 +182,11 @@ impl<'w> Session<'w> {
             }
         }
         .map_err(|fault| answer.shows(fault))?;
+        let waited = &answer.waited;
         Ok(Answered {
-            computation_time_s: answer.wall.saturating_sub(answer.host).as_secs_f64(),
-            host_time_s: answer.host.as_secs_f64(),
-            cpu_time_s: answer.cpu_time_s,
+            computation_time_s: waited.of_the_agent().as_secs_f64(),
+            host_time_s: waited.host.as_secs_f64(),
+            cpu_time_s: waited.cpu_time_s,
         })
     }
 
@@ -222,10 +222,10 @@ fn hello(
     contest: Contest,
     stated: Option<i64>,
     limit_s: f64,
-    started: Instant,
 ) -> Result<Interpolation, Trouble> {
     let hello = Message::hello(contest, wire_env(contest));
-    let mut sent = exchange.send(&hello, Phase::StartUp, limit_s, Some(started))?;
+    // Its time begins when its sandbox stands: what that took was ours.
+    let mut sent = exchange.send(&hello, Phase::StartUp, limit_s)?;
     let answer = exchange.wait(&mut sent)?;
     let ready = answer::parse_ready(&answer.bytes).map_err(|fault| answer.shows(fault))?;
     match stated {

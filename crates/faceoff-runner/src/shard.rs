@@ -4,7 +4,7 @@ use crate::{
     config::AgentEnvironment,
     fault::PlatformFault,
     host_watch::{Counters, HostWatch},
-    player::Player,
+    player::{IfTheHostWins, Player},
 };
 use faceoff_dataset::{Recorder, ShardFolder, ShardReport};
 use faceoff_episode::Arena;
@@ -64,6 +64,7 @@ pub fn run_shard_watched(
         spec.episodes.end.saturating_sub(spec.episodes.start),
         Arena::by(spec.ruleset, spec.profile, spec.seed, spec.mismatch_seed),
         watch,
+        IfTheHostWins::LastTryCounts,
     );
     let played = play(spec, &mut player, &mut recorder, observer, &mut calibration);
     let (outcomes, stopped_by_faults) = match played {

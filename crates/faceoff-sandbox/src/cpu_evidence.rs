@@ -6,7 +6,7 @@
 //! Version 2 tells only the agent's own time; what all did is then taken from `/proc/stat`, in ticks
 //! of 10 ms. What such a tick leaves open is always read in the host's disfavour.
 
-use crate::cpu_waits::Waits;
+use crate::cpu_waits::{KnownThreads, Waits};
 use rustix::process::Pid;
 use std::{
     fs::{self, File},
@@ -16,6 +16,10 @@ use std::{
 
 /// `USER_HZ` of every architecture that the seccomp filter knows.
 const TICK: Duration = Duration::from_millis(10);
+
+/// How far counters may lag behind: who runs is charged at the kernel's next tick, of which there are 100 in
+/// a second at least.
+const LAG: Duration = Duration::from_millis(10);
 
 /// Where the counters of one agent are.
 #[derive(Debug)]
@@ -73,15 +77,36 @@ impl CpuEvidence {
         self.read(First::Agent, agent)
     }
 
-    /// For how much of the time since `begun` the agent was kept from running, because everything that it
-    /// may run on ran something else.
-    pub(crate) fn taken_since(&self, begun: &CpuReading, agent: &[Pid]) -> Option<Duration> {
+    /// The counters now as far as they are read in some microseconds, as the beginning of a span: without
+    /// ticks, and of known threads only. `None` if the host does not tell, or in ticks alone.
+    pub(crate) fn glance(&self, agent: &KnownThreads) -> Option<CpuReading> {
+        let RunTime::PerCpu { all, .. } = &self.run_time else {
+            return None;
+        };
+        Some(CpuReading {
+            agent: self.agent()?,
+            all: of_cpus(&text(all)?, &self.cpus)?,
+            throttled: self.throttled(),
+            ticks: Vec::new(),
+            waits: Some(agent.waits()?),
+            at: Instant::now(),
+        })
+    }
+
+    /// For how much of the time since `begun`, or since the glance before, the agent was kept from running,
+    /// because everything that it may run on ran something else: the more that either proves.
+    pub(crate) fn taken_since(
+        &self,
+        begun: Option<&CpuReading>,
+        glance: Option<&CpuReading>,
+        agent: &[Pid],
+    ) -> Option<Duration> {
         let now = self.read(First::Others, agent)?;
-        Some(taken(
-            begun,
-            &now,
-            matches!(self.run_time, RunTime::PerCpu { .. }),
-        ))
+        let precise = matches!(self.run_time, RunTime::PerCpu { .. });
+        let since = |from: Option<&CpuReading>| from.map(|from| taken(from, &now, precise));
+        // What others ran right before a glance may be charged to them after it.
+        let since_glance = since(glance).map(|taken| taken.saturating_sub(LAG));
+        Some(since(begun).max(since_glance).unwrap_or_default())
     }
 
     fn read(&self, first: First, processes: &[Pid]) -> Option<CpuReading> {
@@ -100,18 +125,20 @@ impl CpuEvidence {
         } else {
             at = Instant::now();
         }
-        let throttled = self
-            .throttled
-            .as_ref()
-            .and_then(|file| throttled(&text(file)?));
         Some(CpuReading {
             at,
             agent,
             all,
-            throttled: throttled.unwrap_or_default(),
+            throttled: self.throttled(),
             ticks,
             waits: Waits::read(processes),
         })
+    }
+
+    fn throttled(&self) -> Duration {
+        let file = self.throttled.as_ref();
+        let told = file.and_then(|file| throttled(&text(file)?));
+        told.unwrap_or_default()
     }
 
     fn agent(&self) -> Option<Duration> {

@@ -2,11 +2,28 @@
 //! by what others run meanwhile.
 
 use rustix::process::Pid;
-use std::{collections::BTreeMap, fs, time::Duration};
+use std::{
+    collections::BTreeMap,
+    fs::{self, File},
+    os::unix::fs::FileExt,
+    time::Duration,
+};
 
 /// Of each thread, at one time.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(crate) struct Waits(BTreeMap<u32, Thread>);
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Waits {
+    threads: BTreeMap<u32, Thread>,
+    of: Which,
+}
+
+/// Whose waits were read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Which {
+    /// Of all threads: one that is new later was born since.
+    All,
+    /// Of those that were known: nothing follows for others.
+    Known,
+}
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Thread {
@@ -21,42 +38,102 @@ impl Waits {
     /// What the kernel tells of all threads of these processes; `None` if it tells nothing at all, as one
     /// does that was built without that.
     pub(crate) fn read(processes: &[Pid]) -> Option<Self> {
-        let mut waits = BTreeMap::new();
-        for process in processes {
-            let tasks = format!("/proc/{}/task", process.as_raw_nonzero());
-            // A process or thread that has just ended has no file: it waits no more.
-            for task in fs::read_dir(tasks).into_iter().flatten().flatten() {
-                let of = |file| fs::read_to_string(task.path().join(file)).ok();
-                let id = task.file_name().to_string_lossy().parse();
-                if let (Ok(id), Some(schedule), Some(status)) = (id, of("schedstat"), of("stat")) {
-                    waits.extend(thread(&schedule, &status).map(|thread| (id, thread)));
-                }
+        let mut threads = BTreeMap::new();
+        for_each_task(processes, |id, task| {
+            let of = |file| fs::read_to_string(task.join(file)).ok();
+            if let (Some(schedule), Some(status)) = (of("schedstat"), of("stat")) {
+                threads.extend(thread(&schedule, &status).map(|thread| (id, thread)));
             }
-        }
-        (!waits.is_empty()).then_some(Self(waits))
+        });
+        let of = Which::All;
+        (!threads.is_empty()).then_some(Self { threads, of })
     }
 
     /// The longest wait of a thread since `before`, which was `wall` ago.
     pub(crate) fn longest_since(&self, before: &Self, wall: Duration) -> Duration {
-        let since = |(id, now): (&u32, &Thread)| match before.0.get(id) {
+        let since = |(id, now): (&u32, &Thread)| match before.threads.get(id) {
             // The wait that it is in is added to the counter when it ends.
             Some(then) if now.wants_to_run && now.ran == then.ran => wall,
             Some(then) => now.waited.saturating_sub(then.waited),
-            None => now.waited,
+            None if before.of == Which::All => now.waited,
+            None => Duration::ZERO,
         };
-        self.0.iter().map(since).max().unwrap_or_default().min(wall)
+        let each = self.threads.iter().map(since);
+        each.max().unwrap_or_default().min(wall)
     }
+}
+
+/// The counters of an agent's threads, held open: to read them costs a microsecond each.
+#[derive(Debug, Default)]
+pub(crate) struct KnownThreads(Vec<(u32, File)>);
+
+impl KnownThreads {
+    /// More of them make every question dearer; the first ones are those that answer.
+    const MOST: usize = 16;
+
+    /// The threads that these processes have now.
+    pub(crate) fn of(processes: &[Pid]) -> Self {
+        let mut threads = Vec::new();
+        for_each_task(processes, |id, task| {
+            if threads.len() < Self::MOST {
+                let file = File::open(task.join("schedstat")).ok();
+                threads.extend(file.map(|file| (id, file)));
+            }
+        });
+        Self(threads)
+    }
+
+    /// Their counters now. Whether one wants to run is not among them.
+    pub(crate) fn waits(&self) -> Option<Waits> {
+        let mut threads = BTreeMap::new();
+        for (id, file) in &self.0 {
+            let mut bytes = [0; 128];
+            // A thread that has ended waits no more.
+            let Ok(count) = file.read_at(&mut bytes, 0) else {
+                continue;
+            };
+            let counters = std::str::from_utf8(&bytes[..count]).ok().and_then(counters);
+            threads.extend(counters.map(|(ran, waited)| {
+                let thread = Thread {
+                    ran,
+                    waited,
+                    wants_to_run: false,
+                };
+                (*id, thread)
+            }));
+        }
+        let of = Which::Known;
+        (!threads.is_empty()).then_some(Waits { threads, of })
+    }
+}
+
+/// Every thread's number and folder. A process or thread that has just ended has none.
+fn for_each_task(processes: &[Pid], mut each: impl FnMut(u32, &std::path::Path)) {
+    for process in processes {
+        let tasks = format!("/proc/{}/task", process.as_raw_nonzero());
+        for task in fs::read_dir(tasks).into_iter().flatten().flatten() {
+            if let Ok(id) = task.file_name().to_string_lossy().parse() {
+                each(id, &task.path());
+            }
+        }
+    }
+}
+
+/// Nanoseconds of running and of waiting, the first two numbers of `schedstat`.
+fn counters(schedule: &str) -> Option<(Duration, Duration)> {
+    let mut numbers = schedule.split_ascii_whitespace().map(str::parse);
+    let mut next = || Some(Duration::from_nanos(numbers.next()?.ok()?));
+    Some((next()?, next()?))
 }
 
 /// From `schedstat` (nanoseconds of running and of waiting, slices) and `stat` (number, name, state).
 fn thread(schedule: &str, status: &str) -> Option<Thread> {
-    let mut numbers = schedule.split_ascii_whitespace().map(str::parse);
-    let mut next = || Some(Duration::from_nanos(numbers.next()?.ok()?));
+    let (ran, waited) = counters(schedule)?;
     // The name is the program's, and may hold anything.
     let (_, rest) = status.rsplit_once(')')?;
     Some(Thread {
-        ran: next()?,
-        waited: next()?,
+        ran,
+        waited,
         wants_to_run: rest.trim_start().starts_with('R'),
     })
 }
@@ -67,7 +144,10 @@ mod tests {
 
     fn waits(threads: &[(u32, &str, &str)]) -> Waits {
         let of = |&(id, schedule, status)| (id, thread(schedule, status).unwrap());
-        Waits(threads.iter().map(of).collect())
+        Waits {
+            threads: threads.iter().map(of).collect(),
+            of: Which::All,
+        }
     }
 
     #[test]
@@ -93,9 +173,28 @@ mod tests {
         let this = rustix::process::getpid();
         let waits = Waits::read(&[this]).expect("this kernel counts waits");
         assert!(
-            waits.0.values().any(|thread| thread.wants_to_run),
+            waits.threads.values().any(|thread| thread.wants_to_run),
             "this thread runs: {waits:?}"
         );
         assert_eq!(Waits::read(&[]), None);
+        let known = KnownThreads::of(&[this]).waits().expect("the same");
+        assert!(known.threads.len() <= KnownThreads::MOST);
+        assert!(
+            known
+                .threads
+                .keys()
+                .all(|id| waits.threads.contains_key(id)),
+            "{known:?}"
+        );
+        assert_eq!(KnownThreads::of(&[]).waits(), None);
+    }
+
+    #[test]
+    fn of_a_thread_that_was_not_known_nothing_follows() {
+        const WALL: Duration = Duration::from_nanos(1000);
+        let mut before = waits(&[(1, "500 100 3", "1 (a) S 0")]);
+        before.of = Which::Known;
+        let now = waits(&[(1, "510 130 4", "1 (a) S 0"), (9, "5 900 2", "9 (b) R 0")]);
+        assert_eq!(now.longest_since(&before, WALL).as_nanos(), 30);
     }
 }

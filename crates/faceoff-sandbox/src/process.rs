@@ -2,6 +2,7 @@ use crate::{
     CpuReading, Isolation, Limits, ReadLine, SandboxError, SpawnError, SpawnSpec, WriteError,
     cgroup::AgentCgroup,
     command_check::check_command,
+    cpu_waits::KnownThreads,
     end::{End, Evidence},
     error::IoContext,
     line_pipe::{Closed, LinePipe, wait_for_any},
@@ -33,6 +34,8 @@ pub struct AgentProcess {
     tree: ProcessTree,
     limits: Limits,
     next_look: NextLook,
+    /// Whose waits [`Self::glance_at_cpus`] reads.
+    threads: KnownThreads,
     end: Option<End>,
 }
 
@@ -85,6 +88,7 @@ impl AgentProcess {
             tree,
             limits: spec.limits,
             next_look: NextLook::first(Instant::now()),
+            threads: KnownThreads::default(),
             end: None,
         })
     }
@@ -216,14 +220,34 @@ impl AgentProcess {
         evidence.begin(&self.tree.processes())
     }
 
-    /// For how much of the time since `begun` the agent wanted to run and could not, because all CPUs that
-    /// it may use ran something outside of its cgroup, or were held up by a machine below this one. Never more than
-    /// the kernel's counters prove, if the agent was waited for since 10 ms before `begun`, the longest
-    /// that they lag behind: with version 1 of the cgroup interface in nanoseconds, with version 2 in
-    /// ticks of 10 ms, of which a few may be missing.
-    pub fn taken_from_it_since(&self, begun: &CpuReading) -> Option<Duration> {
+    /// Looks up which threads the agent has; [`Self::glance_at_cpus`] knows no others.
+    pub fn know_threads(&mut self) {
+        self.threads = KnownThreads::of(&self.tree.processes());
+    }
+
+    /// [`Self::read_cpus`] in some microseconds: of the threads that were known when that was last looked
+    /// up. `None` also where the kernel counts in ticks alone.
+    pub fn glance_at_cpus(&self) -> Option<CpuReading> {
         let evidence = self.tree.cgroup.as_ref()?.cpu_evidence.as_ref()?;
-        evidence.taken_since(begun, &self.tree.processes())
+        evidence.glance(&self.threads)
+    }
+
+    /// For how much of the time since `begun`, or since the `glance` before it, the agent wanted to run and
+    /// could not, because all CPUs that it may use ran something outside of its cgroup, or were held up by a
+    /// machine below this one; without either, zero. `None` where the host does not tell. Never more
+    /// than the kernel's counters prove: with version 1 of the cgroup interface in nanoseconds, with version
+    /// 2 in ticks of 10 ms, of which a few may be missing. They lag behind by 10 ms at most: so long the
+    /// agent must have been waited for when it `begun`, and as much is taken off since a glance.
+    pub fn taken_from_it_since(
+        &self,
+        begun: Option<&CpuReading>,
+        glance: Option<&CpuReading>,
+    ) -> Option<Duration> {
+        let evidence = self.tree.cgroup.as_ref()?.cpu_evidence.as_ref()?;
+        if begun.is_none() && glance.is_none() {
+            return Some(Duration::ZERO);
+        }
+        evidence.taken_since(begun, glance, &self.tree.processes())
     }
 
     /// Closes the agent's input, waits up to `grace` for it to exit, then kills the tree; always reaps.

@@ -102,8 +102,8 @@ async fn fill(folder: &Path) {
             .await
             .unwrap();
             sqlx::query(
-                "INSERT INTO units (id, kind, urgency, state, claimable_at, worker, nonce)
-                 VALUES (?, 'shard', 2, 'done', 0, 'w', 'n')",
+                "INSERT INTO units (id, kind, state, claimable_at, worker, nonce)
+                 VALUES (?, 'shard', 'done', 0, 'w', 'n')",
             )
             .bind(&unit)
             .execute(&mut *tx)

@@ -81,7 +81,7 @@ impl Default for ResourceLimits {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TimeLimits {
-    /// From the start of the process to its answer to `hello`.
+    /// From the start of the process, once its sandbox stands, to its answer to `hello`.
     pub startup_s: f64,
     /// To answer `reset`.
     pub reset_s: f64,

@@ -25,6 +25,8 @@ pub struct CpuLayout {
     pub slots: Vec<SlotCpus>,
     /// Does an agent share its CPUs, because there are too few?
     pub shared: bool,
+    /// Where the rest of a server runs: requests, database, schedule. Empty = anywhere.
+    pub service: Vec<usize>,
 }
 
 impl CpuLayout {
@@ -43,6 +45,7 @@ impl CpuLayout {
             return Self {
                 slots: vec![unpinned; slots],
                 shared: true,
+                service: Vec::new(),
             };
         }
         let slots = cpus
@@ -60,16 +63,78 @@ impl CpuLayout {
         Self {
             slots,
             shared: false,
+            service: Vec::new(),
         }
     }
-}
 
-/// The CPUs that this process may use.
-pub(crate) fn allowed() -> Vec<usize> {
-    affinity::allowed().unwrap_or_else(|error| {
-        tracing::warn!(%error, "cannot ask for this process's CPUs; nothing is pinned");
-        Vec::new()
-    })
+    /// [`Self::divide`] beside a server that answers strangers. Where slots leave a CPU over, a quarter of
+    /// all CPUs, but at least one, is the server's alone, the first ones, which take most devices'
+    /// interrupts; where they leave none it shares the simulators', and never an agent's.
+    #[must_use]
+    pub fn beside_a_service(cpus: &[usize], slots: usize, agents: usize) -> Self {
+        let left_over = cpus.len().saturating_sub(slots * (1 + agents));
+        let (service, rest) = cpus.split_at(left_over.min((cpus.len() / 4).max(1)));
+        let mut layout = Self::divide(rest, slots, agents);
+        if !layout.shared {
+            layout.service = match service {
+                [] => layout.simulators(),
+                own => own.to_vec(),
+            };
+        }
+        layout
+    }
+
+    /// All agents on `agents`, one slot at a time or not, as the organiser wants it. Of the other CPUs
+    /// each simulator has one and the server the rest; where they are too few, all of these share them.
+    #[must_use]
+    pub fn with_agents_on(agents: &[usize], cpus: &[usize], slots: usize) -> Self {
+        let others: Vec<usize> = cpus
+            .iter()
+            .copied()
+            .filter(|cpu| !agents.contains(cpu))
+            .collect();
+        let (simulators, service) = if others.len() > slots {
+            let (service, simulators) = others.split_at(others.len() - slots);
+            (simulators.iter().map(|cpu| vec![*cpu]).collect(), service)
+        } else {
+            (vec![Vec::new(); slots], &others[..])
+        };
+        let slot = |simulator| SlotCpus {
+            simulator,
+            agents: vec![agents.to_vec()],
+        };
+        Self {
+            slots: simulators.into_iter().map(slot).collect(),
+            shared: slots > 1,
+            service: service.to_vec(),
+        }
+    }
+
+    /// The layout of a server on this host, for `slots` slots of one agent each; `agent_cpus` as the
+    /// organiser has set them, empty if not. To be asked before a thread is pinned.
+    #[must_use]
+    pub fn of_a_server(slots: usize, agent_cpus: &[usize]) -> Self {
+        let cpus = affinity::allowed().unwrap_or_else(|error| {
+            tracing::warn!(%error, "cannot ask for this process's CPUs; nothing is pinned");
+            Vec::new()
+        });
+        if !agent_cpus.is_empty() {
+            return Self::with_agents_on(agent_cpus, &cpus, slots);
+        }
+        let layout = Self::beside_a_service(&cpus, slots, 1);
+        if layout.shared {
+            tracing::warn!(
+                slots,
+                "fewer than two CPUs per slot: agents share theirs, and computation times are uneven"
+            );
+        }
+        layout
+    }
+
+    fn simulators(&self) -> Vec<usize> {
+        let each = self.slots.iter().flat_map(|slot| &slot.simulator);
+        each.copied().collect()
+    }
 }
 
 /// Pins the calling thread. Timings are less even without it, results are the same.
@@ -102,7 +167,8 @@ mod tests {
             layout,
             CpuLayout {
                 slots,
-                shared: false
+                shared: false,
+                service: Vec::new(),
             }
         );
     }
@@ -124,7 +190,8 @@ mod tests {
                 layout,
                 CpuLayout {
                     slots,
-                    shared: true
+                    shared: true,
+                    service: Vec::new(),
                 }
             );
         }
@@ -148,6 +215,42 @@ mod tests {
                 assert_eq!(used.len(), count, "{cpus} CPUs, {slots} slots: {layout:?}");
             }
         }
+    }
+
+    #[test]
+    fn a_server_has_cpus_of_its_own_where_slots_leave_one_and_never_an_agents() {
+        for (cpus, slots, service) in [
+            (1, 1, &[][..]),
+            (2, 1, &[0]),
+            (3, 1, &[0]),
+            (4, 1, &[0]),
+            (4, 2, &[0, 2]),
+            (8, 1, &[0, 1]),
+            (8, 3, &[0, 1]),
+            (9, 4, &[0]),
+        ] {
+            let layout = CpuLayout::beside_a_service(&first(cpus), slots, 1);
+            assert_eq!(layout.service, service, "{cpus} CPUs, {slots} slots");
+            assert_eq!(layout.slots.len(), slots);
+            let agents: Vec<_> = layout.slots.iter().flat_map(|s| &s.agents[0]).collect();
+            assert!(!service.iter().any(|cpu| agents.contains(&cpu)));
+            if cpus > 2 * slots {
+                let simulators = layout.simulators();
+                assert!(!service.iter().any(|cpu| simulators.contains(cpu)));
+            }
+        }
+    }
+
+    #[test]
+    fn agents_where_the_organiser_wants_them_leave_the_rest_to_the_others() {
+        let layout = |agents: &[usize], cpus, slots| {
+            let layout = CpuLayout::with_agents_on(agents, &first(cpus), slots);
+            (layout.simulators(), layout.service)
+        };
+        assert_eq!(layout(&[1], 2, 1), (vec![], vec![0]));
+        assert_eq!(layout(&[3], 4, 1), (vec![2], vec![0, 1]));
+        assert_eq!(layout(&[2, 3], 4, 2), (vec![], vec![0, 1]));
+        assert_eq!(layout(&[0], 1, 1), (vec![], vec![]), "it has no other");
     }
 
     #[test]

@@ -22,9 +22,11 @@ mod scratch;
 mod server;
 mod service;
 mod slot;
+mod slot_threads;
 #[cfg(test)]
 mod tests;
 
 pub use cpus::{CpuLayout, SlotCpus};
 pub use schedule::{DailyPlan, run_schedule};
 pub use service::{WorkerConfig, run};
+pub use slot_threads::{SlotStarter, SlotThreads};

@@ -1,6 +1,6 @@
 use crate::{
     bundle_cache::BundleCache,
-    cpus::{self, CpuLayout, SlotCpus},
+    cpus::{self, CpuLayout},
     evaluator::{Evaluator, Runner},
     executor::{AgentHost, Executor},
     full_disk::Pause,
@@ -8,12 +8,13 @@ use crate::{
     scratch::Scratch,
     server::WorkServer,
     slot::Slot,
+    slot_threads::SlotThreads,
 };
 use anyhow::Context as _;
 use faceoff_runner::{AgentEnvironment, bundle::BundleLimits};
 use faceoff_store::{Store, StoreError};
 use faceoff_types::{AgentLimits, Clock};
-use std::{path::PathBuf, sync::Arc, thread, time::Duration};
+use std::{path::PathBuf, sync::Arc, time::Duration};
 use tokio::{runtime::Handle, sync::oneshot, task::JoinSet};
 use tokio_util::sync::CancellationToken;
 
@@ -42,20 +43,21 @@ impl Default for Intervals {
 /// How this process works.
 #[derive(Debug, Clone)]
 pub struct WorkerConfig {
-    /// Units worked on at a time; at least one.
-    pub slots: usize,
+    /// The slots, each with its CPUs; at least one. So many units are worked on at a time.
+    pub cpus: CpuLayout,
+    /// Who starts the slots' threads.
+    pub threads: SlotThreads,
     /// How long a claim lasts without renewal, seconds; after a crash the work rests that long.
     pub lease_s: u32,
     /// A folder of this process's own for unpacked bundles and recordings; emptied at the start.
     pub scratch_dir: PathBuf,
-    /// How agents are run. With `agent_cpus` empty every slot gets CPUs by [`CpuLayout`]; otherwise
-    /// all agents run on those given.
+    /// How agents are run; each slot's agent on the slot's CPUs.
     pub agent: AgentEnvironment,
     /// What an archive may hold.
     pub bundle_limits: BundleLimits,
 }
 
-/// Runs `slots` named threads (`faceoff-slot-0` …) until `shutdown` is cancelled. On a shutdown every
+/// Runs a named thread per slot (`faceoff-slot-0` …) until `shutdown` is cancelled. On a shutdown every
 /// unit is given back at once, and the threads are waited for, for 20 s at most: an agent in the
 /// middle of an answer may take that long. Fails if the scratch folder cannot be had or a slot dies.
 pub async fn run(
@@ -105,7 +107,10 @@ pub(crate) async fn run_with(
     intervals: Intervals,
     shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
-    anyhow::ensure!(config.slots > 0, "a worker needs at least one slot");
+    anyhow::ensure!(
+        !config.cpus.slots.is_empty(),
+        "a worker needs at least one slot"
+    );
     anyhow::ensure!(config.lease_s > 0, "a lease lasts at least one second");
     let folder = config.scratch_dir.clone();
     let scratch = tokio::task::spawn_blocking(move || Scratch::take(&folder)).await??;
@@ -124,7 +129,7 @@ pub(crate) async fn run_with(
     // However this function ends, its threads do, too.
     let _stop = stop.clone().drop_guard();
     let mut slots = JoinSet::new();
-    for (index, cpus) in layout(&config).into_iter().enumerate() {
+    for (index, cpus) in config.cpus.slots.into_iter().enumerate() {
         let folder = scratch.slot(index)?;
         let slot = Slot {
             name: format!("{}/slot-{index}", scratch.worker()),
@@ -143,7 +148,7 @@ pub(crate) async fn run_with(
             },
             shutdown: stop.clone(),
         };
-        let end = start(index, slot)?;
+        let end = start(&config.threads, index, slot)?;
         slots.spawn(async move { end.await.map_err(|_| index) });
     }
     let tidying = tokio::spawn(tidy(server, intervals.tidy, shutdown.clone()));
@@ -153,31 +158,11 @@ pub(crate) async fn run_with(
     ended
 }
 
-/// The CPUs of every slot. A task is played by one agent.
-fn layout(config: &WorkerConfig) -> Vec<SlotCpus> {
-    if !config.agent.agent_cpus.is_empty() {
-        let cpus = SlotCpus {
-            simulator: Vec::new(),
-            agents: vec![config.agent.agent_cpus.clone()],
-        };
-        return vec![cpus; config.slots];
-    }
-    let layout = CpuLayout::divide(&cpus::allowed(), config.slots, 1);
-    if layout.shared {
-        tracing::warn!(
-            slots = config.slots,
-            "fewer than two CPUs per slot: agents share theirs, and computation times are uneven"
-        );
-    }
-    layout.slots
-}
-
 /// Starts a slot's thread; the receiver hears of its end, or of its panic by the sender's drop.
-fn start(index: usize, slot: Slot) -> anyhow::Result<oneshot::Receiver<()>> {
+fn start(threads: &SlotThreads, index: usize, slot: Slot) -> anyhow::Result<oneshot::Receiver<()>> {
     let (ended, end) = oneshot::channel();
-    thread::Builder::new()
-        .name(format!("faceoff-slot-{index}"))
-        .spawn(move || {
+    threads
+        .start(format!("faceoff-slot-{index}"), move || {
             cpus::pin_simulator(&slot.executor.host.cpus.simulator);
             slot.run();
             // nobody listens any more after the grace

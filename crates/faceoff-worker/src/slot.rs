@@ -152,6 +152,7 @@ fn outside(error: &anyhow::Error) -> &'static str {
             "the recording could not be made"
         }
         Some(PlatformFault::Simulation(_)) => "the simulator failed",
+        Some(PlatformFault::HostBusy(_)) => "the host kept the agent from answering",
         Some(PlatformFault::Cancelled) | None => "the evaluator failed",
     }
 }

@@ -121,8 +121,8 @@ impl Default for EvaluationConfig {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WorkersConfig {
-    /// Evaluations at the same time; left out, one per two CPUs, so that an agent and its simulator
-    /// have a CPU each.
+    /// Evaluations at the same time; left out, one per two CPUs and one CPU less, so that an agent, its
+    /// simulator and the rest of the server have a CPU each.
     pub slots: Option<usize>,
     /// Seconds after which the work of a dead worker is given to another.
     pub lease_s: u32,
@@ -430,12 +430,19 @@ impl Config {
         }
     }
 
-    /// Worker slots: as configured, or one per two CPUs.
+    /// Worker slots: as configured, or one per two CPUs once the server has one.
     #[must_use]
     pub fn slots(&self) -> usize {
         self.workers.slots.unwrap_or_else(|| {
-            std::thread::available_parallelism().map_or(1, |cpus| (cpus.get() / 2).max(1))
+            let cpus = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+            Self::slots_on(cpus)
         })
+    }
+
+    /// How many slots so many CPUs have without disturbing each other or the server: one at least.
+    #[must_use]
+    pub const fn slots_on(cpus: usize) -> usize {
+        if cpus < 3 { 1 } else { (cpus - 1) / 2 }
     }
 
     /// Folder for unpacked bundles and recordings under way.

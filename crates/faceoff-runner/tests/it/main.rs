@@ -10,6 +10,7 @@ mod dataset;
 mod free_time;
 mod fuzz;
 mod host_noise;
+mod host_share;
 mod misbehaviour;
 mod recording;
 mod shard;

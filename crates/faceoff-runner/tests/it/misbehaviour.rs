@@ -25,7 +25,7 @@ fn verdict_in(agent: &Agent, env: &AgentEnvironment) -> (AgentFaultKind, SmokeRe
 
 fn fault(report: &SmokeReport) -> AgentFault {
     match &report.defect {
-        Some(SmokeDefect::Fault(fault)) => fault.clone(),
+        Some(SmokeDefect::Fault { fault, .. }) => fault.clone(),
         other => panic!("expected a fault, got {other:?}"),
     }
 }

@@ -94,7 +94,11 @@ fn each_side_gets_its_own_verdict() {
     }
     let faults = both(&mut sessions).map(|came| match came {
         // A busy host may explain the silence; it is silence all the same.
-        Err(Trouble::Agent { fault, .. } | Trouble::Host { fault }) => fault,
+        Err(
+            Trouble::Agent { fault, .. }
+            | Trouble::Late { fault, .. }
+            | Trouble::Host { fault, .. },
+        ) => fault,
         other => panic!("{other:?}"),
     });
     let phase = Phase::Step;

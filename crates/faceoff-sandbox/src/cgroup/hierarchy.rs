@@ -16,6 +16,18 @@ pub(super) enum Version {
     V2,
 }
 
+impl Version {
+    /// Ten times the ordinary one: beside a thread of ordinary priority that wants the same CPU, agents
+    /// have ten of eleven parts. With more, one that never sleeps would starve a service that has no
+    /// other CPU.
+    const fn weight_of_agents(self) -> (&'static str, &'static str) {
+        match self {
+            Self::V1 => ("cpu.shares", "10240"),
+            Self::V2 => ("cpu.weight", "1000"),
+        }
+    }
+}
+
 /// A controller's hierarchy, seen from the service.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Home {
@@ -83,6 +95,11 @@ impl Home {
         match fs::create_dir(&folder) {
             Err(error) if error.kind() != io::ErrorKind::AlreadyExists => return Err(error),
             _ => {}
+        }
+        if controllers.contains(&"cpu") {
+            let (file, weight) = self.version.weight_of_agents();
+            // Without it times are less even, and nothing is wrong.
+            let _ = fs::write(folder.join(file), weight);
         }
         if self.version == Version::V2 {
             self.delegate(&folder, controllers)?;

@@ -86,9 +86,10 @@ pub struct RunSeeds {
 }
 
 impl Store {
-    /// Leases the next unit of work for `lease_s` seconds: smoke runs first, then finalisations, then
-    /// shards in evaluation order, then those of ablations. A unit whose lease is over is leased
-    /// again. `None`: nothing to do now (see [`Store::work_signal`]).
+    /// Leases the next unit of work for `lease_s` seconds. Finalisations come first; smoke runs and
+    /// shards of evaluations share the slots half and half, and the teams that wait for either share
+    /// that half equally, by slot time; shards of ablations have what is left. A unit whose lease is
+    /// over is leased again. `None`: nothing to do now (see [`Store::work_signal`]).
     pub async fn claim(
         &self,
         worker: &str,

@@ -73,7 +73,8 @@ pub(crate) async fn run_ended(
 }
 
 async fn queue_finalisation(tx: &mut Tx, id: EvaluationId) -> Result<()> {
-    let unit = queue::insert(tx, purpose::FINALISE).await?;
+    let account = queue::account(tx, purpose::FINALISE.lane, purpose::PLATFORM).await?;
+    let unit = queue::insert(tx, purpose::FINALISE, account).await?;
     finalisations::insert(tx, id, unit).await?;
     tx.record(Subject::Evaluation(id), Event::EvaluationFinalising);
     Ok(())

@@ -43,7 +43,7 @@ pub(crate) async fn enter(
         rest_s,
         ..purpose::SHARD
     };
-    runs::create(tx, &run, &[entrant.submission], unit).await?;
+    runs::create(tx, &run, &[entrant.submission], unit, entrant.team).await?;
     let new = Entry {
         id: EvaluationId::new(),
         submission: entrant.submission,

@@ -33,7 +33,8 @@ impl Store {
         plan.check()?;
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
-            if submissions::find(tx, submission).await?.state != SubmissionState::Valid {
+            let taken_apart = submissions::find(tx, submission).await?;
+            if taken_apart.state != SubmissionState::Valid {
                 return Err(StoreError::Conflict(
                     "only a valid submission can be taken apart: wait for its smoke run, or upload a \
                      corrected one"
@@ -53,7 +54,8 @@ impl Store {
                     seed: SeedLabel::Ablation,
                     keeps_recordings: false,
                 };
-                runs::create(tx, &run, &[submission], purpose::ABLATION_SHARD).await?;
+                let (unit, team) = (purpose::ABLATION_SHARD, taken_apart.team);
+                runs::create(tx, &run, &[submission], unit, team).await?;
                 ablations::insert_run(tx, id, run.id).await?;
             }
             let event = Event::AblationOrdered {

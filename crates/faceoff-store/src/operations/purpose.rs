@@ -1,6 +1,6 @@
 use crate::{
     error::{Result, StoreError},
-    queue::NewUnit,
+    queue::{Lane, NewUnit},
     tables::{
         finalisations,
         shards::{self, Shard},
@@ -30,20 +30,33 @@ impl Kind {
         }
     }
 
-    const fn urgency(self, urgency: u32) -> NewUnit {
+    const fn waiting_in(self, lane: Lane) -> NewUnit {
         NewUnit {
             kind: self.label(),
-            urgency,
+            lane,
             rest_s: 0,
         }
     }
 }
 
-// Teams wait for a smoke run and for a finished score; shards are the bulk; ablations can wait.
-pub(crate) const SMOKE: NewUnit = Kind::Smoke.urgency(0);
-pub(crate) const FINALISE: NewUnit = Kind::Finalise.urgency(1);
-pub(crate) const SHARD: NewUnit = Kind::Shard.urgency(2);
-pub(crate) const ABLATION_SHARD: NewUnit = Kind::Shard.urgency(3);
+const fn lane(name: &'static str, urgency: u32, rank: u32) -> Lane {
+    Lane {
+        name,
+        urgency,
+        rank,
+    }
+}
+
+// A finalisation runs no agent, is the platform's own, and ends what has had its turn. Smoke runs and
+// shards share the slots half and half, so that neither makes the other wait for long. Ablations do not
+// count: they have what is left.
+pub(crate) const FINALISE: NewUnit = Kind::Finalise.waiting_in(lane("finalise", 0, 0));
+pub(crate) const SMOKE: NewUnit = Kind::Smoke.waiting_in(lane("smoke", 1, 0));
+pub(crate) const SHARD: NewUnit = Kind::Shard.waiting_in(lane("shard", 1, 1));
+pub(crate) const ABLATION_SHARD: NewUnit = Kind::Shard.waiting_in(lane("ablation", 2, 0));
+
+/// Finalisations are done for nobody in particular, in the order in which evaluations were played.
+pub(crate) const PLATFORM: &str = "";
 
 /// What a unit of work is for.
 #[derive(Debug)]

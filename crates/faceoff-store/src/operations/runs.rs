@@ -11,7 +11,7 @@ use crate::{
     },
     write::Tx,
 };
-use faceoff_types::{AblationId, EvaluationId, RunId, ShardId, SubmissionId};
+use faceoff_types::{AblationId, EvaluationId, RunId, ShardId, SubmissionId, TeamId};
 use sqlx::SqliteConnection;
 
 /// What a run is a part of.
@@ -43,14 +43,17 @@ pub(crate) async fn owner(connection: &mut SqliteConnection, run: RunId) -> Resu
         .ok_or_else(|| StoreError::Damaged(format!("run {run}: nothing owns it")))
 }
 
-/// Adds a run, cuts it into shards, in (task, first episode) order, and queues them.
+/// Adds a run, cuts it into shards, in (task, first episode) order, and queues them; their slot time is
+/// charged to `team`.
 pub(crate) async fn create(
     tx: &mut Tx,
     run: &Run,
     contestants: &[SubmissionId],
     unit: NewUnit,
+    team: TeamId,
 ) -> Result<()> {
     runs::insert(tx, run, contestants).await?;
+    let account = queue::account(tx, unit.lane, &team.to_string()).await?;
     let mut tasks = run.plan.tasks.clone();
     tasks.sort_unstable();
     let mut position = 0;
@@ -68,7 +71,7 @@ pub(crate) async fn create(
                 end_episode,
                 recording: None,
             };
-            let unit = queue::insert(tx, unit).await?;
+            let unit = queue::insert(tx, unit, account).await?;
             shards::insert(tx, run.id, &shard, position, unit).await?;
             position += 1;
             first_episode = end_episode;

@@ -45,7 +45,8 @@ impl Store {
             quota.check(bundles::usage(tx, team, day_of(now)).await?, bundle.bytes)?;
             let id = SubmissionId::new();
             submissions::insert(tx, id, team, &bundle, now).await?;
-            let unit = queue::insert(tx, purpose::SMOKE).await?;
+            let account = queue::account(tx, purpose::SMOKE.lane, &team.to_string()).await?;
+            let unit = queue::insert(tx, purpose::SMOKE, account).await?;
             smoke_runs::insert(tx, id, unit).await?;
             let event = Event::SubmissionUploaded {
                 team,

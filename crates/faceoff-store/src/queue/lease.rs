@@ -50,7 +50,7 @@ pub(crate) async fn hold(connection: &mut SqliteConnection, claim: &Claim) -> Re
 }
 
 /// Extends the lease to `lease_s` seconds from now and stores the progress; the unit's kind, or
-/// `None` if the lease is lost.
+/// `None` if the lease is lost. What it is extended by is charged.
 pub(crate) async fn renew(
     connection: &mut SqliteConnection,
     claim: &Claim,
@@ -64,8 +64,9 @@ pub(crate) async fn renew(
         Instant(after(now, lease_s)),
     );
     Ok(sqlx::query_scalar!(
-        r#"UPDATE units SET claimable_at = ?, progress = ?
-           WHERE id = ? AND nonce = ? AND state = 'leased' RETURNING kind AS "kind!""#,
+        r#"UPDATE units SET charged_ms = MAX(0, charged_ms + ?1 - claimable_at), claimable_at = ?1,
+                            progress = ?2
+           WHERE id = ?3 AND nonce = ?4 AND state = 'leased' RETURNING kind AS "kind!""#,
         until,
         progress,
         id,
@@ -75,25 +76,26 @@ pub(crate) async fn renew(
     .await?)
 }
 
-/// Takes a held unit out of the queue.
-pub(crate) async fn mark_done(
-    connection: &mut SqliteConnection,
-    claim: &Claim,
-    progress: u32,
-) -> Result<()> {
-    let id = Text(claim.unit);
+/// Takes a held unit out of the queue. What is left of its lease is given back to its account, and what
+/// it took beyond the lease is charged.
+pub(crate) async fn mark_done(tx: &mut Tx, claim: &Claim, progress: u32) -> Result<()> {
+    let (id, now) = (Text(claim.unit), Instant(tx.now));
     sqlx::query!(
-        "UPDATE units SET state = 'done', progress = ? WHERE id = ?",
+        "UPDATE units SET state = 'done', progress = ?,
+                          charged_ms = MAX(0, charged_ms + ? - claimable_at)
+         WHERE id = ?",
         progress,
+        now,
         id,
     )
-    .execute(connection)
+    .execute(&mut **tx)
     .await?;
     Ok(())
 }
 
 /// Counts a failure of a held unit and queues it again, to rest for a while that grows with the
-/// failures; how many there were. No worker is woken: there is nothing to claim yet.
+/// failures; how many there were. No worker is woken: there is nothing to claim yet. Slot time that we
+/// wasted is charged to nobody.
 pub(crate) async fn requeue_failed(
     connection: &mut SqliteConnection,
     claim: &Claim,
@@ -102,7 +104,7 @@ pub(crate) async fn requeue_failed(
     let id = Text(claim.unit);
     let failures = sqlx::query_scalar!(
         r#"UPDATE units SET state = 'queued', worker = NULL, nonce = NULL, progress = 0,
-                            failures = failures + 1
+                            charged_ms = 0, failures = failures + 1
            WHERE id = ? RETURNING failures AS "failures!: u32""#,
         id,
     )
@@ -135,12 +137,12 @@ pub(crate) async fn renew_all(
     Ok(())
 }
 
-/// Queues a held unit again, claimable after a rest; the attempt does not count.
+/// Queues a held unit again, claimable after a rest; neither the attempt nor its slot time counts.
 pub(crate) async fn release(tx: &mut Tx, claim: &Claim, rest_s: u32) -> Result<()> {
     let (id, from) = (Text(claim.unit), Instant(after(tx.now, rest_s)));
     sqlx::query!(
         "UPDATE units SET state = 'queued', worker = NULL, nonce = NULL, progress = 0,
-                          attempts = attempts - 1, claimable_at = ?
+                          charged_ms = 0, attempts = attempts - 1, claimable_at = ?
          WHERE id = ?",
         from,
         id,

@@ -1,12 +1,14 @@
 //! The queue of work: units that are claimed by a lease of seconds, renewed, handed back or done.
 //! What a unit is for is written in the tables that refer to it; its kind is a label that the queue
-//! hands through.
+//! hands through, and so is whoever its slot time is charged to.
 
 mod lease;
+mod shares;
 mod units;
 
 pub use lease::Claim;
 pub(crate) use lease::{Hold, hold, mark_done, release, renew, renew_all, requeue_failed};
+pub(crate) use shares::{Lane, account};
 pub(crate) use units::{
     Leased, NewUnit, Standing, claim_next, drop_units, end_leases_of, insert, standing,
 };

@@ -1,4 +1,12 @@
-use crate::{column::Instant, error::Result, queue::lease::after, write::Tx};
+use crate::{
+    column::Instant,
+    error::Result,
+    queue::{
+        lease::after,
+        shares::{Account, Lane},
+    },
+    write::Tx,
+};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 use uuid::Uuid;
@@ -7,21 +15,22 @@ use uuid::Uuid;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct NewUnit {
     pub(crate) kind: &'static str,
-    /// The smaller is claimed first; among equals the one queued first.
-    pub(crate) urgency: u32,
+    /// Where it waits.
+    pub(crate) lane: Lane,
     /// How long it rests before it can be claimed, seconds.
     pub(crate) rest_s: u32,
 }
 
-/// Queues a unit, claimable after its rest.
-pub(crate) async fn insert(tx: &mut Tx, unit: NewUnit) -> Result<Uuid> {
+/// Queues a unit, claimable after its rest. The account is one of its lane; within it units are claimed in
+/// the order in which they were queued.
+pub(crate) async fn insert(tx: &mut Tx, unit: NewUnit, account: Account) -> Result<Uuid> {
     let id = Uuid::now_v7();
     let (id_text, from) = (Text(id), Instant(after(tx.now, unit.rest_s)));
     sqlx::query!(
-        "INSERT INTO units (id, kind, urgency, state, claimable_at) VALUES (?, ?, ?, 'queued', ?)",
+        "INSERT INTO units (id, kind, account_no, state, claimable_at) VALUES (?, ?, ?, 'queued', ?)",
         id_text,
         unit.kind,
-        unit.urgency,
+        account.0,
         from,
     )
     .execute(&mut **tx)
@@ -38,7 +47,8 @@ pub(crate) struct Leased {
     pub(crate) attempts: u32,
 }
 
-/// Claims the unit whose turn it is, one whose lease is over included, in one statement.
+/// Claims the unit whose turn it is, one whose lease is over included, in one statement. The whole lease is
+/// charged at once, so that who holds one slot is no longer the least served when the next is free.
 pub(crate) async fn claim_next(
     connection: &mut SqliteConnection,
     worker: &str,
@@ -47,18 +57,27 @@ pub(crate) async fn claim_next(
     now: Timestamp,
 ) -> Result<Option<Leased>> {
     let (nonce, until, now) = (Text(nonce), Instant(after(now, lease_s)), Instant(now));
+    let lease_ms = milliseconds(lease_s);
     Ok(sqlx::query_as!(
         Leased,
         r#"UPDATE units
-           SET state = 'leased', worker = ?, nonce = ?, claimable_at = ?, attempts = attempts + 1,
-               progress = 0
-           WHERE queue_no = (SELECT queue_no FROM units
-                             WHERE state IN ('queued', 'leased') AND claimable_at <= ?
-                             ORDER BY urgency, queue_no LIMIT 1)
+           SET state = 'leased', worker = ?1, nonce = ?2, claimable_at = ?3, attempts = attempts + 1,
+               progress = 0, charged_ms = ?4
+           WHERE queue_no = (
+               SELECT first FROM (
+                   SELECT l.urgency, l.served_ms AS of_lane, l.rank, a.served_ms AS of_account,
+                          (SELECT u.queue_no FROM units u
+                           WHERE u.account_no = a.account_no AND u.state IN ('queued', 'leased')
+                             AND u.claimable_at <= ?5
+                           ORDER BY u.queue_no LIMIT 1) AS first
+                   FROM accounts a JOIN lanes l ON l.lane = a.lane)
+               WHERE first IS NOT NULL
+               ORDER BY urgency, of_lane, rank, of_account, first LIMIT 1)
            RETURNING id AS "id!: Text<Uuid>", kind AS "kind!", attempts AS "attempts!: u32""#,
         worker,
         nonce,
         until,
+        lease_ms,
         now,
     )
     .fetch_optional(connection)
@@ -66,25 +85,30 @@ pub(crate) async fn claim_next(
 }
 
 /// Takes units that are not done out of the queue; their workers lose the lease.
-pub(crate) async fn drop_units(connection: &mut SqliteConnection, units: &[Uuid]) -> Result<()> {
+pub(crate) async fn drop_units(tx: &mut Tx, units: &[Uuid]) -> Result<()> {
+    let now = Instant(tx.now);
     for unit in units {
         let unit = Text(*unit);
         sqlx::query!(
-            "UPDATE units SET state = 'dropped', nonce = NULL
-             WHERE id = ? AND state IN ('queued', 'leased')",
+            "UPDATE units SET state = 'dropped', nonce = NULL,
+                              charged_ms = CASE state WHEN 'leased'
+                                           THEN MAX(0, charged_ms + ?2 - claimable_at) ELSE 0 END
+             WHERE id = ?1 AND state IN ('queued', 'leased')",
             unit,
+            now,
         )
-        .execute(&mut *connection)
+        .execute(&mut **tx)
         .await?;
     }
     Ok(())
 }
 
-/// Ends the leases of `worker` and of every name `worker/…`; how many. The attempts stay counted.
+/// Ends the leases of `worker` and of every name `worker/…`; how many. The attempts stay counted, the
+/// slot time does not: what died was ours.
 pub(crate) async fn end_leases_of(tx: &mut Tx, worker: &str) -> Result<u64> {
     let now = Instant(tx.now);
     let ended = sqlx::query!(
-        "UPDATE units SET claimable_at = ?1
+        "UPDATE units SET claimable_at = ?1, charged_ms = 0
          WHERE state = 'leased' AND claimable_at > ?1
            AND (worker = ?2 OR substr(worker, 1, length(?2) + 1) = ?2 || '/')",
         now,
@@ -130,4 +154,8 @@ pub(crate) async fn standing(
         waiting: row.waiting,
         waiting_since: row.since.map(|since| since.0),
     })
+}
+
+pub(super) fn milliseconds(seconds: u32) -> i64 {
+    1000 * i64::from(seconds)
 }

@@ -21,4 +21,5 @@ mod queue;
 mod releases;
 mod retries;
 mod rulesets;
+mod shares;
 mod teams;

@@ -1,10 +1,12 @@
 //! The scripted evaluator and a server around it.
 
 use crate::{
+    cpus::CpuLayout,
     evaluator::Evaluator,
     local::LocalServer,
     server::WorkServer,
     service::{Intervals, WorkerConfig, run_with},
+    slot_threads::SlotThreads,
 };
 use faceoff_runner::{
     AgentEnvironment, Assembled, EvaluationMeta, Observer, PlatformFault, ShardReport, ShardSpec,
@@ -338,7 +340,8 @@ impl Server {
 
     fn config(&self, slots: usize) -> WorkerConfig {
         WorkerConfig {
-            slots,
+            cpus: CpuLayout::with_agents_on(&[0], &[0], slots),
+            threads: SlotThreads::of_the_caller(),
             lease_s: LEASE_S,
             scratch_dir: self.folder.path().join("scratch"),
             agent: AgentEnvironment {
@@ -353,7 +356,7 @@ impl Server {
                 },
                 isolation: Isolation::None,
                 runtimes: BTreeMap::new(),
-                agent_cpus: vec![0],
+                agent_cpus: Vec::new(),
             },
             bundle_limits: BundleLimits {
                 packed_bytes: 1,

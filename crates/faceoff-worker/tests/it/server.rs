@@ -4,7 +4,7 @@ use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::BundleLimits};
 use faceoff_sandbox::{Isolation, Limits, Runtime};
 use faceoff_store::*;
 use faceoff_types::*;
-use faceoff_worker::WorkerConfig;
+use faceoff_worker::{CpuLayout, SlotThreads, WorkerConfig};
 use jiff::Timestamp;
 use std::{
     collections::BTreeMap,
@@ -62,7 +62,8 @@ impl Server {
             Runtime::python3().expect("this machine has Python"),
         )]);
         let config = WorkerConfig {
-            slots,
+            cpus: CpuLayout::of_a_server(slots, &[]),
+            threads: SlotThreads::of_the_caller(),
             // Nobody waits for its end: a killed worker's successor takes over at once.
             lease_s: 3600,
             scratch_dir: self.path().join("scratch"),

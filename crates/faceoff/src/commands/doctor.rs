@@ -251,10 +251,16 @@ fn describe(name: &str, runtime: &Runtime) -> String {
 fn cpus(config: &Config) -> Cpus {
     let usable = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let slots = config.slots();
+    let fitting = Config::slots_on(usable);
     // An agent and the simulator that waits for it take turns, but two agents on one CPU disturb each
-    // other's computation times.
-    let advice = (slots * 2 > usable && usable > 1).then(|| {
-        format!("{slots} slots on {usable} CPUs disturb each other's computation times; set workers.slots = {}", usable / 2)
+    // other's computation times, and requests disturb a simulator's.
+    let advice = (slots > fitting).then(|| {
+        let what = if slots * 2 > usable {
+            "disturb each other's computation times"
+        } else {
+            "leave none to the server's own work, which then gives way on the simulators'"
+        };
+        format!("{slots} slots on {usable} CPUs {what}; set workers.slots = {fitting}")
     });
     Cpus {
         usable,

@@ -7,10 +7,10 @@ use faceoff_http::{
     ConnectionLimits, HttpConfig,
     token::{Token, TokenKind, hash_token},
 };
-use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime, probe_host};
+use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime, affinity, probe_host};
 use faceoff_store::{Actor, Room, Store};
 use faceoff_types::Clock;
-use faceoff_worker::{DailyPlan, WorkerConfig};
+use faceoff_worker::{CpuLayout, DailyPlan, SlotThreads, WorkerConfig};
 use jiff::Timestamp;
 use std::{
     collections::BTreeMap,
@@ -20,6 +20,7 @@ use std::{
     num::NonZeroU32,
     os::unix::fs::{DirBuilderExt, OpenOptionsExt},
     path::{Path, PathBuf},
+    thread,
     time::Duration,
 };
 use tokio::{net::TcpListener, signal::unix::SignalKind, task::JoinSet};
@@ -79,16 +80,45 @@ impl ServeCommand {
             );
         }
         let connections = descriptors.limits(connections);
-        tokio::runtime::Builder::new_multi_thread()
-            .enable_all()
-            .thread_name("http")
-            .build()
-            .context("starting the async runtime")?
-            .block_on(serve(config, connections))
+        let cpus = CpuLayout::of_a_server(config.slots(), &config.workers.agent_cpus);
+        let (threads, starter) = SlotThreads::of_another();
+        let service = thread::Builder::new()
+            .name("service".to_owned())
+            .spawn(move || serve_giving_way(config, connections, cpus, threads))
+            .context("starting the service's thread")?;
+        // This thread keeps its CPUs and its priority, for the slots' threads to inherit.
+        starter.tend();
+        service
+            .join()
+            .unwrap_or_else(|_| bail!("the service's thread panicked"))
     }
 }
 
-async fn serve(config: Config, connections: ConnectionLimits) -> anyhow::Result<()> {
+/// Requests, the database and the schedule: whatever strangers do with them, slots come first. All threads
+/// of the runtime, and those that the database starts, inherit from this one.
+fn serve_giving_way(
+    config: Config,
+    connections: ConnectionLimits,
+    cpus: CpuLayout,
+    threads: SlotThreads,
+) -> anyhow::Result<()> {
+    if let Err(error) = affinity::give_way(&cpus.service) {
+        tracing::warn!(%error, cpus = ?cpus.service, "requests cannot be kept from disturbing slots");
+    }
+    tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .thread_name("http")
+        .build()
+        .context("starting the async runtime")?
+        .block_on(serve(config, connections, cpus, threads))
+}
+
+async fn serve(
+    config: Config,
+    connections: ConnectionLimits,
+    cpus: CpuLayout,
+    threads: SlotThreads,
+) -> anyhow::Result<()> {
     let data_dir = config.server.data_dir.clone();
     private_folder(&data_dir)?;
     let upload_dir = data_dir.join("uploads");
@@ -138,7 +168,8 @@ async fn serve(config: Config, connections: ConnectionLimits) -> anyhow::Result<
     // For as long as agents run.
     let _image = in_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
     let workers = WorkerConfig {
-        slots: config.slots(),
+        cpus,
+        threads,
         lease_s: config.workers.lease_s,
         scratch_dir,
         agent,
@@ -147,7 +178,8 @@ async fn serve(config: Config, connections: ConnectionLimits) -> anyhow::Result<
     tracing::info!(
         %address,
         data_dir = %data_dir.display(),
-        slots = workers.slots,
+        slots = workers.cpus.slots.len(),
+        service_cpus = ?workers.cpus.service,
         daily_at = config.evaluation.at.map(|at| at.to_string()),
         "serving"
     );

@@ -80,3 +80,18 @@ fn no_hierarchy_no_home() {
         None
     );
 }
+
+#[test]
+fn agents_weigh_ten_times_as_much_as_others() {
+    let host = tempfile::tempdir().unwrap();
+    let home = Home {
+        version: Version::V1,
+        top: host.path().into(),
+        own: host.path().into(),
+    };
+    let folder = home.prepare_folder(&["memory"]).unwrap();
+    assert!(!folder.join("cpu.shares").exists(), "another controller's");
+    assert_eq!(home.prepare_folder(&["cpu"]).unwrap(), folder);
+    let written = std::fs::read_to_string(folder.join("cpu.shares")).unwrap();
+    assert_eq!(written, "10240");
+}
