@@ -45,10 +45,7 @@ pub struct Server {
     /// The organiser's bearer token.
     pub admin_token: String,
     client: Client,
-    log: Log,
 }
-
-/// What a server has logged so far.
 
 impl Server {
     /// Starts the server on a free port with `config` (the text of a configuration file) and waits
