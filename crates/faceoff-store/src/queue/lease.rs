@@ -129,7 +129,9 @@ pub(crate) async fn renew_all(
 ) -> Result<()> {
     let until = Instant(after(now, lease_s));
     sqlx::query!(
-        "UPDATE units SET claimable_at = ?1 WHERE state = 'leased' AND claimable_at < ?1",
+        // both conditions on the state: by the first SQLite sees that the index of open units serves
+        "UPDATE units SET claimable_at = ?1
+         WHERE state IN ('queued', 'leased') AND state = 'leased' AND claimable_at < ?1",
         until,
     )
     .execute(connection)
