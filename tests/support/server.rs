@@ -106,7 +106,6 @@ impl Server {
             url,
             admin_token,
             client,
-            log,
         }
     }
 

@@ -5,13 +5,18 @@ use crate::{
     bundle::Bundle,
     config::AgentEnvironment,
     fault::{PlatformFault, Trouble},
-    host_watch::{Evidence, HostWatch, Over, Wait},
+    host_watch::{Evidence, GLANCE_LASTS, HostWatch, Over, Wait},
     waited::Waited,
 };
-use faceoff_sandbox::{AgentProcess, ReadLine, SpawnError, SpawnSpec, WriteError, affinity};
+use faceoff_sandbox::{
+    AgentProcess, CpuReading, ReadLine, SpawnError, SpawnSpec, WriteError, affinity,
+};
 use faceoff_types::{AgentFaultKind, Phase, TimeLimits};
 use faceoff_wire::{MAX_LINE_BYTES, Message, answer, quote_line};
-use std::time::{Duration, Instant};
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 /// The running process.
 #[derive(Debug)]
@@ -20,6 +25,8 @@ pub(crate) struct Exchange<'w> {
     watch: &'w dyn HostWatch,
     /// Does the agent keep to CPUs that the calling thread keeps off?
     apart: bool,
+    /// What the counters said at the last glance, and when that was.
+    glance: Option<(Instant, Arc<CpuReading>)>,
     /// The message being sent; its memory is reused.
     line: Vec<u8>,
     /// CPU time of the whole process tree at its last answer, in seconds, where the host tells.
@@ -91,6 +98,7 @@ impl<'w> Exchange<'w> {
             process,
             watch,
             apart,
+            glance: None,
             line: Vec::with_capacity(4096),
             exit_grace: TimeLimits::duration(env.time.bye_s),
         })
@@ -108,10 +116,7 @@ impl<'w> Exchange<'w> {
             return Err(self.early(phase));
         }
         message.write_line(&mut self.line);
-        if phase != Phase::Step {
-            self.process.know_threads();
-        }
-        let before = self.process.glance_at_cpus();
+        let before = self.glance(phase);
         match self.process.send_line(&self.line) {
             Ok(asked) => {
                 let limit = TimeLimits::duration(limit_s);
@@ -125,6 +130,22 @@ impl<'w> Exchange<'w> {
             Err(WriteError::Closed) => Err(self.closed()),
             Err(WriteError::Platform(error)) => Err(error.into()),
         }
+    }
+
+    /// The counters before a question, which may be as old as [`GLANCE_LASTS`]: to read them for each of an
+    /// instant agent's questions would cost more than the answer.
+    fn glance(&mut self, phase: Phase) -> Option<Arc<CpuReading>> {
+        if phase != Phase::Step {
+            self.process.know_threads();
+            self.glance = None;
+        }
+        let now = Instant::now();
+        let is_fresh = |(at, _): &(Instant, Arc<CpuReading>)| now < *at + GLANCE_LASTS;
+        if !self.glance.as_ref().is_some_and(is_fresh) {
+            let glance = self.process.glance_at_cpus();
+            self.glance = glance.map(|reading| (now, Arc::new(reading)));
+        }
+        self.glance.as_ref().map(|(_, reading)| Arc::clone(reading))
     }
 
     /// Waits for the answer until `until`, which may have passed, or until its limit is over; `None` if it
@@ -228,9 +249,9 @@ impl<'w> Exchange<'w> {
             return Duration::ZERO;
         }
         let wait = &sent.wait;
-        let others_ran = self
-            .process
-            .taken_from_it_since(wait.first_reading(), wait.before());
+        let others_ran =
+            self.process
+                .taken_from_it_since(wait.asked, wait.first_reading(), wait.before());
         let evidence = Evidence {
             now,
             others_ran,

@@ -3,13 +3,19 @@
 //! microseconds.
 
 use faceoff_sandbox::CpuReading;
-use std::time::{Duration, Instant};
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 /// An answer that takes longer is looked after. Half of the lowest limit that costs points, and as long as
 /// the kernel's counters may lag behind: what they tell later was then within the wait.
 pub(crate) const FIRST_LOOK: Duration = Duration::from_millis(10);
 /// How often the evaluator wakes while an answer is late, so that its own lateness can be told.
 pub(crate) const NEXT_LOOK: Duration = Duration::from_millis(5);
+/// How old what the counters said before a question may be. That much less is proven by it, which with the
+/// counters' own lag leaves less than costs points.
+pub(crate) const GLANCE_LASTS: Duration = Duration::from_millis(5);
 /// An evaluator that wakes late by no more than this was not held up.
 const ORDINARY_LATENESS: Duration = Duration::from_millis(1);
 /// A hard limit is extended by the host's share up to this many times itself; then the host explains
@@ -39,8 +45,8 @@ pub(crate) struct Wait {
     /// From when on the time counts.
     pub asked: Instant,
     limit: Duration,
-    /// What the counters said right before, at a glance.
-    before: Option<CpuReading>,
+    /// What the counters said before, at a glance, [`GLANCE_LASTS`] ago at most.
+    before: Option<Arc<CpuReading>>,
     /// By how much too long it took the evaluator to write the question.
     held_up: Duration,
     /// The answer is late, and this is what the counters said first.
@@ -67,7 +73,7 @@ impl Wait {
     /// The wait for an answer to what was asked at `asked`, whose limit runs from then on; the attempt to
     /// write it, which waits for nothing, was over at `written`.
     pub fn begin(
-        before: Option<CpuReading>,
+        before: Option<Arc<CpuReading>>,
         asked: Instant,
         written: Instant,
         limit: Duration,
@@ -100,8 +106,8 @@ impl Wait {
     }
 
     /// What the counters said at a glance before the question.
-    pub const fn before(&self) -> Option<&CpuReading> {
-        self.before.as_ref()
+    pub fn before(&self) -> Option<&CpuReading> {
+        self.before.as_deref()
     }
 
     /// What the counters said when the answer was found to be late.

@@ -93,10 +93,11 @@ impl CpuEvidence {
         })
     }
 
-    /// For how much of the time since `begun`, or since the glance before, the agent was kept from running,
+    /// For how much of the time since `begun`, or by the glance before it was `asked`, the agent was kept from running,
     /// because everything that it may run on ran something else: the more that either proves.
     pub(crate) fn taken_since(
         &self,
+        asked: Instant,
         begun: Option<&CpuReading>,
         glance: Option<&CpuReading>,
         agent: &[Pid],
@@ -104,8 +105,12 @@ impl CpuEvidence {
         let now = self.read(First::Others, agent)?;
         let precise = matches!(self.run_time, RunTime::PerCpu { .. });
         let since = |from: Option<&CpuReading>| from.map(|from| taken(from, &now, precise));
-        // What others ran right before a glance may be charged to them after it.
-        let since_glance = since(glance).map(|taken| taken.saturating_sub(LAG));
+        // What others ran right before a glance may be charged to them after it, and what they ran between it
+        // and the question was not taken from the answer.
+        let since_glance = glance.map(|glance| {
+            let age = asked.saturating_duration_since(glance.at);
+            taken(glance, &now, precise).saturating_sub(LAG + age)
+        });
         Some(since(begun).max(since_glance).unwrap_or_default())
     }
 

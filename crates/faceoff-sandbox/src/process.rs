@@ -232,14 +232,16 @@ impl AgentProcess {
         evidence.glance(&self.threads)
     }
 
-    /// For how much of the time since `begun`, or since the `glance` before it, the agent wanted to run and
+    /// For how much of the time since `asked`, or since it `begun` to be late, or by the `glance` before it was
+    /// asked, the agent wanted to run and
     /// could not, because all CPUs that it may use ran something outside of its cgroup, or were held up by a
     /// machine below this one; without either, zero. `None` where the host does not tell. Never more
     /// than the kernel's counters prove: with version 1 of the cgroup interface in nanoseconds, with version
     /// 2 in ticks of 10 ms, of which a few may be missing. They lag behind by 10 ms at most: so long the
-    /// agent must have been waited for when it `begun`, and as much is taken off since a glance.
+    /// agent must have been waited for when it `begun`, and as much, with its age, is taken off since a glance.
     pub fn taken_from_it_since(
         &self,
+        asked: Instant,
         begun: Option<&CpuReading>,
         glance: Option<&CpuReading>,
     ) -> Option<Duration> {
@@ -247,7 +249,7 @@ impl AgentProcess {
         if begun.is_none() && glance.is_none() {
             return Some(Duration::ZERO);
         }
-        evidence.taken_since(begun, glance, &self.tree.processes())
+        evidence.taken_since(asked, begun, glance, &self.tree.processes())
     }
 
     /// Closes the agent's input, waits up to `grace` for it to exit, then kills the tree; always reaps.

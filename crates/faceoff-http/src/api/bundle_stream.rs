@@ -90,7 +90,7 @@ pub(crate) async fn receive(
         }
         hasher.update(&chunk);
         if let Err(error) = writer.write_all(&chunk).await {
-            drain(&mut stream, announced.unwrap_or(DRAIN_BYTES), patience).await;
+            incoming.drain(announced.unwrap_or(DRAIN_BYTES)).await;
             return Err(room::unwritten(error));
         }
     }

@@ -572,9 +572,10 @@ async fn many_teams_with_work_of_both_sorts_share_whatever_it_costs() {
         let teams: Vec<TeamId> = s.teams.keys().copied().collect();
         for _ in 0..40 {
             let team = teams[drawn.below(6) as usize];
+            let quota = UploadQuota::default();
             let uploaded =
                 s.f.store
-                    .create_submission(Actor::Team(team), team, bundle(), s.f.now);
+                    .create_submission(Actor::Team(team), team, bundle(), s.f.now, &quota);
             uploaded.await.unwrap();
         }
         let costs: BTreeMap<(&str, Kind), i64> = NAMES
