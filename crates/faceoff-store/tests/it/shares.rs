@@ -575,7 +575,7 @@ async fn many_teams_with_work_of_both_sorts_share_whatever_it_costs() {
             let quota = UploadQuota::default();
             let uploaded =
                 s.f.store
-                    .create_submission(Actor::Team(team), team, bundle(), s.f.now, &quota);
+                    .create_submission(Actor::Team(team), team, bundle(), &quota, s.f.now);
             uploaded.await.unwrap();
         }
         let costs: BTreeMap<(&str, Kind), i64> = NAMES
