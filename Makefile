@@ -11,12 +11,13 @@ CARGO      ?= cargo
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
 
-.PHONY: demo test fuzz steady lint format fidelity setup setup-test agents clean-demo help
+.PHONY: demo test fuzz busy steady lint format fidelity setup setup-test agents clean-demo help
 
 help:
 	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
 	@echo "make test   run everything that proves that it works"
 	@echo "make fuzz   feed the readers what is nearly valid: MINUTES=$(MINUTES)"
+	@echo "make busy   play beside hogs, floods and bursts of processes"
 	@echo "make steady run the tests ten times, and three times on a busy machine"
 	@echo "make lint   format check and lints"
 	@echo "make fidelity   draw how far the simulator is from the recordings"
@@ -60,6 +61,11 @@ test: setup-test
 fuzz: setup-test
 	FUZZ_MINUTES=$(MINUTES) $(CARGO) test --release --locked --package faceoff-runner --test it fuzz:: \
 	    -- --nocapture --test-threads 4
+
+# What other load costs agents: nothing. Alone, for it takes all of the machine that it can get.
+busy: setup-test
+	$(CARGO) build --locked --workspace --bins --tests
+	$(CARGO) test --locked --workspace --test e2e busy_host -- --include-ignored --test-threads 1
 
 # No verdict may depend on how busy the machine is.
 steady:
