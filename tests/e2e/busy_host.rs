@@ -221,19 +221,8 @@ fn a_busy_host_costs_no_point_no_fault_and_no_success() {
     }
 }
 
-#[test]
-fn what_answers_strangers_gives_way_and_keeps_off_the_agents_cpus() {
-    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let server = Server::start(&scratch.path().join("data"), CONFIG);
-    let mut beside = Load::default();
-    beside.flood(&server);
-    let team = Team::create(&server, "Held");
-    let id = team.upload(
-        &server,
-        bundle::packed(&bundle::reference("hold", scratch.path())),
-    );
-    let verdict = team.verdict(&server, &id);
-    assert_eq!(verdict["state"], "valid", "{verdict:#}");
+/// The server's threads with their CPUs: those of ordinary priority, and those that give way.
+fn threads_of(server: &Server) -> (Vec<(String, String)>, Vec<(String, String)>) {
     let tasks = fs::read_dir(format!("/proc/{}/task", server.process_id())).expect("it runs");
     let (mut ordinary, mut giving_way) = (Vec::new(), Vec::new());
     for task in tasks.flatten() {
@@ -262,6 +251,23 @@ fn what_answers_strangers_gives_way_and_keeps_off_the_agents_cpus() {
             ordinary.push(thread)
         }
     }
+    (ordinary, giving_way)
+}
+
+#[test]
+fn what_answers_strangers_gives_way_and_keeps_off_the_agents_cpus() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    let mut beside = Load::default();
+    beside.flood(&server);
+    let team = Team::create(&server, "Held");
+    let id = team.upload(
+        &server,
+        bundle::packed(&bundle::reference("hold", scratch.path())),
+    );
+    let verdict = team.verdict(&server, &id);
+    assert_eq!(verdict["state"], "valid", "{verdict:#}");
+    let (ordinary, giving_way) = threads_of(&server);
     let of = |threads: &[(String, String)], begins: &str| -> Vec<String> {
         let named = threads.iter().filter(|one| one.0.starts_with(begins));
         named.map(|one| one.1.clone()).collect()
@@ -269,9 +275,22 @@ fn what_answers_strangers_gives_way_and_keeps_off_the_agents_cpus() {
     let slot = of(&ordinary, "faceoff-slot");
     assert_eq!(slot.len(), 1, "{ordinary:?}");
     for name in ["http", "sqlx-sqlite", "service"] {
-        assert!(of(&ordinary, name).is_empty(), "{ordinary:?}");
         assert!(!of(&giving_way, name).is_empty(), "{name}: {giving_way:?}");
     }
+    // One that is being started for a slot's request gives way as its first deed.
+    let started = |threads: &[(String, String)]| {
+        let names = ["http", "service"];
+        names.iter().any(|name| !of(threads, name).is_empty())
+    };
+    let mut seen = ordinary;
+    for _ in 0..1000 {
+        if !started(&seen) {
+            break;
+        }
+        thread::yield_now();
+        seen = threads_of(&server).0;
+    }
+    assert!(!started(&seen), "{seen:?}");
     // Two CPUs at least: the agent's is none of these.
     let cpus = thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let theirs = of(&giving_way, "http");

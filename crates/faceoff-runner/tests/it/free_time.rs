@@ -8,6 +8,7 @@ use crate::{
 use faceoff_runner::AgentEnvironment;
 use faceoff_sandbox::{Isolation, Layer};
 use faceoff_types::{AgentFaultKind, Task};
+use std::path::Path;
 
 /// Reads its standard input by itself and leaves the end of each question unread, so that sooner or later
 /// the next one does not fit into a pipe that was made small; then it thinks, and says so in its log.
@@ -97,6 +98,18 @@ fn leaves_unread(shrinks: bool, who: &str) -> Agent {
     ))
 }
 
+/// How many of the recorded answers took 0.3 s or more, whoever's time that was.
+fn slow_answers(recording: &Path) -> usize {
+    let steps = read(&recording.join("steps.parquet"));
+    let counted = seconds(&steps, "computation_time_ns");
+    let host = seconds(&steps, "host_time_ns");
+    let took = counted
+        .iter()
+        .zip(&host)
+        .map(|(counted, host)| counted + host);
+    took.filter(|took| *took >= 0.3).count()
+}
+
 /// Without the filter that keeps the pipe's size.
 fn without_filter() -> AgentEnvironment {
     let mut env = sandboxed();
@@ -119,16 +132,7 @@ fn a_question_that_does_not_fit_is_on_the_agents_time() {
         assert!(report.log.contains("shrunk 4096"), "{}", report.log);
         assert_eq!(report.outcomes[0].fault, None);
         let thoughts = report.log.matches("thought").count();
-        let steps = read(&out.path().join("steps.parquet"));
-        let (counted, host) = (
-            seconds(&steps, "computation_time_ns"),
-            seconds(&steps, "host_time_ns"),
-        );
-        let slow = counted
-            .iter()
-            .zip(&host)
-            .filter(|(counted, host)| **counted + **host >= 0.3)
-            .count();
+        let slow = slow_answers(out.path());
         // Some may have been thought while the evaluator itself was slow to ask; before, none showed.
         assert_eq!(thoughts, 6, "{}", report.log);
         assert!(slow >= 1, "{slow} of {thoughts}");
@@ -156,18 +160,8 @@ fn a_question_that_a_thread_takes_slowly_is_on_the_agents_time() {
         let report = run(&spec(Task::Hit, 0..1), &agent, &env, out.path()).unwrap();
         assert_eq!(report.outcomes[0].fault, None, "{}", report.log);
         assert_eq!(report.log.matches("thought").count(), 6);
-        let steps = read(&out.path().join("steps.parquet"));
-        let (counted, host) = (
-            seconds(&steps, "computation_time_ns"),
-            seconds(&steps, "host_time_ns"),
-        );
         // A millisecond for each byte of a question, of which there are some hundred.
-        let slow = counted
-            .iter()
-            .zip(&host)
-            .filter(|(counted, host)| **counted + **host >= 0.3)
-            .count();
-        assert_eq!(slow, 6);
+        assert_eq!(slow_answers(out.path()), 6);
     }
 }
 

@@ -108,9 +108,26 @@ fn serve_giving_way(
     tokio::runtime::Builder::new_multi_thread()
         .enable_all()
         .thread_name("http")
+        .on_thread_start({
+            let (cpus, nice) = (
+                cpus.service.clone(),
+                affinity::niceness().unwrap_or_default(),
+            );
+            move || give_way_too(&cpus, nice)
+        })
         .build()
         .context("starting the async runtime")?
         .block_on(serve(config, connections, cpus, threads))
+}
+
+/// A thread of the runtime that was started for what a slot asked has the slot's priority until here, where
+/// the others have the value `nice`.
+fn give_way_too(cpus: &[usize], nice: i32) {
+    if affinity::niceness().is_ok_and(|own| own < nice)
+        && let Err(error) = affinity::give_way(cpus)
+    {
+        tracing::warn!(%error, ?cpus, "requests cannot be kept from disturbing slots");
+    }
 }
 
 async fn serve(
