@@ -221,8 +221,11 @@ fn a_busy_host_costs_no_point_no_fault_and_no_success() {
     }
 }
 
+/// A thread's name and its CPUs.
+type Named = (String, String);
+
 /// The server's threads with their CPUs: those of ordinary priority, and those that give way.
-fn threads_of(server: &Server) -> (Vec<(String, String)>, Vec<(String, String)>) {
+fn threads_of(server: &Server) -> (Vec<Named>, Vec<Named>) {
     let tasks = fs::read_dir(format!("/proc/{}/task", server.process_id())).expect("it runs");
     let (mut ordinary, mut giving_way) = (Vec::new(), Vec::new());
     for task in tasks.flatten() {
@@ -268,7 +271,7 @@ fn what_answers_strangers_gives_way_and_keeps_off_the_agents_cpus() {
     let verdict = team.verdict(&server, &id);
     assert_eq!(verdict["state"], "valid", "{verdict:#}");
     let (ordinary, giving_way) = threads_of(&server);
-    let of = |threads: &[(String, String)], begins: &str| -> Vec<String> {
+    let of = |threads: &[Named], begins: &str| -> Vec<String> {
         let named = threads.iter().filter(|one| one.0.starts_with(begins));
         named.map(|one| one.1.clone()).collect()
     };
@@ -278,7 +281,7 @@ fn what_answers_strangers_gives_way_and_keeps_off_the_agents_cpus() {
         assert!(!of(&giving_way, name).is_empty(), "{name}: {giving_way:?}");
     }
     // One that is being started for a slot's request gives way as its first deed.
-    let started = |threads: &[(String, String)]| {
+    let started = |threads: &[Named]| {
         let names = ["http", "service"];
         names.iter().any(|name| !of(threads, name).is_empty())
     };
