@@ -25,8 +25,8 @@ pub(crate) struct Exchange<'w> {
     watch: &'w dyn HostWatch,
     /// Does the agent keep to CPUs that the calling thread keeps off?
     apart: bool,
-    /// What the counters said at the last glance, and when that was.
-    glance: Option<(Instant, Arc<CpuReading>)>,
+    /// What the counters said at the last glance.
+    glance: Option<Arc<CpuReading>>,
     /// The message being sent; its memory is reused.
     line: Vec<u8>,
     /// CPU time of the whole process tree at its last answer, in seconds, where the host tells.
@@ -139,13 +139,11 @@ impl<'w> Exchange<'w> {
             self.process.know_threads();
             self.glance = None;
         }
-        let now = Instant::now();
-        let is_fresh = |(at, _): &(Instant, Arc<CpuReading>)| now < *at + GLANCE_LASTS;
+        let is_fresh = |glance: &Arc<CpuReading>| glance.at().elapsed() < GLANCE_LASTS;
         if !self.glance.as_ref().is_some_and(is_fresh) {
-            let glance = self.process.glance_at_cpus();
-            self.glance = glance.map(|reading| (now, Arc::new(reading)));
+            self.glance = self.process.glance_at_cpus().map(Arc::new);
         }
-        self.glance.as_ref().map(|(_, reading)| Arc::clone(reading))
+        self.glance.clone()
     }
 
     /// Waits for the answer until `until`, which may have passed, or until its limit is over; `None` if it

@@ -71,6 +71,13 @@ enum First {
     Others,
 }
 
+impl CpuReading {
+    /// When they were read.
+    pub const fn at(&self) -> Instant {
+        self.at
+    }
+}
+
 impl CpuEvidence {
     /// The counters now, as the beginning of a span; `None` if the host does not tell.
     pub(crate) fn begin(&self, agent: &[Pid]) -> Option<CpuReading> {

@@ -94,8 +94,9 @@ impl ServeCommand {
     }
 }
 
-/// Requests, the database and the schedule: whatever strangers do with them, slots come first. All threads
-/// of the runtime, and those that the database starts, inherit from this one.
+/// Requests, the database and the schedule: whatever strangers do with them, slots come first. Threads
+/// inherit from the one that starts them: most from this one. Those that a slot's request makes the runtime start
+/// give way by themselves; a connection of the database that such a request opens keeps the slot's priority.
 fn serve_giving_way(
     config: Config,
     connections: ConnectionLimits,
