@@ -20,6 +20,12 @@ pub fn is_harmless(c: char) -> bool {
 /// still is, and says the same.
 #[must_use]
 pub fn harmless(text: &str) -> Cow<'_, str> {
+    if text
+        .bytes()
+        .all(|byte| matches!(byte, b' '..=b'~' | b'\n' | b'\t'))
+    {
+        return Cow::Borrowed(text);
+    }
     let stays = |c: char| is_harmless(c) || matches!(c, '\n' | '\t');
     if text.chars().all(stays) {
         return Cow::Borrowed(text);

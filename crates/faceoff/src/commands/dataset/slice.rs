@@ -1,7 +1,7 @@
 use crate::terminal;
 use anyhow::Context;
 use arrow_array::{
-    Array, RecordBatch,
+    Array,
     cast::AsArray,
     types::{Float64Type, Int64Type, UInt32Type},
 };
@@ -95,9 +95,13 @@ impl SliceArgs {
         }
         let steps = self.steps.map_or(0..u32::MAX, |steps| steps.0);
         let numbers = rows["step"].as_primitive::<UInt32Type>();
+        let columns: Vec<(&str, &dyn Array)> = names
+            .iter()
+            .map(|name| (name.as_str(), &*rows[name.as_str()]))
+            .collect();
         for row in 0..rows.num_rows() {
             if steps.contains(&numbers.value(row)) {
-                write_row(&mut out, self.format, &names, &rows, row)?;
+                write_row(&mut out, self.format, &columns, row)?;
             }
         }
         Ok(out.flush()?)
@@ -107,17 +111,16 @@ impl SliceArgs {
 fn write_row(
     out: &mut dyn Write,
     format: Format,
-    names: &[String],
-    batch: &RecordBatch,
+    columns: &[(&str, &dyn Array)],
     row: usize,
 ) -> anyhow::Result<()> {
-    let cells = names
+    let cells = columns
         .iter()
-        .map(|name| (name, json(&batch[name.as_str()], row)));
+        .map(|(name, column)| (*name, json(*column, row)));
     match format {
         Format::Jsonl => {
             let object: Map<String, Value> =
-                cells.map(|(name, cell)| (name.clone(), cell)).collect();
+                cells.map(|(name, cell)| (name.to_owned(), cell)).collect();
             writeln!(out, "{}", Value::Object(object))?;
         }
         Format::Csv => {
