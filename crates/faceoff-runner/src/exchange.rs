@@ -18,6 +18,10 @@ use std::{
     time::{Duration, Instant},
 };
 
+/// Who answered within this time is looked out for as long at the next question, where that costs the agent
+/// nothing: to sleep and be woken takes longer than such an answer.
+const QUICK: Duration = Duration::from_micros(50);
+
 /// The running process.
 #[derive(Debug)]
 pub(crate) struct Exchange<'w> {
@@ -25,6 +29,8 @@ pub(crate) struct Exchange<'w> {
     watch: &'w dyn HostWatch,
     /// Does the agent keep to CPUs that the calling thread keeps off?
     apart: bool,
+    /// Was its last answer a quick one?
+    is_quick: bool,
     /// What the counters said at the last glance.
     glance: Option<Arc<CpuReading>>,
     /// The message being sent; its memory is reused.
@@ -98,6 +104,7 @@ impl<'w> Exchange<'w> {
             process,
             watch,
             apart,
+            is_quick: false,
             glance: None,
             line: Vec::with_capacity(4096),
             exit_grace: TimeLimits::duration(env.time.bye_s),
@@ -149,6 +156,9 @@ impl<'w> Exchange<'w> {
     /// Waits for the answer until `until`, which may have passed, or until its limit is over; `None` if it
     /// may still come.
     pub fn poll(&mut self, sent: &mut Sent, until: Instant) -> Result<Option<Answer>, Trouble> {
+        if self.apart && self.is_quick {
+            self.process.look_out(until.min(sent.wait.asked + QUICK))?;
+        }
         loop {
             let stop = until.min(sent.wait.wake);
             match self.process.read_line(MAX_LINE_BYTES, stop)? {
@@ -203,6 +213,7 @@ impl<'w> Exchange<'w> {
         let cpu_time_s = self.process.cpu_time_s();
         let waited = self.waited(sent, at, used_s(self.cpu_time_s, cpu_time_s));
         self.cpu_time_s = cpu_time_s;
+        self.is_quick = waited.wall < QUICK;
         Answer { bytes, waited }
     }
 
@@ -223,10 +234,8 @@ impl<'w> Exchange<'w> {
                 Over::ByTheHost => Err(Trouble::Host { fault, waited }),
             };
         }
-        if wait.is_newly_late(now) {
-            wait.became_late(self.process.read_cpus());
-        }
         if now >= wait.wake {
+            wait.look(self.process.read_cpus());
             // From when it was seen that nothing is there: an evaluator that is held up after that is late.
             wait.sleep_on(now);
         }
@@ -247,12 +256,13 @@ impl<'w> Exchange<'w> {
             return Duration::ZERO;
         }
         let wait = &sent.wait;
-        let others_ran =
+        let taken =
             self.process
                 .taken_from_it_since(wait.asked, wait.first_reading(), wait.before());
         let evidence = Evidence {
             now,
-            others_ran,
+            kept: taken.map(|taken| taken.kept),
+            stolen: taken.map_or(Duration::ZERO, |taken| taken.stolen),
             agent_ran: agent_ran_s.map(TimeLimits::duration),
             apart: self.apart,
         };

@@ -51,6 +51,10 @@ pub(crate) struct Wait {
     held_up: Duration,
     /// The answer is late, and this is what the counters said first.
     late: Option<Option<CpuReading>>,
+    /// What they said last, if not at first.
+    last: Option<CpuReading>,
+    /// For how long the agent was seen waiting to run at two looks in a row.
+    unlet: Duration,
     /// When the evaluator wants to be woken.
     pub wake: Instant,
     /// When the limit is over, as extended so far.
@@ -61,8 +65,10 @@ pub(crate) struct Wait {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Evidence {
     pub now: Instant,
-    /// That others ran on the agent's CPUs; `None` where the host does not tell.
-    pub others_ran: Option<Duration>,
+    /// That the agent was kept from running; `None` where the host does not tell.
+    pub kept: Option<Duration>,
+    /// That there was no CPU at all: nobody ran, even if a kernel counts it as somebody's run time.
+    pub stolen: Duration,
     /// That the agent itself ran, since its last answer.
     pub agent_ran: Option<Duration>,
     /// Are the evaluator's CPUs none of the agent's?
@@ -85,6 +91,8 @@ impl Wait {
             before,
             held_up: lateness(asked, written),
             late: None,
+            last: None,
+            unlet: Duration::ZERO,
             wake: (asked + FIRST_LOOK).min(deadline),
             deadline,
         }
@@ -95,14 +103,19 @@ impl Wait {
         self.late.is_some() || now > self.wake + ORDINARY_LATENESS
     }
 
-    /// Is this the first time that the answer is found to be late?
-    pub fn is_newly_late(&self, now: Instant) -> bool {
-        self.late.is_none() && now >= self.wake
-    }
-
-    /// The counters when the answer was found to be late.
-    pub fn became_late(&mut self, reading: Option<CpuReading>) {
-        self.late = Some(reading);
+    /// What the counters say at a look, now that the answer is late.
+    pub fn look(&mut self, reading: Option<CpuReading>) {
+        let Some(first) = &self.late else {
+            if let (Some(before), Some(now)) = (&self.before, &reading) {
+                self.unlet += now.stolen_unlet_since(before, self.asked);
+            }
+            self.late = Some(reading);
+            return;
+        };
+        if let (Some(before), Some(now)) = (self.last.as_ref().or(first.as_ref()), &reading) {
+            self.unlet += now.unlet_since(before);
+        }
+        self.last = reading;
     }
 
     /// What the counters said at a glance before the question.
@@ -124,7 +137,8 @@ impl Wait {
     pub fn taken(&self, watch: &dyn HostWatch, evidence: Evidence) -> Duration {
         let Evidence {
             now,
-            others_ran,
+            kept,
+            stolen,
             agent_ran,
             apart,
         } = evidence;
@@ -132,14 +146,15 @@ impl Wait {
         // An answer that lay there when the evaluator woke late may have come at any time since it wanted
         // to, and a question that it was held up with may not have been there to be answered. Its CPUs
         // being out of the agent's reach, that is nobody's fault here.
-        let overslept = match others_ran {
+        let overslept = match kept {
             Some(_) if apart => self.held_up + lateness(self.wake, now),
             _ => Duration::ZERO,
         };
-        let proven = others_ran
-            .map(|others| others + overslept)
+        let ran = agent_ran.map_or(wall, |ran| ran.min(wall.saturating_sub(stolen)));
+        let proven = kept
+            .map(|kept| kept.max(self.unlet) + overslept)
             // Whatever the rest says: while it ran, it was not kept from running.
-            .map(|proven| proven.min(wall.saturating_sub(agent_ran.unwrap_or(wall))));
+            .map(|proven| proven.min(wall.saturating_sub(ran)));
         watch.taken(self.asked, now, proven).min(wall)
     }
 
@@ -188,7 +203,8 @@ mod tests {
     fn evidence(now: Instant, others_ms: u64, agent_ms: u64, apart: bool) -> Evidence {
         Evidence {
             now,
-            others_ran: Some(MS(others_ms)),
+            kept: Some(MS(others_ms)),
+            stolen: Duration::ZERO,
             agent_ran: Some(MS(agent_ms)),
             apart,
         }
@@ -208,8 +224,17 @@ mod tests {
             ..evidence(asked + MS(10), 9, 0, true)
         };
         assert_eq!(wait.taken(&Counters, unknown), MS(0));
+        let stolen = Evidence {
+            stolen: MS(9),
+            ..evidence(asked + MS(10), 9, 5, false)
+        };
+        assert_eq!(
+            wait.taken(&Counters, stolen),
+            MS(9),
+            "what was stolen was not run, whoever it is counted for"
+        );
         let nothing = Evidence {
-            others_ran: None,
+            kept: None,
             ..evidence(asked + MS(80), 0, 0, true)
         };
         assert_eq!(

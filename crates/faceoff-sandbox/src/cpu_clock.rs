@@ -1,7 +1,7 @@
-//! CPU time of a process tree that no cgroup accounts for: the sum of the processes' own clocks.
+//! CPU time by the processes' own clocks: of a tree that no cgroup accounts for, and where the cgroup's lags behind.
 
 use rustix::process::Pid;
-use std::{cell::RefCell, collections::BTreeMap, fs};
+use std::{cell::RefCell, collections::BTreeMap, fs, time::Duration};
 
 /// The CPU time of every process of a tree that was ever seen, in nanoseconds. What a process used
 /// after the last look at it, or one that came and went between two looks, is missed.
@@ -33,6 +33,14 @@ impl TreeClock {
         let sum: u64 = seen.values().sum();
         (!seen.is_empty()).then_some(sum as f64 * 1e-9)
     }
+}
+
+/// CPU time of these processes up to now, also of what runs at this moment, as far as they still are.
+pub(crate) fn run_time_of(processes: &[Pid]) -> Duration {
+    let each = processes
+        .iter()
+        .filter_map(|process| process_clock_ns(process.as_raw_nonzero().get()));
+    Duration::from_nanos(each.sum())
 }
 
 /// The children of all threads of a process; none where the kernel does not list them.

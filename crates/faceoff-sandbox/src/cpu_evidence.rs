@@ -6,7 +6,10 @@
 //! Version 2 tells only the agent's own time; what all did is then taken from `/proc/stat`, in ticks
 //! of 10 ms. What such a tick leaves open is always read in the host's disfavour.
 
-use crate::cpu_waits::{KnownThreads, Waits};
+use crate::{
+    cpu_clock,
+    cpu_waits::{KnownThreads, Waits},
+};
 use rustix::process::Pid;
 use std::{
     fs::{self, File},
@@ -45,12 +48,25 @@ pub(crate) enum RunTime {
 pub struct CpuReading {
     at: Instant,
     agent: Duration,
+    /// The same by the clocks of its processes, which do not lag behind but miss those that ended; zero at a
+    /// glance.
+    clocks: Duration,
     /// Run time of everything on the agent's CPUs; zero where only ticks tell.
     all: Duration,
     throttled: Duration,
     ticks: Vec<Ticks>,
     /// Of the agent's threads, where the kernel tells.
     waits: Option<Waits>,
+}
+
+/// What was taken of a span of an agent's time.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Taken {
+    /// For how long it was kept from running.
+    pub kept: Duration,
+    /// How much of the span there was no CPU at all, for a machine below a virtual one held it up. Kernels
+    /// differ in whether that is also the run time of whoever was on it.
+    pub stolen: Duration,
 }
 
 /// What one CPU did since the host's start, in ticks.
@@ -76,6 +92,40 @@ impl CpuReading {
     pub const fn at(&self) -> Instant {
         self.at
     }
+
+    /// For how long since `before` the agent was not let run, as seen by two looks at its threads: one of them wanted
+    /// to run at both and did not sleep in between, and none of them ran. A thread that was woken on a CPU which the
+    /// machine below holds up is seen by nothing else: its wait is counted from when that CPU has heard of it.
+    pub fn unlet_since(&self, before: &Self) -> Duration {
+        let (Some(then), Some(now)) = (&before.waits, &self.waits) else {
+            return Duration::ZERO;
+        };
+        if !now.one_never_slept_since(then) {
+            return Duration::ZERO;
+        }
+        self.at
+            .saturating_duration_since(before.at)
+            .saturating_sub(self.ran_since(before))
+            .saturating_sub(self.throttled.saturating_sub(before.throttled))
+    }
+
+    /// What was stolen since a glance `before` the agent was `asked`, if one of its threads wants to run and was not
+    /// let since: whether it slept until now nobody has seen, but not longer than there was no CPU.
+    pub fn stolen_unlet_since(&self, before: &Self, asked: Instant) -> Duration {
+        let (Some(then), Some(now)) = (&before.waits, &self.waits) else {
+            return Duration::ZERO;
+        };
+        if !now.one_is_not_let_since(then) {
+            return Duration::ZERO;
+        }
+        stolen(before, self).min(self.at.saturating_duration_since(asked))
+    }
+
+    /// What the agent ran, the most that either count tells.
+    fn ran_since(&self, before: &Self) -> Duration {
+        let by_clocks = self.clocks.saturating_sub(before.clocks);
+        by_clocks.max(self.agent.saturating_sub(before.agent))
+    }
 }
 
 impl CpuEvidence {
@@ -84,41 +134,50 @@ impl CpuEvidence {
         self.read(First::Agent, agent)
     }
 
-    /// The counters now as far as they are read in some microseconds, as the beginning of a span: without
-    /// ticks, and of known threads only. `None` if the host does not tell, or in ticks alone.
+    /// The counters now as far as they are read in some microseconds, as the beginning of a span: of known
+    /// threads only. `None` if the host does not tell, or in ticks alone.
     pub(crate) fn glance(&self, agent: &KnownThreads) -> Option<CpuReading> {
         let RunTime::PerCpu { all, .. } = &self.run_time else {
             return None;
         };
         Some(CpuReading {
             agent: self.agent()?,
+            clocks: Duration::ZERO,
             all: of_cpus(&text(all)?, &self.cpus)?,
             throttled: self.throttled(),
-            ticks: Vec::new(),
+            ticks: ticks_of(&fs::read_to_string("/proc/stat").ok()?, &self.cpus)?,
             waits: Some(agent.waits()?),
             at: Instant::now(),
         })
     }
 
-    /// For how much of the time since `begun`, or by the glance before it was `asked`, the agent was kept from running,
-    /// because everything that it may run on ran something else: the more that either proves.
+    /// What was taken of the time since `begun`, or by the glance before the agent was `asked`: for how long it was
+    /// kept from running, the more that either proves, and how much was stolen since the earlier of them.
     pub(crate) fn taken_since(
         &self,
         asked: Instant,
         begun: Option<&CpuReading>,
         glance: Option<&CpuReading>,
         agent: &[Pid],
-    ) -> Option<Duration> {
+    ) -> Option<Taken> {
         let now = self.read(First::Others, agent)?;
         let precise = matches!(self.run_time, RunTime::PerCpu { .. });
-        let since = |from: Option<&CpuReading>| from.map(|from| taken(from, &now, precise));
+        let since_begun =
+            begun.map(|begun| taken(begun, &now, precise).max(kept_waiting(begun, &now, precise)));
         // What others ran right before a glance may be charged to them after it, and what they ran between it
         // and the question was not taken from the answer.
         let since_glance = glance.map(|glance| {
             let age = asked.saturating_duration_since(glance.at);
-            taken(glance, &now, precise).saturating_sub(LAG + age)
+            let ran = taken(glance, &now, precise).saturating_sub(LAG + age);
+            ran.max(kept_waiting(glance, &now, precise).saturating_sub(age))
         });
-        Some(since(begun).max(since_glance).unwrap_or_default())
+        let kept = since_begun.max(since_glance).unwrap_or_default();
+        // The earlier reading is the one of the longer span.
+        let stolen = glance.or(begun).map(|from| stolen(from, &now));
+        Some(Taken {
+            kept,
+            stolen: stolen.unwrap_or_default(),
+        })
     }
 
     fn read(&self, first: First, processes: &[Pid]) -> Option<CpuReading> {
@@ -140,6 +199,7 @@ impl CpuEvidence {
         Some(CpuReading {
             at,
             agent,
+            clocks: cpu_clock::run_time_of(processes),
             all,
             throttled: self.throttled(),
             ticks,
@@ -179,7 +239,7 @@ fn taken(from: &CpuReading, to: &CpuReading, precise: bool) -> Duration {
             .sum::<u64>();
         stolen += at_least(from.stolen, to.stolen);
     }
-    // Who sleeps is kept from nothing. A machine that stands still as a whole tells of no waits.
+    // Who sleeps is kept from nothing, also while time is stolen: it ran, or seemed to, or waited to.
     let waited = match (&from.waits, &to.waits) {
         (Some(from), Some(to)) => to.longest_since(from, wall),
         _ => wall,
@@ -199,11 +259,51 @@ fn taken(from: &CpuReading, to: &CpuReading, precise: bool) -> Duration {
             .min((wall * cpus).saturating_sub(idle))
             .saturating_sub(agent)
     };
+    // Whoever asks why an answer was late finds it in the log.
+    tracing::debug!(
+        ?wall,
+        ?others,
+        ?agent,
+        ?stolen,
+        ?waited,
+        from = ?from.ticks,
+        to = ?to.ticks,
+        "evidence of what the host took"
+    );
     others
         .saturating_sub(wall * cpus.saturating_sub(1))
         .saturating_sub(to.throttled.saturating_sub(from.throttled))
-        .min(stolen.saturating_add(waited))
+        .min(stolen.min(waited + agent).saturating_add(waited))
         .min(wall)
+}
+
+/// For how long the agent was kept from running by what does not lag behind: of an only CPU what one of its
+/// threads waited for, less what all of them ran; or what was stolen while one ran, seemed to, or waited to. An
+/// agent can bring about neither, and by sleeping it is kept from nothing.
+fn kept_waiting(from: &CpuReading, to: &CpuReading, precise: bool) -> Duration {
+    if !precise {
+        return Duration::ZERO;
+    }
+    let wall = to.at.saturating_duration_since(from.at);
+    let waited = match (&from.waits, &to.waits, &to.ticks[..]) {
+        (Some(from), Some(to), [_]) => to.longest_since(from, wall),
+        _ => Duration::ZERO,
+    };
+    let ran = to.agent.saturating_sub(from.agent);
+    let stolen = stolen(from, to).min(waited + ran);
+    waited
+        .saturating_sub(ran)
+        .saturating_sub(to.throttled.saturating_sub(from.throttled))
+        .max(stolen)
+        .min(wall)
+}
+
+/// What the machine below a virtual one took, in the middle of what its ticks leave open. Of several CPUs one
+/// was there at least for the rest.
+fn stolen(from: &CpuReading, to: &CpuReading) -> Duration {
+    let each = std::iter::zip(&from.ticks, &to.ticks);
+    let stolen = each.map(|(from, to)| to.stolen.saturating_sub(from.stolen));
+    ticks(stolen.min().unwrap_or_default())
 }
 
 fn ticks(count: u64) -> Duration {
@@ -271,6 +371,7 @@ mod tests {
         CpuReading {
             at,
             agent: MS(agent),
+            clocks: MS(agent),
             all: MS(all),
             throttled: Duration::ZERO,
             ticks: ticks.to_vec(),
@@ -327,6 +428,79 @@ mod tests {
         let two = [cpu(0, 0, 0); 2];
         assert_eq!(taken(0, 100, &two, 100), MS(0));
         assert_eq!(taken(0, 170, &two, 100), MS(70));
+    }
+
+    #[test]
+    fn what_a_thread_waited_for_on_its_only_cpu_was_taken_but_for_what_its_own_kin_ran() {
+        let begun = Instant::now();
+        let kept = |agent: u64, waited: u64, ticks: &[Ticks]| {
+            let still = vec![Ticks::default(); ticks.len()];
+            let mut from = reading(begun, 500, 700, &still);
+            let mut to = reading(begun + MS(30), 500 + agent, 700, ticks);
+            from.waits = Some(Waits::of_one_thread(MS(400), MS(10)));
+            to.waits = Some(Waits::of_one_thread(MS(401), MS(10 + waited)));
+            kept_waiting(&from, &to, true)
+        };
+        let one = [cpu(0, 0, 0)];
+        assert_eq!(kept(1, 26, &one), MS(25));
+        assert_eq!(kept(30, 29, &one), MS(0), "its other threads ran");
+        assert_eq!(kept(1, 0, &one), MS(0), "it slept");
+        assert_eq!(kept(1, 26, &[cpu(0, 0, 0); 2]), MS(0), "another was free");
+        assert_eq!(
+            kept(25, 0, &[cpu(0, 0, 2)]),
+            MS(20),
+            "stolen while it seemed to run"
+        );
+        assert_eq!(kept(1, 0, &[cpu(0, 0, 2)]), MS(1), "it slept meanwhile");
+        assert_eq!(kept(20, 25, &[cpu(0, 0, 9)]), MS(30), "never more than all");
+        assert_eq!(kept(1, 0, &[cpu(0, 0, 2), cpu(0, 0, 0)]), MS(0));
+        let mut from = reading(begun, 500, 700, &one);
+        let mut to = reading(begun + MS(250), 501, 700, &[cpu(0, 0, 15)]);
+        from.waits = Some(Waits::of_one_thread(MS(400), MS(10)));
+        to.waits = from.waits.clone();
+        assert_eq!(
+            super::taken(&from, &to, true),
+            MS(1),
+            "a sleeper's time is its own"
+        );
+        let still = reading(begun, 0, 0, &one);
+        assert_eq!(kept_waiting(&still, &still, false), MS(0), "ticks alone");
+    }
+
+    #[test]
+    fn a_thread_that_two_looks_find_waiting_was_kept_from_running_but_for_what_ran() {
+        let begun = Instant::now();
+        let at = |ms, agent, slices, stolen, wants_to_run| {
+            let mut reading = reading(begun + MS(ms), agent, 0, &[cpu(0, 0, stolen)]);
+            reading.waits = Some(Waits::of_one_thread_let(slices, wants_to_run));
+            reading
+        };
+        let first = at(10, 3, 7, 5, true);
+        let unlet = |later: &CpuReading| later.unlet_since(&first);
+        assert_eq!(unlet(&at(15, 3, 7, 5, true)), MS(5));
+        assert_eq!(unlet(&at(15, 5, 7, 5, true)), MS(3), "less what it ran");
+        assert_eq!(
+            unlet(&at(15, 9, 7, 5, true)),
+            MS(0),
+            "with its other threads"
+        );
+        assert_eq!(unlet(&at(15, 3, 8, 5, true)), MS(0), "it may have slept");
+        assert_eq!(unlet(&at(15, 3, 7, 5, false)), MS(0), "it sleeps");
+        let mut throttled = at(15, 3, 7, 5, true);
+        throttled.throttled = MS(4);
+        assert_eq!(unlet(&throttled), MS(1), "its own quota");
+        let mut ended = at(15, 3, 7, 5, true);
+        (ended.clocks, ended.agent) = (MS(0), MS(7));
+        assert_eq!(unlet(&ended), MS(1), "a process that ended ran, too");
+
+        // A glance does not tell who wants to run.
+        let glance = at(0, 3, 7, 4, false);
+        let stolen = |now: &CpuReading| now.stolen_unlet_since(&glance, begun + MS(2));
+        assert_eq!(stolen(&at(10, 3, 7, 4, true)), MS(0), "nothing was stolen");
+        assert_eq!(stolen(&at(20, 3, 7, 5, true)), MS(10));
+        assert_eq!(stolen(&at(10, 3, 7, 6, true)), MS(8), "never more than all");
+        assert_eq!(stolen(&at(10, 3, 7, 6, false)), MS(0), "it sleeps");
+        assert_eq!(stolen(&at(10, 3, 8, 6, true)), MS(0), "it was let run");
     }
 
     #[test]

@@ -30,6 +30,8 @@ struct Thread {
     ran: Duration,
     /// Up to when it was last let run.
     waited: Duration,
+    /// How often it was let run.
+    slices: u64,
     /// It runs or waits to run now.
     wants_to_run: bool,
 }
@@ -41,12 +43,41 @@ impl Waits {
         let mut threads = BTreeMap::new();
         for_each_task(processes, |id, task| {
             let of = |file| fs::read_to_string(task.join(file)).ok();
-            if let (Some(schedule), Some(status)) = (of("schedstat"), of("stat")) {
+            // The state first: one that is let run, sleeps and is woken has another number of slices then.
+            if let (Some(status), Some(schedule)) = (of("stat"), of("schedstat")) {
                 threads.extend(thread(&schedule, &status).map(|thread| (id, thread)));
             }
         });
         let of = Which::All;
         (!threads.is_empty()).then_some(Self { threads, of })
+    }
+
+    /// Of one thread, which sleeps now.
+    #[cfg(test)]
+    pub(crate) fn of_one_thread(ran: Duration, waited: Duration) -> Self {
+        let counters = Counters {
+            ran,
+            waited,
+            slices: 0,
+        };
+        Self {
+            threads: BTreeMap::from([(1, counters.of(false))]),
+            of: Which::All,
+        }
+    }
+
+    /// Of one thread that was let run so often.
+    #[cfg(test)]
+    pub(crate) fn of_one_thread_let(slices: u64, wants_to_run: bool) -> Self {
+        let counters = Counters {
+            ran: Duration::ZERO,
+            waited: Duration::ZERO,
+            slices,
+        };
+        Self {
+            threads: BTreeMap::from([(1, counters.of(wants_to_run))]),
+            of: Which::All,
+        }
     }
 
     /// The longest wait of a thread since `before`, which was `wall` ago.
@@ -60,6 +91,25 @@ impl Waits {
         };
         let each = self.threads.iter().map(since);
         each.max().unwrap_or_default().min(wall)
+    }
+
+    /// Has one thread wanted to run all the time since `before`? Then it ran as well, or was not let: had it slept
+    /// in between, it would have been let run to wake. That an idle CPU which the machine below holds up has yet to
+    /// be told of a thread that was woken counts as waiting here, and is missing in [`Self::longest_since`].
+    pub(crate) fn one_never_slept_since(&self, before: &Self) -> bool {
+        self.one_since(before, |then, now| then.wants_to_run && now.wants_to_run)
+    }
+
+    /// Does one thread want to run that was not let since `before`, whatever it wanted then?
+    pub(crate) fn one_is_not_let_since(&self, before: &Self) -> bool {
+        self.one_since(before, |_, now| now.wants_to_run)
+    }
+
+    fn one_since(&self, before: &Self, has: impl Fn(&Thread, &Thread) -> bool) -> bool {
+        self.threads.iter().any(|(id, now)| {
+            let then = before.threads.get(id);
+            then.is_some_and(|then| then.slices == now.slices && has(then, now))
+        })
     }
 }
 
@@ -93,14 +143,7 @@ impl KnownThreads {
                 continue;
             };
             let counters = std::str::from_utf8(&bytes[..count]).ok().and_then(counters);
-            threads.extend(counters.map(|(ran, waited)| {
-                let thread = Thread {
-                    ran,
-                    waited,
-                    wants_to_run: false,
-                };
-                (*id, thread)
-            }));
+            threads.extend(counters.map(|counters| (*id, counters.of(false))));
         }
         let of = Which::Known;
         (!threads.is_empty()).then_some(Waits { threads, of })
@@ -119,23 +162,45 @@ fn for_each_task(processes: &[Pid], mut each: impl FnMut(u32, &std::path::Path))
     }
 }
 
-/// Nanoseconds of running and of waiting, the first two numbers of `schedstat`.
-fn counters(schedule: &str) -> Option<(Duration, Duration)> {
-    let mut numbers = schedule.split_ascii_whitespace().map(str::parse);
-    let mut next = || Some(Duration::from_nanos(numbers.next()?.ok()?));
-    Some((next()?, next()?))
+/// What `schedstat` tells: nanoseconds of running and of waiting, and the number of slices.
+#[derive(Debug, Clone, Copy)]
+struct Counters {
+    ran: Duration,
+    waited: Duration,
+    slices: u64,
 }
 
-/// From `schedstat` (nanoseconds of running and of waiting, slices) and `stat` (number, name, state).
+impl Counters {
+    const fn of(self, wants_to_run: bool) -> Thread {
+        let Self {
+            ran,
+            waited,
+            slices,
+        } = self;
+        Thread {
+            ran,
+            waited,
+            slices,
+            wants_to_run,
+        }
+    }
+}
+
+fn counters(schedule: &str) -> Option<Counters> {
+    let mut numbers = schedule.split_ascii_whitespace().map(str::parse);
+    let mut next = || numbers.next()?.ok();
+    Some(Counters {
+        ran: Duration::from_nanos(next()?),
+        waited: Duration::from_nanos(next()?),
+        slices: next()?,
+    })
+}
+
+/// From `schedstat` and `stat` (number, name, state).
 fn thread(schedule: &str, status: &str) -> Option<Thread> {
-    let (ran, waited) = counters(schedule)?;
     // The name is the program's, and may hold anything.
     let (_, rest) = status.rsplit_once(')')?;
-    Some(Thread {
-        ran,
-        waited,
-        wants_to_run: rest.trim_start().starts_with('R'),
-    })
+    Some(counters(schedule)?.of(rest.trim_start().starts_with('R')))
 }
 
 #[cfg(test)]
@@ -166,6 +231,35 @@ mod tests {
         assert_eq!(longest(&[(2, "75 20 2", "2 () R) S 0")]), 20);
         assert_eq!(longest(&[(3, "5 40 2", "3 (new) R 0")]), 40);
         assert_eq!(longest(&[]), 0);
+    }
+
+    #[test]
+    fn who_wants_to_run_at_both_times_and_was_not_let_in_between_did_not_sleep() {
+        let then = waits(&[(1, "500 100 3", "1 (a) R 0"), (2, "70 0 1", "2 (b) S 0")]);
+        let now = |threads| {
+            let now = waits(threads);
+            (
+                now.one_never_slept_since(&then),
+                now.one_is_not_let_since(&then),
+            )
+        };
+        assert_eq!(now(&[(1, "500 100 3", "1 (a) R 0")]), (true, true));
+        assert_eq!(
+            now(&[(1, "501 100 4", "1 (a) R 0")]),
+            (false, false),
+            "it was let run, and may have slept"
+        );
+        assert_eq!(
+            now(&[(1, "500 100 3", "1 (a) S 0")]),
+            (false, false),
+            "it sleeps now"
+        );
+        assert_eq!(
+            now(&[(2, "70 0 1", "2 (b) R 0")]),
+            (false, true),
+            "it slept then"
+        );
+        assert_eq!(now(&[(3, "0 0 0", "3 (new) R 0")]), (false, false));
     }
 
     #[test]

@@ -40,7 +40,7 @@ mod status_pipe;
 mod stderr_tail;
 mod sweep;
 
-pub use cpu_evidence::CpuReading;
+pub use cpu_evidence::{CpuReading, Taken};
 pub use error::{SandboxError, SpawnError, WriteError};
 pub use faceoff_types::ResourceLimits as Limits;
 pub use isolation::{Isolation, Layer};

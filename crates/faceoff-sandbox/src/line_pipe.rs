@@ -2,6 +2,7 @@
 //! What the agent leaves no room for is kept, and follows while an answer is waited for: a write never
 //! waits, so that no time passes unseen.
 
+use memchr::memchr;
 use rustix::{
     buffer::spare_capacity,
     event::{PollFd, PollFlags, Timespec, poll},
@@ -138,14 +139,28 @@ impl LinePipe {
                 return Ok(ReadLine::Closed);
             }
             // A line that was there before the rest is handed out before: it answers something else.
-            if !self.is_all_sent() && !self.holds_line() && self.send_rest()? == Err(Closed) {
+            if self.holds_line() {
+                continue;
+            }
+            if !self.is_all_sent() && self.send_rest()? == Err(Closed) {
                 return Ok(ReadLine::Closed);
             }
             // A dribbling agent always has something to read: the deadline holds all the same.
-            if Instant::now() >= deadline && !self.holds_line() {
+            if Instant::now() >= deadline {
                 return Ok(self.take_line(max_bytes).unwrap_or(ReadLine::TimedOut));
             }
         }
+    }
+
+    /// Takes what comes until `until`, without sleeping: to be woken takes longer than many an answer.
+    pub(crate) fn look_out(&mut self, until: Instant) -> io::Result<()> {
+        while self.is_all_sent() && !self.holds_line() {
+            // Also of an agent that writes without end no more is taken than comes until then.
+            if !self.fill()? || self.last_read_at >= until {
+                break;
+            }
+        }
+        Ok(())
     }
 
     /// What there is to wait for: output, and room for what was not sent yet.
@@ -164,13 +179,11 @@ impl LinePipe {
 
     /// Has a whole line been read that has not been handed out?
     pub(crate) fn holds_line(&self) -> bool {
-        self.buffer[self.searched..].contains(&b'\n')
+        memchr(b'\n', &self.buffer[self.searched..]).is_some()
     }
 
     fn take_line(&mut self, max_bytes: usize) -> Option<ReadLine> {
-        let newline = self.buffer[self.searched..]
-            .iter()
-            .position(|&byte| byte == b'\n');
+        let newline = memchr(b'\n', &self.buffer[self.searched..]);
         let end = newline.map_or(self.buffer.len(), |offset| self.searched + offset);
         if end - self.start > max_bytes {
             let head = self.buffer[self.start..end.min(self.start + HEAD_BYTES)].to_vec();
@@ -240,5 +253,50 @@ pub(crate) fn wait_for_any(fds: &mut [PollFd<'_>], deadline: Instant) -> io::Res
             Err(Errno::INTR) => {}
             Err(error) => return Err(error.into()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rustix::pipe::pipe;
+    use std::{fs::File, io::Write as _, thread, time::Duration};
+
+    /// The service's ends, and the agent's output.
+    fn line_pipe() -> (LinePipe, File) {
+        let (_agents_input, input) = pipe().unwrap();
+        let (output, agents_output) = pipe().unwrap();
+        (LinePipe::new(input, output).unwrap(), agents_output.into())
+    }
+
+    #[test]
+    fn looking_out_ends_with_the_line_with_the_output_and_with_its_time() {
+        let far = || Instant::now() + Duration::from_secs(3600);
+        let (mut lines, mut agent) = line_pipe();
+        agent.write_all(b"here\n").unwrap();
+        lines.look_out(far()).unwrap();
+        let line = lines.read_line(100, Instant::now()).unwrap();
+        assert!(matches!(line, ReadLine::Line { bytes, .. } if bytes == b"here"));
+        lines.look_out(Instant::now()).unwrap();
+        assert!(!lines.holds_line());
+        drop(agent);
+        lines.look_out(far()).unwrap();
+        let end = lines.read_line(100, far()).unwrap();
+        assert!(matches!(end, ReadLine::Closed));
+    }
+
+    #[test]
+    fn looking_out_for_a_line_that_never_ends_ends() {
+        let (mut lines, mut agent) = line_pipe();
+        let flood = thread::spawn(move || while agent.write_all(&[b'x'; 4096]).is_ok() {});
+        for _ in 0..10 {
+            lines
+                .look_out(Instant::now() + Duration::from_micros(50))
+                .unwrap();
+        }
+        let line = lines.read_line(100, Instant::now() + Duration::from_secs(3600));
+        assert!(matches!(line.unwrap(), ReadLine::TooLong { .. }));
+        drop(lines);
+        flood.join().unwrap();
     }
 }

@@ -1,5 +1,6 @@
 use crate::{
-    CpuReading, Isolation, Limits, ReadLine, SandboxError, SpawnError, SpawnSpec, WriteError,
+    CpuReading, Isolation, Limits, ReadLine, SandboxError, SpawnError, SpawnSpec, Taken,
+    WriteError,
     cgroup::AgentCgroup,
     command_check::check_command,
     cpu_waits::KnownThreads,
@@ -149,6 +150,17 @@ impl AgentProcess {
         Ok(outcome)
     }
 
+    /// Looks for the agent's next line until `until` without giving the CPU away, for [`Self::read_line`] to
+    /// take: only on a CPU that the agent cannot use.
+    ///
+    /// # Errors
+    /// When the pipe itself failed.
+    pub fn look_out(&mut self, until: Instant) -> Result<(), SandboxError> {
+        self.lines
+            .look_out(until)
+            .context("cannot read from the agent")
+    }
+
     /// Waits until one of the agents has something for [`Self::read_line`], be it a part of a line or
     /// its end, or until `deadline`. May return early, when an agent's silence is to be looked into:
     /// that, too, `read_line` does, with a deadline that has passed.
@@ -244,10 +256,10 @@ impl AgentProcess {
         asked: Instant,
         begun: Option<&CpuReading>,
         glance: Option<&CpuReading>,
-    ) -> Option<Duration> {
+    ) -> Option<Taken> {
         let evidence = self.tree.cgroup.as_ref()?.cpu_evidence.as_ref()?;
         if begun.is_none() && glance.is_none() {
-            return Some(Duration::ZERO);
+            return Some(Taken::default());
         }
         evidence.taken_since(asked, begun, glance, &self.tree.processes())
     }
