@@ -99,6 +99,24 @@ impl Subject {
     }
 }
 
+impl fmt::Display for Subject {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (kind, id) = self.columns();
+        match id.as_str() {
+            "" => f.write_str(kind),
+            id => write!(f, "{kind}:{id}"),
+        }
+    }
+}
+
+impl FromStr for Subject {
+    type Err = ParseEventError;
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        let (kind, id) = s.split_once(':').unwrap_or((s, ""));
+        Self::from_columns(kind, id)
+    }
+}
+
 /// What happened. The variants' names and fields are stored: new ones may be added, old ones stay.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
@@ -226,6 +244,23 @@ pub enum Event {
     SeasonClosed,
 }
 
+impl Event {
+    /// Is there an event of this name?
+    ///
+    /// # Errors
+    /// If not, with the names that there are.
+    pub fn check_kind(name: &str) -> Result<(), String> {
+        let named = serde_json::json!({ "kind": name });
+        match serde_json::from_value::<Self>(named) {
+            Err(error) if error.to_string().starts_with("unknown variant") => {
+                Err(error.to_string())
+            }
+            // There is, whether or not it has fields that are wanting here.
+            _ => Ok(()),
+        }
+    }
+}
+
 /// An event as it is stored.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EventRecord {
@@ -290,7 +325,17 @@ mod tests {
         for subject in subjects {
             let (kind, id) = subject.columns();
             assert_eq!(Subject::from_columns(kind, &id), Ok(subject));
+            assert_eq!(subject.to_string().parse(), Ok(subject));
         }
         assert!(Subject::from_columns("team", "none").is_err());
+    }
+
+    #[test]
+    fn names_of_events_are_known_with_and_without_fields() {
+        for kind in ["season_closed", "team_created", "day_started"] {
+            assert_eq!(Event::check_kind(kind), Ok(()));
+        }
+        let unknown = Event::check_kind("day_start").unwrap_err();
+        assert!(unknown.contains("day_started"), "{unknown}");
     }
 }

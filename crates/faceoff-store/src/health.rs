@@ -33,6 +33,8 @@ pub enum QueueHealth {
         running: u32,
         /// Units that could be begun.
         waiting: u32,
+        /// Units that found no room again and again, although the disk is not short of it: they need more.
+        without_room: u32,
     },
     /// Nothing is begun: there is too little [`Room`](crate::Room).
     Paused {
@@ -89,6 +91,7 @@ impl Store {
             running,
             waiting,
             waiting_since,
+            without_room,
         } = queue::standing(&mut *self.database.read.acquire().await?, now).await?;
         if self.room.is_short() {
             return Ok(QueueHealth::Paused { waiting });
@@ -105,7 +108,11 @@ impl Store {
             {
                 QueueHealth::Stuck { waiting, since }
             }
-            _ => QueueHealth::Moving { running, waiting },
+            _ => QueueHealth::Moving {
+                running,
+                waiting,
+                without_room,
+            },
         })
     }
 }

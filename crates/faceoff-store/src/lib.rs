@@ -58,6 +58,7 @@ pub use tables::{
     bundles::{UploadQuota, UploadUsage},
     days::Day,
     evaluations::{Evaluation, EvaluationState},
+    events::EventFilter,
     plan::RunPlan,
     runs::Run,
     season::Season,

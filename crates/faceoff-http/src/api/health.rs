@@ -46,8 +46,14 @@ pub(crate) async fn health(State(app): State<App>) -> Result<Json<HealthView>, P
     let room = app.store.room();
     let short = room.is_short();
     let health = app.store.health(app.config.clock.now()).await;
+    let without_room = match health.queue {
+        QueueHealth::Moving { without_room, .. } => without_room,
+        _ => 0,
+    };
     let (running, waiting, queue) = match health.queue {
-        QueueHealth::Moving { running, waiting } => (running, waiting, "moving"),
+        QueueHealth::Moving {
+            running, waiting, ..
+        } => (running, waiting, "moving"),
         QueueHealth::Paused { waiting } => (0, waiting, "paused"),
         QueueHealth::Stuck { waiting, .. } => (0, waiting, "stuck"),
         QueueHealth::Unknown => (0, 0, "unknown"),
@@ -60,6 +66,12 @@ pub(crate) async fn health(State(app): State<App>) -> Result<Json<HealthView>, P
         missing.push(format!(
             "less than {} bytes are free on the disk, so the queue pauses and uploads are refused",
             room.min_free_bytes()
+        ));
+    }
+    if without_room > 0 {
+        missing.push(format!(
+            "{without_room} units of work found no room again and again although the disk has what is to be kept \
+             free: they need more than that; they are tried on"
         ));
     }
     match health.queue {
@@ -90,7 +102,14 @@ pub(crate) async fn health(State(app): State<App>) -> Result<Json<HealthView>, P
             },
         )
         .with("queue", queue)
-        .with("room", if short { "short" } else { "enough" })
+        .with(
+            "room",
+            match (short, without_room > 0) {
+                (true, _) => "short",
+                (false, true) => "too little for some work",
+                (false, false) => "enough",
+            },
+        )
         .with("min_free_bytes", room.min_free_bytes())
         .with("waiting", waiting))
 }

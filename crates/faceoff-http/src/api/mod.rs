@@ -10,6 +10,7 @@ mod days;
 mod document;
 mod episodes;
 mod evaluations;
+mod events;
 mod health;
 mod me;
 mod season;
@@ -37,6 +38,7 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(teams::create_team, teams::list_teams))
         .routes(routes!(teams::replace_token))
         .routes(routes!(days::start_day))
+        .routes(routes!(events::list_events))
         .routes(routes!(submissions::list_submissions))
         .routes(routes!(submissions::submission))
         .routes(routes!(submissions::activate_submission))

@@ -9,6 +9,7 @@ pub mod board;
 pub mod comparison;
 pub mod day;
 pub mod evaluation;
+pub mod event;
 pub mod me;
 pub mod season;
 pub mod submission;

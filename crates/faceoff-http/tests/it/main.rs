@@ -10,6 +10,7 @@ mod board_load;
 mod comparisons;
 mod days;
 mod evaluations;
+mod events;
 mod openapi;
 mod problems;
 mod room;

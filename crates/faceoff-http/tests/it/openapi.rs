@@ -26,6 +26,7 @@ async fn the_document_lists_what_is_there_and_nothing_else() {
         "GET /api/v1/evaluations/{id}/compare/{other}",
         "GET /api/v1/evaluations/{id}/dataset",
         "GET /api/v1/evaluations/{id}/violations",
+        "GET /api/v1/events",
         "GET /api/v1/health",
         "GET /api/v1/health/live",
         "GET /api/v1/me",

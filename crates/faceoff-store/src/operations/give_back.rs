@@ -96,13 +96,16 @@ impl Store {
     /// Shutdown: gives the unit back at once; the attempt does not count. Of a lost lease nothing is
     /// recorded.
     pub async fn release(&self, claim: &Claim, now: Timestamp) -> Result<()> {
-        self.release_resting(claim, 0, now).await
+        self.release_resting(claim, 0, false, now).await
     }
 
     /// A full disk: the unit goes back to the queue to rest for a while. That is nobody's failure: the
-    /// attempt does not count. Of a lost lease nothing is recorded.
+    /// attempt does not count. Of a lost lease nothing is recorded. What finds no room again and again on a
+    /// disk that is not short of it is told by [`health`](Self::health).
     pub async fn release_full(&self, claim: &Claim, now: Timestamp) -> Result<()> {
-        self.release_resting(claim, FULL_DISK_REST_S, now).await
+        let without_room = !self.room.is_short();
+        self.release_resting(claim, FULL_DISK_REST_S, without_room, now)
+            .await
     }
 
     /// Gives all leases `lease_s` seconds from now on: they may have run out only because nothing could
@@ -114,13 +117,19 @@ impl Store {
         .await
     }
 
-    async fn release_resting(&self, claim: &Claim, rest_s: u32, now: Timestamp) -> Result<()> {
+    async fn release_resting(
+        &self,
+        claim: &Claim,
+        rest_s: u32,
+        without_room: bool,
+        now: Timestamp,
+    ) -> Result<()> {
         let actor = Actor::Worker(claim.worker.clone());
         self.write(actor, now, async |tx| {
             let Hold::Held { kind } = queue::hold(tx, claim).await? else {
                 return Ok(());
             };
-            queue::release(tx, claim, rest_s).await?;
+            queue::release(tx, claim, rest_s, without_room).await?;
             let purpose = purpose::of_unit(tx, claim.unit, &kind).await?;
             let subject = subject(tx, &purpose).await?;
             tx.advanced(subject);

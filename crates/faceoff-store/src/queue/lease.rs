@@ -139,14 +139,22 @@ pub(crate) async fn renew_all(
     Ok(())
 }
 
-/// Queues a held unit again, claimable after a rest; neither the attempt nor its slot time counts.
-pub(crate) async fn release(tx: &mut Tx, claim: &Claim, rest_s: u32) -> Result<()> {
+/// Queues a held unit again, claimable after a rest; neither the attempt nor its slot time counts. Whether it
+/// found no room where there should be enough does.
+pub(crate) async fn release(
+    tx: &mut Tx,
+    claim: &Claim,
+    rest_s: u32,
+    without_room: bool,
+) -> Result<()> {
     let (id, from) = (Text(claim.unit), Instant(after(tx.now, rest_s)));
     sqlx::query!(
         "UPDATE units SET state = 'queued', worker = NULL, nonce = NULL, progress = 0,
-                          charged_ms = 0, attempts = attempts - 1, claimable_at = ?
+                          charged_ms = 0, attempts = attempts - 1, claimable_at = ?,
+                          without_room = without_room + ?
          WHERE id = ?",
         from,
+        without_room,
         id,
     )
     .execute(&mut **tx)

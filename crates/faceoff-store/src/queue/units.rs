@@ -132,7 +132,12 @@ pub(crate) struct Standing {
     pub(crate) waiting: u32,
     /// Since when the first of them.
     pub(crate) waiting_since: Option<Timestamp>,
+    /// Open units that found no room [`OFTEN`] where there should be enough.
+    pub(crate) without_room: u32,
 }
+
+/// What found no room so many times is not the victim of a moment.
+const OFTEN: i64 = 3;
 
 /// How the queue stands now.
 pub(crate) async fn standing(
@@ -143,9 +148,11 @@ pub(crate) async fn standing(
     let row = sqlx::query!(
         r#"SELECT COUNT(*) FILTER (WHERE state = 'leased' AND claimable_at > ?1) AS "running!: u32",
                   COUNT(*) FILTER (WHERE claimable_at <= ?1) AS "waiting!: u32",
-                  MIN(claimable_at) FILTER (WHERE claimable_at <= ?1) AS "since?: Instant"
+                  MIN(claimable_at) FILTER (WHERE claimable_at <= ?1) AS "since?: Instant",
+                  COUNT(*) FILTER (WHERE without_room >= ?2) AS "without_room!: u32"
            FROM units WHERE state IN ('queued', 'leased')"#,
         now,
+        OFTEN,
     )
     .fetch_one(connection)
     .await?;
@@ -153,6 +160,7 @@ pub(crate) async fn standing(
         running: row.running,
         waiting: row.waiting,
         waiting_since: row.since.map(|since| since.0),
+        without_room: row.without_room,
     })
 }
 

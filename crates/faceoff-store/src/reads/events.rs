@@ -1,9 +1,23 @@
-use crate::{error::Result, event::EventRecord, store::Store, tables::events};
+use crate::{
+    error::Result,
+    event::EventRecord,
+    store::Store,
+    tables::events::{self, EventFilter},
+};
 
 impl Store {
     /// What happened after the event with id `after` (0: from the beginning), the oldest first,
     /// `limit` at most.
     pub async fn events_after(&self, after: i64, limit: u32) -> Result<Vec<EventRecord>> {
         events::after(&mut *self.database.read.acquire().await?, after, limit).await
+    }
+
+    /// What happened last of what the filter lets through, the newest first, `limit` at most.
+    pub async fn newest_events(
+        &self,
+        filter: &EventFilter,
+        limit: u32,
+    ) -> Result<Vec<EventRecord>> {
+        events::newest(&mut *self.database.read.acquire().await?, filter, limit).await
     }
 }

@@ -8,13 +8,58 @@ use crate::{
 use serde_json::{Map, Value};
 use sqlx::{SqliteConnection, types::Text};
 
+/// Which events are looked for; `None` allows any.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct EventFilter {
+    /// Only those before the one with this id.
+    pub before: Option<i64>,
+    /// Who caused it, as [`Actor`] is written; or all of a kind, as `team`.
+    pub actor: Option<String>,
+    /// What it is about.
+    pub subject: Option<Subject>,
+    /// The name of what happened, as `team_created`.
+    pub kind: Option<String>,
+}
+
+struct Row {
+    id: i64,
+    at: Instant,
+    actor: Text<Actor>,
+    subject_kind: String,
+    subject_id: String,
+    kind: String,
+    payload: Json<Map<String, Value>>,
+}
+
+impl TryFrom<Row> for EventRecord {
+    type Error = StoreError;
+
+    fn try_from(row: Row) -> Result<Self> {
+        let damaged = |error: &dyn std::fmt::Display| {
+            StoreError::Damaged(format!("event {}: {error}", row.id))
+        };
+        let mut fields = row.payload.0;
+        fields.insert("kind".into(), row.kind.into());
+        Ok(Self {
+            id: row.id,
+            at: row.at.0,
+            actor: row.actor.0,
+            subject: Subject::from_columns(&row.subject_kind, &row.subject_id)
+                .map_err(|error| damaged(&error))?,
+            event: serde_json::from_value::<Event>(fields.into())
+                .map_err(|error| damaged(&error))?,
+        })
+    }
+}
+
 /// The events after the one with id `after`, the oldest first, `limit` at most.
 pub(crate) async fn after(
     connection: &mut SqliteConnection,
     after: i64,
     limit: u32,
 ) -> Result<Vec<EventRecord>> {
-    let rows = sqlx::query!(
+    let rows = sqlx::query_as!(
+        Row,
         r#"SELECT id, at AS "at: Instant", actor AS "actor: Text<Actor>", subject_kind, subject_id,
                   kind, payload AS "payload: Json<Map<String, Value>>"
            FROM events WHERE id > ? ORDER BY id LIMIT ?"#,
@@ -23,22 +68,63 @@ pub(crate) async fn after(
     )
     .fetch_all(connection)
     .await?;
-    rows.into_iter()
-        .map(|row| {
-            let damaged = |error: &dyn std::fmt::Display| {
-                StoreError::Damaged(format!("event {}: {error}", row.id))
-            };
-            let mut fields = row.payload.0;
-            fields.insert("kind".into(), row.kind.into());
-            Ok(EventRecord {
-                id: row.id,
-                at: row.at.0,
-                actor: row.actor.0,
-                subject: Subject::from_columns(&row.subject_kind, &row.subject_id)
-                    .map_err(|error| damaged(&error))?,
-                event: serde_json::from_value::<Event>(fields.into())
-                    .map_err(|error| damaged(&error))?,
-            })
-        })
-        .collect()
+    rows.into_iter().map(EventRecord::try_from).collect()
+}
+
+/// The newest events that the filter lets through, the newest first, `limit` at most.
+pub(crate) async fn newest(
+    connection: &mut SqliteConnection,
+    filter: &EventFilter,
+    limit: u32,
+) -> Result<Vec<EventRecord>> {
+    let EventFilter {
+        before,
+        actor,
+        subject,
+        kind,
+    } = filter;
+    let before = before.unwrap_or(i64::MAX);
+    // Two statements, since each goes by an index of its own.
+    let rows = match subject {
+        Some(subject) => {
+            let (subject_kind, subject_id) = subject.columns();
+            sqlx::query_as!(
+                Row,
+                r#"SELECT id, at AS "at: Instant", actor AS "actor: Text<Actor>", subject_kind, subject_id,
+                          kind, payload AS "payload: Json<Map<String, Value>>"
+                   FROM events
+                   WHERE subject_kind = ?1 AND subject_id = ?2 AND id < ?3
+                     AND (?4 IS NULL OR actor = ?4 OR substr(actor, 1, length(?4) + 1) = ?4 || ':')
+                     AND (?5 IS NULL OR kind = ?5)
+                   ORDER BY id DESC LIMIT ?6"#,
+                subject_kind,
+                subject_id,
+                before,
+                actor,
+                kind,
+                limit,
+            )
+            .fetch_all(connection)
+            .await?
+        }
+        None => {
+            sqlx::query_as!(
+                Row,
+                r#"SELECT id, at AS "at: Instant", actor AS "actor: Text<Actor>", subject_kind, subject_id,
+                          kind, payload AS "payload: Json<Map<String, Value>>"
+                   FROM events
+                   WHERE id < ?1
+                     AND (?2 IS NULL OR actor = ?2 OR substr(actor, 1, length(?2) + 1) = ?2 || ':')
+                     AND (?3 IS NULL OR kind = ?3)
+                   ORDER BY id DESC LIMIT ?4"#,
+                before,
+                actor,
+                kind,
+                limit,
+            )
+            .fetch_all(connection)
+            .await?
+        }
+    };
+    rows.into_iter().map(EventRecord::try_from).collect()
 }

@@ -42,6 +42,29 @@ async fn a_unit_that_met_a_full_disk_rests_and_has_lost_no_try() {
 }
 
 #[tokio::test]
+async fn health_tells_of_a_unit_that_never_finds_room_until_it_does() {
+    let mut f = Fixture::new().await;
+    let team = f.team("Alpha").await;
+    f.upload(&team).await;
+    let without_room = async |f: &Fixture| match f.store.health(f.now).await.queue {
+        QueueHealth::Moving { without_room, .. } => without_room,
+        other => panic!("{other:?}"),
+    };
+    for told in [0, 0, 1, 1] {
+        let claim = f.claim().await.expect("it has rested").claim;
+        f.store.release_full(&claim, f.now).await.unwrap();
+        assert_eq!(without_room(&f).await, told);
+        f.later(10);
+    }
+    // A shutdown says nothing of room.
+    let claim = f.claim().await.expect("it has rested").claim;
+    f.store.release(&claim, f.now).await.unwrap();
+    assert_eq!(without_room(&f).await, 1);
+    f.validate().await;
+    assert_eq!(without_room(&f).await, 0);
+}
+
+#[tokio::test]
 async fn a_lease_that_could_not_be_renewed_is_its_holders_after_the_pause() {
     let mut f = Fixture::new().await;
     let team = f.team("Alpha").await;
@@ -62,6 +85,7 @@ async fn health_tells_whether_the_queue_moves() {
     let just_queued = QueueHealth::Moving {
         running: 0,
         waiting: 1,
+        without_room: 0,
     };
     assert_eq!(queue(&f).await, just_queued);
     let since = f.now;
@@ -77,6 +101,7 @@ async fn health_tells_whether_the_queue_moves() {
     let running = QueueHealth::Moving {
         running: 1,
         waiting: 0,
+        without_room: 0,
     };
     assert_eq!(queue(&f).await, running);
     drop(claimed);

@@ -1,0 +1,92 @@
+use crate::site::{ADMIN, Site, text};
+use serde_json::{Value, json};
+
+/// The kinds of a page's events.
+fn kinds(page: &Value) -> Vec<String> {
+    let events = page["events"].as_array().unwrap();
+    events.iter().map(|event| text(&event["kind"])).collect()
+}
+
+async fn page(site: &Site, query: &str) -> Value {
+    let path = format!("/api/v1/events{query}");
+    site.get(&path, Some(ADMIN)).await.json(200)
+}
+
+#[tokio::test]
+async fn every_change_has_an_author_and_is_found_by_all_that_it_has() {
+    let site = Site::start().await;
+    let (alpha, beta) = (site.team("Alpha").await, site.team("Beta").await);
+    site.valid_submission(&alpha, "a").await;
+    let fresh = format!("/api/v1/teams/{}/token", beta.id);
+    site.post(&fresh, Some(ADMIN), &json!({})).await.json(200);
+    site.post("/api/v1/days", Some(ADMIN), &json!({}))
+        .await
+        .json(200);
+
+    let all = page(&site, "").await;
+    assert_eq!(all["next_before"], json!(null));
+    let found = kinds(&all);
+    assert_eq!(found.last().map(String::as_str), Some("season_named"));
+    for kind in ["submission_uploaded", "token_replaced", "day_started"] {
+        assert_eq!(found.iter().filter(|found| *found == kind).count(), 1);
+    }
+    // By who, by what about, by what.
+    assert_eq!(
+        kinds(&page(&site, &format!("?actor=team:{}", alpha.id)).await),
+        ["submission_uploaded"]
+    );
+    assert_eq!(
+        kinds(&page(&site, "?actor=team").await),
+        ["submission_uploaded"]
+    );
+    let of_beta = page(&site, &format!("?subject=team:{}", beta.id)).await;
+    assert_eq!(kinds(&of_beta), ["token_replaced", "team_created"]);
+    let created = &of_beta["events"][1];
+    assert_eq!(created["actor"], "organiser");
+    assert_eq!(created["details"], json!({ "name": "Beta" }));
+    assert_eq!(created["subject"], format!("team:{}", beta.id));
+    let by_organiser = format!("?subject=team:{}&actor=schedule", beta.id);
+    assert_eq!(kinds(&page(&site, &by_organiser).await), [""; 0]);
+    assert_eq!(
+        kinds(&page(&site, "?kind=team_created&limit=1").await),
+        ["team_created"]
+    );
+
+    // Page by page the same.
+    let (mut paged, mut query) = (Vec::new(), "?limit=2".to_owned());
+    loop {
+        let page = page(&site, &query).await;
+        assert!(kinds(&page).len() <= 2);
+        paged.extend(page["events"].as_array().unwrap().clone());
+        match page["next_before"].as_i64() {
+            Some(before) => query = format!("?limit=2&before={before}"),
+            None => break,
+        }
+    }
+    assert_eq!(json!(paged), all["events"]);
+}
+
+#[tokio::test]
+async fn the_log_is_the_organisers_and_its_words_are_checked() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let path = "/api/v1/events";
+    site.get(path, None)
+        .await
+        .problem(401, "unauthenticated", &["token"]);
+    site.get(path, Some(&team.token))
+        .await
+        .problem(403, "forbidden", &["organiser"]);
+    for (query, words) in [
+        ("limit=0", ["limit", "1 to 1000"]),
+        ("limit=1001", ["limit", "1 to 1000"]),
+        ("actor=robot", ["actor", "schedule"]),
+        ("actor=team:none", ["actor", "team:ID"]),
+        ("subject=team", ["subject", "team:ID"]),
+        ("kind=day_start", ["kind", "day_started"]),
+    ] {
+        site.get(&format!("{path}?{query}"), Some(ADMIN))
+            .await
+            .problem(422, "invalid-content", &words);
+    }
+}
