@@ -11,13 +11,14 @@ CARGO      ?= cargo
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
 
-.PHONY: demo test fuzz busy steady lint format fidelity setup setup-test agents clean-demo help
+.PHONY: demo test fuzz busy soak steady lint format fidelity setup setup-test agents clean-demo help
 
 help:
 	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
 	@echo "make test   run everything that proves that it works"
 	@echo "make fuzz   feed the readers what is nearly valid: MINUTES=$(MINUTES)"
 	@echo "make busy   play beside hogs, floods and bursts of processes"
+	@echo "make soak   upload, play, read, fill the disk and kill the server, all at once: MINUTES=$(MINUTES)"
 	@echo "make steady run the tests ten times, and three times on a busy machine"
 	@echo "make lint   format check and lints"
 	@echo "make fidelity   draw how far the simulator is from the recordings"
@@ -66,6 +67,11 @@ fuzz: setup-test
 busy: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
 	$(CARGO) test --locked --workspace --test e2e busy_host -- --include-ignored --test-threads 1
+
+# All disturbances at once; SOAK_SEED=N for other moments than last time.
+soak: setup-test
+	$(CARGO) build --locked --workspace --bins --tests
+	SOAK_MINUTES=$(MINUTES) $(CARGO) test --locked --workspace --test e2e soak:: -- --include-ignored --nocapture
 
 # No verdict may depend on how busy the machine is.
 steady:

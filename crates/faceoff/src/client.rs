@@ -12,6 +12,7 @@ use faceoff_http::{
         comparison::ComparisonView,
         day::DayView,
         evaluation::EvaluationView,
+        event::EventsView,
         me::MeView,
         season::SeasonView,
         submission::SubmissionView,
@@ -248,6 +249,12 @@ impl Client {
             Some(day) => request.query(&[("day", day.to_string())]),
             None => request,
         };
+        read(self.send(request).await?).await
+    }
+
+    /// Organiser: what was changed last, of what the parameters of `GET /events` let through.
+    pub async fn events(&self, wanted: &[(&str, String)]) -> anyhow::Result<EventsView> {
+        let request = self.request(Method::GET, "/events").query(wanted);
         read(self.send(request).await?).await
     }
 

@@ -4,22 +4,25 @@
 //! that the file, the documentation (`docs/operating.md`, held to them by a test) and the code
 //! cannot state different ones.
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, anyhow};
 use faceoff_http::{ConnectionLimits, HttpLimits, LeastRate};
 use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::BundleLimits};
-use faceoff_sandbox::{Isolation, Layer, Limits, Runtime};
+use faceoff_sandbox::{Isolation, Layer, Limits, Runtime, affinity};
 use faceoff_store::{RunPlan, UploadQuota};
-use faceoff_types::{MAX_EPISODES_PER_TASK, Profile, Task};
+use faceoff_types::{Profile, Task};
 use jiff::civil::Time;
 use serde::{Deserialize, Serialize};
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::BTreeMap,
     net::{IpAddr, SocketAddr},
     path::{Path, PathBuf},
 };
 
 /// The file that is read when none is named and it exists.
 pub const DEFAULT_FILE: &str = "faceoff.toml";
+
+/// The defaults, with units and meanings: what `faceoff init` writes.
+pub const COMMENTED: &str = include_str!("config/faceoff.toml");
 
 /// The whole file.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -299,104 +302,19 @@ impl Config {
                 }
             }
         };
-        Self::parse(&text).with_context(|| format!("the configuration {}", file.display()))
+        let read = || -> anyhow::Result<Self> {
+            let config = Self::parse(&text)?;
+            config.check_host(&affinity::allowed().context("asking for this host's CPUs")?)?;
+            Ok(config)
+        };
+        read().with_context(|| format!("the configuration {}", file.display()))
     }
 
     fn parse(text: &str) -> anyhow::Result<Self> {
-        let config: Self = toml::from_str(text)?;
+        let config: Self = toml::from_str(text)
+            .map_err(|error: toml::de::Error| anyhow!(nearest::told(&error.to_string())))?;
         config.check()?;
         Ok(config)
-    }
-
-    /// What types alone cannot say.
-    fn check(&self) -> anyhow::Result<()> {
-        let evaluation = &self.evaluation;
-        ensure!(
-            (1..=MAX_EPISODES_PER_TASK).contains(&evaluation.episodes_per_task),
-            "evaluation.episodes_per_task: expected 1 to {MAX_EPISODES_PER_TASK}, got {}",
-            evaluation.episodes_per_task
-        );
-        ensure!(
-            evaluation.episodes_per_shard >= 1,
-            "evaluation.episodes_per_shard: expected at least 1, got 0"
-        );
-        ensure!(
-            evaluation.ablation_episodes <= MAX_EPISODES_PER_TASK,
-            "evaluation.ablation_episodes: expected at most {MAX_EPISODES_PER_TASK}, got {}",
-            evaluation.ablation_episodes
-        );
-        ensure!(
-            !evaluation.tasks.is_empty(),
-            "evaluation.tasks: expected at least one task"
-        );
-        let mut seen = BTreeSet::new();
-        if let Some(twice) = evaluation.tasks.iter().find(|task| !seen.insert(**task)) {
-            bail!("evaluation.tasks: {twice} is listed twice");
-        }
-        ensure!(
-            self.workers.slots != Some(0),
-            "workers.slots: expected at least 1, got 0"
-        );
-        ensure!(
-            (5..=3600).contains(&self.workers.lease_s),
-            "workers.lease_s: expected 5 to 3600 seconds, got {}",
-            self.workers.lease_s
-        );
-        if let Some(name) = &self.season.name {
-            let chars = name.chars().count();
-            ensure!(
-                (1..=80).contains(&chars),
-                "season.name: expected 1 to 80 characters, got {chars}"
-            );
-        }
-        for (name, value) in [
-            ("uploads.at_once", self.uploads.at_once as u64),
-            ("uploads.least_bytes_per_s", self.uploads.least_bytes_per_s),
-            ("connections.most", self.connections.most as u64),
-            (
-                "connections.per_address",
-                self.connections.per_address as u64,
-            ),
-            (
-                "connections.least_bytes_per_s",
-                self.connections.least_bytes_per_s,
-            ),
-            ("bundle.unpack_s", self.bundle.unpack_s.into()),
-        ] {
-            ensure!(value >= 1, "{name}: expected at least 1, got 0");
-        }
-        for (name, seconds) in [
-            ("uploads.grace_s", self.uploads.grace_s),
-            ("connections.head_s", self.connections.head_s),
-            ("connections.grace_s", self.connections.grace_s),
-        ] {
-            ensure!(
-                seconds.is_finite() && seconds > 0.0 && seconds <= 3600.0,
-                "{name}: expected more than 0 and at most 3600, got {seconds}"
-            );
-        }
-        for (name, seconds) in [
-            ("startup_s", self.time.startup_s),
-            ("reset_s", self.time.reset_s),
-            ("step_s", self.time.step_s),
-            ("bye_s", self.time.bye_s),
-            ("mean_s", self.time.mean_s),
-            ("episode_control_times", self.time.episode_control_times),
-            ("episode_extra_s", self.time.episode_extra_s),
-            ("reset_mean_s", self.time.reset_mean_s),
-            ("resets_extra_s", self.time.resets_extra_s),
-        ] {
-            ensure!(
-                seconds.is_finite() && seconds > 0.0 && seconds <= 3600.0,
-                "time.{name}: expected more than 0 and at most 3600, got {seconds}"
-            );
-        }
-        ensure!(
-            self.limits.cpus.is_finite() && self.limits.cpus > 0.0,
-            "limits.cpus: expected more than 0, got {}",
-            self.limits.cpus
-        );
-        Ok(())
     }
 
     /// What an evaluation plays.
@@ -455,5 +373,7 @@ impl Config {
     }
 }
 
+mod check;
+mod nearest;
 #[cfg(test)]
 mod tests;

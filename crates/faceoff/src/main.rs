@@ -24,6 +24,8 @@ struct Cli {
 enum Command {
     /// Run the competition server: API, board and worker slots.
     Serve(commands::serve::ServeCommand),
+    /// Write a configuration with every default, unit and meaning.
+    Init(commands::init::InitCommand),
     /// Play a whole competition day with the reference agents.
     Demo(commands::demo::DemoCommand),
     /// Evaluate a bundle locally with the server's evaluator.
@@ -51,6 +53,7 @@ enum Command {
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Serve(command) => command.run(),
+        Command::Init(command) => command.run(),
         Command::Demo(command) => command.run(),
         Command::Eval(command) => command.run(),
         Command::Compare(command) => command.run(),

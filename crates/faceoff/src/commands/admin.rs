@@ -8,11 +8,13 @@ use faceoff_http::{
     requests::StartDay,
     views::{
         evaluation::{EvaluationStatus, EvaluationView},
+        event::EventView,
         season::SeasonView,
     },
 };
 use faceoff_types::{EvaluationId, MAX_EPISODES_PER_TASK, Profile, TeamId};
 use jiff::civil::Date;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Organises a running competition.
@@ -85,6 +87,24 @@ enum Action {
     },
     /// List the teams
     Teams,
+    /// List what was changed, when and by whom, the newest first
+    Log {
+        /// Who: organiser, team, team:ID, schedule, worker, worker:NAME or server
+        #[arg(long)]
+        actor: Option<String>,
+        /// About what: season, day:DATE, team:ID, submission:ID, evaluation:ID or ablation:ID
+        #[arg(long)]
+        subject: Option<String>,
+        /// What happened, e.g. day_started
+        #[arg(long)]
+        kind: Option<String>,
+        /// How many, 1 to 1000
+        #[arg(long, default_value_t = 100)]
+        limit: u32,
+        /// Only changes before the one with this number
+        #[arg(long, value_name = "NUMBER")]
+        before: Option<i64>,
+    },
     /// List the evaluations of a day with their progress
     Evaluations {
         /// UTC day, e.g. 2026-11-21 [default: today]
@@ -211,6 +231,34 @@ impl AdminCommand {
                     )
                 })
             }
+            Action::Log {
+                actor,
+                subject,
+                kind,
+                limit,
+                before,
+            } => {
+                let wanted: Vec<(&str, String)> = [
+                    ("limit", Some(limit.to_string())),
+                    ("actor", actor),
+                    ("subject", subject),
+                    ("kind", kind),
+                    ("before", before.map(|number| number.to_string())),
+                ]
+                .into_iter()
+                .filter_map(|(name, value)| Some((name, value?)))
+                .collect();
+                let found = client.events(&wanted).await?;
+                print(self.json, &found, || {
+                    let mut lines: Vec<String> = found.events.iter().map(event_line).collect();
+                    lines.extend(
+                        found
+                            .next_before
+                            .map(|number| format!("older ones: --before {number}")),
+                    );
+                    or_none(lines, "nothing of that kind happened")
+                })
+            }
             Action::Evaluations { day } => {
                 let mut evaluations = client.evaluations(day).await?;
                 for evaluation in &mut evaluations {
@@ -228,6 +276,29 @@ impl AdminCommand {
             }
         }
     }
+}
+
+/// Number, time, who, what, about what, and what else is known.
+fn event_line(event: &EventView) -> String {
+    let details: Vec<String> = event
+        .details
+        .iter()
+        .map(|(name, value)| match value {
+            Value::String(text) => format!("{name}={text}"),
+            other => format!("{name}={other}"),
+        })
+        .collect();
+    format!(
+        "{:>6}  {}  {}  {}  {}  {}",
+        event.id,
+        event.at.strftime("%Y-%m-%d %H:%M:%S UTC"),
+        event.actor,
+        event.kind,
+        event.subject,
+        details.join(" ")
+    )
+    .trim_end()
+    .to_owned()
 }
 
 /// The token from the file that the server made.

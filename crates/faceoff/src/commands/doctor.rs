@@ -4,6 +4,7 @@ use crate::{config::Config, descriptors::Descriptors};
 use anyhow::{Context as _, bail};
 use clap::Args;
 use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime, probe_host};
+use faceoff_store::Room;
 use serde::Serialize;
 use std::{io::Write, path::PathBuf};
 
@@ -28,6 +29,18 @@ struct Findings {
     in_memory: InMemory,
     cpus: Cpus,
     descriptors: DescriptorsFound,
+    disks: Vec<DiskFound>,
+}
+
+/// The disk of a folder that `serve` writes to.
+#[derive(Debug, Serialize)]
+struct DiskFound {
+    /// As configured; it need not exist yet.
+    folder: PathBuf,
+    /// `None`: the disk cannot be asked.
+    free_bytes: Option<u64>,
+    found: String,
+    cure: Option<String>,
 }
 
 /// How `serve` would divide the descriptors that it gets from this shell.
@@ -131,6 +144,7 @@ impl Findings {
             in_memory: in_memory(config),
             cpus: cpus(config),
             descriptors: descriptors(config),
+            disks: disks(config),
         }
     }
 
@@ -173,7 +187,13 @@ impl Findings {
         print_cure(out, cpus.advice.as_deref())?;
         writeln!(out, "Descriptors")?;
         writeln!(out, "  {}", self.descriptors.found)?;
-        print_cure(out, self.descriptors.cure.as_deref())
+        print_cure(out, self.descriptors.cure.as_deref())?;
+        writeln!(out, "Disks")?;
+        for disk in &self.disks {
+            writeln!(out, "  {}: {}", disk.folder.display(), disk.found)?;
+            print_cure(out, disk.cure.as_deref())?;
+        }
+        Ok(())
     }
 }
 
@@ -303,6 +323,45 @@ fn descriptors(config: &Config) -> DescriptorsFound {
     }
 }
 
+fn disks(config: &Config) -> Vec<DiskFound> {
+    let mut folders = vec![config.server.data_dir.clone(), config.scratch_dir()];
+    folders.dedup_by(|second, first| second.starts_with(first));
+    folders
+        .into_iter()
+        .map(|folder| disk(folder, config.server.min_free_bytes))
+        .collect()
+}
+
+fn disk(folder: PathBuf, min_free_bytes: u64) -> DiskFound {
+    let absolute = std::path::absolute(&folder).unwrap_or_else(|_| folder.clone());
+    let existing = absolute.ancestors().find(|folder| folder.exists());
+    let asked = existing.map(|folder| (folder, rustix::fs::statvfs(folder)));
+    let Some((existing, Ok(disk))) = asked else {
+        return DiskFound {
+            folder,
+            free_bytes: None,
+            found: "its disk cannot be asked".into(),
+            cure: Some("correct data_dir and scratch_dir of the configuration".into()),
+        };
+    };
+    let free_bytes = disk.f_bavail.saturating_mul(disk.f_frsize);
+    let room = Room::new(vec![existing.to_owned()], min_free_bytes);
+    let cure = room.is_short().then(|| {
+        "the queue would pause and uploads be refused: make room, or lower server.min_free_bytes"
+            .to_owned()
+    });
+    DiskFound {
+        folder,
+        free_bytes: Some(free_bytes),
+        found: format!(
+            "{} MiB free, {} MiB of them to stay so",
+            free_bytes >> 20,
+            min_free_bytes >> 20
+        ),
+        cure,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -321,7 +380,26 @@ mod tests {
             in_memory: in_memory(&Config::default()),
             cpus: cpus(&Config::default()),
             descriptors: descriptors(&Config::default()),
+            disks: disks(&Config::default()),
         }
+    }
+
+    #[test]
+    fn a_disk_with_less_than_is_to_be_kept_free_is_shown_with_its_cure() {
+        let folder = std::env::temp_dir().join("not/yet/made");
+        let roomy = disk(folder.clone(), 1);
+        assert!(
+            roomy.free_bytes.is_some() && roomy.cure.is_none(),
+            "{roomy:?}"
+        );
+        let short = disk(folder, u64::MAX);
+        assert_eq!(short.free_bytes.is_some(), roomy.free_bytes.is_some());
+        assert!(
+            short
+                .cure
+                .expect("it is short")
+                .contains("server.min_free_bytes")
+        );
     }
 
     #[test]

@@ -7,6 +7,7 @@ pub mod dataset;
 pub mod demo;
 pub mod doctor;
 pub mod eval;
+pub mod init;
 pub mod score;
 pub mod serve;
 pub mod sim;

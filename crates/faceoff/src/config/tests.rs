@@ -95,15 +95,116 @@ fn an_error_names_the_field() {
 }
 
 #[test]
-fn the_documentation_quotes_the_defaults() {
+fn what_init_writes_is_the_defaults_and_the_documentation_shows_it() {
+    // Values whose default is “none” or of the host stand there as comments.
+    assert_eq!(Config::parse(COMMENTED).unwrap(), Config::default());
     let documentation = include_str!("../../../../docs/operating.md");
     let block = documentation
         .split("```toml\n")
         .nth(1)
-        .and_then(|rest| rest.split("```").next())
-        .expect("docs/operating.md shows the configuration in its first toml block");
-    // Fields whose default is “none” or of the host stand there as comments.
-    assert_eq!(Config::parse(block).unwrap(), Config::default());
+        .and_then(|rest| rest.split("```").next());
+    assert_eq!(block, Some(COMMENTED));
+}
+
+#[test]
+fn init_writes_every_value_with_what_it_means() {
+    let mut written = toml::Table::try_from(Config::default()).unwrap();
+    // Named by the organiser, each of them.
+    written.remove("runtimes");
+    // No default is written of these.
+    for (section, name) in [
+        ("season", "name"),
+        ("evaluation", "at"),
+        ("workers", "slots"),
+        ("workers", "scratch_dir"),
+    ] {
+        let section = written[section].as_table_mut().unwrap();
+        let before = section.insert(name.to_owned(), toml::Value::Boolean(true));
+        assert_eq!(before, None, "{name}");
+    }
+    for (section, values) in &written {
+        let (_, rest) = COMMENTED
+            .split_once(&format!("\n[{section}"))
+            .expect(section);
+        let lines: Vec<&str> = rest
+            .lines()
+            .take_while(|line| !line.starts_with('['))
+            .collect();
+        for name in values.as_table().unwrap().keys() {
+            let of_name = |line: &&&str| {
+                let line = line.trim_start_matches("# ");
+                line.strip_prefix(name.as_str())
+                    .is_some_and(|rest| rest.starts_with(" = "))
+            };
+            let line = lines.iter().find(of_name);
+            let line = line.unwrap_or_else(|| panic!("{section}.{name} is not there"));
+            let (_, meaning) = line.rsplit_once("  # ").unwrap_or_else(|| panic!("{line}"));
+            assert!(meaning.len() > 10, "{line}");
+        }
+    }
+}
+
+#[test]
+fn an_unknown_name_is_told_with_the_one_that_was_meant() {
+    for (text, meant) in [
+        ("[server]\nlisten_on = 1", "listen"),
+        ("[serve]", "server"),
+        ("[evaluation]\nepisodes_pre_task = 1", "episodes_per_task"),
+        ("[limits]\npid = 1", "pids"),
+        ("[time]\nstep = 1", "step_s"),
+    ] {
+        let error = error(text);
+        assert!(
+            error.contains(&format!("did you mean `{meant}`?")),
+            "{error}"
+        );
+    }
+    let error = error("[server]\nxyzzy = 1");
+    assert!(
+        error.contains("xyzzy") && !error.contains("did you mean"),
+        "{error}"
+    );
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    for (section, name, value) in [
+        ("limits", "memory_bytes", "10"),
+        ("limits", "pids", "0"),
+        ("limits", "open_files", "3"),
+        ("limits", "file_size_bytes", "1"),
+        ("limits", "cpus", "0.0"),
+        ("limits", "cpus", "nan"),
+        ("bundle", "packed_bytes", "10"),
+        ("bundle", "unpacked_bytes", "10"),
+        ("bundle", "files", "0"),
+        ("uploads", "day_bytes", "0"),
+        ("uploads", "stored_bytes", "0"),
+        ("time", "mean_s", "1e9"),
+    ] {
+        let error = error(&format!("[{section}]\n{name} = {value}"));
+        assert!(
+            error.contains(&format!("{section}.{name}: expected")),
+            "{error}"
+        );
+    }
+    let on_two_cpus = |text: &str| {
+        let config = Config::parse(text).unwrap();
+        config
+            .check_host(&[0, 1])
+            .map_err(|error| error.to_string())
+    };
+    assert_eq!(on_two_cpus("[workers]\nslots = 2"), Ok(()));
+    let error = on_two_cpus("[workers]\nslots = 500").unwrap_err();
+    assert!(
+        error.contains("workers.slots: expected at most 8"),
+        "{error}"
+    );
+    let error = on_two_cpus("[workers]\nagent_cpus = [7]").unwrap_err();
+    assert!(
+        error.contains("workers.agent_cpus: expected CPUs of [0, 1], got 7"),
+        "{error}"
+    );
 }
 
 #[test]

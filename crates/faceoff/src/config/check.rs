@@ -1,0 +1,140 @@
+//! Values that no server, or no host like this one, can have.
+
+use super::Config;
+use anyhow::{bail, ensure};
+use faceoff_types::MAX_EPISODES_PER_TASK;
+use std::collections::BTreeSet;
+
+/// Slots per CPU beyond which none would get on.
+const MOST_SLOTS_PER_CPU: usize = 4;
+
+impl Config {
+    /// What no host with these CPUs can do.
+    pub(super) fn check_host(&self, cpus: &[usize]) -> anyhow::Result<()> {
+        let most = MOST_SLOTS_PER_CPU * cpus.len();
+        ensure!(
+            self.slots() <= most,
+            "workers.slots: expected at most {most} on a host with {} CPUs, got {}; left out, it is {}",
+            cpus.len(),
+            self.slots(),
+            Self::slots_on(cpus.len())
+        );
+        if let Some(cpu) = self
+            .workers
+            .agent_cpus
+            .iter()
+            .find(|cpu| !cpus.contains(cpu))
+        {
+            bail!("workers.agent_cpus: expected CPUs of {cpus:?}, got {cpu}");
+        }
+        Ok(())
+    }
+
+    /// What types alone cannot say.
+    pub(super) fn check(&self) -> anyhow::Result<()> {
+        let evaluation = &self.evaluation;
+        ensure!(
+            (1..=MAX_EPISODES_PER_TASK).contains(&evaluation.episodes_per_task),
+            "evaluation.episodes_per_task: expected 1 to {MAX_EPISODES_PER_TASK}, got {}",
+            evaluation.episodes_per_task
+        );
+        ensure!(
+            evaluation.episodes_per_shard >= 1,
+            "evaluation.episodes_per_shard: expected at least 1, got 0"
+        );
+        ensure!(
+            evaluation.ablation_episodes <= MAX_EPISODES_PER_TASK,
+            "evaluation.ablation_episodes: expected at most {MAX_EPISODES_PER_TASK}, got {}",
+            evaluation.ablation_episodes
+        );
+        ensure!(
+            !evaluation.tasks.is_empty(),
+            "evaluation.tasks: expected at least one task"
+        );
+        let mut seen = BTreeSet::new();
+        if let Some(twice) = evaluation.tasks.iter().find(|task| !seen.insert(**task)) {
+            bail!("evaluation.tasks: {twice} is listed twice");
+        }
+        ensure!(
+            self.workers.slots != Some(0),
+            "workers.slots: expected at least 1, got 0"
+        );
+        ensure!(
+            (5..=3600).contains(&self.workers.lease_s),
+            "workers.lease_s: expected 5 to 3600 seconds, got {}",
+            self.workers.lease_s
+        );
+        if let Some(name) = &self.season.name {
+            let chars = name.chars().count();
+            ensure!(
+                (1..=80).contains(&chars),
+                "season.name: expected 1 to 80 characters, got {chars}"
+            );
+        }
+        for (name, value) in [
+            ("uploads.at_once", self.uploads.at_once as u64),
+            ("uploads.least_bytes_per_s", self.uploads.least_bytes_per_s),
+            ("connections.most", self.connections.most as u64),
+            (
+                "connections.per_address",
+                self.connections.per_address as u64,
+            ),
+            (
+                "connections.least_bytes_per_s",
+                self.connections.least_bytes_per_s,
+            ),
+            ("bundle.unpack_s", self.bundle.unpack_s.into()),
+            ("bundle.files", self.bundle.files),
+            ("uploads.day_bytes", self.uploads.day_bytes),
+            ("uploads.stored_bytes", self.uploads.stored_bytes),
+        ] {
+            ensure!(value >= 1, "{name}: expected at least 1, got 0");
+        }
+        // Below these no agent starts, or no bundle exists.
+        for (name, least, value) in [
+            ("limits.memory_bytes", 16 << 20, self.limits.memory_bytes),
+            ("limits.pids", 2, self.limits.pids.into()),
+            ("limits.open_files", 16, self.limits.open_files.into()),
+            ("limits.file_size_bytes", 4096, self.limits.file_size_bytes),
+            ("bundle.packed_bytes", 1024, self.bundle.packed_bytes),
+            ("bundle.unpacked_bytes", 1024, self.bundle.unpacked_bytes),
+        ] {
+            ensure!(
+                value >= least,
+                "{name}: expected at least {least}, got {value}"
+            );
+        }
+        for (name, seconds) in [
+            ("uploads.grace_s", self.uploads.grace_s),
+            ("connections.head_s", self.connections.head_s),
+            ("connections.grace_s", self.connections.grace_s),
+        ] {
+            ensure!(
+                seconds.is_finite() && seconds > 0.0 && seconds <= 3600.0,
+                "{name}: expected more than 0 and at most 3600, got {seconds}"
+            );
+        }
+        for (name, seconds) in [
+            ("startup_s", self.time.startup_s),
+            ("reset_s", self.time.reset_s),
+            ("step_s", self.time.step_s),
+            ("bye_s", self.time.bye_s),
+            ("mean_s", self.time.mean_s),
+            ("episode_control_times", self.time.episode_control_times),
+            ("episode_extra_s", self.time.episode_extra_s),
+            ("reset_mean_s", self.time.reset_mean_s),
+            ("resets_extra_s", self.time.resets_extra_s),
+        ] {
+            ensure!(
+                seconds.is_finite() && seconds > 0.0 && seconds <= 3600.0,
+                "time.{name}: expected more than 0 and at most 3600, got {seconds}"
+            );
+        }
+        ensure!(
+            (0.01..=1024.0).contains(&self.limits.cpus),
+            "limits.cpus: expected 0.01 to 1024, got {}",
+            self.limits.cpus
+        );
+        Ok(())
+    }
+}
