@@ -33,6 +33,6 @@ fn an_evaluation_survives_kill_9_and_scores_as_the_local_evaluator_does() {
     let survived = team.finished(&server, &evaluation);
     assert_eq!(survived["result"]["seed"], manifest["seed"]);
 
-    let local = scored_locally(&striker, &manifest, &scratch.path().join("local"));
+    let local = scored_locally(&striker, &manifest, 4, &scratch.path().join("local"));
     assert_eq!(without_times(&survived["result"]), without_times(&local));
 }

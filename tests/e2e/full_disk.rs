@@ -168,7 +168,7 @@ fn assert_undisturbed(
         assert_eq!(shard.get("platform_retries"), None, "{shards:#}");
     }
     let manifest = entry(&mut dataset, "manifest.json");
-    let local = scored_locally(agent, &manifest, &scratch.join("local"));
+    let local = scored_locally(agent, &manifest, 4, &scratch.join("local"));
     // the dataset released the seed
     let finished = team.finished(&disk.server, evaluation);
     assert_eq!(without_times(&finished["result"]), without_times(&local));

@@ -13,7 +13,7 @@ use std::{
 };
 
 /// The bound that the server keeps, and what may come on top while it is at it.
-const BOUND_BYTES: u64 = (16 + 4) << 20;
+pub(crate) const BOUND_BYTES: u64 = (16 + 4) << 20;
 
 /// So many writes are more than twice the bound: each is some 20 KB of log.
 const TEAMS: u32 = 2000;

@@ -14,6 +14,7 @@ mod kills;
 mod luck;
 mod privacy;
 mod real_time;
+mod soak;
 mod strangers;
 mod told_text;
 mod undisturbed;
@@ -141,14 +142,15 @@ fn entry(dataset: &mut ZipArchive<Cursor<Bytes>>, name: &str) -> Value {
     serde_json::from_reader(file).expect("it is JSON")
 }
 
-/// What the local evaluator makes of a bundle, with the seeds that a dataset's manifest publishes, the
-/// episodes of [`CONFIG`] and another number of workers.
-fn scored_locally(bundle: &Path, manifest: &Value, out: &Path) -> Value {
+/// What the local evaluator makes of a bundle, with the seeds that a dataset's manifest publishes, so many
+/// episodes per task and another number of workers.
+fn scored_locally(bundle: &Path, manifest: &Value, episodes: u32, out: &Path) -> Value {
     let seed = |name: &str| manifest[name].as_str().expect("the manifest names it");
     let local = Command::new(program("faceoff"))
         .arg("eval")
         .arg(bundle)
-        .args(["--task", "hit,defend,prepare", "--episodes", "4"])
+        .args(["--task", "hit,defend,prepare"])
+        .args(["--episodes", &episodes.to_string()])
         .args(["--profile", "evaluation", "--seed", seed("seed")])
         .args(["--mismatch-seed", seed("mismatch_seed"), "--workers", "2"])
         .arg("--config")

@@ -97,7 +97,7 @@ impl Stranger {
 fn disturbed_by(manner: Manner) {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let config = format!(
-        "{CONFIG}\n[connections]\nhead_s = 10.0\nleast_bytes_per_s = 10000\ngrace_s = 10.0\n"
+        "{CONFIG}\n[connections]\nhead_s = 4.0\nleast_bytes_per_s = 10000\ngrace_s = 4.0\n"
     );
     let server = Server::start_with_descriptors(&scratch.path().join("data"), &config, DESCRIPTORS);
     let hold = repository().join("agents/hold");

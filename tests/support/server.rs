@@ -25,13 +25,19 @@ const PAGE_BYTES: usize = 4096;
 
 /// A process that does not outlive the test, however that ends.
 #[derive(Debug)]
-struct Process(Child);
+pub(crate) struct Process(pub(crate) Child);
 
-impl Drop for Process {
-    fn drop(&mut self) {
+impl Process {
+    fn end(&mut self) {
         // Already ended is fine.
         let _ = self.0.kill();
         let _ = self.0.wait();
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        self.end();
     }
 }
 
@@ -174,6 +180,11 @@ impl Server {
     /// Ends the server, as dropping it does.
     pub fn kill(self) {
         drop(self);
+    }
+
+    /// [`kill`](Self::kill), for who replaces it.
+    pub(crate) fn end(&mut self) {
+        self.process.end();
     }
 
     /// Starts the server and ends it as [`kill`](Self::kill) does, `later` after `reached` has said yes

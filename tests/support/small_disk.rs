@@ -1,18 +1,19 @@
 //! A server whose data folder is a small disk, which a test fills and empties while it runs.
 //!
-//! The disk is a file system in memory that only the server sees, mounted where only the server has a
-//! mount: it goes with the process. The test reaches it through the process's root folder.
+//! The disk is a file system in memory, mounted where only a process that does nothing else and the server
+//! see it: it goes with that process, which goes with the test, and outlives the server. The test reaches it
+//! through the process's root folder.
 
 use crate::{
     program,
-    server::{Server, serve},
+    server::{Process, Server, serve},
 };
 use rustix::fs::statvfs;
 use std::{
     fs::{self, OpenOptions},
-    io::{ErrorKind, Write as _},
+    io::{BufRead as _, BufReader, ErrorKind, Write as _},
     path::{Path, PathBuf},
-    process::Command,
+    process::{Command, Stdio},
     sync::{
         Arc,
         atomic::{AtomicBool, Ordering},
@@ -24,9 +25,11 @@ use std::{
 const PAGE_BYTES: usize = 4096;
 const FILLER: &str = "filler";
 
-/// Mounts a disk of `$0` at `$1`, then becomes the rest; `$2` is where its log goes.
-const MOUNT_AND_RUN: &str = r#"mount -t tmpfs -o "size=$0,mode=0700" faceoff "$1" && log="$2" && shift 2 &&
-if [ -n "$log" ]; then exec "$@" 2>>"$log"; else exec "$@"; fi"#;
+/// Mounts a disk of `$0` at `$1`, says so, and keeps it until its input ends.
+const MOUNT_AND_HOLD: &str =
+    r#"mount -t tmpfs -o "size=$0,mode=0700" faceoff "$1" && echo mounted && exec cat"#;
+/// Becomes the rest; `$0` is where its log goes, if not where it went.
+const LOG_AND_RUN: &str = r#"if [ -n "$0" ]; then exec "$@" 2>>"$0"; else exec "$@"; fi"#;
 
 /// Where the server's log goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,6 +47,70 @@ pub struct SmallDisk {
     pub server: Server,
     /// The data folder, as this process sees it.
     pub data_dir: PathBuf,
+    disk: Disk,
+}
+
+/// The disk, and how a server on it is started.
+#[derive(Debug)]
+struct Disk {
+    holder: Process,
+    mount: PathBuf,
+    config_file: PathBuf,
+    log: LogTo,
+}
+
+impl Disk {
+    fn mount(folder: &Path, bytes: u64, config: &str, log: LogTo) -> Self {
+        let mount = folder.join("disk");
+        fs::create_dir_all(&mount).expect("a scratch folder can be made");
+        let config_file = folder.join("faceoff.toml");
+        fs::write(&config_file, config).expect("a scratch file can be written");
+        let child = Command::new("unshare")
+            .args(["--mount", "sh", "-c", MOUNT_AND_HOLD])
+            .arg(bytes.to_string())
+            .arg(&mount)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn();
+        let mut holder = Process(child.expect("the program can be started"));
+        let mut told = String::new();
+        BufReader::new(holder.0.stdout.take().expect("it is piped"))
+            .read_line(&mut told)
+            .expect("a pipe can be read");
+        assert_eq!(
+            told.trim(),
+            "mounted",
+            "this needs root, as the sandbox does"
+        );
+        Self {
+            holder,
+            mount,
+            config_file,
+            log,
+        }
+    }
+
+    /// The data folder, as this process sees it.
+    fn data_dir(&self) -> PathBuf {
+        let absolute = self.mount.canonicalize().expect("the folder was made");
+        let below_root = absolute.strip_prefix("/").expect("it is absolute");
+        PathBuf::from(format!("/proc/{}/root", self.holder.0.id())).join(below_root)
+    }
+
+    fn start_server(&self) -> Server {
+        let mut command = Command::new("nsenter");
+        command
+            .args(["--mount", "--target", &self.holder.0.id().to_string()])
+            .args(["sh", "-c", LOG_AND_RUN])
+            .arg(match self.log {
+                LogTo::Test => PathBuf::new(),
+                LogTo::Disk => self.mount.join("log"),
+            })
+            .arg(program("faceoff"));
+        serve(&mut command, &self.mount, &self.config_file);
+        // Every program on the way becomes the next one: the id stays.
+        Server::answering(command, |_| self.data_dir())
+    }
 }
 
 impl SmallDisk {
@@ -53,30 +120,22 @@ impl SmallDisk {
     /// If it does not start: this needs root, as the sandbox does.
     #[must_use]
     pub fn start(folder: &Path, bytes: u64, config: &str, log: LogTo) -> Self {
-        let mount = folder.join("disk");
-        fs::create_dir_all(&mount).expect("a scratch folder can be made");
-        let config_file = folder.join("faceoff.toml");
-        fs::write(&config_file, config).expect("a scratch file can be written");
-        let mut command = Command::new("unshare");
-        command
-            .args(["--mount", "sh", "-c", MOUNT_AND_RUN])
-            .arg(bytes.to_string())
-            .arg(&mount)
-            .arg(match log {
-                LogTo::Test => PathBuf::new(),
-                LogTo::Disk => mount.join("log"),
-            })
-            .arg(program("faceoff"));
-        serve(&mut command, &mount, &config_file);
-        // Every program on the way becomes the next one: the id stays.
-        let inside = |process: u32| {
-            let absolute = mount.canonicalize().expect("the folder was made");
-            let below_root = absolute.strip_prefix("/").expect("it is absolute");
-            PathBuf::from(format!("/proc/{process}/root")).join(below_root)
-        };
-        let server = Server::answering(command, inside);
-        let data_dir = inside(server.process_id());
-        Self { server, data_dir }
+        let disk = Disk::mount(folder, bytes, config, log);
+        Self {
+            server: disk.start_server(),
+            data_dir: disk.data_dir(),
+            disk,
+        }
+    }
+
+    /// Kills the server, does something, and starts another on the same disk.
+    ///
+    /// # Panics
+    /// If that does not start.
+    pub fn kill_and_restart(&mut self, between: impl FnOnce()) {
+        self.server.end();
+        between();
+        self.server = self.disk.start_server();
     }
 
     /// The log on the disk.
