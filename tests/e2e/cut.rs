@@ -168,8 +168,8 @@ fn a_second_start_and_a_choice_after_the_cut_change_nothing() {
     let newest = team.submit(&server, &holding(scratch.path(), "newest"));
     assert_eq!(newest["active"], true, "{newest:#}");
     start_again(&server, &day);
-    let shorter = json!({ "episodes_per_task": 1, "profile": "ideal" });
-    let answer = server.post("/api/v1/days", &server.admin_token, &shorter);
+    let named = json!({ "stage": day["stage"] });
+    let answer = server.post("/api/v1/days", &server.admin_token, &named);
     if get(&server, "/api/v1/season", &team.token)["today"] == day["day"] {
         assert_refused(answer, 409, "day-has-cut");
     }

@@ -1,7 +1,6 @@
 use crate::pace::LeastRate;
-use faceoff_store::{RunPlan, UploadQuota};
+use faceoff_store::UploadQuota;
 use faceoff_types::Clock;
-use jiff::civil;
 use std::{path::PathBuf, time::Duration};
 
 /// How much the web side takes on at a time, and how long it waits.
@@ -42,14 +41,10 @@ impl Default for HttpLimits {
 pub struct HttpConfig {
     /// Largest packed bundle, in bytes.
     pub max_bundle_bytes: u64,
-    /// How a day's evaluations run, where the body of `POST /api/v1/days` does not say otherwise.
-    pub plan: RunPlan,
     /// BLAKE3 of the organiser's bearer token ([`token::hash_token`](crate::token::hash_token)).
     pub admin_token_hash: [u8; 32],
     /// Existing folder for uploads under way, on a disk with room for some bundles.
     pub upload_dir: PathBuf,
-    /// UTC time of the daily cut; `None` when the organiser starts the day by hand. Shown only.
-    pub daily_at: Option<civil::Time>,
     /// Stamps what is written, and tells which day it is.
     pub clock: Clock,
     /// Concurrency and patience.

@@ -88,8 +88,10 @@ fn parse<T: DeserializeOwned>((is_json, bytes): (bool, Bytes)) -> Result<T, Prob
             "expected a JSON body; send it with the header “Content-Type: application/json”",
         ));
     }
-    serde_json::from_slice(&bytes).map_err(|error| {
-        if error.is_data() {
+    let mut deserializer = serde_json::Deserializer::from_slice(&bytes);
+    // Many a type's own message does not say which field it is about.
+    let parsed = serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
+        if error.inner().is_data() {
             Problem::new(
                 ProblemKind::InvalidContent,
                 format!("the JSON does not fit: {error}"),
@@ -97,10 +99,18 @@ fn parse<T: DeserializeOwned>((is_json, bytes): (bool, Bytes)) -> Result<T, Prob
         } else {
             Problem::new(
                 ProblemKind::InvalidRequest,
-                format!("the body is not valid JSON: {error}"),
+                format!("the body is not valid JSON: {}", error.inner()),
             )
         }
-    })
+    })?;
+    let rest = deserializer.end();
+    rest.map_err(|error| {
+        Problem::new(
+            ProblemKind::InvalidRequest,
+            format!("the body is not valid JSON: {error}"),
+        )
+    })?;
+    Ok(parsed)
 }
 
 /// The parameters of the path, in its order.

@@ -14,8 +14,8 @@ pub(crate) async fn check_released(app: &AppState, evaluation: &Evaluation) -> R
     if evaluation.released_at.is_some() {
         return Ok(());
     }
-    let day = evaluation.day;
-    let of_day = app.store.evaluations_on(day).await?;
+    let day = evaluation.of.date;
+    let of_day = app.store.evaluations_of_day(evaluation.of).await?;
     let is_open = |state: &EvaluationState| !state.is_over();
     let under_way = of_day.iter().filter(|other| is_open(&other.state)).count();
     Err(Problem::new(

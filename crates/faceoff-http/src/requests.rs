@@ -1,8 +1,9 @@
 //! What clients send to the API.
 
-use faceoff_types::Profile;
-use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
+use faceoff_types::{Profile, Schedule, StageId, Task, Zone};
+use jiff::Timestamp;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use utoipa::{IntoParams, ToSchema};
 
 /// A team to create.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
@@ -12,16 +13,135 @@ pub struct NewTeam {
     pub name: String,
 }
 
-/// How today's evaluations shall differ from the configuration. All fields may be left out.
+/// Which board.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct BoardQuery {
+    /// Whose; without it that of the stage that is open, or of the nearest.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stage: Option<StageId>,
+    /// By which of the stage's rules; without it by the newest with results. No board mixes two.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub revision: Option<u32>,
+}
+
+/// Which day is to start.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct StartDay {
-    /// Episodes of each task.
+    /// Of which stage; may be left out while one is open.
     #[serde(skip_serializing_if = "Option::is_none")]
+    pub stage: Option<StageId>,
+}
+
+/// A stage to make: what is left out is as in the stage that is open, or in the nearest.
+#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewStage {
+    /// 1 to 40 letters, digits, spaces and . _ -
+    pub name: String,
+    /// From then on its days start; left out, now.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub opens_at: Option<Timestamp>,
+    /// From then on none of its days starts; left out, it has no end yet.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub closes_at: Option<Timestamp>,
+    /// Its days are dates there, and its schedule is of its clocks.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub zone: Option<Zone>,
+    /// The perturbations.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<Profile>,
+    /// In the order of play; at least one, none twice.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tasks: Option<Vec<Task>>,
+    /// Episodes of each task that a team plays on a day.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub episodes_per_task: Option<u32>,
+    /// More agent faults than this end an evaluation without a score.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_faults: Option<u32>,
+    /// When its days start; left out, when the organiser starts them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub schedule: Option<Schedule>,
+    /// Episodes of each task and profile of the ablation of every submission that the schedule starts; left out,
+    /// none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ablation_episodes: Option<u32>,
+    /// Episodes of one unit of work.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub episodes_per_shard: Option<u32>,
+}
+
+/// What of a stage is to be another; what is left out stays as it is.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct StageChange {
+    /// 1 to 40 letters, digits, spaces and . _ -
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Of a stage that has not opened.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub opens_at: Option<Timestamp>,
+    /// Of a stage that has not closed; null: it has no end yet.
+    #[serde(
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "given",
+        serialize_with = "given_or_null"
+    )]
+    #[schema(value_type = Option<Timestamp>)]
+    pub closes_at: Option<Option<Timestamp>>,
+    /// Of a stage none of whose days has had its cut.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub zone: Option<Zone>,
     /// The perturbations.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub profile: Option<Profile>,
+    /// In the order of play; at least one, none twice.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tasks: Option<Vec<Task>>,
+    /// Episodes of each task that a team plays on a day.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub episodes_per_task: Option<u32>,
+    /// More agent faults than this end an evaluation without a score.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_faults: Option<u32>,
+    /// When its days start; null: when the organiser starts them.
+    #[serde(
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "given",
+        serialize_with = "given_or_null"
+    )]
+    #[schema(value_type = Option<Schedule>)]
+    pub schedule: Option<Option<Schedule>>,
+    /// Episodes of each task and profile of the ablation of every submission that the schedule starts; 0: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ablation_episodes: Option<u32>,
+    /// Episodes of one unit of work.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub episodes_per_shard: Option<u32>,
+    /// The stage's name, if other rules are to begin while it is open: its board begins anew then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub confirm: Option<String>,
+}
+
+/// Tells null from what was left out.
+fn given<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
+    deserializer: D,
+) -> Result<Option<Option<T>>, D::Error> {
+    Option::deserialize(deserializer).map(Some)
+}
+
+#[expect(clippy::option_option, reason = "null and left out are told apart")]
+fn given_or_null<S: Serializer, T: Serialize>(
+    value: &Option<Option<T>>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    value
+        .as_ref()
+        .and_then(Option::as_ref)
+        .serialize(serializer)
 }
 
 /// Why an evaluation is stopped.

@@ -6,9 +6,10 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use faceoff_store::Store;
 use faceoff_types::{
     ComputationTimeSummary, EvaluationId, EvaluationResult, Profile, RULESET, Ruleset, RunId, Seed,
-    ShardId, SubmissionId, Task, TaskResult, TeamId, Tier, ViolationCounts,
+    ShardId, StageId, StageRules, StageSettings, SubmissionId, Task, TaskResult, TeamId, Tier,
+    ViolationCounts, Zone,
 };
-use jiff::{ToSpan, civil::date};
+use jiff::{Timestamp, ToSpan, civil::date};
 use sqlx::{Connection, SqliteConnection};
 use std::{hint::black_box, path::Path};
 use uuid::Uuid;
@@ -51,14 +52,14 @@ fn result(score: f64) -> EvaluationResult {
 
 /// Writes the season by SQL in one transaction: through the store it would be a hundred thousand
 /// commits.
-async fn fill(folder: &Path) {
+async fn fill(folder: &Path, stage: StageId) {
     let url = format!("sqlite://{}", folder.join("faceoff.sqlite3").display());
     let mut connection = SqliteConnection::connect(&url).await.unwrap();
     let mut tx = connection.begin().await.unwrap();
-    let log = "x".repeat(LOG_BYTES);
+    let (log, stage) = ("x".repeat(LOG_BYTES), stage.to_string());
     for team_number in 0..TEAMS {
         let team = TeamId::new().to_string();
-        sqlx::query("INSERT INTO teams VALUES (?, ?, ?, 0)")
+        sqlx::query("INSERT INTO teams (id, name, token_hash, created_at) VALUES (?, ?, ?, 0)")
             .bind(&team)
             .bind(format!("Team {team_number}"))
             .bind(&blake3::hash(&team_number.to_le_bytes()).as_bytes()[..])
@@ -70,8 +71,9 @@ async fn fill(folder: &Path) {
             if day_number % DAYS_PER_SUBMISSION == 0 {
                 submission = SubmissionId::new().to_string();
                 sqlx::query(
-                    "INSERT INTO submissions VALUES (?, ?, 'bundles/x', 1, 'x', 'agent.zip', ?, 'agent',
-                                                     'valid', NULL, ?)",
+                    "INSERT INTO submissions (id, team_id, bundle_key, bundle_bytes, bundle_blake3,
+                                              bundle_file_name, created_at, agent_name, state, log)
+                     VALUES (?, ?, 'bundles/x', 1, 'x', 'agent.zip', ?, 'agent', 'valid', ?)",
                 )
                 .bind(&submission)
                 .bind(&team)
@@ -85,16 +87,20 @@ async fn fill(folder: &Path) {
                 .saturating_add(day_number.days())
                 .to_string();
             if team_number == 0 {
-                sqlx::query("INSERT INTO days VALUES (?, 0, 0)")
-                    .bind(&day)
-                    .execute(&mut *tx)
-                    .await
-                    .unwrap();
+                sqlx::query(
+                    "INSERT INTO days (stage_id, day, cut_at, released_at) VALUES (?, ?, 0, 0)",
+                )
+                .bind(&stage)
+                .bind(&day)
+                .execute(&mut *tx)
+                .await
+                .unwrap();
             }
             let (run, unit) = (RunId::new().to_string(), Uuid::now_v7().to_string());
             sqlx::query(
-                r#"INSERT INTO runs VALUES (?, 'evaluation', ?, '["hit","defend","prepare"]', 1000, 50, 10,
-                                            1, 'played', 0)"#,
+                r#"INSERT INTO runs (id, profile, seed, tasks, episodes_per_task, episodes_per_shard, max_faults,
+                                     keeps_recordings, state, recordings_removed_at)
+                   VALUES (?, 'evaluation', ?, '["hit","defend","prepare"]', 1000, 50, 10, 1, 'played', 0)"#,
             )
             .bind(&run)
             .bind(&day)
@@ -110,7 +116,9 @@ async fn fill(folder: &Path) {
             .await
             .unwrap();
             sqlx::query(
-                "INSERT INTO shards VALUES (?, ?, ?, 0, 'hit', 0, 1000, 0, 'recordings/x', 0, '[]', '')",
+                "INSERT INTO shards (id, run_id, unit_id, position, task, first_episode, end_episode, committed_at,
+                                     recording, agent_faults, outcomes, log)
+                 VALUES (?, ?, ?, 0, 'hit', 0, 1000, 0, 'recordings/x', 0, '[]', '')",
             )
             .bind(ShardId::new().to_string())
             .bind(&run)
@@ -120,12 +128,14 @@ async fn fill(folder: &Path) {
             .unwrap();
             let scored = result(40.0 + team_number as f64 / 10.0);
             sqlx::query(
-                "INSERT INTO evaluations VALUES (?, ?, ?, ?, ?, ?, 'finished', ?, NULL, 'datasets/x.zip',
-                                                 'x', ?, NULL)",
+                "INSERT INTO evaluations (id, submission_id, team_id, stage_id, day, revision, run_id, created_at,
+                                          state, finished_at, dataset, dataset_blake3, result)
+                 VALUES (?, ?, ?, ?, ?, 1, ?, ?, 'finished', ?, 'datasets/x.zip', 'x', ?)",
             )
             .bind(EvaluationId::new().to_string())
             .bind(&submission)
             .bind(&team)
+            .bind(&stage)
             .bind(&day)
             .bind(&run)
             .bind(day_number)
@@ -134,12 +144,14 @@ async fn fill(folder: &Path) {
             .execute(&mut *tx)
             .await
             .unwrap();
-            sqlx::query("INSERT INTO episode_summaries VALUES (?, 1, ?)")
-                .bind(&run)
-                .bind("y".repeat(SUMMARY_BYTES))
-                .execute(&mut *tx)
-                .await
-                .unwrap();
+            sqlx::query(
+                "INSERT INTO episode_summaries (run_id, version, summary) VALUES (?, 1, ?)",
+            )
+            .bind(&run)
+            .bind("y".repeat(SUMMARY_BYTES))
+            .execute(&mut *tx)
+            .await
+            .unwrap();
         }
     }
     tx.commit().await.unwrap();
@@ -150,20 +162,34 @@ async fn fill(folder: &Path) {
 fn board(criterion: &mut Criterion) {
     let runtime = tokio::runtime::Runtime::new().unwrap();
     let folder = tempfile::tempdir().unwrap();
-    let store = runtime.block_on(async {
-        drop(Store::open(folder.path()).await.unwrap());
-        fill(folder.path()).await;
-        Store::open(folder.path()).await.unwrap()
+    let (store, stage) = runtime.block_on(async {
+        let store = Store::open(folder.path()).await.unwrap();
+        let now = Timestamp::now();
+        let rules = StageRules {
+            ruleset: Ruleset::CURRENT,
+            profile: Profile::Evaluation,
+            tasks: Task::ALL.to_vec(),
+            episodes_per_task: 1000,
+            max_faults: 10,
+        };
+        store
+            .configure_stage(rules, StageSettings::default(), Zone::UTC, now)
+            .await
+            .unwrap();
+        let stage = store.stages().await.unwrap().remove(0).id;
+        drop(store);
+        fill(folder.path(), stage).await;
+        (Store::open(folder.path()).await.unwrap(), stage)
     });
     let bytes = std::fs::metadata(folder.path().join("faceoff.sqlite3"))
         .unwrap()
         .len();
     eprintln!("the database: {} MB", bytes / 1_000_000);
-    let records = runtime.block_on(store.board(Ruleset::CURRENT)).unwrap();
+    let records = runtime.block_on(store.board(stage, 1)).unwrap();
     assert_eq!(records.len(), TEAMS);
     let runs: Vec<_> = records.iter().map(|record| record.run).collect();
     criterion.bench_function("board of 200 teams × 120 days", |bencher| {
-        bencher.iter(|| black_box(runtime.block_on(store.board(Ruleset::CURRENT)).unwrap()));
+        bencher.iter(|| black_box(runtime.block_on(store.board(stage, 1)).unwrap()));
     });
     criterion.bench_function("its episode summaries", |bencher| {
         bencher.iter(|| black_box(runtime.block_on(store.episode_summaries(&runs, 1)).unwrap()));

@@ -20,6 +20,22 @@ pub enum StoreError {
         /// When it started.
         cut_at: Timestamp,
     },
+    /// Names that differ only in case count as the same.
+    #[error("a stage named {0:?} exists already")]
+    StageNameTaken(String),
+    /// The stage's days do not start yet, or no longer.
+    #[error("the stage {name:?} {}", match closed_at {
+        Some(at) => format!("closed at {at}"),
+        None => format!("opens at {opens_at}"),
+    })]
+    StageNotOpen {
+        /// Which.
+        name: String,
+        /// From when on they start.
+        opens_at: Timestamp,
+        /// When it closed, if it did.
+        closed_at: Option<Timestamp>,
+    },
     /// The season is over: nothing more is uploaded or evaluated.
     #[error("the season was closed at {closed_at}")]
     SeasonClosed {

@@ -1,7 +1,8 @@
 //! What is recorded of every change: who did what to what. The audit log, and what feeds read.
 
 use faceoff_types::{
-    AblationId, EvaluationId, RunId, ShardId, SubmissionId, Task, TeamId, TeamName,
+    AblationId, EvaluationId, RunId, ShardId, StageDay, StageId, StageName, StageRules,
+    StageSettings, SubmissionId, Task, TeamId, TeamName, Zone,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
@@ -60,8 +61,12 @@ impl FromStr for Actor {
 pub enum Subject {
     /// The season, of which a data folder has one.
     Season,
-    /// A UTC day of the season.
-    Day(Date),
+    /// A stage.
+    Stage(StageId),
+    /// A day of a stage.
+    Day(StageDay),
+    /// A day from before there were stages.
+    DayOfNone(Date),
     /// A team.
     Team(TeamId),
     /// An upload and its smoke run.
@@ -77,7 +82,9 @@ impl Subject {
     pub(crate) fn columns(self) -> (&'static str, String) {
         match self {
             Self::Season => ("season", String::new()),
-            Self::Day(day) => ("day", day.to_string()),
+            Self::Stage(id) => ("stage", id.to_string()),
+            Self::Day(of) => ("day", of.to_string()),
+            Self::DayOfNone(date) => ("day", date.to_string()),
             Self::Team(id) => ("team", id.to_string()),
             Self::Submission(id) => ("submission", id.to_string()),
             Self::Evaluation(id) => ("evaluation", id.to_string()),
@@ -89,7 +96,9 @@ impl Subject {
         let unknown = || ParseEventError(format!("{kind} {id}"));
         Ok(match kind {
             "season" => Self::Season,
-            "day" => Self::Day(id.parse().map_err(|_| unknown())?),
+            "stage" => Self::Stage(id.parse().map_err(|_| unknown())?),
+            "day" if id.contains('/') => Self::Day(id.parse().map_err(|_| unknown())?),
+            "day" => Self::DayOfNone(id.parse().map_err(|_| unknown())?),
             "team" => Self::Team(id.parse().map_err(|_| unknown())?),
             "submission" => Self::Submission(id.parse().map_err(|_| unknown())?),
             "evaluation" => Self::Evaluation(id.parse().map_err(|_| unknown())?),
@@ -158,7 +167,10 @@ pub enum Event {
         team: TeamId,
         /// What plays.
         submission: SubmissionId,
-        /// The UTC day.
+        /// Whose day; unknown of those from before there were stages.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        stage: Option<StageId>,
+        /// Its date.
         day: Date,
         /// What is played.
         run: RunId,
@@ -235,6 +247,41 @@ pub enum Event {
     /// The day's seed is public: its last evaluation has ended (before there were cuts: its first
     /// dataset was handed out).
     DayReleased,
+    /// The season has another stage.
+    StageCreated {
+        /// As it was then.
+        name: StageName,
+        /// From when on its days start.
+        opens_at: Timestamp,
+        /// Until when; none: it has no end yet.
+        closes_at: Option<Timestamp>,
+        /// Where its days are dates.
+        zone: Zone,
+        /// What scores depend on.
+        rules: StageRules,
+        /// What they do not depend on.
+        settings: StageSettings,
+    },
+    /// The stage's name, times or settings are others: all of them as they are now.
+    StageChanged {
+        /// The name.
+        name: StageName,
+        /// From when on its days start.
+        opens_at: Timestamp,
+        /// Until when; none: it has no end yet.
+        closes_at: Option<Timestamp>,
+        /// Where its days are dates.
+        zone: Zone,
+        /// What no score depends on.
+        settings: StageSettings,
+    },
+    /// The stage has other rules from now on; before it opens, from its opening on.
+    StageRulesChanged {
+        /// From 1; before the opening, the one that there was.
+        revision: u32,
+        /// The new ones.
+        rules: StageRules,
+    },
     /// The season has another name.
     SeasonNamed {
         /// The new one.
@@ -280,7 +327,7 @@ pub struct EventRecord {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Change {
     /// It is in the events table.
-    Recorded(EventRecord),
+    Recorded(Box<EventRecord>),
     /// Work on the subject has advanced. Nothing is recorded of it: it comes every second from every
     /// slot, the next one replaces it, and what matters in the end is in the shard's commit.
     Progress(Subject),
@@ -316,7 +363,12 @@ mod tests {
         assert!("team:none".parse::<Actor>().is_err());
         let subjects = [
             Subject::Season,
-            Subject::Day(jiff::civil::date(2026, 3, 1)),
+            Subject::Stage(StageId::new()),
+            Subject::Day(StageDay {
+                stage: StageId::new(),
+                date: jiff::civil::date(2026, 3, 1),
+            }),
+            Subject::DayOfNone(jiff::civil::date(2026, 3, 1)),
             Subject::Team(TeamId::new()),
             Subject::Submission(SubmissionId::new()),
             Subject::Evaluation(EvaluationId::new()),

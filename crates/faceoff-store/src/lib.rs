@@ -47,6 +47,7 @@ pub use operations::{
     give_back::MAX_ATTEMPTS,
     rerun::RERUN_PAUSES_S,
     runs::RunOwner,
+    stages::{NewStage, StageChange},
     tidy::{RECORDINGS_KEPT, UNCHECKED_KEPT},
 };
 pub use queue::Claim;
@@ -63,6 +64,7 @@ pub use tables::{
     runs::Run,
     season::Season,
     shards::{Shard, ShardCommit},
+    stages::{Revision, Stage, StagePhase},
     submissions::{Submission, SubmissionState},
     teams::Team,
 };

@@ -40,13 +40,13 @@ impl Tx {
         let mut told = Vec::with_capacity(self.recorded.len() + self.advanced.len());
         for (subject, event) in std::mem::take(&mut self.recorded) {
             let id = append(&mut self.transaction, actor, self.now, subject, &event).await?;
-            told.push(Change::Recorded(EventRecord {
+            told.push(Change::Recorded(Box::new(EventRecord {
                 id,
                 at: self.now,
                 actor: actor.clone(),
                 subject,
                 event,
-            }));
+            })));
         }
         told.extend(self.advanced.drain(..).map(Change::Progress));
         Ok(told)

@@ -1,7 +1,7 @@
-use jiff::{Timestamp, civil::Date, tz::TimeZone};
+use jiff::Timestamp;
 use std::{fmt, sync::Arc};
 
-/// Tells the instants that leases and UTC days are reckoned by. A program makes one from its system's
+/// Tells the instants that leases and days are reckoned by. A program makes one from its system's
 /// clock and hands it down; a test turns its own.
 #[derive(Clone)]
 pub struct Clock(Arc<dyn Fn() -> Timestamp + Send + Sync>);
@@ -16,12 +16,6 @@ impl Clock {
     #[must_use]
     pub fn now(&self) -> Timestamp {
         (self.0)()
-    }
-
-    /// The current UTC day.
-    #[must_use]
-    pub fn today(&self) -> Date {
-        self.now().to_zoned(TimeZone::UTC).date()
     }
 }
 

@@ -67,6 +67,11 @@ id!(
     "team"
 );
 id!(
+    /// A part of a season with its own days, rules and board. Seeds of its days follow from it.
+    StageId,
+    "stage"
+);
+id!(
     /// One uploaded agent.
     SubmissionId,
     "submission"

@@ -16,17 +16,20 @@ mod harmless;
 mod ids;
 mod interpolation;
 mod limits;
+mod names;
 mod outcome;
 mod profile;
 mod result;
 mod ruleset;
+mod schedule;
 mod seed;
 mod seed_label;
 mod smoke_outcome;
+mod stage;
 mod task;
-mod team_name;
 mod tier;
 mod timing;
+mod zone;
 
 pub use archive_format::ArchiveFormat;
 pub use bundle_ref::BundleRef;
@@ -37,19 +40,24 @@ pub use contest::{Contest, Side};
 pub use fault::{AgentFault, AgentFaultKind, Phase};
 pub use full_disk::tells_of_full_disk;
 pub use harmless::{harmless, is_harmless};
-pub use ids::{AblationId, EvaluationId, ParseIdError, RunId, ShardId, SubmissionId, TeamId};
+pub use ids::{
+    AblationId, EvaluationId, ParseIdError, RunId, ShardId, StageId, SubmissionId, TeamId,
+};
 pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, UnknownInterpolation};
 pub use limits::{AgentLimits, BundleLimits, ResourceLimits, TimeLimits};
+pub use names::{InvalidName, StageName, TeamName};
 pub use outcome::{EpisodeEnd, EpisodeOutcome};
 pub use profile::{Factor, Factors, ParseProfileError, Profile};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult, ViolationCounts};
 pub use ruleset::{
     ACTION_LIMIT, FOULS_PER_POINT, GAME_WINDOWS, RULESET, Ruleset, UnknownRuleset, WINDOW_STEPS,
 };
+pub use schedule::{InvalidSchedule, Schedule};
 pub use seed::{ParseSeedError, Seed};
 pub use seed_label::{ParseSeedLabelError, SeedLabel};
 pub use smoke_outcome::{SmokeOutcome, SmokeTiming};
+pub use stage::{InvalidStageRules, ParseStageDayError, StageDay, StageRules, StageSettings};
 pub use task::{MAX_EPISODES_PER_TASK, ParseTaskError, Task};
-pub use team_name::{InvalidTeamName, TeamName};
 pub use tier::Tier;
 pub use timing::{RoundTrips, SlotTiming};
+pub use zone::{UnknownZone, Zone};

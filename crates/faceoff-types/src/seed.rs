@@ -1,4 +1,4 @@
-use crate::{SubmissionId, Task};
+use crate::{StageId, SubmissionId, Task};
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize, de::Error as _};
 use std::{fmt, str::FromStr};
@@ -40,7 +40,14 @@ impl Seed {
         Self(*hasher.finalize().as_bytes())
     }
 
-    /// Season secret → the seed of all evaluations of one UTC day.
+    /// Season secret → the seed that all days of one stage follow from.
+    #[must_use]
+    pub fn stage(&self, stage: StageId) -> Self {
+        self.derive("stage", stage.as_uuid().as_bytes())
+    }
+
+    /// A stage's seed → the seed of all evaluations of one day. (Of a season without stages, and of the first stage of
+    /// one that had none: the season secret.)
     #[must_use]
     pub fn day(&self, day: Date) -> Self {
         self.derive("day", day.to_string().as_bytes())

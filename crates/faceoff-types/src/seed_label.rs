@@ -1,4 +1,4 @@
-use crate::seed::Seed;
+use crate::{StageDay, seed::Seed};
 use jiff::civil::Date;
 use std::{fmt, str::FromStr};
 
@@ -6,8 +6,11 @@ use std::{fmt, str::FromStr};
 /// episodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum SeedLabel {
-    /// All that counts of one UTC day. Its text is the ISO date.
+    /// All that counts of one day of a season without stages, or of its first stage if that was played before
+    /// there were stages. Its text is the ISO date.
     Day(Date),
+    /// All that counts of one day of a stage.
+    StageDay(StageDay),
     /// All ablations of the season. Its text is `ablation`.
     Ablation,
 }
@@ -18,6 +21,7 @@ impl SeedLabel {
     pub fn seed(self, season_secret: &Seed) -> Seed {
         match self {
             Self::Day(day) => season_secret.day(day),
+            Self::StageDay(of) => season_secret.stage(of.stage).day(of.date),
             Self::Ablation => season_secret.ablation(),
         }
     }
@@ -27,6 +31,7 @@ impl fmt::Display for SeedLabel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Day(day) => day.fmt(f),
+            Self::StageDay(of) => of.fmt(f),
             Self::Ablation => f.write_str("ablation"),
         }
     }
@@ -34,7 +39,9 @@ impl fmt::Display for SeedLabel {
 
 /// Text that is no seed label.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("not a seed label: expected a day as YYYY-MM-DD or “ablation”")]
+#[error(
+    "not a seed label: expected a day as YYYY-MM-DD, a stage's as ID/YYYY-MM-DD, or “ablation”"
+)]
 pub struct ParseSeedLabelError;
 
 impl FromStr for SeedLabel {
@@ -42,7 +49,14 @@ impl FromStr for SeedLabel {
     fn from_str(s: &str) -> Result<Self, Self::Err> {
         match s {
             "ablation" => Ok(Self::Ablation),
-            day => day.parse().map(Self::Day).map_err(|_| ParseSeedLabelError),
+            label if label.contains('/') => label
+                .parse()
+                .map(Self::StageDay)
+                .map_err(|_| ParseSeedLabelError),
+            label => label
+                .parse()
+                .map(Self::Day)
+                .map_err(|_| ParseSeedLabelError),
         }
     }
 }
@@ -50,6 +64,7 @@ impl FromStr for SeedLabel {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::StageId;
 
     #[test]
     fn a_label_gives_the_seed_of_its_day_or_of_ablations() {
@@ -57,9 +72,17 @@ mod tests {
         let day = jiff::civil::date(2026, 3, 1);
         assert_eq!(SeedLabel::Day(day).seed(&secret), secret.day(day));
         assert_eq!(SeedLabel::Ablation.seed(&secret), secret.ablation());
-        for label in [SeedLabel::Day(day), SeedLabel::Ablation] {
+        let of = |stage| SeedLabel::StageDay(StageDay { stage, date: day });
+        let stage = StageId::new();
+        let staged = of(stage);
+        assert_eq!(staged.seed(&secret), secret.stage(stage).day(day));
+        assert_ne!(staged.seed(&secret), secret.day(day));
+        assert_ne!(staged.seed(&secret), of(StageId::new()).seed(&secret));
+        for label in [SeedLabel::Day(day), staged, SeedLabel::Ablation] {
             assert_eq!(label.to_string().parse(), Ok(label));
         }
-        assert!("someday".parse::<SeedLabel>().is_err());
+        for wrong in ["someday", "stage/2026-03-01", "/2026-03-01"] {
+            assert!(wrong.parse::<SeedLabel>().is_err(), "{wrong}");
+        }
     }
 }

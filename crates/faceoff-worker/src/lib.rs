@@ -27,6 +27,6 @@ mod slot_threads;
 mod tests;
 
 pub use cpus::{CpuLayout, SlotCpus};
-pub use schedule::{DailyPlan, run_schedule};
+pub use schedule::run_schedule;
 pub use service::{WorkerConfig, run};
 pub use slot_threads::{SlotStarter, SlotThreads};

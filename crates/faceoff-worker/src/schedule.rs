@@ -1,55 +1,45 @@
 use anyhow::Context as _;
-use faceoff_store::{Actor, Evaluation, RunPlan, Store};
+use faceoff_store::{Actor, Evaluation, RunPlan, Stage, Store};
 use faceoff_types::Clock;
-use jiff::{Timestamp, civil::Time, tz::TimeZone};
+use jiff::Timestamp;
 use std::{num::NonZeroU32, time::Duration};
 use tokio_util::sync::CancellationToken;
 
-/// The longest sleep: a machine's clock may be set, or the machine suspended, while we wait.
-const LONGEST_SLEEP: Duration = Duration::from_secs(60);
+/// The longest sleep: a stage may be changed, a machine's clock set, or the machine suspended, while we wait, and
+/// a day is to start within the second that is shown.
+const LONGEST_SLEEP: Duration = Duration::from_secs(1);
 
-/// What the schedule does each day.
-#[derive(Debug, Clone)]
-pub struct DailyPlan {
-    /// The UTC time at which it does so.
-    pub at: Time,
-    /// What every team plays.
-    pub evaluation: RunPlan,
-    /// Episodes of each task and profile of an ablation of every submission that was started and has
-    /// none yet; `None`: no ablations.
-    pub ablation_episodes: Option<NonZeroU32>,
-}
-
-/// Starts the evaluations of each UTC day once, at its time, until `shutdown` is cancelled. A day whose
-/// time passed while the server was down is started when it comes up, the same day still. A failing
-/// database is tried again every minute.
+/// Starts the days of all stages that have a schedule, each once, at its time, until `shutdown` is cancelled. A
+/// day whose time passed while the server was down is started when it comes up, on the same date still. What a
+/// failing database keeps from starting is tried again every second.
 pub async fn run_schedule(
     store: Store,
     clock: Clock,
-    daily: DailyPlan,
     shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
+    let mut failed = false;
     loop {
         let now = clock.now();
-        let wait = match until_next(now, daily.at)
-            .context("reckoning the time of the daily start")?
-        {
-            Due::In(wait) => wait,
-            Due::Today { next } => match store.start_scheduled_day(&daily.evaluation, now).await {
-                Ok(Some(started)) => {
-                    tracing::info!(evaluations = started.len(), "the day was started");
-                    if let Some(episodes) = daily.ablation_episodes {
-                        order_ablations(&store, &started, episodes, &daily.evaluation, now).await;
-                    }
-                    next
+        let next = match start_due(&store, now).await {
+            Ok(next) => {
+                failed = false;
+                next
+            }
+            Err(error) => {
+                // Once: it comes again every second.
+                if !failed {
+                    tracing::error!(
+                        error = format!("{error:#}"),
+                        "days could not be started; trying again"
+                    );
                 }
-                Ok(None) => next,
-                Err(error) => {
-                    tracing::error!(%error, "the day could not be started; trying again");
-                    LONGEST_SLEEP
-                }
-            },
+                failed = true;
+                None
+            }
         };
+        let wait = next.map_or(LONGEST_SLEEP, |at| {
+            Duration::try_from(at.duration_since(now)).unwrap_or(Duration::ZERO)
+        });
         tokio::select! {
             () = shutdown.cancelled() => return Ok(()),
             () = tokio::time::sleep(wait.min(LONGEST_SLEEP)) => {}
@@ -57,18 +47,56 @@ pub async fn run_schedule(
     }
 }
 
-/// Orders an ablation of each submission that has none. One that cannot be ordered is the organiser's
-/// to order by hand: what counts must not wait for it.
-async fn order_ablations(
+/// Starts what is due at `now`; when the next day is, if one comes.
+async fn start_due(store: &Store, now: Timestamp) -> anyhow::Result<Option<Timestamp>> {
+    let mut first = None;
+    let stages = store.stages().await.context("reading the stages")?;
+    for stage in stages {
+        let next = match next_cut(store, &stage, now).await? {
+            Some(at) if at <= now => {
+                let started = store.start_scheduled_day(stage.id, now).await;
+                let started = started.with_context(|| format!("the stage {}", stage.name))?;
+                if let Some(started) = started {
+                    tracing::info!(stage = %stage.name, evaluations = started.len(), "the day was started");
+                    order_ablations(store, &stage, &started, now).await;
+                }
+                // It is not due again unless something keeps it from starting, which may last.
+                let next = next_cut(store, &stage, now).await?;
+                next.filter(|at| *at > now)
+            }
+            next => next,
+        };
+        first = match (first, next) {
+            (Some(first), Some(next)) => Some(std::cmp::min::<Timestamp>(first, next)),
+            (first, next) => first.or(next),
+        };
+    }
+    Ok(first)
+}
+
+/// When the schedule starts the stage's next day.
+async fn next_cut(
     store: &Store,
-    started: &[Evaluation],
-    episodes: NonZeroU32,
-    plan: &RunPlan,
+    stage: &Stage,
     now: Timestamp,
-) {
+) -> anyhow::Result<Option<Timestamp>> {
+    let newest = store
+        .newest_day(stage.id)
+        .await
+        .context("reading the days")?;
+    let next = stage.next_cut(newest.map(|day| day.of.date), now);
+    Ok(next.and_then(|(_, at)| at))
+}
+
+/// Orders an ablation of each submission that has none, if the stage wants them. One that cannot be ordered is the
+/// organiser's to order by hand: what counts must not wait for it.
+async fn order_ablations(store: &Store, stage: &Stage, started: &[Evaluation], now: Timestamp) {
+    let Some(episodes) = NonZeroU32::new(stage.settings.ablation_episodes) else {
+        return;
+    };
     let plan = RunPlan {
         episodes_per_task: episodes.get(),
-        ..plan.clone()
+        ..stage.plan()
     };
     for evaluation in started {
         let submission = evaluation.submission;
@@ -84,64 +112,5 @@ async fn order_ablations(
         if let Err(error) = ordered {
             tracing::error!(%submission, %error, "an ablation could not be ordered");
         }
-    }
-}
-
-/// How the day stands.
-#[derive(Debug, PartialEq, Eq)]
-enum Due {
-    /// Today's time has not come.
-    In(Duration),
-    /// Today's time has come; `next` is the way to tomorrow's.
-    Today { next: Duration },
-}
-
-fn until_next(now: Timestamp, at: Time) -> Result<Due, jiff::Error> {
-    let day = now.to_zoned(TimeZone::UTC).date();
-    let start = |day: jiff::civil::Date| day.to_datetime(at).to_zoned(TimeZone::UTC);
-    let wait = |until: jiff::Zoned| {
-        Duration::try_from(until.timestamp().duration_since(now)).unwrap_or(Duration::ZERO)
-    };
-    let today = start(day)?;
-    if now < today.timestamp() {
-        Ok(Due::In(wait(today)))
-    } else {
-        Ok(Due::Today {
-            next: wait(start(day.tomorrow()?)?),
-        })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn due(now: &str, at: &str) -> Due {
-        until_next(now.parse().unwrap(), at.parse().unwrap()).unwrap()
-    }
-
-    #[test]
-    fn a_day_is_due_from_its_time_on() {
-        assert_eq!(
-            due("2026-03-01T05:59:59Z", "06:00"),
-            Due::In(Duration::from_secs(1))
-        );
-        let day = Duration::from_secs(86_400);
-        assert_eq!(
-            due("2026-03-01T06:00:00Z", "06:00"),
-            Due::Today { next: day }
-        );
-        let hours = Duration::from_secs(7 * 3600);
-        assert_eq!(
-            due("2026-03-01T23:00:00Z", "06:00"),
-            Due::Today { next: hours }
-        );
-        // another zone's wall clock is no matter
-        assert_eq!(
-            due("2026-03-01T00:30:00+01:00", "00:00"),
-            Due::Today {
-                next: Duration::from_secs(1800)
-            }
-        );
     }
 }

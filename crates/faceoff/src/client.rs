@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 use bundle_file::BundleFile;
 use faceoff_http::{
     API_BASE,
-    requests::{Cancellation, CloseSeason, NewTeam, StartDay},
+    requests::{Cancellation, CloseSeason, NewStage, NewTeam, StageChange, StartDay},
     views::{
         board::BoardView,
         comparison::ComparisonView,
@@ -15,11 +15,12 @@ use faceoff_http::{
         event::EventsView,
         me::MeView,
         season::SeasonView,
+        stage::StageView,
         submission::SubmissionView,
         team::{TeamView, TeamWithToken},
     },
 };
-use faceoff_types::{EvaluationId, SubmissionId, TeamId};
+use faceoff_types::{EvaluationId, StageId, SubmissionId, TeamId};
 use futures::StreamExt;
 use indicatif::ProgressBar;
 use jiff::civil::Date;
@@ -152,22 +153,33 @@ impl Client {
         read(self.send(request).await?).await
     }
 
-    /// Organiser: starts today's evaluations, with another number of episodes if one is given.
-    pub async fn start_day(&self, episodes_per_task: Option<u32>) -> anyhow::Result<DayView> {
-        self.start_day_as(&StartDay {
-            episodes_per_task,
-            profile: None,
-        })
-        .await
+    /// Organiser: starts the day of a stage, or of the one that is open.
+    pub async fn start_day(&self, stage: Option<StageId>) -> anyhow::Result<DayView> {
+        let request = self
+            .request(Method::POST, "/days")
+            .json(&StartDay { stage });
+        read(self.send(request).await?).await
     }
 
-    /// Organiser: starts today's evaluations.
-    pub async fn start_day_as(&self, wanted: &StartDay) -> anyhow::Result<DayView> {
-        read(
-            self.send(self.request(Method::POST, "/days").json(wanted))
-                .await?,
-        )
-        .await
+    /// All stages, the first to open first.
+    pub async fn stages(&self) -> anyhow::Result<Vec<StageView>> {
+        self.get("/stages").await
+    }
+
+    /// Organiser: makes a stage.
+    pub async fn create_stage(&self, new: &NewStage) -> anyhow::Result<StageView> {
+        let request = self.request(Method::POST, "/stages").json(new);
+        read(self.send(request).await?).await
+    }
+
+    /// Organiser: changes a stage.
+    pub async fn change_stage(
+        &self,
+        id: StageId,
+        change: &StageChange,
+    ) -> anyhow::Result<StageView> {
+        let request = self.request(Method::PATCH, &format!("/stages/{id}"));
+        read(self.send(request.json(change)).await?).await
     }
 
     /// Organiser: plays an evaluation again that was cancelled or failed by the server's fault.

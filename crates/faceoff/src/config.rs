@@ -8,9 +8,11 @@ use anyhow::{Context, anyhow};
 use faceoff_http::{ConnectionLimits, HttpLimits, LeastRate};
 use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::BundleLimits};
 use faceoff_sandbox::{Isolation, Layer, Limits, Runtime, affinity};
-use faceoff_store::{RunPlan, UploadQuota};
-use faceoff_types::{Profile, Task};
-use jiff::civil::Time;
+use faceoff_store::UploadQuota;
+use faceoff_types::{
+    InvalidSchedule, Profile, Ruleset, Schedule, StageRules, StageSettings, Task, Zone,
+};
+use jiff::civil::{Date, Time};
 use serde::{Deserialize, Serialize};
 use std::{
     collections::BTreeMap,
@@ -84,7 +86,7 @@ pub struct SeasonConfig {
     pub name: Option<String>,
 }
 
-/// `[evaluation]`
+/// `[evaluation]`: rules and settings of the season's first stage, as long as nobody changes them through the API.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct EvaluationConfig {
@@ -97,8 +99,14 @@ pub struct EvaluationConfig {
     /// Episodes of one unit of work. Scores do not depend on it; smaller units lose less when a
     /// worker dies, larger ones start fewer agents.
     pub episodes_per_shard: u32,
-    /// UTC time of the daily evaluation; left out, the organiser starts each day.
+    /// Time of the daily cut in `zone`; left out, `cron` says when, or the organiser starts each day.
     pub at: Option<Time>,
+    /// When days start, in place of `at`: minute, hour, day of the month, month, day of the week in `zone`.
+    pub cron: Option<String>,
+    /// Dates on which neither starts a day.
+    pub days_off: Vec<Date>,
+    /// Time zone of `at` and `cron`; days are dates there.
+    pub zone: Zone,
     /// More agent faults than this end an evaluation without a score.
     pub max_faults: u32,
     /// Episodes of each task and profile of the ablation that the schedule orders of every submission
@@ -114,6 +122,9 @@ impl Default for EvaluationConfig {
             episodes_per_task: 1000,
             episodes_per_shard: 50,
             at: None,
+            cron: None,
+            days_off: Vec::new(),
+            zone: Zone::UTC,
             max_faults: 10,
             ablation_episodes: 0,
         }
@@ -317,17 +328,36 @@ impl Config {
         Ok(config)
     }
 
-    /// What an evaluation plays.
+    /// What scores of the first stage depend on.
     #[must_use]
-    pub fn plan(&self) -> RunPlan {
+    pub fn rules(&self) -> StageRules {
         let evaluation = &self.evaluation;
-        RunPlan {
+        StageRules {
+            ruleset: Ruleset::CURRENT,
             profile: evaluation.profile,
             tasks: evaluation.tasks.clone(),
             episodes_per_task: evaluation.episodes_per_task,
-            episodes_per_shard: evaluation.episodes_per_shard,
             max_faults: evaluation.max_faults,
         }
+    }
+
+    /// What they do not depend on.
+    ///
+    /// # Errors
+    /// If there is no such schedule, which no configuration that was read has.
+    pub fn settings(&self) -> Result<StageSettings, InvalidSchedule> {
+        let evaluation = &self.evaluation;
+        let schedule = match (evaluation.at, &evaluation.cron) {
+            (None, None) => None,
+            (Some(at), None) => Some(Schedule::daily(at)),
+            (None, Some(pattern)) => Some(Schedule::cron(pattern)?),
+            (Some(_), Some(_)) => return Err(InvalidSchedule::Which),
+        };
+        Ok(StageSettings {
+            schedule: schedule.map(|schedule| schedule.without(evaluation.days_off.clone())),
+            ablation_episodes: evaluation.ablation_episodes,
+            episodes_per_shard: evaluation.episodes_per_shard,
+        })
     }
 
     /// How agents are run here: all layers but those given up; `native`, `python3` where this host

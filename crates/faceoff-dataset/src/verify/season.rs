@@ -1,4 +1,4 @@
-use faceoff_types::Seed;
+use faceoff_types::{Seed, StageId};
 use faceoff_wire::dataset::DatasetManifest;
 use jiff::civil::Date;
 
@@ -9,7 +9,10 @@ pub struct SeasonClaim {
     pub secret: Seed,
     /// BLAKE3 of the secret's 32 bytes, 64 hexadecimal digits, published before the season.
     pub commitment: Option<String>,
-    /// The UTC day of the evaluation.
+    /// The stage of the evaluation; `None` for a season without stages, or its first that began before there were
+    /// any.
+    pub stage: Option<StageId>,
+    /// The date of the evaluation's day.
     pub day: Date,
 }
 
@@ -31,6 +34,9 @@ impl SeasonClaim {
     /// # Errors
     /// The first that does not.
     pub fn check(&self, manifest: &DatasetManifest) -> Result<(), SeasonMismatch> {
+        let of_days = self
+            .stage
+            .map_or(self.secret, |stage| self.secret.stage(stage));
         let commitment = blake3::hash(self.secret.as_bytes()).to_hex().to_string();
         let claims = [
             self.commitment
@@ -39,7 +45,7 @@ impl SeasonClaim {
             Some((
                 "the evaluation's seed",
                 manifest.seed.to_string(),
-                self.secret.day(self.day).to_string(),
+                of_days.day(self.day).to_string(),
             )),
             Some((
                 "the seed of the model mismatch",

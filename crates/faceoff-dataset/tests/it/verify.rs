@@ -515,6 +515,7 @@ fn seeds_follow_from_the_revealed_secret() {
     manifest.seed = secret.day(day);
     manifest.mismatch_seed = secret.model_mismatch();
     let claim = SeasonClaim {
+        stage: None,
         secret,
         commitment: Some(blake3::hash(secret.as_bytes()).to_hex().to_uppercase()),
         day,

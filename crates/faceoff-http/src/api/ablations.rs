@@ -8,7 +8,7 @@ use crate::{
     extract::{OptionalJson, PathParam},
     problem::Problem,
     requests::OrderAblation,
-    views::ablation::AblationView,
+    views::{ablation::AblationView, stage},
 };
 use axum::{Json, extract::State, http::StatusCode, response::IntoResponse};
 use faceoff_store::{Actor, RunPlan};
@@ -59,7 +59,7 @@ pub(crate) async fn order_ablation(
     let episodes = wanted.episodes_per_task.unwrap_or(DEFAULT_EPISODES);
     let plan = RunPlan {
         episodes_per_task: checked_episodes(episodes)?,
-        ..app.config.plan.clone()
+        ..stage::current(&app).await?.plan()
     };
     let ablation = app
         .store

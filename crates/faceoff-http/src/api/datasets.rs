@@ -46,7 +46,7 @@ pub(crate) async fn dataset(
         .await
         .map_err(Problem::internal)?;
     let team = app.store.team(evaluation.team).await?;
-    let name = download_name(team.name.as_str(), evaluation.day);
+    let name = download_name(team.name.as_str(), evaluation.of.date);
     let disposition = HeaderValue::try_from(format!("attachment; filename=\"{name}\""))
         .map_err(Problem::internal)?;
     let headers = [

@@ -7,7 +7,7 @@ use crate::{
     paths,
     problem::Problem,
     requests::Cancellation,
-    views::evaluation::EvaluationView,
+    views::{evaluation::EvaluationView, stage},
 };
 use axum::{
     Json,
@@ -28,7 +28,7 @@ const MAX_REASON_CHARS: usize = 500;
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(crate) struct DayQuery {
-    /// UTC day, e.g. 2026-11-21. The organiser gets today's without it, a team all of its own.
+    /// A date in the stages' zones, e.g. 2026-11-21. The organiser gets today's without it, a team all of its own.
     day: Option<Date>,
 }
 
@@ -44,7 +44,10 @@ pub(crate) async fn list_evaluations(
 ) -> Result<Json<Vec<EvaluationView>>, Problem> {
     let evaluations = match caller {
         Caller::Organiser => {
-            let day = query.day.unwrap_or_else(|| app.config.clock.today());
+            let day = match query.day {
+                Some(day) => day,
+                None => stage::current(&app).await?.day(app.config.clock.now()).date,
+            };
             EvaluationView::all_on(&app, day).await?
         }
         Caller::Team(team) => {

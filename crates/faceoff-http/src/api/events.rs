@@ -26,7 +26,7 @@ pub(crate) struct EventsQuery {
     limit: Option<u32>,
     /// Who caused it: `organiser`, `team:ID`, `schedule`, `worker:NAME`, `server`; `team` and `worker` name all of them.
     actor: Option<String>,
-    /// What it is about: `season`, `day:2026-03-01`, `team:ID`, `submission:ID`, `evaluation:ID` or `ablation:ID`.
+    /// What it is about: `season`, `stage:ID`, `day:STAGE/2026-03-01`, `team:ID`, `submission:ID`, `evaluation:ID` or `ablation:ID`.
     subject: Option<String>,
     /// What happened, e.g. `day_started`.
     kind: Option<String>,
@@ -71,7 +71,7 @@ pub(crate) async fn list_events(
 
 fn subject(text: &str) -> Result<Subject, Problem> {
     text.parse().map_err(|_| {
-        let expected = "season, day:DATE, team:ID, submission:ID, evaluation:ID or ablation:ID";
+        let expected = "season, stage:ID, day:STAGE/DATE, team:ID, submission:ID, evaluation:ID or ablation:ID";
         Problem::invalid("subject", format!("expected {expected}, got {text:?}"))
     })
 }

@@ -14,6 +14,7 @@ mod events;
 mod health;
 mod me;
 mod season;
+mod stages;
 mod submissions;
 mod teams;
 mod upload;
@@ -37,6 +38,8 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(me::me))
         .routes(routes!(teams::create_team, teams::list_teams))
         .routes(routes!(teams::replace_token))
+        .routes(routes!(stages::list_stages, stages::create_stage))
+        .routes(routes!(stages::stage, stages::change_stage))
         .routes(routes!(days::start_day))
         .routes(routes!(events::list_events))
         .routes(routes!(submissions::list_submissions))

@@ -6,20 +6,22 @@ use super::{
 };
 use crate::{
     app::App,
-    extract::PathParam,
+    extract::{PathParam, QueryParams},
     problem::Problem,
+    requests::BoardQuery,
     views::{
         board::{BoardRow, BoardView},
         evaluation::{EvaluationStatus, EvaluationView, Progress},
         season::SeasonHead,
+        stage::{PhaseView, StageView},
         task::TaskView,
     },
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
-use faceoff_types::{EvaluationId, Task, Tier, ViolationCounts};
+use faceoff_types::{EvaluationId, StageDay, Task, Tier, ViolationCounts};
 use figures::Rate;
-use jiff::civil;
+use jiff::{Timestamp, civil};
 
 /// Who a row is about.
 struct Who {
@@ -134,12 +136,89 @@ struct UnderWay {
     progress: Option<Progress>,
 }
 
+/// Whose board a page is, and which others there are.
+struct Heading {
+    stage: String,
+    /// Since when, until when.
+    times: String,
+    /// When the next day starts.
+    next: Option<String>,
+    /// Of the rules, if the stage has had several.
+    rules: Option<String>,
+    others: Vec<OtherBoard>,
+}
+
+struct OtherBoard {
+    label: String,
+    /// The query that asks for it.
+    query: String,
+}
+
+impl Heading {
+    async fn of(app: &App, board: &BoardView) -> Result<Self, PageProblem> {
+        let stages = StageView::all(app).await?;
+        let mut others = Vec::new();
+        let mut heading = None;
+        for stage in stages {
+            let is_shown = stage.id == board.stage;
+            for rules in &stage.revisions {
+                let newest = rules.revision == stage.rules.revision;
+                if is_shown && rules.revision == board.revision || (!is_shown && !newest) {
+                    continue;
+                }
+                others.push(OtherBoard {
+                    label: if is_shown {
+                        format!("{}, rules of {}", stage.name, minute(rules.since))
+                    } else {
+                        stage.name.to_string()
+                    },
+                    query: if is_shown {
+                        format!("?stage={}&revision={}", stage.id, rules.revision)
+                    } else {
+                        format!("?stage={}", stage.id)
+                    },
+                });
+            }
+            if is_shown {
+                heading = Some(Self {
+                    times: times(&stage),
+                    next: stage.next_cut.map(|next| next.to_string()),
+                    rules: (stage.revisions.len() > 1).then(|| {
+                        format!("revision {}, since {}", board.revision, minute(board.since))
+                    }),
+                    stage: stage.name.to_string(),
+                    others: Vec::new(),
+                });
+            }
+        }
+        let heading = heading.ok_or_else(|| Problem::internal("a board without its stage"))?;
+        Ok(Self { others, ..heading })
+    }
+}
+
+fn minute(at: Timestamp) -> String {
+    at.strftime("%Y-%m-%d %H:%M UTC").to_string()
+}
+
+fn times(stage: &StageView) -> String {
+    let there = |at: Timestamp| {
+        let there = at.to_zoned(stage.zone.time_zone());
+        format!("{} {}", there.strftime("%Y-%m-%d %H:%M:%S"), stage.zone)
+    };
+    match (stage.phase, stage.closes_at) {
+        (PhaseView::Upcoming, _) => format!("opens {}", there(stage.opens_at)),
+        (PhaseView::Open, Some(at)) => format!("open until {}", there(at)),
+        (PhaseView::Open, None) => "open".to_owned(),
+        (PhaseView::Closed, at) => format!("closed {}", there(at.unwrap_or(stage.opens_at))),
+    }
+}
+
 #[derive(Template)]
 #[template(path = "board.html")]
 struct OverallPage {
     frame: Frame,
     today: civil::Date,
-    daily_at: Option<String>,
+    heading: Heading,
     commitment: String,
     setting: Option<String>,
     tiers: Vec<TierRows<OverallRow>>,
@@ -147,18 +226,20 @@ struct OverallPage {
 }
 
 /// The overall board.
-pub(super) async fn overall(State(app): State<App>) -> Result<Response, PageProblem> {
+pub(super) async fn overall(
+    State(app): State<App>,
+    query: Result<QueryParams<BoardQuery>, Problem>,
+) -> Result<Response, PageProblem> {
+    let QueryParams(query) = query?;
     let season = SeasonHead::now(&app).await?;
-    let today = app.config.clock.today();
-    let board = BoardView::newest(&app, None).await?;
+    let board = BoardView::asked(&app, query, None).await?;
+    let today = app.store.stage(board.stage).await.map_err(Problem::from)?;
+    let today = today.day(app.config.clock.now());
     let setting = common_setting(&board.rows);
     let page = OverallPage {
         frame: Frame::of(&app, season.name, "/"),
-        today,
-        daily_at: app
-            .config
-            .daily_at
-            .map(|at| at.strftime("%H:%M").to_string()),
+        today: today.date,
+        heading: Heading::of(&app, &board).await?,
         commitment: season.commitment,
         tiers: by_tier(&board, |row| OverallRow::of(row, setting.as_ref())),
         setting,
@@ -167,7 +248,7 @@ pub(super) async fn overall(State(app): State<App>) -> Result<Response, PageProb
     render(&page)
 }
 
-async fn under_way(app: &App, today: civil::Date) -> Result<Vec<UnderWay>, PageProblem> {
+async fn under_way(app: &App, today: StageDay) -> Result<Vec<UnderWay>, PageProblem> {
     let evaluations = EvaluationView::current(app, today).await?;
     let under_way = evaluations.into_iter().filter_map(|evaluation| {
         let state = match evaluation.status {
@@ -236,6 +317,7 @@ impl TaskRow {
 #[template(path = "task.html")]
 struct TaskPage {
     frame: Frame,
+    heading: Heading,
     title: &'static str,
     aim: &'static str,
     setting: Option<String>,
@@ -246,8 +328,9 @@ struct TaskPage {
 pub(super) async fn by_task(
     State(app): State<App>,
     task: Result<PathParam<Task>, Problem>,
+    query: Result<QueryParams<BoardQuery>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let PathParam(task) = task?;
+    let (PathParam(task), QueryParams(query)) = (task?, query?);
     let season = SeasonHead::now(&app).await?;
     let (title, aim) = match task {
         Task::Hit => (
@@ -263,7 +346,7 @@ pub(super) async fn by_task(
             "Bring a puck from the border to a good hitting position.",
         ),
     };
-    let mut board = BoardView::newest(&app, Some(task)).await?;
+    let mut board = BoardView::asked(&app, query, Some(task)).await?;
     // The board leaves out teams without the task; a row without one could show nothing.
     board.rows.retain(|row| row.tasks.contains_key(&task));
     let setting = common_setting(&board.rows);
@@ -273,6 +356,7 @@ pub(super) async fn by_task(
     let frame = Frame::of(&app, season.name, format!("/tasks/{task}"));
     render(&TaskPage {
         frame,
+        heading: Heading::of(&app, &board).await?,
         title,
         aim,
         setting,

@@ -22,7 +22,7 @@ use askama::Template;
 use axum::{extract::State, response::Response};
 use faceoff_scoring::{EpisodeSummary, TIER_CHANGE_RESAMPLES};
 use faceoff_store::EvaluationState;
-use faceoff_types::{EvaluationId, Profile, RoundTrips, SlotTiming, Task};
+use faceoff_types::{EvaluationId, Profile, RoundTrips, SlotTiming, StageDay, Task};
 use faceoff_wire::dataset::SlowEpisode;
 use figures::Rate;
 use jiff::{Timestamp, civil};
@@ -341,7 +341,11 @@ async fn others(app: &App, of: &EvaluationView) -> Result<Vec<Other>, PageProble
             && other.episodes_per_task == of.episodes_per_task
             && other.tasks == of.tasks
     };
-    let same_day = EvaluationView::all_on(app, of.day).await?;
+    let day = StageDay {
+        stage: of.stage,
+        date: of.day,
+    };
+    let same_day = EvaluationView::of_day(app, day).await?;
     let mut others: Vec<_> = same_day
         .into_iter()
         .filter(same_episodes)

@@ -2,9 +2,13 @@
 //! from it.
 
 use super::frame::{Frame, PageProblem, render};
-use crate::{app::App, views::season::SeasonView};
+use crate::{
+    app::App,
+    views::{season::SeasonView, stage::StageView},
+};
 use askama::Template;
 use axum::{extract::State, response::Response};
+use faceoff_types::StageId;
 use jiff::Timestamp;
 
 #[derive(Template)]
@@ -14,6 +18,33 @@ struct Page {
     season: SeasonView,
     opened: String,
     closed: Option<String>,
+}
+
+impl Page {
+    fn there(&self, stage: &StageView, at: &Timestamp) -> String {
+        let there = at.to_zoned(stage.zone.time_zone());
+        format!("{} {}", there.strftime("%Y-%m-%d %H:%M:%S"), stage.zone)
+    }
+
+    fn name(&self, id: &StageId) -> String {
+        let stage = self.season.stages.iter().find(|stage| stage.id == *id);
+        stage.map_or_else(|| id.to_string(), |stage| stage.name.to_string())
+    }
+
+    /// The stage whose id enters no seed, if there is one.
+    fn unnamed(&self) -> Option<&str> {
+        let stage = self.season.stages.iter().find(|stage| !stage.names_seeds);
+        stage.map(|stage| stage.name.as_str())
+    }
+
+    /// The hexadecimal digits of a stage's id.
+    fn example_stage(&self) -> String {
+        let stage = self.season.stages.iter().find(|stage| stage.names_seeds);
+        stage.map_or_else(
+            || "STAGE".to_owned(),
+            |stage| stage.id.as_uuid().simple().to_string(),
+        )
+    }
 }
 
 pub(super) async fn page(State(app): State<App>) -> Result<Response, PageProblem> {

@@ -1,5 +1,6 @@
 use super::{details::Problem, kind::ProblemKind};
 use faceoff_store::StoreError;
+use jiff::Timestamp;
 
 impl From<StoreError> for Problem {
     fn from(error: StoreError) -> Self {
@@ -15,6 +16,24 @@ impl From<StoreError> for Problem {
                      for it with POST /api/v1/teams/ID/token"
                 ),
             ),
+            StoreError::StageNameTaken(name) => Self::new(
+                ProblemKind::StageNameTaken,
+                format!("a stage named {name:?} exists already; choose another name"),
+            ),
+            StoreError::StageNotOpen {
+                name,
+                opens_at,
+                closed_at,
+            } => {
+                let shown = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M:%S UTC").to_string();
+                let when = match closed_at {
+                    Some(at) => format!("closed at {}; no day of it starts any more", shown(at)),
+                    None => format!("opens at {}; no day of it starts before", shown(opens_at)),
+                };
+                Self::new(ProblemKind::StageNotOpen, format!("the stage {name:?} {when}"))
+                    .with("opens_at", opens_at.to_string())
+                    .with("closed_at", closed_at.map(|at| at.to_string()))
+            }
             error @ StoreError::DayHasCut { .. } => {
                 Self::new(ProblemKind::DayHasCut, error.to_string())
             }

@@ -54,6 +54,15 @@ kinds! {
     TeamNameTaken "team-name-taken" CONFLICT
         "The name is taken"
         "Another team has this name. Choose another one, or ask for a new token for the existing team."
+    StageNameTaken "stage-name-taken" CONFLICT
+        "The name is taken"
+        "Another stage of the season has this name. Choose another one."
+    StageNotOpen "stage-not-open" CONFLICT
+        "The stage is not open"
+        "Days of a stage start from its opening to its closing; “opens_at” and “closed_at” say when these are. GET /api/v1/stages lists the stages."
+    NotConfirmed "not-confirmed" CONFLICT
+        "This needs to be confirmed"
+        "The request would do what cannot be undone; the detail says what. Send it again with the field “confirm” as the detail tells."
     DayHasCut "day-has-cut" CONFLICT
         "The day has had its cut"
         "A day starts once: what each team has active then plays it. What is active at the next cut plays the next day; “next_cut” says when that is."
@@ -65,7 +74,7 @@ kinds! {
         "The season's secret is published, so nothing more is uploaded or evaluated. Results and datasets stay."
     NotPaired "not-paired" CONFLICT
         "Not the same episodes"
-        "Two evaluations are compared if they are of the same day and played equally many episodes of the same tasks under the same rules and profile. “field” names what differs."
+        "Two evaluations are compared if they are of the same stage and day and played equally many episodes of the same tasks under the same rules and profile. “field” names what differs."
     Conflict "conflict" CONFLICT
         "Not possible in this state"
         "The detail says which state the thing is in and what it waits for."

@@ -1,22 +1,35 @@
 //! Who stands where, and how sure that is.
 
-use super::task::TaskView;
-use crate::{app::AppState, problem::Problem, summaries::RunSummaries, views::shown};
+use super::{stage, task::TaskView};
+use crate::{
+    app::AppState, problem::Problem, requests::BoardQuery, summaries::RunSummaries, views::shown,
+};
 use faceoff_scoring::{
     BoardEntry, Played, RankedEntry, SIGNIFICANCE, TIER_CHANGE_RESAMPLES, overall_board,
     rank_groups, task_board,
 };
-use faceoff_store::BoardRecord;
-use faceoff_types::{EvaluationId, Profile, Ruleset, Seed, Task, TeamId, TeamName, Tier};
+use faceoff_store::{BoardRecord, Stage};
+use faceoff_types::{
+    EvaluationId, Profile, Seed, StageId, StageName, Task, TeamId, TeamName, Tier,
+};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
-/// A board: each team's newest evaluation that is finished under one ruleset, in board order.
+/// A board: each team's newest evaluation of a stage that is finished under one revision of its rules, in board
+/// order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct BoardView {
-    /// The rules that the scores refer to.
+    /// Whose it is.
+    pub stage: StageId,
+    /// As the organiser named it.
+    pub stage_name: StageName,
+    /// By which of the stage's rules the rows were played; no board mixes two.
+    pub revision: u32,
+    /// Since when those were the stage's.
+    pub since: Timestamp,
+    /// The simulator and the scoring that the scores refer to.
     #[schema(example = "airhockey-2023.2")]
     pub ruleset: String,
     /// The task, or null for the overall board.
@@ -52,7 +65,7 @@ pub struct BoardRow {
     pub agent: Option<String>,
     /// The newest that the team finished.
     pub evaluation: EvaluationId,
-    /// The UTC day whose episodes it played.
+    /// The date, in the stage's zone, whose episodes it played.
     pub day: Date,
     /// When its score was published.
     pub finished_at: Timestamp,
@@ -73,19 +86,36 @@ pub struct BoardRow {
 }
 
 impl BoardView {
-    /// The overall board, or that of one task, of the newest ruleset with results. A constant number of
-    /// reads, however many teams there are.
-    pub(crate) async fn newest(app: &AppState, task: Option<Task>) -> Result<Self, Problem> {
-        Self::of(app, app.store.board_ruleset().await?, task).await
-    }
-
-    /// The board of a ruleset.
-    pub(crate) async fn of(
+    /// The board that a request asks for: the overall one, or that of one task.
+    pub(crate) async fn asked(
         app: &AppState,
-        ruleset: Ruleset,
+        query: BoardQuery,
         task: Option<Task>,
     ) -> Result<Self, Problem> {
-        let records = app.store.board(ruleset).await?;
+        let stage = match query.stage {
+            Some(id) => app.store.stage(id).await?,
+            None => stage::current(app).await?,
+        };
+        Self::of(app, &stage, query.revision, task).await
+    }
+
+    /// The overall board of a stage, or that of one task: by one of the stage's revisions, or else by the newest
+    /// with results. A constant number of reads, however many teams there are.
+    pub(crate) async fn of(
+        app: &AppState,
+        stage: &Stage,
+        revision: Option<u32>,
+        task: Option<Task>,
+    ) -> Result<Self, Problem> {
+        let number = match revision {
+            Some(number) => number,
+            None => app.store.board_revision(stage).await?,
+        };
+        let mut revisions = app.store.stage_revisions(stage.id).await?.into_iter();
+        let Some(revision) = revisions.find(|revision| revision.number == number) else {
+            return Err(Problem::not_found("revision of the stage's rules"));
+        };
+        let records = app.store.board(stage.id, number).await?;
         let runs: Vec<_> = records.iter().map(|record| record.run).collect();
         let summaries = app.summaries.of(&runs).await?;
         let mismatch_seed = app.store.season().await?.secret.model_mismatch();
@@ -109,7 +139,11 @@ impl BoardView {
             Ok(row(ranked, rank_group, tier_change_probability))
         });
         Ok(Self {
-            ruleset: ruleset.to_string(),
+            stage: stage.id,
+            stage_name: stage.name.clone(),
+            revision: number,
+            since: revision.since,
+            ruleset: revision.rules.ruleset.to_string(),
             task,
             significance: SIGNIFICANCE,
             tier_change_resamples: TIER_CHANGE_RESAMPLES,

@@ -20,7 +20,7 @@ pub struct ComparisonView {
     pub a: ComparedView,
     /// The second evaluation.
     pub b: ComparedView,
-    /// The UTC day whose episodes both played.
+    /// The date, in their stage's zone, whose episodes both played.
     pub day: Date,
     /// The rules that both were scored by.
     pub ruleset: String,
@@ -110,7 +110,14 @@ impl ComparisonView {
             )
             .with("field", field)
         };
-        let (day_a, day_b) = (a.evaluation.day, b.evaluation.day);
+        let (stage_a, stage_b) = (a.evaluation.of.stage, b.evaluation.of.stage);
+        if stage_a != stage_b {
+            return Err(not_paired(
+                "stage",
+                format!("stage: the first evaluation is of {stage_a}, the second of {stage_b}"),
+            ));
+        }
+        let (day_a, day_b) = (a.evaluation.of.date, b.evaluation.of.date);
         if day_a != day_b {
             return Err(not_paired(
                 "day",

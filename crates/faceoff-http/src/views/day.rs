@@ -2,8 +2,9 @@
 
 use super::{evaluation::EvaluationView, team::TeamView};
 use crate::{app::AppState, problem::Problem};
-use faceoff_types::TeamId;
-use jiff::{Timestamp, civil::Date, tz::TimeZone};
+use faceoff_store::Stage;
+use faceoff_types::{StageDay, StageId, StageName, TeamId, Zone};
+use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use std::{collections::BTreeSet, fmt};
 use utoipa::ToSchema;
@@ -11,7 +12,9 @@ use utoipa::ToSchema;
 /// What starting the day did.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 pub struct DayView {
-    /// In UTC.
+    /// Whose day.
+    pub stage: StageId,
+    /// Its date in the stage's zone.
     pub day: Date,
     /// One evaluation for each team that had a submission active.
     pub created: Vec<EvaluationView>,
@@ -20,13 +23,14 @@ pub struct DayView {
 }
 
 impl DayView {
-    pub(crate) async fn of(app: &AppState, day: Date) -> Result<Self, Problem> {
-        let created = EvaluationView::all_on(app, day).await?;
+    pub(crate) async fn of(app: &AppState, of: StageDay) -> Result<Self, Problem> {
+        let created = EvaluationView::of_day(app, of).await?;
         let evaluated: BTreeSet<TeamId> = created.iter().map(|created| created.team).collect();
         let mut without_submission = TeamView::all(app).await?;
         without_submission.retain(|team| !evaluated.contains(&team.id));
         Ok(Self {
-            day,
+            stage: of.stage,
+            day: of.date,
             created,
             without_submission,
         })
@@ -34,49 +38,71 @@ impl DayView {
 }
 
 /// When the next day starts, with what each team has active then.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 pub struct NextCut {
-    /// In UTC; the earliest, where the organiser starts it.
+    /// Of which stage.
+    pub stage: StageId,
+    /// As the organiser named it.
+    pub stage_name: StageName,
+    /// Its date in the stage's zone; the earliest, where the organiser starts it.
     pub day: Date,
     /// By the schedule; null where the organiser starts the day.
     pub at: Option<Timestamp>,
+    /// Where the day is a date.
+    pub zone: Zone,
 }
 
 impl NextCut {
-    /// `None` once the season is closed.
-    pub(crate) async fn unless_closed(app: &AppState) -> Result<Option<Self>, Problem> {
-        match app.store.season().await?.closed_at {
-            Some(_) => Ok(None),
-            None => Self::of(app).await.map(Some),
+    /// Of a stage; `None` if it has no other day, or the season is closed.
+    pub(crate) async fn of(app: &AppState, stage: &Stage) -> Result<Option<Self>, Problem> {
+        if app.store.season().await?.closed_at.is_some() {
+            return Ok(None);
         }
+        let newest = app.store.newest_day(stage.id).await?;
+        let next = stage.next_cut(newest.map(|day| day.of.date), app.config.clock.now());
+        Ok(next.map(|(day, at)| Self {
+            stage: stage.id,
+            stage_name: stage.name.clone(),
+            day,
+            at,
+            zone: stage.zone.clone(),
+        }))
     }
 
-    /// Of a season that is open.
-    pub(crate) async fn of(app: &AppState) -> Result<Self, Problem> {
-        let today = app.config.clock.today();
-        let day = match app.store.newest_day().await? {
-            Some(newest) if newest.date >= today => {
-                newest.date.tomorrow().map_err(Problem::internal)?
+    /// The first of all stages; `None` if none has another day, or the season is closed.
+    pub(crate) async fn first(app: &AppState) -> Result<Option<Self>, Problem> {
+        let mut first: Option<(Timestamp, Self)> = None;
+        for stage in app.store.stages().await? {
+            let Some(next) = Self::of(app, &stage).await? else {
+                continue;
+            };
+            let begins = next.day.to_zoned(stage.zone.time_zone());
+            let begins = begins.map_err(Problem::internal)?.timestamp();
+            let at = next.at.unwrap_or(begins);
+            if first.as_ref().is_none_or(|(earliest, _)| at < *earliest) {
+                first = Some((at, next));
             }
-            _ => today,
-        };
-        let at = app.config.daily_at.map(|at| {
-            let start = day.to_datetime(at).to_zoned(TimeZone::UTC);
-            start.map(|start| start.timestamp())
-        });
-        let at = at.transpose().map_err(Problem::internal)?;
-        Ok(Self { day, at })
+        }
+        Ok(first.map(|(_, next)| next))
     }
 }
 
 impl fmt::Display for NextCut {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.at {
-            Some(at) => write!(f, "{}", at.strftime("%Y-%m-%d at %H:%M UTC")),
+            Some(at) => {
+                let there = at.to_zoned(self.zone.time_zone());
+                write!(
+                    f,
+                    "{} {}",
+                    there.strftime("%Y-%m-%d at %H:%M:%S"),
+                    self.zone
+                )
+            }
             None => write!(
                 f,
-                "{} (UTC) or later, when the organiser starts the day",
-                self.day
+                "{} ({}) or later, when the organiser starts the day",
+                self.day, self.zone
             ),
         }
     }

@@ -5,8 +5,8 @@ use crate::{app::AppState, paths, problem::Problem, views::shown};
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::{Evaluation, EvaluationState};
 use faceoff_types::{
-    AgentFault, EvaluationId, EvaluationResult, Profile, Seed, SlotTiming, SubmissionId, Task,
-    TeamId, TeamName, Tier,
+    AgentFault, EvaluationId, EvaluationResult, Profile, Seed, SlotTiming, StageDay, StageId,
+    SubmissionId, Task, TeamId, TeamName, Tier,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
@@ -24,7 +24,11 @@ pub struct EvaluationView {
     pub team: TeamId,
     /// As the board shows it.
     pub team_name: TeamName,
-    /// The UTC day whose episodes it plays.
+    /// Whose day it plays.
+    pub stage: StageId,
+    /// By which of the stage's rules.
+    pub revision: u32,
+    /// The date, in the stage's zone, whose episodes it plays.
     pub day: Date,
     /// When the day's last evaluation had ended, and all of the day came out; null until then.
     pub released_at: Option<Timestamp>,
@@ -203,20 +207,28 @@ impl EvaluationView {
         Ok(view)
     }
 
-    /// All evaluations of a UTC day, in the order in which they were queued; without faults and logs,
-    /// which are long, as in all lists.
-    pub(crate) async fn all_on(app: &AppState, day: Date) -> Result<Vec<Self>, Problem> {
-        Self::all(app, app.store.evaluations_on(day).await?).await
+    /// All evaluations of a date, of all stages, in the order in which they were queued; without faults and
+    /// logs, which are long, as in all lists.
+    pub(crate) async fn all_on(app: &AppState, date: Date) -> Result<Vec<Self>, Problem> {
+        Self::all(app, app.store.evaluations_on(date).await?).await
     }
 
-    /// Those of `today`, after what began before midnight and is still going.
-    pub(crate) async fn current(app: &AppState, today: Date) -> Result<Vec<Self>, Problem> {
-        let mut evaluations = match today.yesterday() {
-            Ok(yesterday) => app.store.evaluations_on(yesterday).await?,
+    /// Those of a stage's day.
+    pub(crate) async fn of_day(app: &AppState, of: StageDay) -> Result<Vec<Self>, Problem> {
+        Self::all(app, app.store.evaluations_of_day(of).await?).await
+    }
+
+    /// Those of `today`, after what began the day before and is still going.
+    pub(crate) async fn current(app: &AppState, today: StageDay) -> Result<Vec<Self>, Problem> {
+        let mut evaluations = match today.date.yesterday() {
+            Ok(date) => {
+                let yesterday = StageDay { date, ..today };
+                app.store.evaluations_of_day(yesterday).await?
+            }
             Err(_) => Vec::new(),
         };
         evaluations.retain(|evaluation| !evaluation.state.is_over());
-        evaluations.extend(app.store.evaluations_on(today).await?);
+        evaluations.extend(app.store.evaluations_of_day(today).await?);
         Self::all(app, evaluations).await
     }
 
@@ -292,7 +304,9 @@ impl EvaluationView {
             submission: evaluation.submission,
             team: evaluation.team,
             team_name,
-            day: evaluation.day,
+            stage: evaluation.of.stage,
+            revision: evaluation.revision,
+            day: evaluation.of.date,
             released_at: evaluation.released_at,
             rerun_of: evaluation.rerun_of,
             profile: evaluation.plan.profile,

@@ -16,7 +16,7 @@ pub struct EventView {
     /// `organiser`, `team:ID`, `schedule`, `worker:NAME` or `server`.
     #[schema(example = "organiser")]
     pub actor: String,
-    /// `season`, or kind and id: `day:2026-03-01`, `team:ID`, `submission:ID`, `evaluation:ID`, `ablation:ID`.
+    /// `season`, or kind and id: `stage:ID`, `day:STAGE/2026-03-01`, `team:ID`, `submission:ID`, `evaluation:ID`, `ablation:ID`.
     #[schema(example = "day:2026-03-01")]
     pub subject: String,
     /// What happened.

@@ -1,9 +1,9 @@
 //! How a team stands today.
 
-use super::{day::NextCut, team::TeamView};
+use super::{day::NextCut, stage, team::TeamView};
 use crate::{app::AppState, problem::Problem};
 use faceoff_store::{EvaluationState, Team};
-use faceoff_types::{EvaluationId, SubmissionId};
+use faceoff_types::{EvaluationId, StageId, SubmissionId};
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -17,16 +17,18 @@ pub struct MeView {
     pub turn: TurnView,
     /// What it enters at the next cut; null while it has no valid submission.
     pub active_submission: Option<SubmissionId>,
-    /// When that is; null once the season is closed.
+    /// When that is; null if none comes.
     pub next_cut: Option<NextCut>,
     /// Largest packed bundle that the server takes, in bytes.
     pub max_bundle_bytes: u64,
 }
 
-/// What plays for a team on a UTC day.
+/// What plays for a team on a day.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct TurnView {
-    /// In UTC.
+    /// The stage that is open.
+    pub stage: StageId,
+    /// The date in its zone.
     pub day: Date,
     /// The evaluation that counts; null before the day's cut, if the team had nothing active then, and
     /// if it was cancelled or failed by our fault and is not played again.
@@ -35,7 +37,7 @@ pub struct TurnView {
 
 impl MeView {
     pub(crate) async fn of(app: &AppState, team: Team) -> Result<Self, Problem> {
-        let day = app.config.clock.today();
+        let today = stage::current(app).await?.day(app.config.clock.now());
         let counts = |state: &EvaluationState| {
             !matches!(
                 state,
@@ -45,15 +47,19 @@ impl MeView {
         let evaluations = app.store.evaluations_of(team.id).await?;
         let evaluation = evaluations
             .iter()
-            .find(|evaluation| evaluation.day == day && counts(&evaluation.state))
+            .find(|evaluation| evaluation.of == today && counts(&evaluation.state))
             .map(|evaluation| evaluation.id);
         let submissions = app.store.submissions_of(team.id).await?;
         let active = submissions.iter().find(|submission| submission.active);
         Ok(Self {
             team: team.into(),
-            turn: TurnView { day, evaluation },
+            turn: TurnView {
+                stage: today.stage,
+                day: today.date,
+                evaluation,
+            },
             active_submission: active.map(|submission| submission.id),
-            next_cut: NextCut::unless_closed(app).await?,
+            next_cut: NextCut::first(app).await?,
             max_bundle_bytes: app.config.max_bundle_bytes,
         })
     }

@@ -12,6 +12,7 @@ pub mod evaluation;
 pub mod event;
 pub mod me;
 pub mod season;
+pub mod stage;
 pub mod submission;
 pub mod task;
 pub mod team;

@@ -1,12 +1,12 @@
 //! The season's commitment, and what may be known of its seeds.
 
-use super::day::NextCut;
-use crate::{app::AppState, problem::Problem};
-use faceoff_types::{RULESET, Seed};
-use jiff::{
-    Timestamp,
-    civil::{Date, Time},
+use super::{
+    day::NextCut,
+    stage::{self, StageView},
 };
+use crate::{app::AppState, problem::Problem};
+use faceoff_types::{RULESET, Seed, StageDay, StageId};
+use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -29,12 +29,11 @@ pub struct SeasonView {
     pub secret: Option<Seed>,
     /// The seed of the season's model mismatch; null until the season is closed.
     pub mismatch_seed: Option<Seed>,
-    /// The current UTC day.
+    /// The current date, in the zone of the stage that is open.
     pub today: Date,
-    /// UTC time of the daily evaluation; null when the organiser starts it by hand.
-    #[schema(value_type = Option<String>, example = "00:00:00")]
-    pub daily_at: Option<Time>,
-    /// When the next day starts, with what each team has active then; null once the season is closed.
+    /// Its parts, the first to open first.
+    pub stages: Vec<StageView>,
+    /// When the next day starts, with what each team has active then; null if none does.
     pub next_cut: Option<NextCut>,
     /// The days that had their cut, the newest first.
     pub days: Vec<SeasonDay>,
@@ -43,7 +42,9 @@ pub struct SeasonView {
 /// A day of the season.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SeasonDay {
-    /// In UTC.
+    /// Whose day.
+    pub stage: StageId,
+    /// Its date in the stage's zone.
     pub day: Date,
     /// When it started; what each team had active then plays it.
     pub cut_at: Timestamp,
@@ -59,6 +60,11 @@ impl SeasonView {
     pub(crate) async fn now(app: &AppState) -> Result<Self, Problem> {
         let season = app.store.season().await?;
         let days = app.store.days().await?;
+        let stages = app.store.stages().await?;
+        let seed = |of: StageDay| {
+            let stage = stages.iter().find(|stage| stage.id == of.stage)?;
+            Some(stage.seed_label(of.date).seed(&season.secret))
+        };
         let revealed = |seed: Seed| season.closed_at.map(|_| seed);
         Ok(Self {
             ruleset: RULESET.to_owned(),
@@ -66,17 +72,18 @@ impl SeasonView {
             closed_at: season.closed_at,
             secret: revealed(season.secret),
             mismatch_seed: revealed(season.secret.model_mismatch()),
-            today: app.config.clock.today(),
-            daily_at: app.config.daily_at,
-            next_cut: NextCut::unless_closed(app).await?,
+            today: stage::current(app).await?.day(app.config.clock.now()).date,
+            stages: StageView::all(app).await?,
+            next_cut: NextCut::first(app).await?,
             days: days
                 .into_iter()
                 .map(|(day, finished)| SeasonDay {
-                    day: day.date,
+                    stage: day.of.stage,
+                    day: day.of.date,
                     cut_at: day.cut_at,
                     released_at: day.released_at,
                     finished,
-                    seed: day.released_at.map(|_| season.secret.day(day.date)),
+                    seed: day.released_at.and_then(|_| seed(day.of)),
                 })
                 .collect(),
             name: season.name,

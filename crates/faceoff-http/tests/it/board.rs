@@ -156,15 +156,19 @@ async fn until_the_day_is_released_the_boards_tell_score_and_points_only() {
     }
     assert_eq!(board["rows"].as_array().unwrap().len(), ORDER.len());
     assert_eq!(board["ruleset"], "airhockey-2023.2");
-    let first = site.get("/api/v1/board?ruleset=airhockey-2023.1", None);
-    let first = first.await.json(200);
+    let stage = site.stage().await;
     assert_eq!(
-        (&first["ruleset"], &first["rows"]),
-        (&json!("airhockey-2023.1"), &json!([]))
+        (&board["stage"], &board["stage_name"], &board["revision"]),
+        (&json!(stage), &json!("Qualifying"), &json!(1))
     );
-    site.get("/api/v1/board/hit?ruleset=chess", None)
+    let named = format!("/api/v1/board?stage={stage}&revision=1");
+    assert_eq!(site.get(&named, None).await.json(200), board);
+    site.get("/api/v1/board?revision=2", None)
         .await
-        .problem(400, "invalid-request", &["airhockey-2023.1"]);
+        .problem(404, "not-found", &["revision"]);
+    site.get("/api/v1/board/hit?stage=chess", None)
+        .await
+        .problem(400, "invalid-request", &["stage"]);
     let evaluation = format!(
         "/evaluations/{}",
         board["rows"][0]["evaluation"].as_str().unwrap()

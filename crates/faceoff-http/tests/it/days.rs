@@ -10,7 +10,8 @@ async fn a_day_starts_once_with_what_is_active_and_names_who_is_left_out() {
     for (team, agent) in [(&alpha, "a"), (&beta, "b")] {
         site.valid_submission(team, agent).await;
     }
-    let body = json!({ "episodes_per_task": 8, "profile": "ideal" });
+    let stage = site.stage().await;
+    let body = json!({ "stage": stage });
     let day = site
         .post("/api/v1/days", Some(ADMIN), &body)
         .await
@@ -23,8 +24,8 @@ async fn a_day_starts_once_with_what_is_active_and_names_who_is_left_out() {
         .zip(["Alpha", "Beta"])
     {
         assert_eq!(evaluation["team_name"], name);
-        assert_eq!(evaluation["episodes_per_task"], 8);
-        assert_eq!(evaluation["profile"], "ideal");
+        assert_eq!(evaluation["stage"], json!(stage));
+        assert_eq!(evaluation["revision"], 1);
     }
     assert_eq!(day["without_submission"][0]["name"], "Gamma");
 
@@ -49,7 +50,13 @@ async fn a_day_starts_once_with_what_is_active_and_names_who_is_left_out() {
         assert_eq!(problem["day"], "2026-03-01");
         assert_eq!(
             problem["next_cut"],
-            json!({ "day": "2026-03-02", "at": null })
+            json!({
+                "stage": stage,
+                "stage_name": "Qualifying",
+                "day": "2026-03-02",
+                "at": null,
+                "zone": "UTC",
+            })
         );
     }
     let today = site.get("/api/v1/evaluations", Some(ADMIN)).await.json(200);
@@ -83,7 +90,7 @@ async fn the_next_cut_is_the_schedules_where_there_is_one() {
     assert_eq!(next_cut().await, "2026-03-02T12:00:00Z");
     site.post("/api/v1/days", Some(ADMIN), &json!({}))
         .await
-        .problem(409, "day-has-cut", &["2026-03-02 at 12:00 UTC"]);
+        .problem(409, "day-has-cut", &["2026-03-02 at 12:00:00 UTC"]);
 }
 
 #[tokio::test]
@@ -114,20 +121,18 @@ async fn a_day_that_cannot_be_is_refused_and_nothing_starts() {
         let site = &site;
         async move { site.post("/api/v1/days", Some(ADMIN), &body).await }
     };
-    start(json!({ "episodes_per_task": 0 })).await.problem(
+    start(json!({ "stage": "first" }))
+        .await
+        .problem(422, "invalid-content", &["stage"]);
+    start(json!({ "stage": uuid::Uuid::nil() }))
+        .await
+        .problem(404, "not-found", &["stage"]);
+    // Of a day's own there were episodes and a profile; now they are the stage's.
+    start(json!({ "episodes_per_task": 5 })).await.problem(
         422,
         "invalid-content",
-        &["episodes_per_task", "got 0"],
+        &["episodes_per_task"],
     );
-    start(json!({ "episodes_per_task": 100_001 }))
-        .await
-        .problem(422, "invalid-content", &["100000"]);
-    start(json!({ "profile": "easy" }))
-        .await
-        .problem(422, "invalid-content", &["easy"]);
-    start(json!({ "episodes": 5 }))
-        .await
-        .problem(422, "invalid-content", &["episodes"]);
     site.post("/api/v1/days", Some(&team.token), &json!({}))
         .await
         .problem(403, "forbidden", &[]);

@@ -17,6 +17,7 @@ mod room;
 mod season;
 mod seeds;
 mod site;
+mod stages;
 mod submissions;
 mod teams;
 mod uploads;

@@ -40,17 +40,21 @@ async fn closing_the_season_reveals_the_secret_and_ends_it_for_good() {
         blake3::hash(&secret).to_hex().as_str(),
         text(&open["commitment"])
     );
-    let child = |label: &str, data: &str| {
-        let message = [label.as_bytes(), &[0], data.as_bytes()].concat();
-        blake3::keyed_hash(&secret, &message).to_hex().to_string()
+    let child = |parent: &[u8; 32], label: &str, data: &[u8]| {
+        let message = [label.as_bytes(), &[0], data].concat();
+        blake3::keyed_hash(parent, &message)
     };
+    let stage = site.stage().await;
+    let of_stage = child(&secret, "stage", stage.as_uuid().as_bytes());
+    let of_day = child(of_stage.as_bytes(), "day", b"2026-03-01");
     assert_eq!(season["days"][0]["day"], "2026-03-01");
     assert_eq!(season["days"][0]["finished"], 1);
     assert_eq!(season["days"][0]["cut_at"], "2026-03-01T10:00:00Z");
     assert_eq!(season["days"][0]["released_at"], "2026-03-01T10:00:00Z");
     assert_eq!(season["next_cut"], json!(null));
-    assert_eq!(season["days"][0]["seed"], child("day", "2026-03-01"));
-    assert_eq!(season["mismatch_seed"], child("model_mismatch", ""));
+    assert_eq!(season["days"][0]["seed"], of_day.to_hex().as_str());
+    let mismatch = child(&secret, "model_mismatch", b"");
+    assert_eq!(season["mismatch_seed"], mismatch.to_hex().as_str());
 
     let over = ["2026-03-01 at 10:00 UTC"];
     site.post(CLOSE, Some(ADMIN), &confirm)
@@ -95,8 +99,9 @@ async fn the_seasons_page_tells_a_sceptic_how_to_check() {
     let open = site.get("/season", None).await;
     assert_eq!(open.status, 200);
     page(&open.body);
-    let verify =
-        format!("faceoff verify DATASET --secret SECRET --day DAY --commitment {commitment}");
+    let verify = format!(
+        "faceoff verify DATASET --secret SECRET --stage STAGE --day DAY --commitment {commitment}"
+    );
     for part in [
         "Test season",
         "not yet",
@@ -113,7 +118,9 @@ async fn the_seasons_page_tells_a_sceptic_how_to_check() {
     let closed = site.get("/season", None).await;
     page(&closed.body);
     let secret = site.store.season().await.unwrap().secret;
-    let day = secret.day(jiff::civil::date(2026, 3, 1));
+    let day = secret
+        .stage(site.stage().await)
+        .day(jiff::civil::date(2026, 3, 1));
     for part in [
         format!("--secret {secret}"),
         day.to_string(),

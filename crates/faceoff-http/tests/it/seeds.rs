@@ -57,7 +57,7 @@ async fn a_team_that_finishes_early_learns_nothing_of_the_episodes_while_others_
     let other = site.evaluate(second, &submissions[1]).await;
     let secret = site.store.season().await.unwrap().secret;
     let today = jiff::civil::date(2026, 3, 1);
-    let seed = secret.day(today);
+    let seed = secret.stage(site.stage().await).day(today);
     let mut score = result([0.5, 0.6, 0.7], 100.0);
     score.seed = seed;
     site.finish(&score).await;
@@ -105,7 +105,10 @@ async fn a_team_that_finishes_early_learns_nothing_of_the_episodes_while_others_
         .problem(409, "day-has-cut", &["2026-03-02"]);
     site.next_day();
     site.evaluate(&late, &submission).await;
-    let tomorrow = secret.day(today.tomorrow().unwrap()).to_string();
+    let tomorrow = secret
+        .stage(site.stage().await)
+        .day(today.tomorrow().unwrap())
+        .to_string();
     assert!(!shown(&site, first, &early).await.contains(&tomorrow));
     // Yesterday's dataset stays free while today's evaluations run.
     assert_eq!(asked_for(&site, &dataset, &first.token).await, [200; 3]);
@@ -199,5 +202,8 @@ async fn the_mismatch_seed_is_on_no_page_before_the_close() {
     let season: Value = site.get("/api/v1/season", None).await.json(200);
     assert_eq!(season["mismatch_seed"], json!(null));
     let yesterday = jiff::civil::date(2026, 3, 1);
-    assert_eq!(season["days"][0]["seed"], secret.day(yesterday).to_string());
+    assert_eq!(
+        season["days"][0]["seed"],
+        secret.stage(site.stage().await).day(yesterday).to_string()
+    );
 }

@@ -134,20 +134,14 @@ impl Site {
             .name_season(Actor::Organiser, "Test season", start)
             .await
             .unwrap();
+        let schedule = daily_at.map(Schedule::daily);
+        stage_by(&store, &plan(), schedule, start).await;
         let now = Arc::new(Mutex::new(start));
         let clock = Arc::clone(&now);
         let config = HttpConfig {
             max_bundle_bytes: MAX_BUNDLE,
-            plan: RunPlan {
-                profile: Profile::Evaluation,
-                tasks: Task::ALL.to_vec(),
-                episodes_per_task: 4,
-                episodes_per_shard: 4,
-                max_faults: 1,
-            },
             admin_token_hash: hash_token(ADMIN),
             upload_dir,
-            daily_at,
             clock: Clock::new(move || *clock.lock().unwrap()),
             limits,
         };
@@ -294,13 +288,17 @@ impl Site {
         self.publish(&claim, evaluation, result).await;
     }
 
+    /// The season's first stage.
+    pub async fn stage(&self) -> StageId {
+        self.store.stages().await.unwrap()[0].id
+    }
+
     /// Starts the day with what all teams have active, unless that was done; the path in the API of the
     /// team's evaluation, which plays this submission.
     pub async fn evaluate(&self, team: &TestTeam, submission: &str) -> String {
-        let plan = &self.config.plan;
         match self
             .store
-            .start_day(Actor::Organiser, plan, self.now())
+            .start_day(Actor::Organiser, self.stage().await, self.now())
             .await
         {
             Ok(_) | Err(StoreError::DayHasCut { .. }) => {}
@@ -397,9 +395,10 @@ impl Site {
             episodes_per_task: episodes,
             episodes_per_shard: 50,
             max_faults: 0,
-            ..self.config.plan.clone()
+            ..plan()
         };
-        let started = self.store.start_day(Actor::Organiser, &plan, self.now());
+        let stage = stage_by(&self.store, &plan, None, self.now()).await;
+        let started = self.store.start_day(Actor::Organiser, stage, self.now());
         let started = started.await.unwrap();
         let mut by_name = BTreeMap::new();
         for evaluation in &started {
@@ -424,6 +423,43 @@ impl Site {
             self.finish(result).await;
         }
     }
+}
+
+/// What the first stage plays.
+fn plan() -> RunPlan {
+    RunPlan {
+        profile: Profile::Evaluation,
+        tasks: Task::ALL.to_vec(),
+        episodes_per_task: 4,
+        episodes_per_shard: 4,
+        max_faults: 1,
+    }
+}
+
+/// The season's first stage, which plays by this plan from now on.
+async fn stage_by(
+    store: &Store,
+    plan: &RunPlan,
+    schedule: Option<Schedule>,
+    now: Timestamp,
+) -> StageId {
+    let rules = StageRules {
+        ruleset: Ruleset::CURRENT,
+        profile: plan.profile,
+        tasks: plan.tasks.clone(),
+        episodes_per_task: plan.episodes_per_task,
+        max_faults: plan.max_faults,
+    };
+    let settings = StageSettings {
+        schedule,
+        episodes_per_shard: plan.episodes_per_shard,
+        ..StageSettings::default()
+    };
+    store
+        .configure_stage(rules, settings, Zone::UTC, now)
+        .await
+        .unwrap();
+    store.stages().await.unwrap()[0].id
 }
 
 /// How an agent played.

@@ -12,31 +12,38 @@ use crate::{
     },
     write::Tx,
 };
-use faceoff_types::{EvaluationId, Ruleset, RunId, SeedLabel, SubmissionId, TeamId};
-use jiff::civil::Date;
+use faceoff_types::{EvaluationId, Ruleset, RunId, SeedLabel, StageDay, SubmissionId, TeamId};
 
-/// What is to play a day.
+/// Who plays a day.
 pub(crate) struct Entrant {
     pub(crate) submission: SubmissionId,
     pub(crate) team: TeamId,
-    pub(crate) ruleset: Ruleset,
     pub(crate) rerun_of: Option<EvaluationId>,
 }
 
-/// Adds an evaluation of `day` and queues its shards, to be played after `rest_s` seconds.
+/// What all play on a day.
+pub(crate) struct Turn {
+    pub(crate) of: StageDay,
+    /// Of the stage's rules.
+    pub(crate) revision: u32,
+    pub(crate) seed: SeedLabel,
+    pub(crate) ruleset: Ruleset,
+    pub(crate) plan: RunPlan,
+}
+
+/// Adds an evaluation of a day and queues its shards, to be played after `rest_s` seconds.
 /// [`Conflict`](crate::StoreError::Conflict) if the team has one of the day that counts.
 pub(crate) async fn enter(
     tx: &mut Tx,
     entrant: Entrant,
-    day: Date,
-    plan: &RunPlan,
+    turn: &Turn,
     rest_s: u32,
 ) -> Result<EvaluationId> {
     let run = Run {
         id: RunId::new(),
-        ruleset: entrant.ruleset,
-        plan: plan.clone(),
-        seed: SeedLabel::Day(day),
+        ruleset: turn.ruleset,
+        plan: turn.plan.clone(),
+        seed: turn.seed,
         keeps_recordings: true,
     };
     let unit = NewUnit {
@@ -48,7 +55,8 @@ pub(crate) async fn enter(
         id: EvaluationId::new(),
         submission: entrant.submission,
         team: entrant.team,
-        day,
+        of: turn.of,
+        revision: turn.revision,
         run: run.id,
         rerun_of: entrant.rerun_of,
     };
@@ -59,7 +67,8 @@ pub(crate) async fn enter(
         Event::EvaluationQueued {
             team: new.team,
             submission: new.submission,
-            day,
+            stage: Some(new.of.stage),
+            day: new.of.date,
             run: new.run,
             rerun_of: new.rerun_of,
         },

@@ -17,6 +17,7 @@ pub(crate) mod rerun;
 pub(crate) mod runs;
 mod season;
 pub(crate) mod smoke;
+pub(crate) mod stages;
 mod start_day;
 mod submit;
 mod summaries;

@@ -7,21 +7,20 @@ use crate::{
     tables::{days, evaluations},
     write::Tx,
 };
-use faceoff_types::EvaluationId;
-use jiff::civil::Date;
+use faceoff_types::{EvaluationId, StageDay};
 
 /// Releases the day of an evaluation that has just ended, if it was the last: in the same transaction.
 pub(crate) async fn if_over(tx: &mut Tx, ended: EvaluationId) -> Result<()> {
-    let day = evaluations::entry(tx, ended).await?.day;
-    unless_under_way(tx, day).await
+    let of = evaluations::entry(tx, ended).await?.of;
+    unless_under_way(tx, of).await
 }
 
 /// Releases a day none of whose evaluations is under way.
-pub(crate) async fn unless_under_way(tx: &mut Tx, day: Date) -> Result<()> {
-    if evaluations::count_open(tx, Some(day)).await? == 0 {
+pub(crate) async fn unless_under_way(tx: &mut Tx, of: StageDay) -> Result<()> {
+    if evaluations::count_open(tx, Some(of)).await? == 0 {
         let now = tx.now;
-        if days::set_released(tx, day, now).await? {
-            tx.record(Subject::Day(day), Event::DayReleased);
+        if days::set_released(tx, of, now).await? {
+            tx.record(Subject::Day(of), Event::DayReleased);
         }
     }
     Ok(())

@@ -4,7 +4,7 @@
 use crate::{
     error::{Result, StoreError},
     event::Actor,
-    operations::enter::{Entrant, enter},
+    operations::enter::{Entrant, Turn, enter},
     reads,
     store::Store,
     tables::{
@@ -26,20 +26,26 @@ async fn again(tx: &mut Tx, broken: Entry, rest_s: u32) -> Result<EvaluationId> 
     let entrant = Entrant {
         submission: broken.submission,
         team: broken.team,
-        ruleset: run.ruleset,
         rerun_of: Some(broken.id),
     };
-    enter(tx, entrant, broken.day, &run.plan, rest_s).await
+    let turn = Turn {
+        of: broken.of,
+        revision: broken.revision,
+        seed: run.seed,
+        ruleset: run.ruleset,
+        plan: run.plan,
+    };
+    enter(tx, entrant, &turn, rest_s).await
 }
 
 /// Queues what has just ended by our fault again: unless its day is released, or this was tried often
 /// enough.
 pub(crate) async fn after_our_fault(tx: &mut Tx, id: EvaluationId) -> Result<()> {
     let broken = evaluations::entry(tx, id).await?;
-    if days::is_released(tx, broken.day).await? {
+    if days::is_released(tx, broken.of).await? {
         return Ok(());
     }
-    let times = evaluations::count_broken(tx, broken.team, broken.day).await?;
+    let times = evaluations::count_broken(tx, broken.team, broken.of).await?;
     if let Some(rest_s) = RERUN_PAUSES_S.get(times.saturating_sub(1)) {
         again(tx, broken, *rest_s).await?;
     }

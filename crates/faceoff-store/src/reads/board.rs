@@ -2,10 +2,10 @@ use crate::{
     column::{Instant, Json},
     error::Result,
     store::Store,
-    tables::teams::Team,
+    tables::{stages::Stage, teams::Team},
 };
 use faceoff_types::{
-    EvaluationId, EvaluationResult, Ruleset, RunId, SubmissionId, TeamId, TeamName,
+    EvaluationId, EvaluationResult, RunId, StageId, SubmissionId, TeamId, TeamName,
 };
 use jiff::{Timestamp, civil::Date};
 use sqlx::types::Text;
@@ -25,7 +25,7 @@ pub struct BoardRecord {
     pub evaluation: EvaluationId,
     /// The evaluation's episodes.
     pub run: RunId,
-    /// The UTC day of the evaluation.
+    /// The date of the evaluation's day.
     pub day: Date,
     /// When the day was released; `None` before.
     pub released_at: Option<Timestamp>,
@@ -36,27 +36,22 @@ pub struct BoardRecord {
 }
 
 impl Store {
-    /// The newest rules that an evaluation is finished under, the current ones before there is any.
-    pub async fn board_ruleset(&self) -> Result<Ruleset> {
-        for ruleset in Ruleset::ALL.into_iter().rev() {
-            let name = Text(ruleset);
-            let found = sqlx::query_scalar!(
-                r#"SELECT EXISTS (SELECT 1 FROM runs r CROSS JOIN evaluations e
-                                  WHERE r.ruleset = ? AND e.run_id = r.id AND e.state = 'finished')
-                   AS "found!: bool""#,
-                name,
-            );
-            if found.fetch_one(&self.database.read).await? {
-                return Ok(ruleset);
-            }
-        }
-        Ok(Ruleset::CURRENT)
+    /// The newest of a stage's rules that an evaluation is finished under; those of now before there is any.
+    pub async fn board_revision(&self, stage: &Stage) -> Result<u32> {
+        let id = Text(stage.id);
+        let newest = sqlx::query_scalar!(
+            r#"SELECT MAX(revision) AS "revision: u32" FROM evaluations
+               WHERE stage_id = ? AND state = 'finished'"#,
+            id,
+        );
+        let newest = newest.fetch_one(&self.database.read).await?;
+        Ok(newest.unwrap_or(stage.rules.number))
     }
 
-    /// What the board of a ruleset is made of: each team's newest evaluation that is finished under it,
-    /// in the teams' order of names. Ranks and tiers are the scoring's.
-    pub async fn board(&self, ruleset: Ruleset) -> Result<Vec<BoardRecord>> {
-        let ruleset = Text(ruleset);
+    /// What the board of a stage is made of, by one revision of its rules: each team's newest evaluation that is
+    /// finished under it, in the teams' order of names. Ranks and tiers are the scoring's.
+    pub async fn board(&self, stage: StageId, revision: u32) -> Result<Vec<BoardRecord>> {
+        let stage = Text(stage);
         let rows = sqlx::query!(
             r#"/* board */ SELECT t.id AS "team: Text<TeamId>", t.name AS "name: Text<TeamName>",
                       t.created_at AS "invited_at: Instant",
@@ -67,14 +62,15 @@ impl Store {
                       e.finished_at AS "finished_at!: Instant",
                       e.result AS "result!: Json<EvaluationResult>"
                FROM teams t
-               JOIN evaluations e ON e.rowid = (SELECT n.rowid FROM evaluations n CROSS JOIN runs r
-                                                WHERE n.team_id = t.id AND n.state = 'finished'
-                                                  AND r.id = n.run_id AND r.ruleset = ?
+               JOIN evaluations e ON e.rowid = (SELECT n.rowid FROM evaluations n
+                                                WHERE n.team_id = t.id AND n.stage_id = ?1
+                                                  AND n.revision = ?2 AND n.state = 'finished'
                                                 ORDER BY n.day DESC LIMIT 1)
-               LEFT JOIN days d ON d.day = e.day
+               JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
                JOIN submissions s ON s.id = e.submission_id
                ORDER BY t.name"#,
-            ruleset,
+            stage,
+            revision,
         )
         .fetch_all(&self.database.read)
         .await?;

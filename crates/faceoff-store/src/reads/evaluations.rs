@@ -4,7 +4,7 @@ use crate::{
     store::Store,
     tables::evaluations::{self, Evaluation, EvaluationRow},
 };
-use faceoff_types::{EvaluationId, TeamId};
+use faceoff_types::{EvaluationId, StageDay, TeamId};
 use jiff::civil::Date;
 use sqlx::SqliteConnection;
 
@@ -50,10 +50,17 @@ impl Store {
         with_progress(&mut tx, rows).await
     }
 
-    /// The evaluations of a UTC day, in the order in which they were queued.
-    pub async fn evaluations_on(&self, day: Date) -> Result<Vec<Evaluation>> {
+    /// The evaluations of a stage's day, in the order in which they were queued.
+    pub async fn evaluations_of_day(&self, of: StageDay) -> Result<Vec<Evaluation>> {
         let mut tx = self.database.read.begin().await?;
-        let rows = evaluations::on_day(&mut tx, day).await?;
+        let rows = evaluations::of_day(&mut tx, of).await?;
+        with_progress(&mut tx, rows).await
+    }
+
+    /// The evaluations of all stages' days of this date, in the order in which they were queued.
+    pub async fn evaluations_on(&self, date: Date) -> Result<Vec<Evaluation>> {
+        let mut tx = self.database.read.begin().await?;
+        let rows = evaluations::on_date(&mut tx, date).await?;
         with_progress(&mut tx, rows).await
     }
 }

@@ -8,6 +8,7 @@ mod events;
 pub(crate) mod progress;
 pub(crate) mod runs;
 mod season;
+mod stages;
 mod submissions;
 mod summaries;
 mod teams;

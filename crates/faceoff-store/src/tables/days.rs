@@ -2,14 +2,15 @@ use crate::{
     column::Instant,
     error::{Result, StoreError},
 };
+use faceoff_types::{StageDay, StageId};
 use jiff::{Timestamp, civil::Date};
 use sqlx::{SqliteConnection, types::Text};
 
-/// A UTC day of the competition, from its cut on.
+/// A day of a stage, from its cut on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Day {
-    /// Whose label its seed has. An evaluation may outlast it.
-    pub date: Date,
+    /// Whose, and whose label its seed has. An evaluation may outlast the date.
+    pub of: StageDay,
     /// What the teams had active then plays the day, and nothing else.
     pub cut_at: Timestamp,
     /// When its last evaluation had ended: its seed is public from then on, its datasets and logs are
@@ -17,14 +18,14 @@ pub struct Day {
     pub released_at: Option<Timestamp>,
 }
 
-/// All days, the newest first, each with how many of its evaluations are finished.
+/// All days, the newest cut first, each with how many of its evaluations are finished.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<(Day, u32)>> {
     let rows = sqlx::query!(
-        r#"SELECT d.day AS "day: Text<Date>", d.cut_at AS "cut_at: Instant",
+        r#"SELECT d.stage_id AS "stage: Text<StageId>", d.day AS "day: Text<Date>", d.cut_at AS "cut_at: Instant",
                   d.released_at AS "released_at: Instant",
                   (SELECT COUNT(*) FROM evaluations e
-                   WHERE e.day = d.day AND e.state = 'finished') AS "finished!: u32"
-           FROM days d ORDER BY d.day DESC"#
+                   WHERE e.stage_id = d.stage_id AND e.day = d.day AND e.state = 'finished') AS "finished!: u32"
+           FROM days d ORDER BY d.cut_at DESC, d.day DESC, d.stage_id"#
     )
     .fetch_all(connection)
     .await?;
@@ -32,7 +33,10 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<(Day, u
         .into_iter()
         .map(|row| {
             let day = Day {
-                date: row.day.0,
+                of: StageDay {
+                    stage: row.stage.0,
+                    date: row.day.0,
+                },
                 cut_at: row.cut_at.0,
                 released_at: row.released_at.map(|at| at.0),
             };
@@ -41,28 +45,37 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<(Day, u
         .collect())
 }
 
-/// The last day that had its cut.
-pub(crate) async fn newest(connection: &mut SqliteConnection) -> Result<Option<Day>> {
+/// The last day of a stage that had its cut.
+pub(crate) async fn newest(
+    connection: &mut SqliteConnection,
+    stage: StageId,
+) -> Result<Option<Day>> {
+    let id = Text(stage);
     let row = sqlx::query!(
         r#"SELECT day AS "day: Text<Date>", cut_at AS "cut_at: Instant",
                   released_at AS "released_at: Instant"
-           FROM days ORDER BY day DESC LIMIT 1"#
+           FROM days WHERE stage_id = ? ORDER BY day DESC LIMIT 1"#,
+        id
     )
     .fetch_optional(connection)
     .await?;
     Ok(row.map(|row| Day {
-        date: row.day.0,
+        of: StageDay {
+            stage,
+            date: row.day.0,
+        },
         cut_at: row.cut_at.0,
         released_at: row.released_at.map(|at| at.0),
     }))
 }
 
 /// Is the day released?
-pub(crate) async fn is_released(connection: &mut SqliteConnection, day: Date) -> Result<bool> {
-    let day = Text(day);
+pub(crate) async fn is_released(connection: &mut SqliteConnection, of: StageDay) -> Result<bool> {
+    let (stage, day) = (Text(of.stage), Text(of.date));
     Ok(sqlx::query_scalar!(
-        r#"SELECT EXISTS (SELECT 1 FROM days WHERE day = ? AND released_at IS NOT NULL)
+        r#"SELECT EXISTS (SELECT 1 FROM days WHERE stage_id = ? AND day = ? AND released_at IS NOT NULL)
                   AS "released!: bool""#,
+        stage,
         day
     )
     .fetch_one(connection)
@@ -73,34 +86,40 @@ pub(crate) async fn is_released(connection: &mut SqliteConnection, day: Date) ->
 /// that was set back starts nothing.
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
-    date: Date,
+    of: StageDay,
     now: Timestamp,
 ) -> Result<()> {
-    if let Some(newest) = newest(connection).await?
-        && newest.date >= date
+    if let Some(newest) = newest(connection, of.stage).await?
+        && newest.of.date >= of.date
     {
         return Err(StoreError::DayHasCut {
-            day: newest.date,
+            day: newest.of.date,
             cut_at: newest.cut_at,
         });
     }
-    let (day, now) = (Text(date), Instant(now));
-    sqlx::query!("INSERT INTO days (day, cut_at) VALUES (?, ?)", day, now)
-        .execute(connection)
-        .await?;
+    let (stage, day, now) = (Text(of.stage), Text(of.date), Instant(now));
+    sqlx::query!(
+        "INSERT INTO days (stage_id, day, cut_at) VALUES (?, ?, ?)",
+        stage,
+        day,
+        now
+    )
+    .execute(connection)
+    .await?;
     Ok(())
 }
 
 /// Releases a day; false if it was released before.
 pub(crate) async fn set_released(
     connection: &mut SqliteConnection,
-    day: Date,
+    of: StageDay,
     now: Timestamp,
 ) -> Result<bool> {
-    let (day, now) = (Text(day), Instant(now));
+    let (stage, day, now) = (Text(of.stage), Text(of.date), Instant(now));
     let released = sqlx::query!(
-        "UPDATE days SET released_at = ? WHERE day = ? AND released_at IS NULL",
+        "UPDATE days SET released_at = ? WHERE stage_id = ? AND day = ? AND released_at IS NULL",
         now,
+        stage,
         day
     )
     .execute(connection)

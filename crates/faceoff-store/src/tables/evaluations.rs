@@ -3,7 +3,9 @@ use crate::{
     error::{Result, StoreError},
     tables::{plan::RunPlan, runs::RunState},
 };
-use faceoff_types::{EvaluationId, EvaluationResult, Profile, RunId, SubmissionId, Task, TeamId};
+use faceoff_types::{
+    EvaluationId, EvaluationResult, Profile, RunId, StageDay, StageId, SubmissionId, Task, TeamId,
+};
 use jiff::{Timestamp, civil::Date};
 use sqlx::{SqliteConnection, types::Text};
 
@@ -16,8 +18,10 @@ pub struct Evaluation {
     pub submission: SubmissionId,
     /// Whose it is.
     pub team: TeamId,
-    /// The UTC day whose seed it takes.
-    pub day: Date,
+    /// The day whose seed it takes.
+    pub of: StageDay,
+    /// By which of the stage's rules it is played: its board shows no others.
+    pub revision: u32,
     /// When the day was released; `None` while nothing may be told of its episodes.
     pub released_at: Option<Timestamp>,
     /// The evaluation that it plays again: one that we broke, or that was cancelled.
@@ -92,7 +96,9 @@ pub(crate) struct EvaluationRow {
     id: Text<EvaluationId>,
     submission_id: Text<SubmissionId>,
     team_id: Text<TeamId>,
+    stage_id: Text<StageId>,
     day: Text<Date>,
+    revision: u32,
     released_at: Option<Instant>,
     rerun_of: Option<Text<EvaluationId>>,
     run_id: Text<RunId>,
@@ -175,7 +181,11 @@ impl EvaluationRow {
             id: self.id.0,
             submission: self.submission_id.0,
             team: self.team_id.0,
-            day: self.day.0,
+            of: StageDay {
+                stage: self.stage_id.0,
+                date: self.day.0,
+            },
+            revision: self.revision,
             released_at: self.released_at.map(|at| at.0),
             rerun_of: self.rerun_of.map(|id| id.0),
             run: self.run_id.0,
@@ -193,7 +203,8 @@ macro_rules! select_evaluations {
             EvaluationRow,
             r#"SELECT e.id AS "id: Text<EvaluationId>",
                       e.submission_id AS "submission_id: Text<SubmissionId>",
-                      e.team_id AS "team_id: Text<TeamId>", e.day AS "day: Text<Date>",
+                      e.team_id AS "team_id: Text<TeamId>", e.stage_id AS "stage_id: Text<StageId>",
+                      e.day AS "day: Text<Date>", e.revision AS "revision: u32",
                       d.released_at AS "released_at: Instant",
                       e.rerun_of AS "rerun_of: Text<EvaluationId>", e.run_id AS "run_id: Text<RunId>", r.profile AS "profile: Text<Profile>",
                       r.tasks AS "tasks: Json<Vec<Task>>",
@@ -204,7 +215,8 @@ macro_rules! select_evaluations {
                       e.finished_at AS "finished_at: Instant",
                       e.result AS "result: Json<EvaluationResult>", e.dataset, e.dataset_blake3,
                       e.reason
-               FROM evaluations e JOIN runs r ON r.id = e.run_id LEFT JOIN days d ON d.day = e.day "# + $tail
+               FROM evaluations e JOIN runs r ON r.id = e.run_id 
+               LEFT JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day "# + $tail
             $(, $argument)*
         )
     };
@@ -235,12 +247,27 @@ pub(crate) async fn of_team(
     .await?)
 }
 
-/// The evaluations of a day, in the order in which they were queued.
-pub(crate) async fn on_day(
+/// The evaluations of a stage's day, in the order in which they were queued.
+pub(crate) async fn of_day(
     connection: &mut SqliteConnection,
-    day: Date,
+    of: StageDay,
 ) -> Result<Vec<EvaluationRow>> {
-    let day = Text(day);
+    let (stage, day) = (Text(of.stage), Text(of.date));
+    Ok(select_evaluations!(
+        "WHERE e.stage_id = ? AND e.day = ? ORDER BY e.created_at, e.id",
+        stage,
+        day
+    )
+    .fetch_all(connection)
+    .await?)
+}
+
+/// The evaluations of all stages on a date, in the order in which they were queued.
+pub(crate) async fn on_date(
+    connection: &mut SqliteConnection,
+    date: Date,
+) -> Result<Vec<EvaluationRow>> {
+    let day = Text(date);
     Ok(
         select_evaluations!("WHERE e.day = ? ORDER BY e.created_at, e.id", day)
             .fetch_all(connection)
@@ -282,7 +309,8 @@ pub(crate) struct Entry {
     pub(crate) id: EvaluationId,
     pub(crate) submission: SubmissionId,
     pub(crate) team: TeamId,
-    pub(crate) day: Date,
+    pub(crate) of: StageDay,
+    pub(crate) revision: u32,
     pub(crate) run: RunId,
     pub(crate) rerun_of: Option<EvaluationId>,
 }
@@ -291,7 +319,8 @@ pub(crate) async fn entry(connection: &mut SqliteConnection, id: EvaluationId) -
     let id_text = Text(id);
     let row = sqlx::query!(
         r#"SELECT submission_id AS "submission: Text<SubmissionId>", team_id AS "team: Text<TeamId>",
-                  day AS "day: Text<Date>", run_id AS "run: Text<RunId>",
+                  stage_id AS "stage: Text<StageId>", day AS "day: Text<Date>", revision AS "revision: u32",
+                  run_id AS "run: Text<RunId>",
                   rerun_of AS "rerun_of: Text<EvaluationId>"
            FROM evaluations WHERE id = ?"#,
         id_text
@@ -303,7 +332,11 @@ pub(crate) async fn entry(connection: &mut SqliteConnection, id: EvaluationId) -
         id,
         submission: row.submission.0,
         team: row.team.0,
-        day: row.day.0,
+        of: StageDay {
+            stage: row.stage.0,
+            date: row.day.0,
+        },
+        revision: row.revision,
         run: row.run.0,
         rerun_of: row.rerun_of.map(|id| id.0),
     })
@@ -317,15 +350,18 @@ pub(crate) async fn insert(
     now: Timestamp,
 ) -> Result<()> {
     let (id, submission, team) = (Text(new.id), Text(new.submission), Text(new.team));
-    let (day, run, now) = (Text(new.day), Text(new.run), Instant(now));
-    let rerun_of = new.rerun_of.map(Text);
+    let (stage, day) = (Text(new.of.stage), Text(new.of.date));
+    let (run, now, rerun_of) = (Text(new.run), Instant(now), new.rerun_of.map(Text));
     sqlx::query!(
-        "INSERT INTO evaluations (id, submission_id, team_id, day, run_id, created_at, state, rerun_of)
-         VALUES (?, ?, ?, ?, ?, ?, 'open', ?)",
+        "INSERT INTO evaluations (id, submission_id, team_id, stage_id, day, revision, run_id, created_at, state,
+                                  rerun_of)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, 'open', ?)",
         id,
         submission,
         team,
+        stage,
         day,
+        new.revision,
         run,
         now,
         rerun_of,
@@ -336,7 +372,7 @@ pub(crate) async fn insert(
         if StoreError::is_duplicate(&error, "evaluations.day") {
             StoreError::Conflict(format!(
                 "the team has another evaluation of {} that counts, or that is under way",
-                new.day
+                new.of.date
             ))
         } else {
             error.into()
@@ -349,13 +385,14 @@ pub(crate) async fn insert(
 pub(crate) async fn count_broken(
     connection: &mut SqliteConnection,
     team: TeamId,
-    day: Date,
+    of: StageDay,
 ) -> Result<usize> {
-    let (team, day) = (Text(team), Text(day));
+    let (team, stage, day) = (Text(team), Text(of.stage), Text(of.date));
     let count = sqlx::query_scalar!(
         r#"SELECT COUNT(*) AS "count!: u32" FROM evaluations
-           WHERE team_id = ? AND day = ? AND state = 'platform_failed'"#,
+           WHERE team_id = ? AND stage_id = ? AND day = ? AND state = 'platform_failed'"#,
         team,
+        stage,
         day,
     )
     .fetch_one(connection)
@@ -424,12 +461,13 @@ pub(crate) async fn set_failed(
 /// How many are not over, of one day or of all.
 pub(crate) async fn count_open(
     connection: &mut SqliteConnection,
-    day: Option<Date>,
+    of: Option<StageDay>,
 ) -> Result<u32> {
-    let day = day.map(Text);
+    let (stage, day) = (of.map(|of| Text(of.stage)), of.map(|of| Text(of.date)));
     Ok(sqlx::query_scalar!(
         r#"SELECT COUNT(*) AS "count!: u32" FROM evaluations
-           WHERE state = 'open' AND (?1 IS NULL OR day = ?1)"#,
+           WHERE state = 'open' AND (?1 IS NULL OR stage_id = ?1 AND day = ?2)"#,
+        stage,
         day
     )
     .fetch_one(connection)

@@ -123,7 +123,7 @@ async fn it_waits_behind_what_counts_takes_no_turn_and_reaches_no_board() {
     f.commit_ablation(&claim, unrecorded(&shard, 0)).await;
     let of_team = f.store.evaluations_of(evaluation.team).await.unwrap();
     assert_eq!(of_team.len(), 1, "an ablation is no evaluation");
-    assert!(f.store.board(Ruleset::CURRENT).await.unwrap().is_empty());
+    assert!(f.board().await.is_empty());
 }
 
 #[tokio::test]

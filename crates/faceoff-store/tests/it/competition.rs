@@ -17,7 +17,7 @@ async fn a_submission_travels_from_upload_to_board() {
             .await
             .unwrap_err(),
         f.store
-            .start_day(Actor::Organiser, &plan(), f.now)
+            .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
             .await
             .unwrap_err(),
     ] {
@@ -32,7 +32,7 @@ async fn a_submission_travels_from_upload_to_board() {
 
     let evaluation = f.evaluate(submission.id, &plan()).await;
     assert_eq!(evaluation.state, EvaluationState::Queued);
-    assert_eq!(evaluation.day, jiff::civil::date(2026, 3, 1));
+    assert_eq!(evaluation.of.date, jiff::civil::date(2026, 3, 1));
     assert_eq!(evaluation.plan, plan());
 
     let mut played = Vec::new();
@@ -76,7 +76,7 @@ async fn a_submission_travels_from_upload_to_board() {
     );
 
     assert_eq!(f.state(evaluation.id).await, EvaluationState::Finalising);
-    assert!(f.store.board(Ruleset::CURRENT).await.unwrap().is_empty());
+    assert!(f.board().await.is_empty());
     let Some(Claimed {
         claim,
         work:
@@ -97,7 +97,10 @@ async fn a_submission_travels_from_upload_to_board() {
     let in_order: Vec<_> = shards.into_iter().filter_map(|s| s.recording).collect();
     assert_eq!((recordings.len(), recordings), (6, in_order));
     let secret = f.store.season().await.unwrap().secret;
-    assert_eq!(seeds.episodes, secret.day(evaluation.day));
+    assert_eq!(
+        seeds.episodes,
+        secret.stage(evaluation.of.stage).day(evaluation.of.date)
+    );
     assert_eq!(seeds.mismatch, secret.model_mismatch());
     assert!(f.claim().await.is_none(), "and is claimed once");
     f.later(1);
@@ -115,7 +118,7 @@ async fn a_submission_travels_from_upload_to_board() {
         }
     );
 
-    let board = f.store.board(Ruleset::CURRENT).await.unwrap();
+    let board = f.board().await;
     assert_eq!(board.len(), 1);
     assert_eq!(board[0].team, team);
     assert_eq!(board[0].submission, submission.id);

@@ -2,7 +2,7 @@
 
 use crate::fixture::*;
 use faceoff_store::*;
-use faceoff_types::{Ruleset, SmokeOutcome, SubmissionId};
+use faceoff_types::{SmokeOutcome, SubmissionId, Zone};
 use jiff::civil::date;
 
 fn had_its_cut<T: std::fmt::Debug>(result: Result<T, StoreError>) -> jiff::civil::Date {
@@ -25,25 +25,36 @@ async fn a_day_has_one_cut() {
     f.upload(&team).await;
     let second = f.validate().await;
     f.ready_team("Beta").await;
-    let again = f.store.start_day(Actor::Organiser, &plan(), f.now).await;
+    let again = f
+        .store
+        .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
+        .await;
     assert_eq!(had_its_cut(again), date(2026, 3, 1));
     assert_eq!(
         f.store.evaluations_on(date(2026, 3, 1)).await.unwrap(),
         [evaluation]
     );
-    let day = f.store.newest_day().await.unwrap().unwrap();
+    let day = f
+        .store
+        .newest_day(f.stage(&plan()).await)
+        .await
+        .unwrap()
+        .unwrap();
     assert_eq!(
-        (day.date, day.cut_at, day.released_at),
+        (day.of.date, day.cut_at, day.released_at),
         (date(2026, 3, 1), cut_at, None)
     );
     // but the next day comes a millisecond later
     f.now = "2026-03-02T00:00:00Z".parse().unwrap();
     let next = f.evaluate(second.id, &plan()).await;
-    assert_eq!(next.day, date(2026, 3, 2));
-    assert_eq!(f.store.evaluations_on(next.day).await.unwrap().len(), 2);
+    assert_eq!(next.of.date, date(2026, 3, 2));
+    assert_eq!(f.store.evaluations_on(next.of.date).await.unwrap().len(), 2);
     // and a clock that was set back starts nothing
     f.now = "2026-02-27T00:00:00Z".parse().unwrap();
-    let again = f.store.start_day(Actor::Organiser, &plan(), f.now).await;
+    let again = f
+        .store
+        .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
+        .await;
     assert_eq!(had_its_cut(again), date(2026, 3, 2));
 }
 
@@ -52,6 +63,7 @@ async fn of_many_at_once_one_makes_the_cut() {
     let f = Fixture::new().await;
     f.ready_team("Alpha").await;
     let other = f.reopen().await;
+    let stage = f.stage(&plan()).await;
     let attempts = (0..20).map(|index| {
         let store = if index % 2 == 0 {
             f.store.clone()
@@ -59,7 +71,7 @@ async fn of_many_at_once_one_makes_the_cut() {
             other.clone()
         };
         let now = f.now;
-        tokio::spawn(async move { store.start_day(Actor::Organiser, &plan(), now).await })
+        tokio::spawn(async move { store.start_day(Actor::Organiser, stage, now).await })
     });
     let mut cuts = 0;
     for attempt in attempts.collect::<Vec<_>>() {
@@ -76,20 +88,38 @@ async fn of_many_at_once_one_makes_the_cut() {
 async fn a_day_that_nobody_can_play_keeps_its_cut_unless_it_is_the_schedules() {
     let mut f = Fixture::new().await;
     let team = f.team("Alpha").await;
-    let refused = f.store.start_day(Actor::Organiser, &plan(), f.now).await;
+    let refused = f
+        .store
+        .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
+        .await;
     assert!(
         matches!(refused, Err(StoreError::Conflict(_))),
         "{refused:?}"
     );
-    assert_eq!(f.store.newest_day().await.unwrap(), None);
-    let started = f.store.start_scheduled_day(&plan(), f.now).await;
+    assert_eq!(
+        f.store.newest_day(f.stage(&plan()).await).await.unwrap(),
+        None
+    );
+    let started = f
+        .store
+        .start_scheduled_day(f.stage(&plan()).await, f.now)
+        .await;
     assert_eq!(started.unwrap(), Some(Vec::new()));
-    let day = f.store.newest_day().await.unwrap().unwrap();
+    let day = f
+        .store
+        .newest_day(f.stage(&plan()).await)
+        .await
+        .unwrap()
+        .unwrap();
     assert_eq!(day.released_at, Some(f.now), "there is nothing to wait for");
     // who comes later plays the next day
     f.upload(&team).await;
     let submission = f.validate().await;
-    had_its_cut(f.store.start_day(Actor::Organiser, &plan(), f.now).await);
+    had_its_cut(
+        f.store
+            .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
+            .await,
+    );
     f.later(86_400);
     f.evaluate(submission.id, &plan()).await;
 }
@@ -230,7 +260,7 @@ async fn the_cut_takes_the_newest_valid_submission_of_each_team() {
 
     let started = f
         .store
-        .start_day(Actor::Organiser, &plan(), f.now)
+        .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
         .await
         .unwrap();
     let submissions: Vec<_> = started.iter().map(|e| e.submission).collect();
@@ -249,7 +279,7 @@ async fn the_schedule_starts_a_day_once_whoever_asks() {
     f.ready_team("Alpha").await;
     let started = f
         .store
-        .start_scheduled_day(&plan(), f.now)
+        .start_scheduled_day(f.stage(&plan()).await, f.now)
         .await
         .unwrap()
         .unwrap();
@@ -257,16 +287,20 @@ async fn the_schedule_starts_a_day_once_whoever_asks() {
     let other = f.reopen().await;
     assert!(
         other
-            .start_scheduled_day(&plan(), f.now)
+            .start_scheduled_day(f.stage(&plan()).await, f.now)
             .await
             .unwrap()
             .is_none()
     );
-    had_its_cut(other.start_day(Actor::Organiser, &plan(), f.now).await);
+    had_its_cut(
+        other
+            .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
+            .await,
+    );
     f.later(86_400);
     assert_eq!(
         other
-            .start_scheduled_day(&plan(), f.now)
+            .start_scheduled_day(f.stage(&plan()).await, f.now)
             .await
             .unwrap()
             .unwrap()
@@ -277,7 +311,7 @@ async fn the_schedule_starts_a_day_once_whoever_asks() {
     f.later(-86_400);
     assert!(
         f.store
-            .start_scheduled_day(&plan(), f.now)
+            .start_scheduled_day(f.stage(&plan()).await, f.now)
             .await
             .unwrap()
             .is_none()
@@ -307,9 +341,10 @@ async fn an_empty_plan_is_refused() {
         },
     ];
     for plan in bad {
+        let (rules, settings) = rules_of(&plan);
         let error = f
             .store
-            .start_day(Actor::Organiser, &plan, f.now)
+            .configure_stage(rules, settings, Zone::UTC, f.now)
             .await
             .unwrap_err();
         assert!(matches!(error, StoreError::Conflict(_)), "{error}");
@@ -337,7 +372,7 @@ async fn the_board_shows_each_teams_newest_finished_day() {
         f.now = format!("2026-03-0{day}T12:00:00Z").parse().unwrap();
         assert_eq!(
             f.store
-                .start_day(Actor::Organiser, &small, f.now)
+                .start_day(Actor::Organiser, f.stage(&small).await, f.now)
                 .await
                 .unwrap()
                 .len(),
@@ -356,7 +391,7 @@ async fn the_board_shows_each_teams_newest_finished_day() {
             }
         }
     }
-    let board = f.store.board(Ruleset::CURRENT).await.unwrap();
+    let board = f.board().await;
     let rows: Vec<_> = board
         .iter()
         .map(|r| (r.team.name.as_str(), r.day, r.result.score))

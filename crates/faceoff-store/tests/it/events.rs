@@ -22,11 +22,12 @@ fn kinds(records: &[EventRecord]) -> Vec<String> {
 #[tokio::test]
 async fn a_submissions_way_to_the_board_is_recorded_step_by_step() {
     let f = Fixture::new().await;
-    let submission = f.ready_team("Alpha").await;
     let small = RunPlan {
         tasks: vec![faceoff_types::Task::Hit],
         ..plan()
     };
+    f.stage(&small).await;
+    let submission = f.ready_team("Alpha").await;
     let evaluation = f.evaluate(submission.id, &small).await;
     let (claim, _, shard) = f.claim_shard().await;
     f.play(&claim, &shard, 0).await;
@@ -39,7 +40,10 @@ async fn a_submissions_way_to_the_board_is_recorded_step_by_step() {
         .set_team_token(Actor::Organiser, submission.team, [9; 32], f.now)
         .await
         .unwrap();
-    let records = recorded(&f).await;
+    let mut records = recorded(&f).await;
+    let stage = records.remove(0);
+    assert_eq!(stage.actor, Actor::Organiser);
+    assert!(matches!(stage.event, Event::StageCreated { .. }));
     assert_eq!(
         kinds(&records),
         [
@@ -198,7 +202,7 @@ async fn waiting_workers_hear_of_new_work_and_pages_of_changes() {
     let of_table: Vec<_> = told
         .iter()
         .filter_map(|change| match change {
-            Change::Recorded(record) => Some(record.clone()),
+            Change::Recorded(record) => Some(EventRecord::clone(record)),
             Change::Progress(_) => None,
         })
         .collect();

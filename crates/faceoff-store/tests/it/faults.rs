@@ -2,7 +2,6 @@
 
 use crate::fixture::*;
 use faceoff_store::*;
-use faceoff_types::Ruleset;
 
 #[tokio::test]
 async fn as_many_faults_as_allowed_are_scored() {
@@ -64,7 +63,7 @@ async fn one_fault_more_ends_the_evaluation_without_a_score() {
         f.claim().await.is_none(),
         "the remaining shards are dropped"
     );
-    assert!(f.store.board(Ruleset::CURRENT).await.unwrap().is_empty());
+    assert!(f.board().await.is_empty());
     let again = f
         .store
         .rerun_evaluation(Actor::Organiser, evaluation.id, f.now)

@@ -96,13 +96,32 @@ impl Fixture {
         self.validate().await
     }
 
+    /// The season's first stage, which plays by this plan from now on.
+    pub async fn stage(&self, plan: &RunPlan) -> StageId {
+        stage_of(&self.store, plan, self.now).await
+    }
+
+    /// The board of the season's first stage, by the newest rules with results.
+    pub async fn board(&self) -> Vec<BoardRecord> {
+        let Some(stage) = self.store.stages().await.unwrap().into_iter().next() else {
+            return Vec::new();
+        };
+        let revision = self.store.board_revision(&stage).await.unwrap();
+        self.store.board(stage.id, revision).await.unwrap()
+    }
+
     /// Starts the day with what all teams have active, unless that was done; the submission's evaluation.
     pub async fn evaluate(&self, submission: SubmissionId, plan: &RunPlan) -> Evaluation {
-        match self.store.start_day(Actor::Organiser, plan, self.now).await {
+        let stage = self.stage(plan).await;
+        match self
+            .store
+            .start_day(Actor::Organiser, stage, self.now)
+            .await
+        {
             Ok(_) | Err(StoreError::DayHasCut { .. }) => {}
             Err(error) => panic!("{error}"),
         }
-        let today = self.now.to_zoned(jiff::tz::TimeZone::UTC).date();
+        let today = Zone::UTC.date(self.now);
         let of_day = self.store.evaluations_on(today).await.unwrap();
         let found = of_day.into_iter().rfind(|one| one.submission == submission);
         found.expect("it was active at the cut")
@@ -202,6 +221,37 @@ impl Fixture {
     pub async fn state(&self, id: EvaluationId) -> EvaluationState {
         self.store.evaluation(id).await.unwrap().state
     }
+}
+
+/// The first stage of the store's season, which plays by this plan from now on.
+pub async fn stage_of(store: &Store, plan: &RunPlan, now: Timestamp) -> StageId {
+    let (rules, settings) = rules_of(plan);
+    // Open for long, so that a clock may be set back.
+    let since = match store.stages().await.unwrap().is_empty() {
+        true => now - SignedDuration::from_hours(24 * 90),
+        false => now,
+    };
+    store
+        .configure_stage(rules, settings, Zone::UTC, since)
+        .await
+        .unwrap();
+    store.stages().await.unwrap()[0].id
+}
+
+/// What a stage that plays by this plan is told.
+pub fn rules_of(plan: &RunPlan) -> (StageRules, StageSettings) {
+    let rules = StageRules {
+        ruleset: Ruleset::CURRENT,
+        profile: plan.profile,
+        tasks: plan.tasks.clone(),
+        episodes_per_task: plan.episodes_per_task,
+        max_faults: plan.max_faults,
+    };
+    let settings = StageSettings {
+        episodes_per_shard: plan.episodes_per_shard,
+        ..StageSettings::default()
+    };
+    (rules, settings)
 }
 
 /// What `.sqlx/` holds of each query, and where.

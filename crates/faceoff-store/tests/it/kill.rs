@@ -24,7 +24,13 @@ async fn child() {
     let store = Store::open(folder).await.unwrap();
     // a day of its own for each round, and leases of earlier lives are over
     let mut now: jiff::Timestamp = "2026-03-01T10:00:00Z".parse().unwrap();
-    if let Some(newest) = store.newest_day().await.unwrap() {
+    let small = RunPlan {
+        episodes_per_task: 2,
+        episodes_per_shard: 1,
+        ..plan()
+    };
+    let stage = stage_of(&store, &small, now).await;
+    if let Some(newest) = store.newest_day(stage).await.unwrap() {
         now = now.max(newest.cut_at);
     }
     let file = tempfile::NamedTempFile::new().unwrap();
@@ -56,11 +62,6 @@ async fn child() {
             )
             .await
             .unwrap();
-        let small = RunPlan {
-            episodes_per_task: 2,
-            episodes_per_shard: 1,
-            ..plan()
-        };
         now += jiff::SignedDuration::from_hours(24);
         loop {
             let Some(Claimed { claim, work }) = store.claim("child", LEASE_S, now).await.unwrap()
@@ -76,7 +77,7 @@ async fn child() {
                     };
                     store.commit_smoke(&claim, outcome, now).await.unwrap();
                     tell(format!("valid {}", submission.id));
-                    match store.start_day(Actor::Organiser, &small, now).await {
+                    match store.start_day(Actor::Organiser, stage, now).await {
                         Ok(started) => {
                             for evaluation in started {
                                 tell(format!("evaluation {}", evaluation.id));

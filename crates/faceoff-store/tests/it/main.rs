@@ -22,4 +22,5 @@ mod releases;
 mod retries;
 mod rulesets;
 mod shares;
+mod stages;
 mod teams;

@@ -457,7 +457,7 @@ async fn every_old_row_is_there_and_says_what_it_said() {
         assert_eq!(evaluation.state, state, "{number}");
         assert_eq!(evaluation.plan, plan());
         let day = if number == 1400 { (2, 28) } else { (3, 1) };
-        assert_eq!(evaluation.day, date(2026, day.0, day.1));
+        assert_eq!(evaluation.of.date, date(2026, day.0, day.1));
         assert_eq!(f.store.shards(evaluation.run).await.unwrap().len(), 6);
     }
     let run = f.store.evaluation(id(1400)).await.unwrap().run;
@@ -466,7 +466,7 @@ async fn every_old_row_is_there_and_says_what_it_said() {
     assert_eq!(f.store.outcomes(run).await.unwrap().len(), 12);
     let summaries = f.store.episode_summaries(&[run], 7).await.unwrap();
     assert_eq!(summaries[&run], "{\"old\":1}");
-    let board = f.store.board(Ruleset::First).await.unwrap();
+    let board = f.board().await;
     assert_eq!((board.len(), board[0].evaluation), (1, id(1400)));
     // faults and log are those of the shards, which were kept
     let failed = f.store.evaluation(id(1500)).await.unwrap();
@@ -479,8 +479,9 @@ async fn every_old_row_is_there_and_says_what_it_said() {
 
     let days = [date(2026, 2, 28), date(2026, 3, 1)];
     // each began with its first evaluation; one is released, of the other three are under way
+    let stage = f.store.stages().await.unwrap().remove(0).id;
     let day = |date, released_at| Day {
-        date,
+        of: StageDay { stage, date },
         cut_at: finished_at,
         released_at,
     };
@@ -657,13 +658,21 @@ async fn work_goes_on_where_the_old_program_left_it() {
     }
     let ablation = f.store.newest_ablation(id(11)).await.unwrap().unwrap();
     assert!(matches!(ablation.state, AblationState::Finished { .. }));
-    assert_eq!(f.store.board(Ruleset::First).await.unwrap().len(), 4);
+    assert_eq!(f.board().await.len(), 4);
     // its last evaluation released the day, which has had its cut
     assert_eq!(
-        f.store.newest_day().await.unwrap().unwrap().released_at,
+        f.store
+            .newest_day(f.stage(&plan()).await)
+            .await
+            .unwrap()
+            .unwrap()
+            .released_at,
         Some(f.now)
     );
-    let again = f.store.start_day(Actor::Organiser, &plan(), f.now).await;
+    let again = f
+        .store
+        .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
+        .await;
     assert!(
         matches!(again, Err(StoreError::DayHasCut { .. })),
         "{again:?}"
@@ -673,7 +682,10 @@ async fn work_goes_on_where_the_old_program_left_it() {
     // recordings: old ones go a day after their evaluation's end, as new ones do
     f.later(86_400);
     assert_eq!(f.store.remove_old_recordings(f.now).await.unwrap(), 7);
-    let started = f.store.start_day(Actor::Organiser, &plan(), f.now).await;
+    let started = f
+        .store
+        .start_day(Actor::Organiser, f.stage(&plan()).await, f.now)
+        .await;
     let teams: Vec<_> = started.unwrap().iter().map(|e| e.team).collect();
     let valid: Vec<TeamId> = [1, 2, 11, 12, 13, 14, 15, 16, 17, 18].map(id).to_vec();
     assert_eq!(teams, valid);

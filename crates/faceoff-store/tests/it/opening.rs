@@ -57,6 +57,11 @@ async fn everything_is_there_after_reopening() {
 /// Changes the file behind the store's back.
 async fn vandalise(f: &Fixture, sql: &'static str) {
     let mut connection = f.connection().await;
+    let unchecked = "PRAGMA foreign_keys = OFF";
+    sqlx::raw_sql(unchecked)
+        .execute(&mut connection)
+        .await
+        .unwrap();
     sqlx::raw_sql(sql).execute(&mut connection).await.unwrap();
     connection.close().await.unwrap();
 }

@@ -244,7 +244,7 @@ async fn our_faults_cost_a_pause_and_after_some_the_evaluation_is_played_again()
     assert_ne!(run.id, evaluation.run);
     assert_eq!(
         (run.plan, run.seed),
-        (plan(), SeedLabel::Day(evaluation.day))
+        (plan(), SeedLabel::StageDay(evaluation.of))
     );
     assert_eq!((first.task, first.first_episode), (Task::Hit, 0));
 }

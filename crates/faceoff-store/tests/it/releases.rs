@@ -1,6 +1,6 @@
 use crate::fixture::*;
 use faceoff_store::*;
-use faceoff_types::{EvaluationId, Ruleset};
+use faceoff_types::{EvaluationId, StageDay};
 use jiff::civil::date;
 
 async fn rerun(f: &Fixture, id: EvaluationId) -> Result<Evaluation, StoreError> {
@@ -8,7 +8,7 @@ async fn rerun(f: &Fixture, id: EvaluationId) -> Result<Evaluation, StoreError> 
 }
 
 async fn released_at(f: &Fixture) -> Option<jiff::Timestamp> {
-    let newest = f.store.newest_day().await.unwrap();
+    let newest = f.store.newest_day(f.stage(&plan()).await).await.unwrap();
     newest.expect("the day had its cut").released_at
 }
 
@@ -39,7 +39,7 @@ async fn a_day_is_released_by_the_end_of_its_last_evaluation() {
     for id in evaluations {
         assert_eq!(f.store.evaluation(id).await.unwrap().released_at, Some(end));
     }
-    for record in f.store.board(Ruleset::CURRENT).await.unwrap() {
+    for record in f.board().await {
         assert_eq!(record.released_at, Some(end));
     }
     let events = f.store.events_after(0, 1000).await.unwrap();
@@ -48,7 +48,11 @@ async fn a_day_is_released_by_the_end_of_its_last_evaluation() {
         .filter(|record| record.event == Event::DayReleased)
         .collect();
     assert_eq!(released.len(), 1);
-    assert_eq!(released[0].subject, Subject::Day(date(2026, 3, 1)));
+    let of = StageDay {
+        stage: f.stage(&plan()).await,
+        date: date(2026, 3, 1),
+    };
+    assert_eq!(released[0].subject, Subject::Day(of));
 }
 
 #[tokio::test]
@@ -102,7 +106,10 @@ async fn what_we_broke_is_played_again_before_the_release_and_only_so_often() {
     let secret = f.store.season().await.unwrap().secret;
     for evaluation in &all {
         assert_eq!(evaluation.submission, submission.id);
-        assert_eq!((evaluation.day, &evaluation.plan), (first.day, &first.plan));
+        assert_eq!(
+            (evaluation.of.date, &evaluation.plan),
+            (first.of.date, &first.plan)
+        );
     }
     let Some(Claimed {
         claim,
@@ -115,7 +122,10 @@ async fn what_we_broke_is_played_again_before_the_release_and_only_so_often() {
     else {
         panic!("the last try is queued")
     };
-    assert_eq!(seeds.episodes, secret.day(first.day));
+    assert_eq!(
+        seeds.episodes,
+        secret.stage(first.of.stage).day(first.of.date)
+    );
     assert_eq!(plays, bundle());
     f.store.release(&claim, f.now).await.unwrap();
 
@@ -138,10 +148,7 @@ async fn a_try_that_succeeds_releases_the_day() {
     let finished = f.store.evaluation(finished).await.unwrap();
     assert_eq!(finished.rerun_of, Some(broken));
     assert_eq!(finished.released_at, Some(f.now));
-    assert_eq!(
-        f.store.board(Ruleset::CURRENT).await.unwrap()[0].evaluation,
-        finished.id
-    );
+    assert_eq!(f.board().await[0].evaluation, finished.id);
 }
 
 #[tokio::test]
@@ -160,7 +167,10 @@ async fn after_the_release_only_the_cuts_submission_plays_the_day_again() {
     let best_of_n = f.validate().await;
     assert!(best_of_n.active);
     let again = rerun(&f, stopped.id).await.unwrap();
-    assert_eq!((again.submission, again.day), (submission.id, stopped.day));
+    assert_eq!(
+        (again.submission, again.of.date),
+        (submission.id, stopped.of.date)
+    );
     assert_eq!(again.rerun_of, Some(stopped.id));
     let twice = rerun(&f, stopped.id).await;
     assert!(
@@ -182,7 +192,7 @@ async fn after_the_release_only_the_cuts_submission_plays_the_day_again() {
     // The new one plays another day, on other episodes.
     f.later(86_400);
     let next = f.evaluate(best_of_n.id, &small()).await;
-    assert_ne!(next.day, stopped.day);
+    assert_ne!(next.of.date, stopped.of.date);
 }
 
 #[tokio::test]
@@ -242,9 +252,10 @@ async fn a_closed_season_takes_nothing_more_and_stays_closed() {
         .store
         .activate_submission(Actor::Organiser, submission.id, site.now);
     closed(choice.await.unwrap_err());
+    let stage = site.store.stages().await.unwrap().remove(0).id;
     closed(
         site.store
-            .start_day(Actor::Organiser, &plan, site.now)
+            .start_day(Actor::Organiser, stage, site.now)
             .await
             .unwrap_err(),
     );
@@ -254,7 +265,7 @@ async fn a_closed_season_takes_nothing_more_and_stays_closed() {
     closed(ablation.await.unwrap_err());
     assert_eq!(
         site.store
-            .start_scheduled_day(&plan, site.now)
+            .start_scheduled_day(stage, site.now)
             .await
             .unwrap(),
         None

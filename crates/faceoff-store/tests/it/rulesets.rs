@@ -7,10 +7,13 @@ use faceoff_types::*;
 /// Makes all that is there what an earlier program has left.
 async fn was_begun_under_the_first(f: &Fixture) {
     let mut connection = f.connection().await;
-    sqlx::query("UPDATE runs SET ruleset = 'airhockey-2023.1'")
-        .execute(&mut connection)
-        .await
-        .unwrap();
+    for change in [
+        "UPDATE runs SET ruleset = 'airhockey-2023.1'",
+        "UPDATE stage_revisions SET rules = json_set(rules, '$.ruleset', 'airhockey-2023.1')",
+    ] {
+        let changed = sqlx::query(change).execute(&mut connection).await.unwrap();
+        assert!(changed.rows_affected() > 0);
+    }
 }
 
 /// Plays and scores the evaluation that comes next; under which rules its shards and its score were ordered.
@@ -33,39 +36,48 @@ async fn play(f: &Fixture, score: f64) -> Ruleset {
     run.ruleset
 }
 
-async fn teams(f: &Fixture, ruleset: Ruleset) -> Vec<String> {
-    let board = f.store.board(ruleset).await.unwrap();
+async fn teams(f: &Fixture, revision: u32) -> Vec<String> {
+    let stage = f.store.stages().await.unwrap().remove(0).id;
+    let board = f.store.board(stage, revision).await.unwrap();
     board.iter().map(|row| row.team.name.to_string()).collect()
+}
+
+/// By which of the stage's rules the board is, and what they are.
+async fn newest(f: &Fixture) -> (u32, Ruleset) {
+    let stage = f.store.stages().await.unwrap().remove(0);
+    let number = f.store.board_revision(&stage).await.unwrap();
+    let revisions = f.store.stage_revisions(stage.id).await.unwrap();
+    let found = revisions.into_iter().find(|one| one.number == number);
+    (number, found.unwrap().rules.ruleset)
 }
 
 #[tokio::test]
 async fn what_is_under_way_at_an_upgrade_finishes_by_its_own_rules_on_its_own_board() {
     let mut f = Fixture::new().await;
-    assert_eq!(f.store.board_ruleset().await.unwrap(), Ruleset::CURRENT);
     let [alpha, beta] = [f.ready_team("Alpha").await, f.ready_team("Beta").await];
     f.evaluate(alpha.id, &plan()).await;
-    f.evaluate(beta.id, &plan()).await;
+    assert_eq!(newest(&f).await, (1, Ruleset::CURRENT));
     was_begun_under_the_first(&f).await;
     assert_eq!(play(&f, 10.0).await, Ruleset::First);
-    assert_eq!(f.store.board_ruleset().await.unwrap(), Ruleset::First);
+    assert_eq!(newest(&f).await, (1, Ruleset::First));
 
+    // The new program starts, with the same configuration.
     f.later(24 * 3600);
     f.evaluate(alpha.id, &plan()).await;
+    assert_eq!(
+        newest(&f).await,
+        (1, Ruleset::First),
+        "until there is a result"
+    );
     assert_eq!(
         play(&f, 20.0).await,
         Ruleset::First,
         "Beta's was queued before"
     );
     assert_eq!(play(&f, 30.0).await, Ruleset::Second);
-    assert_eq!(f.store.board_ruleset().await.unwrap(), Ruleset::Second);
-    assert_eq!(teams(&f, Ruleset::First).await, ["Alpha", "Beta"]);
-    assert_eq!(teams(&f, Ruleset::Second).await, ["Alpha"]);
-    let scores: Vec<_> = f.store.board(Ruleset::First).await.unwrap();
-    assert_eq!(
-        scores
-            .iter()
-            .map(|row| row.result.score)
-            .collect::<Vec<_>>(),
-        [10.0, 20.0]
-    );
+    assert_eq!(newest(&f).await, (2, Ruleset::Second));
+    assert_eq!(teams(&f, 1).await, ["Alpha", "Beta"]);
+    assert_eq!(teams(&f, 2).await, ["Alpha"]);
+    assert_eq!(f.board().await[0].result.score, 30.0);
+    assert_eq!(beta.team, f.store.submission(beta.id).await.unwrap().team);
 }

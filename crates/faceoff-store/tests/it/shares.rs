@@ -196,9 +196,10 @@ impl Fixture {
         plan: &RunPlan,
     ) -> EvaluationId {
         self.later(24 * 3600);
+        let stage = self.stage(plan).await;
         let started = self
             .store
-            .start_day(Actor::Organiser, plan, self.now)
+            .start_day(Actor::Organiser, stage, self.now)
             .await
             .unwrap();
         let mut of_submission = None;

@@ -293,9 +293,10 @@ impl Server {
             episodes_per_shard: 2,
             max_faults: 10,
         };
+        let stage = stage_by(&self.store, &plan, None, self.now()).await;
         let started = self
             .store
-            .start_day(Actor::Organiser, &plan, self.now())
+            .start_day(Actor::Organiser, stage, self.now())
             .await
             .unwrap();
         assert_eq!(started[0].submission, submission.id);
@@ -403,4 +404,30 @@ impl Running {
         self.shutdown.cancel();
         self.task.await.unwrap().unwrap();
     }
+}
+
+/// The season's first stage, which plays by this plan from now on.
+pub(super) async fn stage_by(
+    store: &Store,
+    plan: &RunPlan,
+    schedule: Option<Schedule>,
+    now: Timestamp,
+) -> StageId {
+    let rules = StageRules {
+        ruleset: Ruleset::CURRENT,
+        profile: plan.profile,
+        tasks: plan.tasks.clone(),
+        episodes_per_task: plan.episodes_per_task,
+        max_faults: plan.max_faults,
+    };
+    let settings = StageSettings {
+        schedule,
+        episodes_per_shard: plan.episodes_per_shard,
+        ..StageSettings::default()
+    };
+    store
+        .configure_stage(rules, settings, Zone::UTC, now)
+        .await
+        .unwrap();
+    store.stages().await.unwrap()[0].id
 }

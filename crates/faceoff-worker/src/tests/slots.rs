@@ -52,8 +52,8 @@ async fn slots_play_every_shard_once_and_publish_the_dataset() {
         .unwrap();
     assert_eq!(std::fs::read_to_string(&file).unwrap(), in_order.join("\n"));
     let season = server.store.season().await.unwrap();
-    let day = server.store.evaluation(id).await.unwrap().day;
-    assert_eq!(result.seed, season.secret.day(day));
+    let of = server.store.evaluation(id).await.unwrap().of;
+    assert_eq!(result.seed, season.secret.stage(of.stage).day(of.date));
     running.stop().await;
 }
 
@@ -167,20 +167,27 @@ async fn the_schedule_starts_a_missed_day_once() {
         episodes_per_shard: 1,
         max_faults: 0,
     };
+    let midnight = Schedule::daily(jiff::civil::Time::midnight());
+    // A stage that opened after midnight would wait for the next one.
+    let opened = server.now() - jiff::SignedDuration::from_hours(24);
+    let stage = stage_by(&server.store, &plan, Some(midnight), opened).await;
+    let settings = StageSettings {
+        ablation_episodes: 2,
+        ..server.store.stage(stage).await.unwrap().settings
+    };
+    let with_ablations = StageChange {
+        settings: Some(settings),
+        ..StageChange::default()
+    };
+    server
+        .store
+        .change_stage(Actor::Organiser, stage, with_ablations, server.now())
+        .await
+        .unwrap();
     for first in [true, false] {
         let mut events = server.store.events();
         let shutdown = CancellationToken::new();
-        let daily = crate::DailyPlan {
-            at: jiff::civil::Time::midnight(),
-            evaluation: plan.clone(),
-            ablation_episodes: std::num::NonZeroU32::new(2),
-        };
-        let schedule = crate::run_schedule(
-            server.store.clone(),
-            server.clock(),
-            daily,
-            shutdown.clone(),
-        );
+        let schedule = crate::run_schedule(server.store.clone(), server.clock(), shutdown.clone());
         let schedule = tokio::spawn(schedule);
         if first {
             let mut kinds = Vec::new();

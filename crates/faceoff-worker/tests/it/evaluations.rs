@@ -1,4 +1,4 @@
-use crate::server::Server;
+use crate::server::{Server, stage_by};
 use faceoff_store::*;
 use faceoff_types::*;
 use jiff::Timestamp;
@@ -31,6 +31,7 @@ async fn play_day(
     assert_eq!(evaluations.len(), 2);
     let worker = server.work(2);
     let mut outcomes = Vec::new();
+    let stage = evaluations[0].of.stage;
     for evaluation in evaluations {
         let state = server.over(evaluation.id).await;
         let EvaluationState::Finished {
@@ -58,7 +59,7 @@ async fn play_day(
             server.store.outcomes(evaluation.run).await.unwrap(),
         ));
     }
-    assert_eq!(server.store.board(Ruleset::CURRENT).await.unwrap().len(), 2);
+    assert_eq!(server.store.board(stage, 1).await.unwrap().len(), 2);
     worker.stop().await;
     outcomes
 }
@@ -66,6 +67,8 @@ async fn play_day(
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn two_teams_meet_the_same_episodes_however_the_work_is_shared_out() {
     let server = Server::new().await;
+    // Before there are two of it: its id enters the seeds.
+    stage_by(&server.store, &plan(1), Timestamp::now()).await;
     let worker = server.work(2);
     for team in ["Alpha", "Beta"] {
         let submission = server.upload(team, "").await;

@@ -136,7 +136,8 @@ impl Server {
 
     /// The cut, with this plan; the evaluations in the order of the uploads.
     pub async fn start_day(&self, plan: &RunPlan, now: Timestamp) -> Vec<Evaluation> {
-        let started = self.store.start_day(Actor::Organiser, plan, now);
+        let stage = stage_by(&self.store, plan, now).await;
+        let started = self.store.start_day(Actor::Organiser, stage, now);
         started.await.unwrap()
     }
 
@@ -201,4 +202,24 @@ fn write_bundle(archive: &Path, env: &str) {
             .unwrap();
     }
     tar.into_inner().unwrap().finish().unwrap();
+}
+
+/// The season's first stage, which plays by this plan from now on.
+pub async fn stage_by(store: &Store, plan: &RunPlan, now: Timestamp) -> StageId {
+    let rules = StageRules {
+        ruleset: Ruleset::CURRENT,
+        profile: plan.profile,
+        tasks: plan.tasks.clone(),
+        episodes_per_task: plan.episodes_per_task,
+        max_faults: plan.max_faults,
+    };
+    let settings = StageSettings {
+        episodes_per_shard: plan.episodes_per_shard,
+        ..StageSettings::default()
+    };
+    store
+        .configure_stage(rules, settings, Zone::UTC, now)
+        .await
+        .unwrap();
+    store.stages().await.unwrap()[0].id
 }

@@ -6,8 +6,8 @@ use faceoff_http::{
     token::hash_token,
     views::{evaluation::EvaluationStatus, submission::SubmissionStatus},
 };
-use faceoff_store::{Claimed, RunPlan, Store, Work};
-use faceoff_types::{Clock, Profile, SmokeOutcome, Task};
+use faceoff_store::{Claimed, Store, Work};
+use faceoff_types::{Clock, Profile, Ruleset, SmokeOutcome, StageRules, StageSettings, Task, Zone};
 use jiff::Timestamp;
 use tempfile::TempDir;
 
@@ -27,18 +27,21 @@ fn now() -> Timestamp {
 async fn site(max_bundle_bytes: u64) -> Site {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
+    let rules = StageRules {
+        ruleset: Ruleset::CURRENT,
+        profile: Profile::Evaluation,
+        tasks: vec![Task::Hit],
+        episodes_per_task: 1,
+        max_faults: 0,
+    };
+    store
+        .configure_stage(rules, StageSettings::default(), Zone::UTC, now())
+        .await
+        .unwrap();
     let config = HttpConfig {
         max_bundle_bytes,
-        plan: RunPlan {
-            profile: Profile::Evaluation,
-            tasks: vec![Task::Hit],
-            episodes_per_task: 2,
-            episodes_per_shard: 2,
-            max_faults: 0,
-        },
         admin_token_hash: hash_token(ADMIN),
         upload_dir: folder.path().to_owned(),
-        daily_at: None,
         clock: Clock::new(now),
         limits: HttpLimits::default(),
     };
@@ -124,7 +127,7 @@ async fn a_folder_is_packed_uploaded_and_followed() {
         "2026-03-01 (UTC) or later, when the organiser starts the day"
     );
 
-    let day = site.organiser.start_day(Some(1)).await.unwrap();
+    let day = site.organiser.start_day(None).await.unwrap();
     assert_eq!(day.created.len(), 1);
     assert_eq!(day.created[0].progress.episodes_total, 1);
     let listed = site.organiser.evaluations(Some(day.day)).await.unwrap();

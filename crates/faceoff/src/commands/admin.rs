@@ -1,18 +1,17 @@
 //! `faceoff admin`: organises a running competition through its API.
 
+mod stage;
+
 use super::serve::ADMIN_TOKEN_FILE;
 use crate::{client::Client, config::Config};
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
-use faceoff_http::{
-    requests::StartDay,
-    views::{
-        evaluation::{EvaluationStatus, EvaluationView},
-        event::EventView,
-        season::SeasonView,
-    },
+use faceoff_http::views::{
+    evaluation::{EvaluationStatus, EvaluationView},
+    event::EventView,
+    season::SeasonView,
 };
-use faceoff_types::{EvaluationId, MAX_EPISODES_PER_TASK, Profile, TeamId};
+use faceoff_types::{EvaluationId, TeamId};
 use jiff::civil::Date;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -59,14 +58,16 @@ enum Action {
         /// The team's name or id
         team: String,
     },
-    /// Start the day: what each team has active now plays it. A day starts once
+    /// Start a stage's day: what each team has active now plays it. A day starts once
     StartDay {
-        /// Episodes of each task [default: the server's configuration]
-        #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_EPISODES_PER_TASK)))]
-        episodes: Option<u32>,
-        /// Perturbation profile [default: the server's configuration]
+        /// The stage's name or id [default: the one that is open]
         #[arg(long)]
-        profile: Option<Profile>,
+        stage: Option<String>,
+    },
+    /// Make, change or list the stages: their times, rules and schedules
+    Stage {
+        #[command(subcommand)]
+        action: stage::StageAction,
     },
     /// Play an evaluation again that was cancelled or failed by the server's fault: same agent, same episodes
     Rerun {
@@ -92,7 +93,7 @@ enum Action {
         /// Who: organiser, team, team:ID, schedule, worker, worker:NAME or server
         #[arg(long)]
         actor: Option<String>,
-        /// About what: season, day:DATE, team:ID, submission:ID, evaluation:ID or ablation:ID
+        /// About what: season, stage:ID, day:STAGE/DATE, team:ID, submission:ID, evaluation:ID or ablation:ID
         #[arg(long)]
         subject: Option<String>,
         /// What happened, e.g. day_started
@@ -107,7 +108,7 @@ enum Action {
     },
     /// List the evaluations of a day with their progress
     Evaluations {
-        /// UTC day, e.g. 2026-11-21 [default: today]
+        /// A date in the stages' zones, e.g. 2026-11-21 [default: today]
         #[arg(long)]
         day: Option<Date>,
     },
@@ -164,13 +165,13 @@ impl AdminCommand {
                     )
                 })
             }
-            Action::StartDay { episodes, profile } => {
-                let day = client
-                    .start_day_as(&StartDay {
-                        episodes_per_task: episodes,
-                        profile,
-                    })
-                    .await?;
+            Action::Stage { action } => stage::act(&client, self.json, action).await,
+            Action::StartDay { stage } => {
+                let stage = match stage {
+                    Some(stage) => Some(stage::find(&client, &stage).await?.id),
+                    None => None,
+                };
+                let day = client.start_day(stage).await?;
                 print(self.json, &day, || {
                     let mut lines = vec![format!("{}: {} started", day.day, day.created.len())];
                     lines.extend(day.created.iter().map(line));

@@ -75,7 +75,7 @@ impl DemoCommand {
 
         println!("1. starting the server on {}", self.data_dir.display());
         let log = self.data_dir.join("server.log");
-        let mut server = Server::start(self.listen, &self.data_dir, &log)?;
+        let mut server = Server::start(self.listen, &self.data_dir, self.episodes, &log)?;
         let organiser = server.ready().await.with_context(|| {
             format!(
                 "the server did not start; the end of {}:\n{}\n",
@@ -105,7 +105,7 @@ impl DemoCommand {
             "3. evaluating: hit, defend, prepare × {} episodes",
             self.episodes
         );
-        let day = organiser.start_day(Some(self.episodes)).await?;
+        let day = organiser.start_day(None).await?;
         ensure!(
             day.created.len() == teams.len(),
             "expected an evaluation per team, got {} for {} teams",
@@ -210,13 +210,24 @@ struct Server {
 }
 
 impl Server {
-    fn start(listen: SocketAddr, data_dir: &Path, log: &Path) -> anyhow::Result<Self> {
+    /// By a configuration of its own, which says nothing but how many episodes a day has.
+    fn start(
+        listen: SocketAddr,
+        data_dir: &Path,
+        episodes: u32,
+        log: &Path,
+    ) -> anyhow::Result<Self> {
+        let config = data_dir.join("faceoff.toml");
+        let text = format!("[evaluation]\nepisodes_per_task = {episodes}\n");
+        std::fs::write(&config, text).with_context(|| format!("writing {}", config.display()))?;
         let program = std::env::current_exe().context("finding this program")?;
         let log =
             std::fs::File::create(log).with_context(|| format!("making {}", log.display()))?;
         let mut command = Command::new(program);
         command
             .arg("serve")
+            .arg("--config")
+            .arg(config)
             .arg("--listen")
             .arg(listen.to_string())
             .arg("--data-dir")

@@ -10,14 +10,13 @@ use faceoff_http::{
 use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime, affinity, probe_host};
 use faceoff_store::{Actor, Room, Store};
 use faceoff_types::Clock;
-use faceoff_worker::{CpuLayout, DailyPlan, SlotThreads, WorkerConfig};
+use faceoff_worker::{CpuLayout, SlotThreads, WorkerConfig};
 use jiff::Timestamp;
 use std::{
     collections::BTreeMap,
     fs::{self, OpenOptions},
     io::Write as _,
     net::SocketAddr,
-    num::NonZeroU32,
     os::unix::fs::{DirBuilderExt, OpenOptionsExt},
     path::{Path, PathBuf},
     thread,
@@ -168,16 +167,22 @@ async fn serve(
     let address = listener
         .local_addr()
         .context("asking for the address that was bound")?;
-    let plan = config.plan();
     let clock = Clock::new(Timestamp::now);
+    store
+        .configure_stage(
+            config.rules(),
+            config.settings()?,
+            config.evaluation.zone.clone(),
+            clock.now(),
+        )
+        .await
+        .context("evaluation: giving the season's first stage its rules")?;
     let router = faceoff_http::router(
         store.clone(),
         HttpConfig {
             max_bundle_bytes: config.bundle.packed_bytes,
-            plan: plan.clone(),
             admin_token_hash,
             upload_dir,
-            daily_at: config.evaluation.at,
             clock: clock.clone(),
             limits: config.uploads.limits(),
         },
@@ -198,7 +203,6 @@ async fn serve(
         data_dir = %data_dir.display(),
         slots = workers.cpus.slots.len(),
         service_cpus = ?workers.cpus.service,
-        daily_at = config.evaluation.at.map(|at| at.to_string()),
         "serving"
     );
 
@@ -210,19 +214,11 @@ async fn serve(
         workers,
         shutdown.clone(),
     ));
-    if let Some(at) = config.evaluation.at {
-        let daily = DailyPlan {
-            at,
-            evaluation: plan,
-            ablation_episodes: NonZeroU32::new(config.evaluation.ablation_episodes),
-        };
-        parts.spawn(faceoff_worker::run_schedule(
-            store.clone(),
-            clock,
-            daily,
-            shutdown.clone(),
-        ));
-    }
+    parts.spawn(faceoff_worker::run_schedule(
+        store.clone(),
+        clock,
+        shutdown.clone(),
+    ));
     parts.spawn(answer(listener, router, connections, shutdown.clone()));
     // For the program that started this one, whatever is logged: from now on a connection is answered,
     // and a port that the system chose is known. That nobody listens is no fault.

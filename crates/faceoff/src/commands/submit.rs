@@ -75,8 +75,8 @@ impl SubmitCommand {
 
 /// When a submission of the team's plays.
 pub(super) fn next_cut(me: &MeView, submission: SubmissionId) -> String {
-    match (me.next_cut, me.active_submission) {
-        (None, _) => "the season is closed: nothing more is evaluated".to_owned(),
+    match (&me.next_cut, me.active_submission) {
+        (None, _) => "no day comes any more: the season or its last stage is closed".to_owned(),
         (Some(cut), Some(active)) if active == submission => {
             format!("it is active and plays at the next cut: {cut}")
         }

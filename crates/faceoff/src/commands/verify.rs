@@ -6,7 +6,7 @@ use faceoff_dataset::{
     Dataset, DatasetError,
     verify::{Difference, SeasonClaim, SeasonMismatch, Verified, VerifyError, verify},
 };
-use faceoff_types::{EvaluationResult, Seed};
+use faceoff_types::{EvaluationResult, Seed, StageId};
 use indicatif::{ProgressBar, ProgressStyle};
 use jiff::civil::Date;
 use serde::Serialize;
@@ -34,7 +34,10 @@ pub struct VerifyCommand {
     /// The season's revealed secret, 64 hexadecimal digits: also check that the seeds derive from it
     #[arg(long, value_name = "HEX", requires = "day")]
     secret: Option<Seed>,
-    /// The UTC day of the evaluation
+    /// The id of the evaluation's stage; left out, the stage is one whose id enters no seed
+    #[arg(long, value_name = "ID", requires = "secret")]
+    stage: Option<StageId>,
+    /// The date of the evaluation's day
     #[arg(long, value_name = "YYYY-MM-DD", requires = "secret")]
     day: Option<Date>,
     /// The commitment that was published before the season: also check that it is the secret's hash
@@ -166,6 +169,7 @@ impl VerifyCommand {
         let claim = self.secret.zip(self.day).map(|(secret, day)| SeasonClaim {
             secret,
             commitment: self.commitment.clone(),
+            stage: self.stage,
             day,
         });
         if let Some(claim) = &claim {
@@ -217,6 +221,7 @@ pub fn verified_line(path: &Path) -> anyhow::Result<String> {
         workers: None,
         json: false,
         secret: None,
+        stage: None,
         day: None,
         commitment: None,
         blake3: None,

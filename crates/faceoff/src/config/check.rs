@@ -1,7 +1,7 @@
 //! Values that no server, or no host like this one, can have.
 
 use super::Config;
-use anyhow::{bail, ensure};
+use anyhow::{Context as _, bail, ensure};
 use faceoff_types::MAX_EPISODES_PER_TASK;
 use std::collections::BTreeSet;
 
@@ -33,6 +33,10 @@ impl Config {
     /// What types alone cannot say.
     pub(super) fn check(&self) -> anyhow::Result<()> {
         let evaluation = &self.evaluation;
+        if evaluation.at.is_some() && evaluation.cron.is_some() {
+            bail!("evaluation.cron: there is evaluation.at, too; leave one of them out");
+        }
+        self.settings().context("evaluation.cron")?;
         ensure!(
             (1..=MAX_EPISODES_PER_TASK).contains(&evaluation.episodes_per_task),
             "evaluation.episodes_per_task: expected 1 to {MAX_EPISODES_PER_TASK}, got {}",

@@ -52,7 +52,7 @@ fn every_section_is_read() {
     .unwrap();
     assert_eq!(config.server.listen.port(), 80);
     assert_eq!(config.season.name.as_deref(), Some("Practice"));
-    assert_eq!(config.plan().episodes_per_task, 7);
+    assert_eq!(config.rules().episodes_per_task, 7);
     assert_eq!(config.evaluation.at, Some(jiff::civil::time(0, 30, 0, 0)));
     assert_eq!(config.evaluation.ablation_episodes, 50);
     assert_eq!(config.slots(), 3);

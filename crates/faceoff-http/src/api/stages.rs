@@ -1,0 +1,176 @@
+//! The season's stages: made and changed by the organiser, seen by everybody.
+
+use crate::{
+    app::App,
+    auth::Organiser,
+    extract::{Json as Body, PathParam},
+    problem::{Problem, ProblemKind},
+    requests::{NewStage, StageChange},
+    views::stage::{self, StageView},
+};
+use axum::{Json, extract::State, http::StatusCode};
+use faceoff_store::{Actor, Stage, StagePhase};
+use faceoff_types::{InvalidStageRules, Ruleset, StageId, StageName, StageRules, StageSettings};
+
+fn name(text: &str) -> Result<StageName, Problem> {
+    text.parse()
+        .map_err(|error| Problem::invalid("name", error))
+}
+
+fn check(rules: &StageRules, settings: &StageSettings) -> Result<(), Problem> {
+    let checked = rules.check().and_then(|()| settings.check());
+    checked.map_err(|error| {
+        let field = match error {
+            InvalidStageRules::Tasks => "tasks",
+            InvalidStageRules::Episodes(_) => "episodes_per_task",
+            InvalidStageRules::Shards(_) => "episodes_per_shard",
+            InvalidStageRules::Ablations(_) => "ablation_episodes",
+        };
+        Problem::invalid(field, error)
+    })
+}
+
+/// All stages, the first to open first.
+#[utoipa::path(
+    get, path = "/stages", tag = "public", responses((status = 200, body = Vec<StageView>))
+)]
+pub(crate) async fn list_stages(State(app): State<App>) -> Result<Json<Vec<StageView>>, Problem> {
+    StageView::all(&app).await.map(Json)
+}
+
+/// One stage.
+#[utoipa::path(
+    get, path = "/stages/{id}", tag = "public", params(("id" = StageId, Path)),
+    responses((status = 200, body = StageView), (status = 404))
+)]
+pub(crate) async fn stage(
+    State(app): State<App>,
+    PathParam(id): PathParam<StageId>,
+) -> Result<Json<StageView>, Problem> {
+    StageView::find(&app, id).await.map(Json)
+}
+
+/// Makes a stage: from its opening on its rules are fixed.
+#[utoipa::path(
+    post, path = "/stages", tag = "organiser", security(("organiser" = [])), request_body = NewStage,
+    responses(
+        (status = 201, body = StageView),
+        (status = 409, description = "the name is taken, the times cannot be, or the season is closed"),
+        (status = 422),
+    )
+)]
+pub(crate) async fn create_stage(
+    _: Organiser,
+    State(app): State<App>,
+    Body(new): Body<NewStage>,
+) -> Result<(StatusCode, Json<StageView>), Problem> {
+    let like = stage::current(&app).await?;
+    let now = app.config.clock.now();
+    let rules = StageRules {
+        ruleset: Ruleset::CURRENT,
+        profile: new.profile.unwrap_or(like.rules.rules.profile),
+        tasks: new.tasks.unwrap_or(like.rules.rules.tasks),
+        episodes_per_task: new
+            .episodes_per_task
+            .unwrap_or(like.rules.rules.episodes_per_task),
+        max_faults: new.max_faults.unwrap_or(like.rules.rules.max_faults),
+    };
+    let settings = StageSettings {
+        schedule: new.schedule,
+        ablation_episodes: new.ablation_episodes.unwrap_or(0),
+        episodes_per_shard: new
+            .episodes_per_shard
+            .unwrap_or(like.settings.episodes_per_shard),
+    };
+    check(&rules, &settings)?;
+    let wanted = faceoff_store::NewStage {
+        name: name(&new.name)?,
+        opens_at: new.opens_at.unwrap_or(now),
+        closes_at: new.closes_at,
+        zone: new.zone.unwrap_or(like.zone),
+        rules,
+        settings,
+    };
+    let made = app
+        .store
+        .create_stage(Actor::Organiser, wanted, now)
+        .await?;
+    tracing::info!(stage = %made.name, id = %made.id, "stage made");
+    let view = StageView::of(&app, made).await?;
+    Ok((StatusCode::CREATED, Json(view)))
+}
+
+/// Changes a stage. Other rules of one that is open are another revision, which begins an empty board.
+#[utoipa::path(
+    patch, path = "/stages/{id}", tag = "organiser", security(("organiser" = [])),
+    params(("id" = StageId, Path)), request_body = StageChange,
+    responses(
+        (status = 200, body = StageView),
+        (status = 404),
+        (status = 409, description = "what is to be changed has begun or is over, the name is taken, other rules of an open stage are not confirmed, or the season is closed"),
+        (status = 422),
+    )
+)]
+pub(crate) async fn change_stage(
+    _: Organiser,
+    State(app): State<App>,
+    PathParam(id): PathParam<StageId>,
+    Body(change): Body<StageChange>,
+) -> Result<Json<StageView>, Problem> {
+    let stage = app.store.stage(id).await?;
+    let now = app.config.clock.now();
+    let is = &stage.rules.rules;
+    let rules = StageRules {
+        ruleset: Ruleset::CURRENT,
+        profile: change.profile.unwrap_or(is.profile),
+        tasks: change.tasks.unwrap_or_else(|| is.tasks.clone()),
+        episodes_per_task: change.episodes_per_task.unwrap_or(is.episodes_per_task),
+        max_faults: change.max_faults.unwrap_or(is.max_faults),
+    };
+    let settings = StageSettings {
+        schedule: change
+            .schedule
+            .unwrap_or_else(|| stage.settings.schedule.clone()),
+        ablation_episodes: change
+            .ablation_episodes
+            .unwrap_or(stage.settings.ablation_episodes),
+        episodes_per_shard: change
+            .episodes_per_shard
+            .unwrap_or(stage.settings.episodes_per_shard),
+    };
+    check(&rules, &settings)?;
+    if rules != *is && stage.phase(now) == StagePhase::Open {
+        check_confirmed(&stage, change.confirm.as_deref())?;
+    }
+    let wanted = faceoff_store::StageChange {
+        name: change.name.as_deref().map(name).transpose()?,
+        opens_at: change.opens_at,
+        closes_at: change.closes_at,
+        zone: change.zone,
+        rules: Some(rules),
+        settings: Some(settings),
+    };
+    let changed = app
+        .store
+        .change_stage(Actor::Organiser, id, wanted, now)
+        .await?;
+    tracing::info!(stage = %changed.name, %id, revision = changed.rules.number, "stage changed");
+    StageView::of(&app, changed).await.map(Json)
+}
+
+fn check_confirmed(stage: &Stage, confirm: Option<&str>) -> Result<(), Problem> {
+    if confirm == Some(stage.name.as_str()) {
+        return Ok(());
+    }
+    let (name, number) = (stage.name.as_str(), stage.rules.number);
+    Err(Problem::new(
+        ProblemKind::NotConfirmed,
+        format!(
+            "the stage {name:?} is open: other rules begin revision {} with an empty board, what was played by \
+             revision {number} stays on its own, and neither can be undone. To do it, send “confirm” with the \
+             stage's name",
+            number + 1
+        ),
+    )
+    .with("confirm", name))
+}

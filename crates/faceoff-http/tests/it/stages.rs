@@ -1,0 +1,305 @@
+//! Stages over HTTP and on pages.
+
+use crate::site::{ADMIN, Answer, Site, result};
+use reqwest::Method;
+use serde_json::{Value, json};
+
+async fn make(site: &Site, body: Value) -> Answer {
+    site.post("/api/v1/stages", Some(ADMIN), &body).await
+}
+
+async fn change(site: &Site, stage: &Value, body: Value) -> Answer {
+    let path = format!("/api/v1/stages/{}", stage["id"].as_str().unwrap());
+    let request = site.request(Method::PATCH, &path, Some(ADMIN));
+    Answer::of(request.json(&body).send().await.unwrap()).await
+}
+
+#[tokio::test]
+async fn a_stage_is_made_seen_changed_and_played() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    site.valid_submission(&team, "a").await;
+    let made = make(
+        &site,
+        json!({
+            "name": "Final",
+            "opens_at": "2026-03-02T08:00:00Z",
+            "closes_at": "2026-03-09T08:00:00Z",
+            "zone": "Europe/Berlin",
+            "episodes_per_task": 2,
+            "schedule": { "cron": "0 9 * * 1-5", "days_off": ["2026-03-04"] },
+        }),
+    )
+    .await
+    .json(201);
+    assert_eq!(made["phase"], "upcoming");
+    assert_eq!(made["profile"], "evaluation", "as in the open stage");
+    assert_eq!(
+        (
+            &made["revision"],
+            &made["since"],
+            &made["episodes_per_task"]
+        ),
+        (&json!(1), &json!("2026-03-02T08:00:00Z"), &json!(2))
+    );
+    // Monday at 9:00 in Berlin is when it opens.
+    assert_eq!(made["next_cut"]["day"], "2026-03-02");
+    assert_eq!(made["next_cut"]["at"], "2026-03-02T08:00:00Z");
+    let path = format!("/api/v1/stages/{}", made["id"].as_str().unwrap());
+    assert_eq!(site.get(&path, None).await.json(200), made);
+    let all = site.get("/api/v1/stages", None).await.json(200);
+    assert_eq!(all.as_array().unwrap().len(), 2);
+    assert_eq!(all[1], made);
+    assert_eq!(
+        site.get("/api/v1/season", None).await.json(200)["stages"],
+        all
+    );
+
+    let early = json!({ "stage": made["id"] });
+    site.post("/api/v1/days", Some(ADMIN), &early)
+        .await
+        .problem(409, "stage-not-open", &["Final", "2026-03-02 08:00:00 UTC"]);
+    let changed = change(
+        &site,
+        &made,
+        json!({ "schedule": null, "closes_at": null, "name": "Finals" }),
+    )
+    .await;
+    let changed = changed.json(200);
+    assert_eq!(
+        (
+            &changed["schedule"],
+            &changed["closes_at"],
+            &changed["name"]
+        ),
+        (&json!(null), &json!(null), &json!("Finals"))
+    );
+
+    site.next_day();
+    // Two are open: which one is to be said.
+    site.post("/api/v1/days", Some(ADMIN), &json!({}))
+        .await
+        .problem(422, "invalid-content", &["stage", "Qualifying", "Finals"]);
+    let day = site
+        .post("/api/v1/days", Some(ADMIN), &early)
+        .await
+        .json(200);
+    assert_eq!(
+        (&day["stage"], &day["day"]),
+        (&made["id"], &json!("2026-03-02"))
+    );
+    site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
+    let board = site.get("/api/v1/board", None).await.json(200);
+    assert_eq!(
+        (
+            &board["stage_name"],
+            board["rows"].as_array().unwrap().len()
+        ),
+        (&json!("Finals"), 1)
+    );
+    let first = format!("/api/v1/board?stage={}", site.stage().await);
+    assert_eq!(site.get(&first, None).await.json(200)["rows"], json!([]));
+}
+
+#[tokio::test]
+async fn other_rules_of_an_open_stage_are_confirmed_and_get_a_board_of_their_own() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let submission = site.valid_submission(&team, "a").await;
+    site.evaluate(&team, &submission).await;
+    site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
+    let stage = site.get("/api/v1/stages", None).await.json(200)[0].clone();
+    let harder = json!({ "episodes_per_task": 9 });
+    let problem = change(&site, &stage, harder).await;
+    let problem = problem.problem(
+        409,
+        "not-confirmed",
+        &["revision 2", "empty board", "confirm"],
+    );
+    assert_eq!(problem["confirm"], "Qualifying");
+    let unchanged = site.get("/api/v1/stages", None).await.json(200);
+    assert_eq!(unchanged[0], stage, "nothing was done");
+
+    let harder = json!({ "episodes_per_task": 9, "confirm": "Qualifying" });
+    let changed = change(&site, &stage, harder).await.json(200);
+    assert_eq!(changed["revision"], 2);
+    assert_eq!(changed["configured"], false);
+    let told: Vec<_> = changed["revisions"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|rules| {
+            (
+                rules["revision"].clone(),
+                rules["episodes_per_task"].clone(),
+            )
+        })
+        .collect();
+    assert_eq!(told, [(json!(1), json!(4)), (json!(2), json!(9))]);
+
+    // Until there is a result by the new rules, the board is that of the old ones, and says so.
+    let board = site.get("/api/v1/board", None).await.json(200);
+    assert_eq!(
+        (&board["revision"], board["rows"].as_array().unwrap().len()),
+        (&json!(1), 1)
+    );
+    let page = site.get("/", None).await.body;
+    assert!(
+        page.contains("Rules: revision 1, since 2026-03-01 10:00 UTC"),
+        "{page}"
+    );
+    assert!(
+        page.contains("revision=2"),
+        "a link to the other board: {page}"
+    );
+    let other = format!("/?stage={}&revision=2", stage["id"].as_str().unwrap());
+    let other = site.get(&other, None).await;
+    assert_eq!(other.status, 200);
+    assert!(
+        other.body.contains("No team has a result yet"),
+        "{}",
+        other.body
+    );
+}
+
+#[tokio::test]
+async fn pages_tell_of_stages() {
+    let site = Site::start_daily("12:00").await;
+    let made = make(
+        &site,
+        json!({ "name": "Final", "opens_at": "2026-03-02T08:00:00Z", "closes_at": "2026-03-09T08:00:00Z" }),
+    );
+    made.await.json(201);
+    let page = site.get("/", None).await.body;
+    for part in [
+        "stage <strong>Qualifying</strong>, open",
+        "2026-03-01 at 12:00:00 UTC",
+        ">Final</a>",
+    ] {
+        assert!(page.contains(part), "{part:?} is not in {page}");
+    }
+    let season = site.get("/season", None).await.body;
+    for part in [
+        "Final",
+        "2026-03-09 08:00:00 UTC",
+        "open end",
+        "revision 1 since",
+    ] {
+        assert!(season.contains(part), "{part:?} is not in {season}");
+    }
+    for path in ["/?stage=chess", "/?revision=x", "/tasks/hit?stage=1"] {
+        let page = site.get(path, None).await;
+        assert_eq!(page.status, 400, "{path}: {}", page.body);
+    }
+    assert_eq!(site.get("/?revision=7", None).await.status, 404);
+    assert_eq!(site.get("/tasks/hit?revision=1", None).await.status, 200);
+}
+
+#[tokio::test]
+async fn what_cannot_be_is_said_with_what_can() {
+    let site = Site::start().await;
+    for (body, status, slug, words) in [
+        (json!({}), 422, "invalid-content", &["name"][..]),
+        (json!({ "name": "" }), 422, "invalid-content", &["1 to 40"]),
+        (
+            json!({ "name": "qualifying" }),
+            409,
+            "stage-name-taken",
+            &["qualifying"],
+        ),
+        (
+            json!({ "name": "F", "zone": "Berlin" }),
+            422,
+            "invalid-content",
+            &["zone", "Europe/Berlin"],
+        ),
+        (
+            json!({ "name": "F", "tasks": [] }),
+            422,
+            "invalid-content",
+            &["tasks", "at least one"],
+        ),
+        (
+            json!({ "name": "F", "tasks": ["hit", "hit"] }),
+            422,
+            "invalid-content",
+            &["tasks"],
+        ),
+        (
+            json!({ "name": "F", "tasks": ["chess"] }),
+            422,
+            "invalid-content",
+            &["tasks", "chess"],
+        ),
+        (
+            json!({ "name": "F", "episodes_per_task": 0 }),
+            422,
+            "invalid-content",
+            &["episodes_per_task", "got 0"],
+        ),
+        (
+            json!({ "name": "F", "profile": "easy" }),
+            422,
+            "invalid-content",
+            &["profile", "easy"],
+        ),
+        (
+            json!({ "name": "F", "schedule": { "daily": "06:00", "cron": "* * * * *" } }),
+            422,
+            "invalid-content",
+            &["schedule", "either"],
+        ),
+        (
+            json!({ "name": "F", "schedule": { "cron": "61 * * * *" } }),
+            422,
+            "invalid-content",
+            &["schedule", "five fields"],
+        ),
+        (
+            json!({ "name": "F", "opens_at": "soon" }),
+            422,
+            "invalid-content",
+            &["opens_at"],
+        ),
+        (
+            json!({ "name": "F", "closes_at": "2026-03-01T09:00:00Z" }),
+            409,
+            "conflict",
+            &["closes_at"],
+        ),
+        (
+            json!({ "name": "F", "deadline": "2026-03-01T09:00:00Z" }),
+            422,
+            "invalid-content",
+            &["deadline", "closes_at"],
+        ),
+    ] {
+        make(&site, body).await.problem(status, slug, words);
+    }
+    assert_eq!(
+        site.get("/api/v1/stages", None)
+            .await
+            .json(200)
+            .as_array()
+            .unwrap()
+            .len(),
+        1
+    );
+    let team = site.team("Alpha").await;
+    let by_team = site
+        .post("/api/v1/stages", Some(&team.token), &json!({ "name": "F" }))
+        .await;
+    by_team.problem(403, "forbidden", &[]);
+    let by_none = site
+        .post("/api/v1/stages", None, &json!({ "name": "F" }))
+        .await;
+    by_none.problem(401, "unauthenticated", &[]);
+    let none = json!({ "id": uuid::Uuid::nil() });
+    change(&site, &none, json!({ "name": "F" }))
+        .await
+        .problem(404, "not-found", &["stage"]);
+    let stage = site.get("/api/v1/stages", None).await.json(200)[0].clone();
+    change(&site, &stage, json!({ "opens_at": "2026-03-05T09:00:00Z" }))
+        .await
+        .problem(409, "conflict", &["opens_at", "opened"]);
+}

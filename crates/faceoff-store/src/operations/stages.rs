@@ -1,0 +1,288 @@
+//! Stages: made, changed as far as they may be, and told by the configuration.
+
+use crate::{
+    error::{Result, StoreError},
+    event::{Actor, Event, Subject},
+    store::Store,
+    tables::{
+        days, season,
+        stages::{self, Revision, Stage, StagePhase},
+    },
+    write::Tx,
+};
+use faceoff_types::{StageId, StageName, StageRules, StageSettings, Zone};
+use jiff::Timestamp;
+
+/// A stage to be made.
+#[derive(Debug, Clone)]
+pub struct NewStage {
+    /// No two that differ only in case.
+    pub name: StageName,
+    /// From when on its days start; one that has passed is now.
+    pub opens_at: Timestamp,
+    /// Until when; `None`: it has no end yet.
+    pub closes_at: Option<Timestamp>,
+    /// Where its days are dates.
+    pub zone: Zone,
+    /// What scores depend on.
+    pub rules: StageRules,
+    /// What they do not depend on.
+    pub settings: StageSettings,
+}
+
+/// What is to be another; `None` stays as it is.
+#[derive(Debug, Clone, Default)]
+pub struct StageChange {
+    /// Its name.
+    pub name: Option<StageName>,
+    /// While it has not opened.
+    pub opens_at: Option<Timestamp>,
+    /// While it has not closed; `Some(None)`: it has no end yet.
+    pub closes_at: Option<Option<Timestamp>>,
+    /// While none of its days has had its cut.
+    pub zone: Option<Zone>,
+    /// Once it is open this makes another revision.
+    pub rules: Option<StageRules>,
+    /// What no score depends on.
+    pub settings: Option<StageSettings>,
+}
+
+/// The name of a season's first stage.
+const FIRST: &str = "Qualifying";
+
+fn conflict<T>(why: String) -> Result<T> {
+    Err(StoreError::Conflict(why))
+}
+
+fn check_times(opens_at: Timestamp, closes_at: Option<Timestamp>, now: Timestamp) -> Result<()> {
+    match closes_at {
+        Some(at) if at <= opens_at => conflict(format!(
+            "closes_at: expected a time after the opening at {opens_at}, got {at}"
+        )),
+        Some(at) if at <= now => conflict(format!(
+            "closes_at: expected a time in the future, got {at}; what has passed is not changed"
+        )),
+        _ => Ok(()),
+    }
+}
+
+fn check_rules(rules: &StageRules, settings: &StageSettings) -> Result<()> {
+    let checked = rules.check().and_then(|()| settings.check());
+    checked.map_err(|error| StoreError::Conflict(error.to_string()))
+}
+
+async fn create(tx: &mut Tx, stage: &Stage) -> Result<()> {
+    let now = tx.now;
+    stages::insert(tx, stage, now).await?;
+    let event = Event::StageCreated {
+        name: stage.name.clone(),
+        opens_at: stage.opens_at,
+        closes_at: stage.closes_at,
+        zone: stage.zone.clone(),
+        rules: stage.rules.rules.clone(),
+        settings: stage.settings.clone(),
+    };
+    tx.record(Subject::Stage(stage.id), event);
+    Ok(())
+}
+
+/// Who changes a stage.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum By {
+    Hand,
+    Configuration,
+}
+
+async fn change(tx: &mut Tx, stage: &Stage, change: StageChange, by: By) -> Result<()> {
+    let now = tx.now;
+    let mut changed = Stage {
+        name: change.name.unwrap_or_else(|| stage.name.clone()),
+        opens_at: change.opens_at.unwrap_or(stage.opens_at),
+        closes_at: change.closes_at.unwrap_or(stage.closes_at),
+        zone: change.zone.unwrap_or_else(|| stage.zone.clone()),
+        settings: change.settings.unwrap_or_else(|| stage.settings.clone()),
+        ..stage.clone()
+    };
+    let phase = stage.phase(now);
+    if phase == StagePhase::Closed {
+        return conflict(format!(
+            "the stage {:?} closed at {}, and what has closed stays as it was; make another stage",
+            stage.name.as_str(),
+            stage.closes_at.unwrap_or(now)
+        ));
+    }
+    if changed.opens_at != stage.opens_at && (phase == StagePhase::Open || changed.opens_at <= now)
+    {
+        return conflict(format!(
+            "opens_at: the stage {} at {}; only the opening of one that is to come is moved, to a time in the future",
+            if phase == StagePhase::Open {
+                "opened"
+            } else {
+                "opens"
+            },
+            stage.opens_at
+        ));
+    }
+    if (changed.opens_at, changed.closes_at) != (stage.opens_at, stage.closes_at) {
+        check_times(changed.opens_at, changed.closes_at, now)?;
+    }
+    if changed.zone != stage.zone && days::newest(tx, stage.id).await?.is_some() {
+        return conflict(format!(
+            "zone: days are named by their date in {}, and some have been; make another stage",
+            stage.zone
+        ));
+    }
+    let rules = change.rules.unwrap_or_else(|| stage.rules.rules.clone());
+    check_rules(&rules, &changed.settings)?;
+    // What a person has changed is not changed back by the next start.
+    let told = (&rules, &changed.settings, &changed.zone);
+    let by_hand = by == By::Hand && told != (&stage.rules.rules, &stage.settings, &stage.zone);
+    if changed != *stage {
+        let event = Event::StageChanged {
+            name: changed.name.clone(),
+            opens_at: changed.opens_at,
+            closes_at: changed.closes_at,
+            zone: changed.zone.clone(),
+            settings: changed.settings.clone(),
+        };
+        tx.record(Subject::Stage(stage.id), event);
+    }
+    changed.configured = stage.configured && !by_hand;
+    stages::update(tx, &changed).await?;
+    set_rules(tx, &changed, rules).await
+}
+
+/// Gives a stage other rules: another revision, unless it has not opened.
+async fn set_rules(tx: &mut Tx, stage: &Stage, rules: StageRules) -> Result<()> {
+    let is_upcoming = stage.phase(tx.now) == StagePhase::Upcoming;
+    let is_new = rules != stage.rules.rules;
+    let revision = Revision {
+        number: stage.rules.number + u32::from(is_new && !is_upcoming),
+        since: if is_upcoming { stage.opens_at } else { tx.now },
+        rules,
+    };
+    if is_upcoming {
+        stages::replace_revision(tx, stage.id, &revision).await?;
+    } else if is_new {
+        stages::insert_revision(tx, stage.id, &revision).await?;
+    }
+    if is_new {
+        let event = Event::StageRulesChanged {
+            revision: revision.number,
+            rules: revision.rules,
+        };
+        tx.record(Subject::Stage(stage.id), event);
+    }
+    Ok(())
+}
+
+impl Store {
+    /// Makes a stage. [`StoreError::StageNameTaken`] if another has its name, [`StoreError::Conflict`] if its times
+    /// or its rules cannot be, [`StoreError::SeasonClosed`] once the season is over.
+    pub async fn create_stage(&self, actor: Actor, new: NewStage, now: Timestamp) -> Result<Stage> {
+        self.write(actor, now, async |tx| {
+            season::check_open(tx).await?;
+            let opens_at = new.opens_at.max(now);
+            check_times(opens_at, new.closes_at, now)?;
+            check_rules(&new.rules, &new.settings)?;
+            let stage = Stage {
+                id: StageId::new(),
+                name: new.name,
+                opens_at,
+                closes_at: new.closes_at,
+                zone: new.zone,
+                settings: new.settings,
+                rules: Revision {
+                    number: 1,
+                    since: opens_at,
+                    rules: new.rules,
+                },
+                names_seeds: true,
+                configured: false,
+            };
+            create(tx, &stage).await?;
+            stages::find(tx, stage.id).await
+        })
+        .await
+    }
+
+    /// Changes a stage as far as it may be; other rules of one that is open are another revision.
+    /// [`StoreError::Conflict`] says what may not be changed; [`StoreError::SeasonClosed`] once the season is over.
+    pub async fn change_stage(
+        &self,
+        actor: Actor,
+        id: StageId,
+        wanted: StageChange,
+        now: Timestamp,
+    ) -> Result<Stage> {
+        self.write(actor, now, async |tx| {
+            season::check_open(tx).await?;
+            let stage = stages::find(tx, id).await?;
+            change(tx, &stage, wanted, By::Hand).await?;
+            stages::find(tx, id).await
+        })
+        .await
+    }
+
+    /// Gives the season its first stage, or the stage that follows the configuration what that says now: other rules
+    /// are another revision. A stage that was changed by hand, has closed, or belongs to a closed season stays as it
+    /// is. [`StoreError::Conflict`] if the zone is another than that of days that have been.
+    pub async fn configure_stage(
+        &self,
+        rules: StageRules,
+        settings: StageSettings,
+        zone: Zone,
+        now: Timestamp,
+    ) -> Result<()> {
+        self.write(Actor::Organiser, now, async |tx| {
+            if season::check_open(tx).await.is_err() {
+                return Ok(());
+            }
+            check_rules(&rules, &settings)?;
+            let Some(id) = stages::configured(tx).await? else {
+                if !stages::all(tx).await?.is_empty() {
+                    return Ok(());
+                }
+                let first = Stage {
+                    id: StageId::new(),
+                    name: FIRST
+                        .parse()
+                        .map_err(|error| StoreError::Damaged(format!("{FIRST}: {error}")))?,
+                    opens_at: now,
+                    closes_at: None,
+                    zone,
+                    settings,
+                    rules: Revision {
+                        number: 1,
+                        since: now,
+                        rules,
+                    },
+                    names_seeds: true,
+                    configured: true,
+                };
+                return create(tx, &first).await;
+            };
+            if stages::revisions(tx, id).await?.is_empty() {
+                // Nothing was played before there were stages.
+                let first = Revision {
+                    number: 1,
+                    since: now,
+                    rules: rules.clone(),
+                };
+                stages::insert_revision(tx, id, &first).await?;
+            }
+            let stage = stages::find(tx, id).await?;
+            if stage.phase(now) == StagePhase::Closed {
+                return Ok(());
+            }
+            let wanted = StageChange {
+                zone: Some(zone),
+                rules: Some(rules),
+                settings: Some(settings),
+                ..StageChange::default()
+            };
+            change(tx, &stage, wanted, By::Configuration).await
+        })
+        .await
+    }
+}

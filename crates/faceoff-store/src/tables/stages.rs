@@ -1,0 +1,387 @@
+use crate::{
+    column::{Instant, Json},
+    error::{Result, StoreError},
+    tables::plan::RunPlan,
+};
+use faceoff_types::{SeedLabel, StageDay, StageId, StageName, StageRules, StageSettings, Zone};
+use jiff::{Timestamp, civil::Date};
+use sqlx::{SqliteConnection, types::Text};
+
+/// A part of the season with its own days, rules and board.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stage {
+    /// Part of its URLs, and of its days' seeds.
+    pub id: StageId,
+    /// No two that differ only in case.
+    pub name: StageName,
+    /// From then on its days start, and its rules are fixed.
+    pub opens_at: Timestamp,
+    /// From then on none of its days starts; `None`: it has no end yet.
+    pub closes_at: Option<Timestamp>,
+    /// Its days are dates there.
+    pub zone: Zone,
+    /// What no score depends on.
+    pub settings: StageSettings,
+    /// What scores depend on, as they are now.
+    pub rules: Revision,
+    /// Does its id enter the seeds of its days? Not if they began before there were stages.
+    pub names_seeds: bool,
+    /// Does it take rules and settings from the server's configuration?
+    pub configured: bool,
+}
+
+/// Rules from one time on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Revision {
+    /// From 1.
+    pub number: u32,
+    /// When they became the stage's.
+    pub since: Timestamp,
+    /// Themselves.
+    pub rules: StageRules,
+}
+
+/// Where a stage is by an instant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StagePhase {
+    /// It opens later.
+    Upcoming,
+    /// Its days start.
+    Open,
+    /// It is over.
+    Closed,
+}
+
+impl Stage {
+    /// Where it is at `now`.
+    #[must_use]
+    pub fn phase(&self, now: Timestamp) -> StagePhase {
+        if now < self.opens_at {
+            StagePhase::Upcoming
+        } else if self.closes_at.is_none_or(|closes_at| now < closes_at) {
+            StagePhase::Open
+        } else {
+            StagePhase::Closed
+        }
+    }
+
+    /// Its day at `now`.
+    #[must_use]
+    pub fn day(&self, now: Timestamp) -> StageDay {
+        StageDay {
+            stage: self.id,
+            date: self.zone.date(now),
+        }
+    }
+
+    /// Its next day, if it has one, whose newest cut so far was on the date `newest`; and when the schedule starts
+    /// that, which may be due already. Without a schedule it is the earliest day that the organiser can start.
+    #[must_use]
+    pub fn next_cut(
+        &self,
+        newest: Option<Date>,
+        now: Timestamp,
+    ) -> Option<(Date, Option<Timestamp>)> {
+        let earliest = self.zone.date(now.max(self.opens_at));
+        let mut from = match newest {
+            Some(newest) if newest >= earliest => newest.tomorrow().ok()?,
+            _ => earliest,
+        };
+        let ends_before = |at: Timestamp| self.closes_at.is_some_and(|closes_at| closes_at <= at);
+        if self.phase(now) == StagePhase::Closed {
+            return None;
+        }
+        let Some(schedule) = &self.settings.schedule else {
+            let begins = from.to_zoned(self.zone.time_zone()).ok()?.timestamp();
+            return (!ends_before(begins)).then_some((from, None));
+        };
+        loop {
+            let (date, at) = schedule.next(from, &self.zone)?;
+            if ends_before(at) {
+                return None;
+            }
+            if at >= self.opens_at {
+                return Some((date, Some(at)));
+            }
+            from = date.tomorrow().ok()?;
+        }
+    }
+
+    /// What each team plays on a day by the rules as they are now.
+    #[must_use]
+    pub fn plan(&self) -> RunPlan {
+        let rules = &self.rules.rules;
+        RunPlan {
+            profile: rules.profile,
+            tasks: rules.tasks.clone(),
+            episodes_per_task: rules.episodes_per_task,
+            episodes_per_shard: self.settings.episodes_per_shard,
+            max_faults: rules.max_faults,
+        }
+    }
+
+    /// What the seeds of its evaluations on a date follow from.
+    #[must_use]
+    pub const fn seed_label(&self, date: Date) -> SeedLabel {
+        if self.names_seeds {
+            SeedLabel::StageDay(StageDay {
+                stage: self.id,
+                date,
+            })
+        } else {
+            SeedLabel::Day(date)
+        }
+    }
+}
+
+struct Row {
+    id: Text<StageId>,
+    name: Text<StageName>,
+    opens_at: Instant,
+    closes_at: Option<Instant>,
+    zone: Text<Zone>,
+    settings: Json<StageSettings>,
+    names_seeds: bool,
+    configured: bool,
+    revision: u32,
+    since: Instant,
+    rules: Json<StageRules>,
+}
+
+impl From<Row> for Stage {
+    fn from(row: Row) -> Self {
+        Self {
+            id: row.id.0,
+            name: row.name.0,
+            opens_at: row.opens_at.0,
+            closes_at: row.closes_at.map(|at| at.0),
+            zone: row.zone.0,
+            settings: row.settings.0,
+            rules: Revision {
+                number: row.revision,
+                since: row.since.0,
+                rules: row.rules.0,
+            },
+            names_seeds: row.names_seeds,
+            configured: row.configured,
+        }
+    }
+}
+
+/// All stages, the first to open first. One without rules is none yet: the program that makes it has not named them.
+pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Stage>> {
+    let rows = sqlx::query_as!(
+        Row,
+        r#"SELECT s.id AS "id: Text<StageId>", s.name AS "name: Text<StageName>", s.opens_at AS "opens_at: Instant",
+                  s.closes_at AS "closes_at: Instant", s.zone AS "zone: Text<Zone>",
+                  s.settings AS "settings: Json<StageSettings>", s.names_seeds AS "names_seeds: bool",
+                  s.configured AS "configured: bool", r.revision AS "revision: u32", r.since AS "since: Instant",
+                  r.rules AS "rules: Json<StageRules>"
+           FROM stages s JOIN stage_revisions r ON r.stage_id = s.id
+           WHERE r.revision = (SELECT MAX(n.revision) FROM stage_revisions n WHERE n.stage_id = s.id)
+           ORDER BY s.opens_at, s.id"#
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows.into_iter().map(Stage::from).collect())
+}
+
+pub(crate) async fn find(connection: &mut SqliteConnection, id: StageId) -> Result<Stage> {
+    // They are few.
+    let stages = all(connection).await?;
+    let found = stages.into_iter().find(|stage| stage.id == id);
+    found.ok_or(StoreError::NotFound("stage"))
+}
+
+/// The rules that a stage has had, the first ones first.
+pub(crate) async fn revisions(
+    connection: &mut SqliteConnection,
+    stage: StageId,
+) -> Result<Vec<Revision>> {
+    let stage = Text(stage);
+    let rows = sqlx::query!(
+        r#"SELECT revision AS "revision: u32", since AS "since: Instant", rules AS "rules: Json<StageRules>"
+           FROM stage_revisions WHERE stage_id = ? ORDER BY revision"#,
+        stage
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows
+        .into_iter()
+        .map(|row| Revision {
+            number: row.revision,
+            since: row.since.0,
+            rules: row.rules.0,
+        })
+        .collect())
+}
+
+/// The stage that takes its rules from the configuration, with or without rules as yet.
+pub(crate) async fn configured(connection: &mut SqliteConnection) -> Result<Option<StageId>> {
+    let id =
+        sqlx::query_scalar!(r#"SELECT id AS "id: Text<StageId>" FROM stages WHERE configured = 1"#)
+            .fetch_optional(connection)
+            .await?;
+    Ok(id.map(|id| id.0))
+}
+
+/// Adds a stage with its first rules. [`StoreError::StageNameTaken`] if another has its name.
+pub(crate) async fn insert(
+    connection: &mut SqliteConnection,
+    stage: &Stage,
+    now: Timestamp,
+) -> Result<()> {
+    let (id, name, opens_at) = (Text(stage.id), stage.name.as_str(), Instant(stage.opens_at));
+    let (closes_at, zone) = (stage.closes_at.map(Instant), Text(&stage.zone));
+    let (settings, now) = (Json(&stage.settings), Instant(now));
+    sqlx::query!(
+        "INSERT INTO stages (id, name, opens_at, closes_at, zone, settings, names_seeds, configured, created_at)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        id,
+        name,
+        opens_at,
+        closes_at,
+        zone,
+        settings,
+        stage.names_seeds,
+        stage.configured,
+        now,
+    )
+    .execute(&mut *connection)
+    .await
+    .map_err(|error| name_taken(error, &stage.name))?;
+    insert_revision(connection, stage.id, &stage.rules).await
+}
+
+pub(crate) async fn insert_revision(
+    connection: &mut SqliteConnection,
+    stage: StageId,
+    revision: &Revision,
+) -> Result<()> {
+    let (stage, since, rules) = (Text(stage), Instant(revision.since), Json(&revision.rules));
+    sqlx::query!(
+        "INSERT INTO stage_revisions (stage_id, revision, since, rules) VALUES (?, ?, ?, ?)",
+        stage,
+        revision.number,
+        since,
+        rules,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Replaces rules by which nothing was played.
+pub(crate) async fn replace_revision(
+    connection: &mut SqliteConnection,
+    stage: StageId,
+    revision: &Revision,
+) -> Result<()> {
+    let (stage, since, rules) = (Text(stage), Instant(revision.since), Json(&revision.rules));
+    sqlx::query!(
+        "UPDATE stage_revisions SET since = ?, rules = ? WHERE stage_id = ? AND revision = ?",
+        since,
+        rules,
+        stage,
+        revision.number,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Stores everything of a stage but its rules. [`StoreError::StageNameTaken`] if another has its name.
+pub(crate) async fn update(connection: &mut SqliteConnection, stage: &Stage) -> Result<()> {
+    let (id, name, opens_at) = (Text(stage.id), stage.name.as_str(), Instant(stage.opens_at));
+    let (closes_at, zone) = (stage.closes_at.map(Instant), Text(&stage.zone));
+    let settings = Json(&stage.settings);
+    sqlx::query!(
+        "UPDATE stages SET name = ?, opens_at = ?, closes_at = ?, zone = ?, settings = ?, configured = ?
+         WHERE id = ?",
+        name,
+        opens_at,
+        closes_at,
+        zone,
+        settings,
+        stage.configured,
+        id,
+    )
+    .execute(connection)
+    .await
+    .map_err(|error| name_taken(error, &stage.name))?;
+    Ok(())
+}
+
+fn name_taken(error: sqlx::Error, name: &StageName) -> StoreError {
+    if StoreError::is_duplicate(&error, "stages.name") {
+        StoreError::StageNameTaken(name.to_string())
+    } else {
+        error.into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use faceoff_types::{Profile, Ruleset, Schedule, Task};
+    use jiff::civil::date;
+
+    fn at(text: &str) -> Timestamp {
+        text.parse().unwrap()
+    }
+
+    fn stage(schedule: Option<Schedule>) -> Stage {
+        Stage {
+            id: StageId::new(),
+            name: "Final".parse().unwrap(),
+            opens_at: at("2026-03-02T10:00:00Z"),
+            closes_at: Some(at("2026-03-05T10:00:00Z")),
+            zone: "Europe/Berlin".parse().unwrap(),
+            settings: StageSettings {
+                schedule,
+                ..StageSettings::default()
+            },
+            rules: Revision {
+                number: 1,
+                since: at("2026-03-02T10:00:00Z"),
+                rules: StageRules {
+                    ruleset: Ruleset::CURRENT,
+                    profile: Profile::Evaluation,
+                    tasks: Task::ALL.to_vec(),
+                    episodes_per_task: 1,
+                    max_faults: 1,
+                },
+            },
+            names_seeds: true,
+            configured: false,
+        }
+    }
+
+    #[test]
+    fn the_next_cut_is_the_first_of_the_schedule_between_opening_and_closing() {
+        // 06:00 in Berlin is 05:00 UTC.
+        let stage = stage(Some(Schedule::daily("06:00".parse().unwrap())));
+        let next = |newest, now: &str| {
+            let (date, starts) = stage.next_cut(newest, at(now))?;
+            Some((date, starts.unwrap().to_string()))
+        };
+        let third = Some((date(2026, 3, 3), "2026-03-03T05:00:00Z".to_owned()));
+        let fourth = Some((date(2026, 3, 4), "2026-03-04T05:00:00Z".to_owned()));
+        assert_eq!(next(None, "2026-02-01T00:00:00Z"), third, "after it opens");
+        assert_eq!(next(None, "2026-03-02T12:00:00Z"), third);
+        assert_eq!(next(None, "2026-03-03T09:00:00Z"), third, "it is due");
+        assert_eq!(next(Some(date(2026, 3, 3)), "2026-03-03T09:00:00Z"), fourth);
+        assert_eq!(next(Some(date(2026, 3, 5)), "2026-03-05T09:00:00Z"), None);
+        assert_eq!(next(None, "2026-03-05T10:00:00Z"), None, "closed");
+    }
+
+    #[test]
+    fn without_a_schedule_it_is_the_next_date_that_has_had_none() {
+        let stage = stage(None);
+        let next = |newest, now: &str| stage.next_cut(newest, at(now)).map(|(date, _)| date);
+        assert_eq!(next(None, "2026-02-01T00:00:00Z"), Some(date(2026, 3, 2)));
+        let second = Some(date(2026, 3, 2));
+        assert_eq!(next(second, "2026-03-02T22:59:00Z"), Some(date(2026, 3, 3)));
+        assert_eq!(next(Some(date(2026, 3, 5)), "2026-03-05T09:00:00Z"), None);
+    }
+}

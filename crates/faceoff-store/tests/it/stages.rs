@@ -1,0 +1,460 @@
+//! Stages: their days, their rules by revision, and what of them may be changed when.
+
+use crate::fixture::*;
+use faceoff_store::*;
+use faceoff_types::*;
+use jiff::{SignedDuration, Timestamp, civil::date};
+
+fn at(text: &str) -> Timestamp {
+    text.parse().unwrap()
+}
+
+/// Open from the fixture's first moment until the third of March.
+fn second() -> NewStage {
+    let (rules, settings) = rules_of(&small());
+    NewStage {
+        name: "Warm-up".parse().unwrap(),
+        opens_at: at("2026-03-01T10:00:00Z"),
+        closes_at: Some(at("2026-03-03T10:00:00Z")),
+        zone: Zone::UTC,
+        rules,
+        settings,
+    }
+}
+
+async fn made(f: &Fixture, new: NewStage) -> Stage {
+    let made = f.store.create_stage(Actor::Organiser, new, f.now);
+    made.await.unwrap()
+}
+
+async fn start(f: &Fixture, stage: StageId) -> Result<Vec<Evaluation>, StoreError> {
+    f.store.start_day(Actor::Organiser, stage, f.now).await
+}
+
+async fn change(f: &Fixture, stage: StageId, change: StageChange) -> Result<Stage, StoreError> {
+    let changed = f.store.change_stage(Actor::Organiser, stage, change, f.now);
+    changed.await
+}
+
+#[track_caller]
+fn refused<T: std::fmt::Debug>(done: Result<T, StoreError>, words: &[&str]) {
+    let Err(StoreError::Conflict(why)) = done else {
+        panic!("expected a conflict with {words:?}: {done:?}");
+    };
+    for word in words {
+        assert!(why.contains(word), "{word:?} is not in {why:?}");
+    }
+}
+
+/// Plays all that is queued, to the same score each.
+async fn play_all(f: &Fixture, score: f64) {
+    while let Some(Claimed { claim, work }) = f.claim().await {
+        match work {
+            Work::Shard { shard, .. } => {
+                f.play(&claim, &shard, 0).await;
+            }
+            Work::Finalise { .. } => {
+                f.finish(&claim, score, "d").await;
+            }
+            Work::Smoke { .. } => panic!("no upload waits"),
+        }
+    }
+}
+
+#[tokio::test]
+async fn stages_have_their_own_days_seeds_and_boards() {
+    let f = Fixture::new().await;
+    let agent = f.ready_team("Alpha").await;
+    let first = f.stage(&small()).await;
+    let second = made(&f, second()).await.id;
+    let secret = f.store.season().await.unwrap().secret;
+    let date = date(2026, 3, 1);
+    let mut seeds = Vec::new();
+    for (stage, score) in [(first, 10.0), (second, 20.0)] {
+        let started = start(&f, stage).await.unwrap();
+        assert_eq!(started.len(), 1);
+        assert_eq!(started[0].of, StageDay { stage, date });
+        assert_eq!(started[0].submission, agent.id);
+        let again = start(&f, stage).await;
+        assert!(
+            matches!(again, Err(StoreError::DayHasCut { .. })),
+            "{again:?}"
+        );
+        let claimed = f.claim().await.unwrap();
+        let Work::Shard {
+            seeds: found,
+            shard,
+            ..
+        } = claimed.work
+        else {
+            panic!("expected a shard");
+        };
+        assert_eq!(found.episodes, secret.stage(stage).day(date));
+        assert_eq!(found.mismatch, secret.model_mismatch());
+        seeds.push(found.episodes);
+        f.play(&claimed.claim, &shard, 0).await;
+        play_all(&f, score).await;
+        let board = f.store.board(stage, 1).await.unwrap();
+        assert_eq!(board.len(), 1);
+        assert_eq!(board[0].result.score, score);
+        assert!(
+            board[0].released_at.is_some(),
+            "the other stage's day is its own"
+        );
+    }
+    assert_ne!(seeds[0], seeds[1]);
+    assert_eq!(f.store.evaluations_on(date).await.unwrap().len(), 2);
+    let of = StageDay {
+        stage: second,
+        date,
+    };
+    assert_eq!(f.store.evaluations_of_day(of).await.unwrap().len(), 1);
+    assert_eq!(f.store.days().await.unwrap().len(), 2);
+}
+
+#[tokio::test]
+async fn a_day_is_the_date_in_the_stages_zone() {
+    let mut f = Fixture::new().await;
+    f.ready_team("Alpha").await;
+    let auckland = NewStage {
+        zone: "Pacific/Auckland".parse().unwrap(),
+        ..second()
+    };
+    let stage = made(&f, auckland).await.id;
+    let day = |started: Vec<Evaluation>| started[0].of.date;
+    assert_eq!(day(start(&f, stage).await.unwrap()), date(2026, 3, 1));
+    play_all(&f, 1.0).await;
+    // Midnight there is 11:00 UTC.
+    f.now = at("2026-03-01T10:59:59Z");
+    assert!(matches!(
+        start(&f, stage).await,
+        Err(StoreError::DayHasCut { .. })
+    ));
+    f.now = at("2026-03-01T11:00:00Z");
+    assert_eq!(day(start(&f, stage).await.unwrap()), date(2026, 3, 2));
+}
+
+#[tokio::test]
+async fn days_start_from_the_opening_to_the_closing_to_the_millisecond() {
+    let mut f = Fixture::new().await;
+    f.ready_team("Alpha").await;
+    let later = NewStage {
+        opens_at: at("2026-03-02T10:00:00Z"),
+        ..second()
+    };
+    let stage = made(&f, later).await;
+    assert_eq!(stage.phase(f.now), StagePhase::Upcoming);
+    f.now = stage.opens_at - SignedDuration::from_millis(1);
+    let early = start(&f, stage.id).await;
+    let Err(
+        error @ StoreError::StageNotOpen {
+            closed_at: None, ..
+        },
+    ) = early
+    else {
+        panic!("{early:?}");
+    };
+    assert!(
+        error.to_string().contains("opens at 2026-03-02T10:00:00Z"),
+        "{error}"
+    );
+    assert_eq!(
+        f.store.start_scheduled_day(stage.id, f.now).await.unwrap(),
+        None
+    );
+    f.now = stage.opens_at;
+    assert_eq!(start(&f, stage.id).await.unwrap().len(), 1);
+
+    let closes_at = stage.closes_at.unwrap();
+    f.now = closes_at - SignedDuration::from_millis(1);
+    assert_eq!(
+        start(&f, stage.id).await.unwrap().len(),
+        1,
+        "the last moment"
+    );
+    f.now = closes_at;
+    assert_eq!(stage.phase(f.now), StagePhase::Closed);
+    let late = start(&f, stage.id).await;
+    assert!(
+        matches!(late, Err(StoreError::StageNotOpen { closed_at: Some(at), .. }) if at == closes_at),
+        "{late:?}"
+    );
+    assert_eq!(
+        f.store.start_scheduled_day(stage.id, f.now).await.unwrap(),
+        None
+    );
+    // What had its cut in time is played to its end, and what we break of it is played again.
+    assert!(f.claim().await.is_some());
+}
+
+#[tokio::test]
+async fn other_rules_of_an_open_stage_are_another_revision_and_another_board() {
+    let mut f = Fixture::new().await;
+    f.ready_team("Alpha").await;
+    let stage = made(&f, second()).await;
+    start(&f, stage.id).await.unwrap();
+    play_all(&f, 10.0).await;
+
+    let rules = StageRules {
+        episodes_per_task: 2,
+        ..stage.rules.rules.clone()
+    };
+    let others = StageChange {
+        rules: Some(rules.clone()),
+        ..StageChange::default()
+    };
+    f.later(60);
+    let changed = change(&f, stage.id, others.clone()).await.unwrap();
+    assert_eq!((changed.rules.number, changed.rules.since), (2, f.now));
+    let same = change(&f, stage.id, others).await.unwrap();
+    assert_eq!(same, changed, "the same again is no change");
+    assert_eq!(f.store.board_revision(&same).await.unwrap(), 1, "as yet");
+
+    f.now = at("2026-03-02T10:00:00Z");
+    let started = start(&f, stage.id).await.unwrap().remove(0);
+    assert_eq!((started.revision, started.plan.episodes_per_task), (2, 2));
+    play_all(&f, 20.0).await;
+    assert_eq!(f.store.board_revision(&same).await.unwrap(), 2);
+    for (revision, score) in [(1, 10.0), (2, 20.0)] {
+        let board = f.store.board(stage.id, revision).await.unwrap();
+        assert_eq!(board.len(), 1);
+        assert_eq!(board[0].result.score, score);
+    }
+    let revisions = f.store.stage_revisions(stage.id).await.unwrap();
+    let told: Vec<_> = revisions
+        .iter()
+        .map(|one| (one.number, &one.rules))
+        .collect();
+    assert_eq!(told, [(1, &stage.rules.rules), (2, &rules)]);
+    let events = f.store.events_after(0, 1000).await.unwrap();
+    let revised = events.iter().filter(|record| {
+        record.event
+            == Event::StageRulesChanged {
+                revision: 2,
+                rules: rules.clone(),
+            }
+    });
+    assert_eq!(revised.count(), 1);
+}
+
+#[tokio::test]
+async fn settings_are_no_rules() {
+    let f = Fixture::new().await;
+    f.ready_team("Alpha").await;
+    let stage = made(&f, second()).await;
+    let settings = StageSettings {
+        schedule: Some(Schedule::daily("06:00".parse().unwrap())),
+        ablation_episodes: 3,
+        episodes_per_shard: 7,
+    };
+    let others = StageChange {
+        settings: Some(settings.clone()),
+        closes_at: Some(None),
+        name: Some("Qualifying 2".parse().unwrap()),
+        ..StageChange::default()
+    };
+    let changed = change(&f, stage.id, others).await.unwrap();
+    assert_eq!((changed.settings, changed.closes_at), (settings, None));
+    assert_eq!(changed.name.as_str(), "Qualifying 2");
+    assert_eq!(changed.rules, stage.rules);
+}
+
+#[tokio::test]
+async fn what_has_begun_is_not_changed() {
+    let mut f = Fixture::new().await;
+    f.ready_team("Alpha").await;
+    let open = made(&f, second()).await;
+    let upcoming = NewStage {
+        name: "Final".parse().unwrap(),
+        opens_at: at("2026-03-02T10:00:00Z"),
+        ..second()
+    };
+    let upcoming = made(&f, upcoming).await;
+    let opening = |text| StageChange {
+        opens_at: Some(at(text)),
+        ..StageChange::default()
+    };
+    let closing = |text| StageChange {
+        closes_at: Some(Some(at(text))),
+        ..StageChange::default()
+    };
+    let zone = || StageChange {
+        zone: Some("Europe/Berlin".parse().unwrap()),
+        ..StageChange::default()
+    };
+    let name = |text: &str| StageChange {
+        name: Some(text.parse().unwrap()),
+        ..StageChange::default()
+    };
+    refused(
+        change(&f, open.id, opening("2026-03-02T00:00:00Z")).await,
+        &["opens_at", "opened at 2026-03-01T10:00:00Z"],
+    );
+    refused(
+        change(&f, upcoming.id, opening("2026-03-01T09:00:00Z")).await,
+        &["opens_at", "future"],
+    );
+    refused(
+        change(&f, upcoming.id, opening("2026-03-04T10:00:00Z")).await,
+        &["closes_at", "after the opening"],
+    );
+    refused(
+        change(&f, open.id, closing("2026-03-01T10:00:00Z")).await,
+        &["closes_at"],
+    );
+    let taken = change(&f, upcoming.id, name("warm-UP")).await;
+    assert!(
+        matches!(taken, Err(StoreError::StageNameTaken(_))),
+        "{taken:?}"
+    );
+    change(&f, open.id, zone()).await.unwrap();
+
+    // Before it opens, other rules take the place of those by which nothing was played.
+    let moved = StageChange {
+        rules: Some(StageRules {
+            episodes_per_task: 9,
+            ..upcoming.rules.rules.clone()
+        }),
+        ..opening("2026-03-02T12:00:00Z")
+    };
+    let moved = change(&f, upcoming.id, moved).await.unwrap();
+    assert_eq!(
+        (
+            moved.rules.number,
+            moved.rules.since,
+            moved.rules.rules.episodes_per_task
+        ),
+        (1, at("2026-03-02T12:00:00Z"), 9)
+    );
+
+    start(&f, open.id).await.unwrap();
+    let utc = StageChange {
+        zone: Some(Zone::UTC),
+        ..StageChange::default()
+    };
+    refused(change(&f, open.id, utc).await, &["zone", "Europe/Berlin"]);
+    f.now = open.closes_at.unwrap();
+    refused(
+        change(&f, open.id, name("Done")).await,
+        &["closed at", "another stage"],
+    );
+    refused(
+        change(&f, open.id, closing("2026-03-09T10:00:00Z")).await,
+        &["closed at"],
+    );
+    let none = StageId::new();
+    let unknown = change(&f, none, name("Done")).await;
+    assert!(
+        matches!(unknown, Err(StoreError::NotFound("stage"))),
+        "{unknown:?}"
+    );
+}
+
+#[tokio::test]
+async fn stages_that_cannot_be_are_refused_whole() {
+    let mut f = Fixture::new().await;
+    let bad_times = NewStage {
+        closes_at: Some(at("2026-03-01T09:00:00Z")),
+        ..second()
+    };
+    let no_tasks = NewStage {
+        rules: StageRules {
+            tasks: Vec::new(),
+            ..second().rules
+        },
+        ..second()
+    };
+    let no_shards = NewStage {
+        settings: StageSettings {
+            episodes_per_shard: 0,
+            ..second().settings
+        },
+        ..second()
+    };
+    for (new, word) in [
+        (bad_times, "closes_at"),
+        (no_tasks, "tasks"),
+        (no_shards, "episodes_per_shard"),
+    ] {
+        let made = f.store.create_stage(Actor::Organiser, new, f.now).await;
+        refused(made, &[word]);
+    }
+    assert_eq!(f.store.stages().await.unwrap(), []);
+    assert_eq!(f.store.events_after(0, 10).await.unwrap(), []);
+    f.store.close_season(Actor::Organiser, f.now).await.unwrap();
+    f.later(1);
+    let late = f
+        .store
+        .create_stage(Actor::Organiser, second(), f.now)
+        .await;
+    assert!(
+        matches!(late, Err(StoreError::SeasonClosed { .. })),
+        "{late:?}"
+    );
+}
+
+#[tokio::test]
+async fn the_first_stage_follows_the_configuration_until_a_hand_changes_it() {
+    let mut f = Fixture::new().await;
+    let told = async |f: &Fixture, plan: &RunPlan| {
+        let (rules, settings) = rules_of(plan);
+        let told = f.store.configure_stage(rules, settings, Zone::UTC, f.now);
+        told.await.unwrap();
+        f.store.stages().await.unwrap()
+    };
+    let first = told(&f, &plan()).await;
+    assert_eq!(first.len(), 1);
+    assert!(first[0].configured && first[0].names_seeds);
+    assert_eq!(first[0].plan(), plan());
+    f.later(60);
+    assert_eq!(
+        told(&f, &plan()).await,
+        first,
+        "the same again is no change"
+    );
+    let second = told(&f, &small()).await;
+    assert_eq!((second[0].id, second[0].rules.number), (first[0].id, 2));
+    assert_eq!(second[0].plan(), small());
+
+    let by_hand = StageChange {
+        rules: Some(first[0].rules.rules.clone()),
+        ..StageChange::default()
+    };
+    let changed = change(&f, first[0].id, by_hand).await.unwrap();
+    assert_eq!((changed.rules.number, changed.configured), (3, false));
+    assert_eq!(told(&f, &small()).await, [changed]);
+}
+
+#[tokio::test]
+async fn the_current_stage_is_the_open_one_or_the_nearest() {
+    let f = Fixture::new().await;
+    let current = async |text: &str| {
+        let current = f.store.current_stage(at(text)).await.unwrap();
+        current.map(|stage| stage.name.to_string())
+    };
+    assert_eq!(current("2026-03-01T10:00:00Z").await, None);
+    for (name, opens_at, closes_at) in [
+        ("A", "2026-03-02T00:00:00Z", "2026-03-04T00:00:00Z"),
+        ("B", "2026-03-03T00:00:00Z", "2026-03-05T00:00:00Z"),
+        ("C", "2026-03-07T00:00:00Z", "2026-03-08T00:00:00Z"),
+    ] {
+        let new = NewStage {
+            name: name.parse().unwrap(),
+            opens_at: at(opens_at),
+            closes_at: Some(at(closes_at)),
+            ..second()
+        };
+        made(&f, new).await;
+    }
+    for (now, expected) in [
+        ("2026-03-01T10:00:00Z", "A"),
+        ("2026-03-02T10:00:00Z", "A"),
+        ("2026-03-03T10:00:00Z", "B"),
+        ("2026-03-04T10:00:00Z", "B"),
+        ("2026-03-06T10:00:00Z", "B"),
+        ("2026-03-07T10:00:00Z", "C"),
+        ("2026-03-09T10:00:00Z", "C"),
+    ] {
+        assert_eq!(current(now).await.as_deref(), Some(expected), "{now}");
+    }
+}

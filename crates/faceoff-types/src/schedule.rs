@@ -1,0 +1,283 @@
+use crate::Zone;
+use croner::{
+    Cron,
+    errors::CronError,
+    parser::{CronParser, Seconds, Year},
+};
+use jiff::{
+    Span, Timestamp,
+    civil::{Date, Time},
+};
+use serde::{Deserialize, Serialize};
+
+/// When the days of a stage start: once on each date that it names, in the stage's zone.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "Fields", into = "Fields")]
+pub struct Schedule {
+    at: At,
+    days_off: Vec<Date>,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum At {
+    Daily(Time),
+    /// As it was given; what it is parsed to has 100 times its size.
+    Cron(String),
+}
+
+/// A schedule as JSON and TOML have it.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+struct Fields {
+    /// Every day at this time; or else `cron`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<String>, example = "06:00:00"))]
+    daily: Option<Time>,
+    /// At the first time of each date that it names: minute, hour, day of the month, month, day of the week.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "openapi", schema(example = "0 6 * * 1-5"))]
+    cron: Option<String>,
+    /// Dates on which no day starts.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    days_off: Vec<Date>,
+}
+
+#[cfg(feature = "openapi")]
+impl utoipa::PartialSchema for Schedule {
+    fn schema() -> utoipa::openapi::RefOr<utoipa::openapi::Schema> {
+        Fields::schema()
+    }
+}
+
+#[cfg(feature = "openapi")]
+impl utoipa::ToSchema for Schedule {}
+
+/// Why something is no schedule.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum InvalidSchedule {
+    /// Neither or both.
+    #[error(
+        "a schedule has either `daily`, a time as \"06:00\", or `cron`, five fields as \"0 6 * * 1-5\""
+    )]
+    Which,
+    /// No expression, or one that never comes true.
+    #[error(
+        "{pattern:?} is no schedule of five fields (minute, hour, day of the month, month, day of the week): {why}"
+    )]
+    Cron {
+        /// As it was given.
+        pattern: String,
+        /// What is wrong.
+        why: String,
+    },
+}
+
+/// How far ahead a cut is looked for: a rare one, and the longest of holidays.
+const HORIZON_DAYS: i64 = 366 * 9;
+
+impl Schedule {
+    /// Every day at a time.
+    #[must_use]
+    pub const fn daily(at: Time) -> Self {
+        Self {
+            at: At::Daily(at),
+            days_off: Vec::new(),
+        }
+    }
+
+    /// At the first time of each date that an expression of five fields names, or one as `@daily`.
+    ///
+    /// # Errors
+    /// If it is none, or names no date at all.
+    pub fn cron(pattern: &str) -> Result<Self, InvalidSchedule> {
+        let wrong = |why: String| InvalidSchedule::Cron {
+            pattern: pattern.to_owned(),
+            why,
+        };
+        parse(pattern).map_err(|error| wrong(error.to_string()))?;
+        let schedule = Self {
+            at: At::Cron(pattern.to_owned()),
+            days_off: Vec::new(),
+        };
+        // One of a leap day's comes within eight years.
+        match schedule.next(jiff::civil::date(2000, 1, 1), &Zone::UTC) {
+            Some(_) => Ok(schedule),
+            None => Err(wrong("there is no such date".to_owned())),
+        }
+    }
+
+    /// Without these dates.
+    #[must_use]
+    pub fn without(mut self, mut days_off: Vec<Date>) -> Self {
+        days_off.sort_unstable();
+        days_off.dedup();
+        self.days_off = days_off;
+        self
+    }
+
+    /// When the day of this date starts; `None` if none does.
+    #[must_use]
+    pub fn on(&self, date: Date, zone: &Zone) -> Option<Timestamp> {
+        let (found, at) = self.first_from(date, zone)?;
+        (found == date && !self.days_off.contains(&date)).then_some(at)
+    }
+
+    /// The first day that starts on this date or later.
+    #[must_use]
+    pub fn next(&self, mut from: Date, zone: &Zone) -> Option<(Date, Timestamp)> {
+        let horizon = from.checked_add(Span::new().days(HORIZON_DAYS)).ok()?;
+        while from <= horizon {
+            let (date, at) = self.first_from(from, zone)?;
+            if !self.days_off.contains(&date) {
+                return Some((date, at));
+            }
+            from = date.tomorrow().ok()?;
+        }
+        None
+    }
+
+    /// The same, days off or not. A time that a change of the clocks leaves out comes when they have changed.
+    fn first_from(&self, from: Date, zone: &Zone) -> Option<(Date, Timestamp)> {
+        match &self.at {
+            At::Daily(at) => {
+                let start = from.to_datetime(*at).to_zoned(zone.time_zone()).ok()?;
+                Some((from, start.timestamp()))
+            }
+            At::Cron(pattern) => {
+                let midnight = from.to_zoned(zone.time_zone()).ok()?;
+                let start = parse(pattern).ok()?.find_next_occurrence(&midnight, true);
+                let start = start.ok()?;
+                Some((start.date(), start.timestamp()))
+            }
+        }
+    }
+}
+
+fn parse(pattern: &str) -> Result<Cron, CronError> {
+    CronParser::builder()
+        .seconds(Seconds::Disallowed)
+        .year(Year::Disallowed)
+        .build()
+        .parse(pattern)
+}
+
+impl TryFrom<Fields> for Schedule {
+    type Error = InvalidSchedule;
+    fn try_from(fields: Fields) -> Result<Self, InvalidSchedule> {
+        let schedule = match (fields.daily, fields.cron) {
+            (Some(at), None) => Self::daily(at),
+            (None, Some(pattern)) => Self::cron(&pattern)?,
+            _ => return Err(InvalidSchedule::Which),
+        };
+        Ok(schedule.without(fields.days_off))
+    }
+}
+
+impl From<Schedule> for Fields {
+    fn from(Schedule { at, days_off }: Schedule) -> Self {
+        let (daily, cron) = match at {
+            At::Daily(at) => (Some(at), None),
+            At::Cron(pattern) => (None, Some(pattern)),
+        };
+        Self {
+            daily,
+            cron,
+            days_off,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use jiff::civil::date;
+
+    fn starts(schedule: &Schedule, zone: &str, from: Date, count: usize) -> Vec<String> {
+        let zone: Zone = zone.parse().unwrap();
+        let mut from = from;
+        let next = || {
+            let (date, at) = schedule.next(from, &zone)?;
+            assert_eq!(schedule.on(date, &zone), Some(at));
+            from = date.tomorrow().unwrap();
+            Some(format!("{date} {at}"))
+        };
+        std::iter::from_fn(next).take(count).collect()
+    }
+
+    #[test]
+    fn a_daily_time_is_that_of_the_zone_through_both_changes_of_the_clocks() {
+        let at = Schedule::daily("02:30".parse().unwrap());
+        assert_eq!(
+            starts(&at, "Europe/Berlin", date(2026, 3, 28), 3),
+            [
+                "2026-03-28 2026-03-28T01:30:00Z",
+                // There is no 02:30 on that date: the clocks go from 02:00 to 03:00.
+                "2026-03-29 2026-03-29T01:30:00Z",
+                "2026-03-30 2026-03-30T00:30:00Z",
+            ]
+        );
+        // There are two: the first.
+        assert_eq!(
+            starts(&at, "Europe/Berlin", date(2026, 10, 25), 1),
+            ["2026-10-25 2026-10-25T00:30:00Z"]
+        );
+    }
+
+    #[test]
+    fn an_expression_starts_a_day_at_the_first_of_its_times() {
+        let weekdays = Schedule::cron("0 6,18 * * 1-5").unwrap();
+        assert_eq!(
+            starts(&weekdays, "America/New_York", date(2026, 11, 20), 3),
+            [
+                "2026-11-20 2026-11-20T11:00:00Z",
+                "2026-11-23 2026-11-23T11:00:00Z",
+                "2026-11-24 2026-11-24T11:00:00Z",
+            ]
+        );
+        assert_eq!(weekdays.on(date(2026, 11, 21), &Zone::UTC), None);
+        let leap = Schedule::cron("0 0 29 2 *").unwrap();
+        assert_eq!(
+            starts(&leap, "UTC", date(2026, 1, 1), 1),
+            ["2028-02-29 2028-02-29T00:00:00Z"]
+        );
+    }
+
+    #[test]
+    fn no_day_starts_on_a_day_off() {
+        let days_off = vec![date(2026, 12, 25), date(2026, 12, 24)];
+        let schedule = Schedule::daily("06:00".parse().unwrap()).without(days_off);
+        assert_eq!(
+            starts(&schedule, "UTC", date(2026, 12, 23), 2),
+            [
+                "2026-12-23 2026-12-23T06:00:00Z",
+                "2026-12-26 2026-12-26T06:00:00Z"
+            ]
+        );
+        assert_eq!(schedule.on(date(2026, 12, 24), &Zone::UTC), None);
+    }
+
+    #[test]
+    fn schedules_read_back_and_others_are_told_what_one_is() {
+        for text in [
+            r#"{"daily":"06:00:00"}"#,
+            r#"{"cron":"0 6 * * 1-5","days_off":["2026-12-24"]}"#,
+        ] {
+            let schedule: Schedule = serde_json::from_str(text).unwrap();
+            assert_eq!(serde_json::to_string(&schedule).unwrap(), text);
+        }
+        for (wrong, named) in [
+            ("{}", "either `daily`"),
+            (r#"{"daily":"06:00","cron":"0 6 * * *"}"#, "either `daily`"),
+            (r#"{"cron":"0 6 * *"}"#, "five fields"),
+            (r#"{"cron":"0 0 6 * * *"}"#, "five fields"),
+            (r#"{"cron":"99 6 * * *"}"#, "five fields"),
+            (r#"{"cron":"0 0 30 2 *"}"#, "no such date"),
+            (r#"{"daily":"25:00"}"#, "hour"),
+            (r#"{"dayly":"05:00"}"#, "dayly"),
+        ] {
+            let error = serde_json::from_str::<Schedule>(wrong).unwrap_err();
+            assert!(error.to_string().contains(named), "{wrong}: {error}");
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! `faceoff admin stage`: makes, changes and lists the season's stages.
+
+use super::{or_none, print};
+use crate::client::Client;
+use anyhow::{Context, bail, ensure};
+use clap::{Args, Subcommand};
+use faceoff_http::{
+    requests::{NewStage, StageChange},
+    views::stage::{PhaseView, StageView},
+};
+use faceoff_types::{Profile, Schedule, StageId, Task, Zone};
+use jiff::{
+    Timestamp, Zoned,
+    civil::{Date, DateTime, Time},
+};
+
+#[derive(Debug, Subcommand)]
+pub(super) enum StageAction {
+    /// List the stages with their times and rules
+    List,
+    /// Make a stage: what is left out is as in the stage that is open
+    Create {
+        /// 1 to 40 letters, digits, spaces and . _ -
+        name: String,
+        #[command(flatten)]
+        wanted: Wanted,
+    },
+    /// Change a stage: what is left out stays as it is
+    Change {
+        /// The stage's name or id
+        stage: String,
+        /// Another name
+        #[arg(long, value_name = "NAME")]
+        rename: Option<String>,
+        #[command(flatten)]
+        wanted: Wanted,
+        /// No end as yet
+        #[arg(long, conflicts_with = "closes")]
+        open_end: bool,
+        /// The organiser starts the days
+        #[arg(long, conflicts_with_all = ["daily", "cron"])]
+        no_schedule: bool,
+        /// The stage's name, if it is open and gets other rules: its board begins anew then
+        #[arg(long, value_name = "NAME")]
+        confirm: Option<String>,
+    },
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Wanted {
+    /// When it opens: "2026-12-01 06:00" in its zone, or with an offset; left out at its making, now
+    #[arg(long, value_name = "TIME")]
+    opens: Option<String>,
+    /// When it closes; left out at its making, it has no end yet
+    #[arg(long, value_name = "TIME")]
+    closes: Option<String>,
+    /// Time zone of its days and its schedule, e.g. Europe/Berlin
+    #[arg(long, value_name = "NAME")]
+    zone: Option<Zone>,
+    /// Perturbation profile
+    #[arg(long)]
+    profile: Option<Profile>,
+    /// Tasks, e.g. hit,defend
+    #[arg(long, value_delimiter = ',', value_name = "TASKS")]
+    tasks: Option<Vec<Task>>,
+    /// Episodes of each task on a day
+    #[arg(long)]
+    episodes: Option<u32>,
+    /// More agent faults than this: no score
+    #[arg(long)]
+    max_faults: Option<u32>,
+    /// Its days start every day at this time
+    #[arg(long, value_name = "HH:MM", conflicts_with = "cron")]
+    daily: Option<Time>,
+    /// Its days start at the first of these times of a date, e.g. "0 6 * * 1-5"
+    #[arg(long, value_name = "EXPRESSION")]
+    cron: Option<String>,
+    /// Dates without a day, with --daily or --cron, e.g. 2026-12-24,2026-12-25
+    #[arg(long, value_delimiter = ',', value_name = "DATES")]
+    days_off: Option<Vec<Date>>,
+    /// Episodes per task and profile of the ablation of every submission that the schedule starts; 0: none
+    #[arg(long)]
+    ablation_episodes: Option<u32>,
+    /// Episodes of one unit of work
+    #[arg(long)]
+    episodes_per_shard: Option<u32>,
+}
+
+impl Wanted {
+    fn schedule(&self) -> anyhow::Result<Option<Schedule>> {
+        let schedule = match (self.daily, &self.cron) {
+            (Some(at), _) => Schedule::daily(at),
+            (None, Some(pattern)) => Schedule::cron(pattern).context("--cron")?,
+            (None, None) => {
+                ensure!(
+                    self.days_off.is_none(),
+                    "--days-off goes with --daily or --cron: say when days start, too"
+                );
+                return Ok(None);
+            }
+        };
+        Ok(Some(
+            schedule.without(self.days_off.clone().unwrap_or_default()),
+        ))
+    }
+}
+
+/// An instant as people write it: with an offset or a zone, or by the clocks of `zone`.
+fn instant(text: &str, zone: &Zone) -> anyhow::Result<Timestamp> {
+    if let Ok(at) = text.parse::<Timestamp>() {
+        return Ok(at);
+    }
+    if let Ok(at) = text.parse::<Zoned>() {
+        return Ok(at.timestamp());
+    }
+    let there: DateTime = text.parse().ok().with_context(|| {
+        format!(
+            "{text:?} is no time: expected one as \"2026-12-01 06:00\" ({zone}), or with an offset as \
+             2026-12-01T06:00+01:00"
+        )
+    })?;
+    let at = there.to_zoned(zone.time_zone());
+    Ok(at
+        .with_context(|| format!("the time {text:?}"))?
+        .timestamp())
+}
+
+pub(super) async fn find(client: &Client, wanted: &str) -> anyhow::Result<StageView> {
+    let stages = client.stages().await?;
+    let id: Option<StageId> = wanted.parse().ok();
+    let named = |stage: &StageView| stage.name.as_str().eq_ignore_ascii_case(wanted);
+    let found = stages
+        .into_iter()
+        .find(|stage| Some(stage.id) == id || named(stage));
+    match found {
+        Some(stage) => Ok(stage),
+        None => bail!("no stage is named {wanted:?}; faceoff admin stage list names them"),
+    }
+}
+
+pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> anyhow::Result<()> {
+    match action {
+        StageAction::List => {
+            let stages = client.stages().await?;
+            print(json, &stages, || {
+                or_none(stages.iter().map(told).collect(), "no stage")
+            })
+        }
+        StageAction::Create { name, wanted } => {
+            let zone = match &wanted.zone {
+                Some(zone) => zone.clone(),
+                None => like(client).await?,
+            };
+            let at = |text: &Option<String>| {
+                let at = text.as_deref().map(|text| instant(text, &zone));
+                at.transpose()
+            };
+            let new = NewStage {
+                name,
+                opens_at: at(&wanted.opens)?,
+                closes_at: at(&wanted.closes)?,
+                schedule: wanted.schedule()?,
+                zone: wanted.zone,
+                profile: wanted.profile,
+                tasks: wanted.tasks,
+                episodes_per_task: wanted.episodes,
+                max_faults: wanted.max_faults,
+                ablation_episodes: wanted.ablation_episodes,
+                episodes_per_shard: wanted.episodes_per_shard,
+            };
+            let made = client.create_stage(&new).await?;
+            print(json, &made, || told(&made))
+        }
+        StageAction::Change {
+            stage,
+            rename,
+            wanted,
+            open_end,
+            no_schedule,
+            confirm,
+        } => {
+            let stage = find(client, &stage).await?;
+            let zone = wanted.zone.clone().unwrap_or_else(|| stage.zone.clone());
+            let at = |text: &Option<String>| {
+                let at = text.as_deref().map(|text| instant(text, &zone));
+                at.transpose()
+            };
+            let schedule = wanted.schedule()?.map(Some).or(no_schedule.then_some(None));
+            let change = StageChange {
+                name: rename,
+                opens_at: at(&wanted.opens)?,
+                closes_at: at(&wanted.closes)?.map(Some).or(open_end.then_some(None)),
+                schedule,
+                zone: wanted.zone,
+                profile: wanted.profile,
+                tasks: wanted.tasks,
+                episodes_per_task: wanted.episodes,
+                max_faults: wanted.max_faults,
+                ablation_episodes: wanted.ablation_episodes,
+                episodes_per_shard: wanted.episodes_per_shard,
+                confirm,
+            };
+            let changed = client.change_stage(stage.id, &change).await?;
+            print(json, &changed, || told(&changed))
+        }
+    }
+}
+
+/// The zone of the stage that is open, or of the last.
+async fn like(client: &Client) -> anyhow::Result<Zone> {
+    let stages = client.stages().await?;
+    let open = stages.iter().rfind(|stage| stage.phase == PhaseView::Open);
+    let like = open.or(stages.last());
+    Ok(like.map_or(Zone::UTC, |stage| stage.zone.clone()))
+}
+
+fn told(stage: &StageView) -> String {
+    let there = |at: Timestamp| {
+        let there = at.to_zoned(stage.zone.time_zone());
+        there.strftime("%Y-%m-%d %H:%M:%S").to_string()
+    };
+    let phase = match stage.phase {
+        PhaseView::Upcoming => "upcoming",
+        PhaseView::Open => "open",
+        PhaseView::Closed => "closed",
+    };
+    let closes = stage.closes_at.map_or_else(|| "open end".to_owned(), there);
+    let rules = &stage.rules.rules;
+    let tasks: Vec<&str> = rules.tasks.iter().map(|task| task.as_str()).collect();
+    let next = match &stage.next_cut {
+        Some(next) => next.to_string(),
+        None => "none".to_owned(),
+    };
+    format!(
+        "{} ({phase})\n  id       {}\n  times    {} to {closes}, {}\n  next day {next}\n  rules    revision {} since {}: {}, {} \
+         episodes of each of {}, at most {} faults",
+        stage.name,
+        stage.id,
+        there(stage.opens_at),
+        stage.zone,
+        stage.rules.revision,
+        there(stage.rules.since),
+        rules.profile,
+        rules.episodes_per_task,
+        tasks.join(", "),
+        rules.max_faults,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_is_by_the_clocks_of_the_stage_unless_it_says_otherwise() {
+        let berlin: Zone = "Europe/Berlin".parse().unwrap();
+        let at = |text: &str| instant(text, &berlin).map(|at| at.to_string());
+        for text in [
+            "2026-12-01 06:00",
+            "2026-12-01T06:00:00",
+            "2026-12-01T05:00:00Z",
+            "2026-12-01T06:00+01:00",
+            "2026-12-01T00:00[America/New_York]",
+        ] {
+            assert_eq!(at(text).unwrap(), "2026-12-01T05:00:00Z", "{text}");
+        }
+        for wrong in ["tomorrow", "2026-13-01 06:00", ""] {
+            let error = at(wrong).unwrap_err().to_string();
+            assert!(error.contains("2026-12-01 06:00"), "{error}");
+        }
+    }
+}
