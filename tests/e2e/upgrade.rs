@@ -102,6 +102,12 @@ fn a_data_folder_of_the_first_release_continues_where_it_was_cut_off() {
         if over.starts_with("day one") {
             assert!(released_at.is_string(), "{over}");
         }
+        // What the old program did not know of.
+        let stage = get(&server, "/api/v1/stages", &admin)[0].take();
+        let fields = found.as_object_mut().expect("an answer is an object");
+        assert_eq!(fields.remove("stage"), Some(stage["id"].clone()), "{over}");
+        assert_eq!(fields.remove("revision"), Some(1.into()), "{over}");
+        assert_eq!(stage["names_seeds"], false, "its days keep their seeds");
         assert_eq!(&found, told.answer(over), "{over}");
     }
     for (ablation, evaluation) in [

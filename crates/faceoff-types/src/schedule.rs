@@ -101,7 +101,11 @@ impl Schedule {
             days_off: Vec::new(),
         };
         // One of a leap day's comes within eight years.
-        match schedule.next(jiff::civil::date(2000, 1, 1), &Zone::UTC) {
+        match schedule.next(
+            jiff::civil::date(2000, 1, 1),
+            Timestamp::UNIX_EPOCH,
+            &Zone::UTC,
+        ) {
             Some(_) => Ok(schedule),
             None => Err(wrong("there is no such date".to_owned())),
         }
@@ -116,20 +120,18 @@ impl Schedule {
         self
     }
 
-    /// When the day of this date starts; `None` if none does.
+    /// The first day that starts on the date `from` or later and not before `earliest`, and when.
     #[must_use]
-    pub fn on(&self, date: Date, zone: &Zone) -> Option<Timestamp> {
-        let (found, at) = self.first_from(date, zone)?;
-        (found == date && !self.days_off.contains(&date)).then_some(at)
-    }
-
-    /// The first day that starts on this date or later.
-    #[must_use]
-    pub fn next(&self, mut from: Date, zone: &Zone) -> Option<(Date, Timestamp)> {
+    pub fn next(
+        &self,
+        mut from: Date,
+        earliest: Timestamp,
+        zone: &Zone,
+    ) -> Option<(Date, Timestamp)> {
         let horizon = from.checked_add(Span::new().days(HORIZON_DAYS)).ok()?;
         while from <= horizon {
-            let (date, at) = self.first_from(from, zone)?;
-            if !self.days_off.contains(&date) {
+            let (date, at) = self.first_from(from, earliest, zone)?;
+            if at >= earliest && !self.days_off.contains(&date) {
                 return Some((date, at));
             }
             from = date.tomorrow().ok()?;
@@ -137,8 +139,14 @@ impl Schedule {
         None
     }
 
-    /// The same, days off or not. A time that a change of the clocks leaves out comes when they have changed.
-    fn first_from(&self, from: Date, zone: &Zone) -> Option<(Date, Timestamp)> {
+    /// The same, days off or not, and perhaps too early. A time that a change of the clocks leaves out comes when they
+    /// have changed.
+    fn first_from(
+        &self,
+        from: Date,
+        earliest: Timestamp,
+        zone: &Zone,
+    ) -> Option<(Date, Timestamp)> {
         match &self.at {
             At::Daily(at) => {
                 let start = from.to_datetime(*at).to_zoned(zone.time_zone()).ok()?;
@@ -146,7 +154,8 @@ impl Schedule {
             }
             At::Cron(pattern) => {
                 let midnight = from.to_zoned(zone.time_zone()).ok()?;
-                let start = parse(pattern).ok()?.find_next_occurrence(&midnight, true);
+                let begin = midnight.max(earliest.to_zoned(zone.time_zone()));
+                let start = parse(pattern).ok()?.find_next_occurrence(&begin, true);
                 let start = start.ok()?;
                 Some((start.date(), start.timestamp()))
             }
@@ -197,8 +206,7 @@ mod tests {
         let zone: Zone = zone.parse().unwrap();
         let mut from = from;
         let next = || {
-            let (date, at) = schedule.next(from, &zone)?;
-            assert_eq!(schedule.on(date, &zone), Some(at));
+            let (date, at) = schedule.next(from, Timestamp::UNIX_EPOCH, &zone)?;
             from = date.tomorrow().unwrap();
             Some(format!("{date} {at}"))
         };
@@ -235,7 +243,13 @@ mod tests {
                 "2026-11-24 2026-11-24T11:00:00Z",
             ]
         );
-        assert_eq!(weekdays.on(date(2026, 11, 21), &Zone::UTC), None);
+        // On the first date, the first of those that are left.
+        let earliest = "2026-11-20T12:00:00Z".parse().unwrap();
+        let next = weekdays.next(date(2026, 11, 20), earliest, &Zone::UTC);
+        assert_eq!(next.unwrap().1.to_string(), "2026-11-20T18:00:00Z");
+        let daily = Schedule::daily("06:00".parse().unwrap());
+        let next = daily.next(date(2026, 11, 20), earliest, &Zone::UTC);
+        assert_eq!(next.unwrap().1.to_string(), "2026-11-21T06:00:00Z");
         let leap = Schedule::cron("0 0 29 2 *").unwrap();
         assert_eq!(
             starts(&leap, "UTC", date(2026, 1, 1), 1),
@@ -254,7 +268,6 @@ mod tests {
                 "2026-12-26 2026-12-26T06:00:00Z"
             ]
         );
-        assert_eq!(schedule.on(date(2026, 12, 24), &Zone::UTC), None);
     }
 
     #[test]

@@ -54,6 +54,11 @@ fn conflict<T>(why: String) -> Result<T> {
     Err(StoreError::Conflict(why))
 }
 
+/// As the database has it, in milliseconds; never later than it is.
+fn stored(at: Timestamp) -> Timestamp {
+    Timestamp::from_millisecond(at.as_millisecond()).unwrap_or(at)
+}
+
 fn check_times(opens_at: Timestamp, closes_at: Option<Timestamp>, now: Timestamp) -> Result<()> {
     match closes_at {
         Some(at) if at <= opens_at => conflict(format!(
@@ -182,7 +187,7 @@ impl Store {
     pub async fn create_stage(&self, actor: Actor, new: NewStage, now: Timestamp) -> Result<Stage> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
-            let opens_at = new.opens_at.max(now);
+            let opens_at = stored(new.opens_at.max(now));
             check_times(opens_at, new.closes_at, now)?;
             check_rules(&new.rules, &new.settings)?;
             let stage = Stage {
@@ -248,13 +253,13 @@ impl Store {
                     name: FIRST
                         .parse()
                         .map_err(|error| StoreError::Damaged(format!("{FIRST}: {error}")))?,
-                    opens_at: now,
+                    opens_at: stored(now),
                     closes_at: None,
                     zone,
                     settings,
                     rules: Revision {
                         number: 1,
-                        since: now,
+                        since: stored(now),
                         rules,
                     },
                     names_seeds: true,

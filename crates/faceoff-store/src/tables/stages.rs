@@ -83,7 +83,7 @@ impl Stage {
         now: Timestamp,
     ) -> Option<(Date, Option<Timestamp>)> {
         let earliest = self.zone.date(now.max(self.opens_at));
-        let mut from = match newest {
+        let from = match newest {
             Some(newest) if newest >= earliest => newest.tomorrow().ok()?,
             _ => earliest,
         };
@@ -95,16 +95,8 @@ impl Stage {
             let begins = from.to_zoned(self.zone.time_zone()).ok()?.timestamp();
             return (!ends_before(begins)).then_some((from, None));
         };
-        loop {
-            let (date, at) = schedule.next(from, &self.zone)?;
-            if ends_before(at) {
-                return None;
-            }
-            if at >= self.opens_at {
-                return Some((date, Some(at)));
-            }
-            from = date.tomorrow().ok()?;
-        }
+        let (date, at) = schedule.next(from, self.opens_at, &self.zone)?;
+        (!ends_before(at)).then_some((date, Some(at)))
     }
 
     /// What each team plays on a day by the rules as they are now.

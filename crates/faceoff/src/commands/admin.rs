@@ -1,5 +1,6 @@
 //! `faceoff admin`: organises a running competition through its API.
 
+mod output;
 mod stage;
 
 use super::serve::ADMIN_TOKEN_FILE;
@@ -13,6 +14,7 @@ use faceoff_http::views::{
 };
 use faceoff_types::{EvaluationId, TeamId};
 use jiff::civil::Date;
+use output::{or_none, print};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -368,28 +370,4 @@ fn line(evaluation: &EvaluationView) -> String {
         EvaluationStatus::Cancelled { reason, .. } => format!("cancelled: {reason}"),
     };
     format!("{:<40} {}  {state}", evaluation.team_name, evaluation.id)
-}
-
-fn or_none(lines: Vec<String>, none: &str) -> String {
-    if lines.is_empty() {
-        none.to_owned()
-    } else {
-        lines.join("\n")
-    }
-}
-
-fn print<T: serde::Serialize>(
-    json: bool,
-    value: &T,
-    text: impl FnOnce() -> String,
-) -> anyhow::Result<()> {
-    if json {
-        println!(
-            "{}",
-            serde_json::to_string_pretty(value).context("writing JSON")?
-        );
-    } else {
-        println!("{}", text());
-    }
-    Ok(())
 }

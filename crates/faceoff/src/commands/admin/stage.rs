@@ -1,6 +1,6 @@
 //! `faceoff admin stage`: makes, changes and lists the season's stages.
 
-use super::{or_none, print};
+use super::output::{or_none, print};
 use crate::client::Client;
 use anyhow::{Context, bail, ensure};
 use clap::{Args, Subcommand};
