@@ -152,6 +152,26 @@ pub struct Cancellation {
     pub reason: String,
 }
 
+/// A decision of the organiser's that cannot be undone, or hits a team at once.
+#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Decision {
+    /// Everybody may read it; 1 to 500 characters.
+    pub reason: String,
+    /// The name of the team, or the date of the day, that it is about. Without it nothing is done, and the answer says
+    /// what would be.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub confirm: Option<String>,
+}
+
+/// Why something is undone.
+#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Reason {
+    /// 1 to 500 characters.
+    pub reason: String,
+}
+
 /// What the ablation shall play. All fields may be left out.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]

@@ -36,6 +36,14 @@ pub enum StoreError {
         /// When it closed, if it did.
         closed_at: Option<Timestamp>,
     },
+    /// The team neither uploads nor plays.
+    #[error("the team was disqualified at {at}: {reason}")]
+    Disqualified {
+        /// When.
+        at: Timestamp,
+        /// As everybody may read it.
+        reason: String,
+    },
     /// The season is over: nothing more is uploaded or evaluated.
     #[error("the season was closed at {closed_at}")]
     SeasonClosed {

@@ -201,6 +201,26 @@ pub enum Event {
         /// As it was told to the team.
         reason: String,
     },
+    /// Its result does not count any more; the turn is given back.
+    EvaluationVoided {
+        /// As everybody may read it.
+        reason: String,
+    },
+    /// All of a day does not count any more; each of its evaluations has an event of its own.
+    DayVoided {
+        /// As everybody may read it.
+        reason: String,
+    },
+    /// It neither plays nor is ranked from now on.
+    TeamDisqualified {
+        /// As everybody may read it.
+        reason: String,
+    },
+    /// It plays and is ranked again.
+    TeamReinstated {
+        /// Why.
+        reason: String,
+    },
     /// A submission is to be taken apart, profile by profile.
     AblationOrdered {
         /// What plays.

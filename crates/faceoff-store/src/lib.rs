@@ -61,6 +61,7 @@ pub use tables::{
     evaluations::{Evaluation, EvaluationState},
     events::EventFilter,
     plan::RunPlan,
+    rulings::Ruling,
     runs::Run,
     season::Season,
     shards::{Shard, ShardCommit},

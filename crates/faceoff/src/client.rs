@@ -6,7 +6,9 @@ use anyhow::{Context, bail};
 use bundle_file::BundleFile;
 use faceoff_http::{
     API_BASE,
-    requests::{Cancellation, CloseSeason, NewStage, NewTeam, StageChange, StartDay},
+    requests::{
+        Cancellation, CloseSeason, Decision, NewStage, NewTeam, Reason, StageChange, StartDay,
+    },
     views::{
         board::BoardView,
         comparison::ComparisonView,
@@ -20,7 +22,7 @@ use faceoff_http::{
         team::{TeamView, TeamWithToken},
     },
 };
-use faceoff_types::{EvaluationId, StageId, SubmissionId, TeamId};
+use faceoff_types::{EvaluationId, StageDay, StageId, SubmissionId, TeamId};
 use futures::StreamExt;
 use indicatif::ProgressBar;
 use jiff::civil::Date;
@@ -196,6 +198,36 @@ impl Client {
                 reason: reason.to_owned(),
             });
         read(self.send(request).await?).await
+    }
+
+    /// Organiser: takes a result off the boards.
+    pub async fn void(
+        &self,
+        id: EvaluationId,
+        decision: &Decision,
+    ) -> anyhow::Result<EvaluationView> {
+        let request = self.request(Method::POST, &format!("/evaluations/{id}/void"));
+        read(self.send(request.json(decision)).await?).await
+    }
+
+    /// Organiser: takes a whole day off the boards.
+    pub async fn void_day(&self, of: StageDay, decision: &Decision) -> anyhow::Result<DayView> {
+        let path = format!("/stages/{}/days/{}/void", of.stage, of.date);
+        let request = self.request(Method::POST, &path);
+        read(self.send(request.json(decision)).await?).await
+    }
+
+    /// Organiser: disqualifies a team.
+    pub async fn disqualify(&self, id: TeamId, decision: &Decision) -> anyhow::Result<TeamView> {
+        let request = self.request(Method::POST, &format!("/teams/{id}/disqualify"));
+        read(self.send(request.json(decision)).await?).await
+    }
+
+    /// Organiser: lets a disqualified team play again.
+    pub async fn reinstate(&self, id: TeamId, reason: &str) -> anyhow::Result<TeamView> {
+        let request = self.request(Method::POST, &format!("/teams/{id}/reinstate"));
+        let reason = reason.to_owned();
+        read(self.send(request.json(&Reason { reason })).await?).await
     }
 
     /// Team: who we are, what plays for us today, and what we enter next.

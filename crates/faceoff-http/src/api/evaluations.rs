@@ -1,5 +1,6 @@
 //! Evaluations: following them, stopping them, and playing them again.
 
+use super::rulings::checked_reason;
 use crate::{
     app::App,
     auth::{Caller, Organiser},
@@ -20,9 +21,6 @@ use faceoff_types::EvaluationId;
 use jiff::civil::Date;
 use serde::Deserialize;
 use utoipa::IntoParams;
-
-/// Longest reason of a cancellation.
-const MAX_REASON_CHARS: usize = 500;
 
 #[derive(Debug, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
@@ -93,20 +91,16 @@ pub(crate) async fn cancel_evaluation(
     PathParam(id): PathParam<EvaluationId>,
     Body(Cancellation { reason }): Body<Cancellation>,
 ) -> Result<Json<EvaluationView>, Problem> {
-    let chars = reason.trim().chars().count();
-    if !(1..=MAX_REASON_CHARS).contains(&chars) {
-        let detail = format!("expected 1 to {MAX_REASON_CHARS} characters, got {chars}");
-        return Err(Problem::invalid("reason", detail));
-    }
+    let reason = checked_reason(&reason)?;
     let now = app.config.clock.now();
     app.store
-        .cancel_evaluation(Actor::Organiser, id, reason.trim(), now)
+        .cancel_evaluation(Actor::Organiser, id, reason, now)
         .await?;
     tracing::info!(evaluation = %id, reason, "evaluation cancelled");
     EvaluationView::find(&app, id).await.map(Json)
 }
 
-/// Plays an evaluation again that was cancelled, or failed by our fault: the submission that was active at
+/// Plays an evaluation again that was cancelled or voided, or failed by our fault: the submission that was active at
 /// the day's cut, on the same episodes, before the day's release or after it.
 #[utoipa::path(
     post, path = "/evaluations/{id}/rerun", tag = "organiser", security(("organiser" = [])),

@@ -13,6 +13,7 @@ mod evaluations;
 mod events;
 mod health;
 mod me;
+mod rulings;
 mod season;
 mod stages;
 mod submissions;
@@ -51,6 +52,10 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(evaluations::evaluation))
         .routes(routes!(evaluations::cancel_evaluation))
         .routes(routes!(evaluations::rerun_evaluation))
+        .routes(routes!(rulings::void_evaluation))
+        .routes(routes!(rulings::void_day))
+        .routes(routes!(rulings::disqualify_team))
+        .routes(routes!(rulings::reinstate_team))
         .routes(routes!(datasets::dataset))
         .routes(routes!(datasets::violations))
         .routes(routes!(comparisons::compare))

@@ -15,6 +15,7 @@ use crate::{
         season::SeasonHead,
         stage::{PhaseView, StageView},
         task::TaskView,
+        team::TeamView,
     },
 };
 use askama::Template;
@@ -223,6 +224,7 @@ struct OverallPage {
     setting: Option<String>,
     tiers: Vec<TierRows<OverallRow>>,
     under_way: Vec<UnderWay>,
+    disqualified: Vec<TeamView>,
 }
 
 /// The overall board.
@@ -244,6 +246,7 @@ pub(super) async fn overall(
         tiers: by_tier(&board, |row| OverallRow::of(row, setting.as_ref())),
         setting,
         under_way: under_way(&app, today).await?,
+        disqualified: board.disqualified,
     };
     render(&page)
 }
@@ -252,6 +255,7 @@ async fn under_way(app: &App, today: StageDay) -> Result<Vec<UnderWay>, PageProb
     let evaluations = EvaluationView::current(app, today).await?;
     let under_way = evaluations.into_iter().filter_map(|evaluation| {
         let state = match evaluation.status {
+            _ if evaluation.voided.is_some() => "Voided by the organiser",
             EvaluationStatus::Finished { .. } => return None,
             EvaluationStatus::Queued => "Queued",
             EvaluationStatus::Running => "Running",

@@ -12,6 +12,7 @@ use crate::{
     views::{
         ablation,
         evaluation::{EvaluationStatus, EvaluationView, Progress, ResultView},
+        ruling::RulingView,
         season::SeasonHead,
         submission::SubmissionView,
         task::TaskView,
@@ -259,6 +260,7 @@ struct Page {
     id: EvaluationId,
     team: String,
     agent: Option<String>,
+    voided: Option<RulingView>,
     day: civil::Date,
     profile: Profile,
     /// Path of the page of its submission's ablation, if there is one.
@@ -305,6 +307,7 @@ pub(super) async fn page(
         id,
         team: view.team_name.to_string(),
         agent: submission.agent_name,
+        voided: view.voided.clone(),
         day: view.day,
         profile: view.profile,
         ablation: ablation.then(|| format!("/submissions/{}/ablation", submission.id)),
@@ -337,6 +340,7 @@ const fn in_words(status: &EvaluationStatus) -> &'static str {
 async fn others(app: &App, of: &EvaluationView) -> Result<Vec<Other>, PageProblem> {
     let same_episodes = |other: &EvaluationView| {
         other.id != of.id
+            && other.voided.is_none()
             && other.profile == of.profile
             && other.episodes_per_task == of.episodes_per_task
             && other.tasks == of.tasks

@@ -34,6 +34,14 @@ impl From<StoreError> for Problem {
                     .with("opens_at", opens_at.to_string())
                     .with("closed_at", closed_at.map(|at| at.to_string()))
             }
+            StoreError::Disqualified { at, reason } => Self::new(
+                ProblemKind::Disqualified,
+                format!(
+                    "the team was disqualified on {}: {reason}. It neither uploads nor plays; the organiser can \
+                     reinstate it",
+                    at.strftime("%Y-%m-%d at %H:%M UTC")
+                ),
+            ),
             error @ StoreError::DayHasCut { .. } => {
                 Self::new(ProblemKind::DayHasCut, error.to_string())
             }

@@ -30,6 +30,9 @@ kinds! {
     Forbidden "forbidden" FORBIDDEN
         "This token may not do that"
         "The token is valid, but of the wrong kind: some requests are a team's, some are the organiser's."
+    Disqualified "disqualified" FORBIDDEN
+        "The team is disqualified"
+        "The organiser has disqualified the team; the detail says when and why. It keeps what it has, and neither uploads nor plays."
     NotFound "not-found" NOT_FOUND
         "Not found"
         "There is no such thing, or it belongs to another team. Check the id."

@@ -1,6 +1,6 @@
 //! Who stands where, and how sure that is.
 
-use super::{stage, task::TaskView};
+use super::{stage, task::TaskView, team::TeamView};
 use crate::{
     app::AppState, problem::Problem, requests::BoardQuery, summaries::RunSummaries, views::shown,
 };
@@ -41,6 +41,8 @@ pub struct BoardView {
     /// Bootstrap resamples behind each `tier_change_probability`.
     #[schema(example = 2000)]
     pub tier_change_resamples: u32,
+    /// Teams that are on no board, and why.
+    pub disqualified: Vec<TeamView>,
     /// Deployable teams first, then improvable, then non-deployable; inside a tier the higher score,
     /// then the fewer penalty points, then the earlier submission.
     pub rows: Vec<BoardRow>,
@@ -116,6 +118,8 @@ impl BoardView {
             return Err(Problem::not_found("revision of the stage's rules"));
         };
         let records = app.store.board(stage.id, number).await?;
+        let mut disqualified = TeamView::all(app).await?;
+        disqualified.retain(|team| team.disqualified.is_some());
         let runs: Vec<_> = records.iter().map(|record| record.run).collect();
         let summaries = app.summaries.of(&runs).await?;
         let mismatch_seed = app.store.season().await?.secret.model_mismatch();
@@ -147,6 +151,7 @@ impl BoardView {
             task,
             significance: SIGNIFICANCE,
             tier_change_resamples: TIER_CHANGE_RESAMPLES,
+            disqualified,
             rows: rows.collect::<Result<_, Problem>>()?,
         })
     }

@@ -1,6 +1,6 @@
 //! An evaluation on its way to a score or a failure.
 
-use super::task::TaskView;
+use super::{ruling::RulingView, task::TaskView};
 use crate::{app::AppState, paths, problem::Problem, views::shown};
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::{Evaluation, EvaluationState};
@@ -32,10 +32,13 @@ pub struct EvaluationView {
     pub day: Date,
     /// When the day's last evaluation had ended, and all of the day came out; null until then.
     pub released_at: Option<Timestamp>,
-    /// The evaluation that it plays again, one that was cancelled or failed by our fault; absent
+    /// The evaluation that it plays again, one that was cancelled, voided or failed by our fault; absent
     /// otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rerun_of: Option<EvaluationId>,
+    /// It does not count, if it was voided; absent otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub voided: Option<RulingView>,
     /// The perturbations.
     pub profile: Profile,
     /// In the order of play.
@@ -309,6 +312,7 @@ impl EvaluationView {
             day: evaluation.of.date,
             released_at: evaluation.released_at,
             rerun_of: evaluation.rerun_of,
+            voided: evaluation.voided.map(RulingView::from),
             profile: evaluation.plan.profile,
             tasks: evaluation.plan.tasks,
             episodes_per_task: evaluation.plan.episodes_per_task,

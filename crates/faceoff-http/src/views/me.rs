@@ -2,7 +2,7 @@
 
 use super::{day::NextCut, stage, team::TeamView};
 use crate::{app::AppState, problem::Problem};
-use faceoff_store::{EvaluationState, Team};
+use faceoff_store::{Evaluation, EvaluationState, Team};
 use faceoff_types::{EvaluationId, StageId, SubmissionId};
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
@@ -31,23 +31,24 @@ pub struct TurnView {
     /// The date in its zone.
     pub day: Date,
     /// The evaluation that counts; null before the day's cut, if the team had nothing active then, and
-    /// if it was cancelled or failed by our fault and is not played again.
+    /// if it was cancelled, voided or failed by our fault and is not played again.
     pub evaluation: Option<EvaluationId>,
 }
 
 impl MeView {
     pub(crate) async fn of(app: &AppState, team: Team) -> Result<Self, Problem> {
         let today = stage::current(app).await?.day(app.config.clock.now());
-        let counts = |state: &EvaluationState| {
-            !matches!(
-                state,
+        let counts = |evaluation: &Evaluation| {
+            let stopped = matches!(
+                evaluation.state,
                 EvaluationState::PlatformFailed { .. } | EvaluationState::Cancelled { .. }
-            )
+            );
+            !stopped && evaluation.voided.is_none()
         };
         let evaluations = app.store.evaluations_of(team.id).await?;
         let evaluation = evaluations
             .iter()
-            .find(|evaluation| evaluation.of == today && counts(&evaluation.state))
+            .find(|evaluation| evaluation.of == today && counts(evaluation))
             .map(|evaluation| evaluation.id);
         let submissions = app.store.submissions_of(team.id).await?;
         let active = submissions.iter().find(|submission| submission.active);

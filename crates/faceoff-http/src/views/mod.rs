@@ -11,6 +11,7 @@ pub mod day;
 pub mod evaluation;
 pub mod event;
 pub mod me;
+pub mod ruling;
 pub mod season;
 pub mod stage;
 pub mod submission;

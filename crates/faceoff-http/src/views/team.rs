@@ -1,5 +1,6 @@
 //! Teams, and their tokens as they are handed out.
 
+use super::ruling::RulingView;
 use crate::{app::AppState, problem::Problem};
 use faceoff_store::Team;
 use faceoff_types::{TeamId, TeamName};
@@ -17,6 +18,9 @@ pub struct TeamView {
     pub name: TeamName,
     /// When the organiser invited it.
     pub created_at: Timestamp,
+    /// It neither plays nor is ranked, if it is; absent otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub disqualified: Option<RulingView>,
 }
 
 impl From<Team> for TeamView {
@@ -25,6 +29,7 @@ impl From<Team> for TeamView {
             id: team.id,
             name: team.name,
             created_at: team.created_at,
+            disqualified: team.disqualified.map(RulingView::from),
         }
     }
 }

@@ -14,6 +14,7 @@ mod events;
 mod openapi;
 mod problems;
 mod room;
+mod rulings;
 mod season;
 mod seeds;
 mod site;

@@ -41,13 +41,17 @@ async fn the_document_lists_what_is_there_and_nothing_else() {
         "POST /api/v1/days",
         "POST /api/v1/evaluations/{id}/cancel",
         "POST /api/v1/evaluations/{id}/rerun",
+        "POST /api/v1/evaluations/{id}/void",
         "POST /api/v1/season/close",
         "POST /api/v1/stages",
+        "POST /api/v1/stages/{id}/days/{day}/void",
         "POST /api/v1/submissions",
         "POST /api/v1/submissions/{id}/ablation",
         "POST /api/v1/submissions/{id}/activate",
         "POST /api/v1/submissions/{id}/evaluations",
         "POST /api/v1/teams",
+        "POST /api/v1/teams/{id}/disqualify",
+        "POST /api/v1/teams/{id}/reinstate",
         "POST /api/v1/teams/{id}/token",
     ];
     assert_eq!(listed, expected);

@@ -5,6 +5,7 @@ use crate::{
     tables::{
         active_submissions, season,
         submissions::{self, Submission, SubmissionState},
+        teams,
     },
     write::Tx,
 };
@@ -30,6 +31,7 @@ fn check_valid(submission: &Submission) -> Result<()> {
 async fn activate(tx: &mut Tx, id: SubmissionId) -> Result<Submission> {
     season::check_open(tx).await?;
     let submission = submissions::find(tx, id).await?;
+    teams::check_may_play(tx, submission.team).await?;
     check_valid(&submission)?;
     let now = tx.now;
     active_submissions::choose(tx, submission.team, id, now).await?;
@@ -42,7 +44,7 @@ async fn activate(tx: &mut Tx, id: SubmissionId) -> Result<Submission> {
 impl Store {
     /// Chooses what a team enters at the next cut, and at those after it, until a later upload turns
     /// valid. A day that had its cut goes on with what was active then. [`StoreError::Conflict`] if the
-    /// submission is not valid (yet); [`StoreError::SeasonClosed`] once the season is over.
+    /// submission is not valid (yet); [`StoreError::Disqualified`] if its team is; [`StoreError::SeasonClosed`] once the season is over.
     pub async fn activate_submission(
         &self,
         actor: Actor,

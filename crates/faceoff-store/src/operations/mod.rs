@@ -14,6 +14,7 @@ mod order_ablation;
 pub(crate) mod purpose;
 mod release_day;
 pub(crate) mod rerun;
+mod rulings;
 pub(crate) mod runs;
 mod season;
 pub(crate) mod smoke;

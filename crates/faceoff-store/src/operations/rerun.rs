@@ -10,7 +10,7 @@ use crate::{
     tables::{
         days,
         evaluations::{self, Entry, Evaluation, EvaluationState},
-        runs, season,
+        runs, season, teams,
     },
     write::Tx,
 };
@@ -53,9 +53,9 @@ pub(crate) async fn after_our_fault(tx: &mut Tx, id: EvaluationId) -> Result<()>
 }
 
 impl Store {
-    /// Plays an evaluation again that was cancelled or that we broke: what was active at the cut, on the
+    /// Plays an evaluation again that was cancelled or voided, or that we broke: what was active at the cut, on the
     /// same episodes, whether the day is released or not. [`StoreError::Conflict`] if it ended otherwise,
-    /// or the team has another one of the day that counts; [`StoreError::SeasonClosed`] once the season
+    /// or the team has another one of the day that counts; [`StoreError::Disqualified`] if it is; [`StoreError::SeasonClosed`] once the season
     /// is over.
     pub async fn rerun_evaluation(
         &self,
@@ -65,17 +65,20 @@ impl Store {
     ) -> Result<Evaluation> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
-            match reads::evaluations::find(tx, id).await?.state {
-                EvaluationState::PlatformFailed { .. } | EvaluationState::Cancelled { .. } => {}
-                _ => {
-                    return Err(StoreError::Conflict(
-                        "only an evaluation that was cancelled, or that failed by our fault, is played \
-                         again"
-                            .into(),
-                    ));
-                }
+            let found = reads::evaluations::find(tx, id).await?;
+            let ended_without_result = matches!(
+                found.state,
+                EvaluationState::PlatformFailed { .. } | EvaluationState::Cancelled { .. }
+            );
+            if !ended_without_result && found.voided.is_none() {
+                return Err(StoreError::Conflict(
+                    "only an evaluation that was cancelled or voided, or that failed by our fault, is played \
+                     again"
+                        .into(),
+                ));
             }
             let broken = evaluations::entry(tx, id).await?;
+            teams::check_may_play(tx, broken.team).await?;
             let id = again(tx, broken, 0).await?;
             reads::evaluations::find(tx, id).await
         })

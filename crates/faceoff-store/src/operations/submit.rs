@@ -28,6 +28,7 @@ impl Store {
     }
 
     /// Records an uploaded bundle whose bytes are an artifact already, and queues its smoke run.
+    /// [`StoreError::Disqualified`](crate::StoreError::Disqualified) if the team is;
     /// [`StoreError::SeasonClosed`](crate::StoreError::SeasonClosed) once the season is over;
     /// [`DayQuotaSpent`](crate::StoreError::DayQuotaSpent) or
     /// [`StoredQuotaSpent`](crate::StoreError::StoredQuotaSpent) beyond the team's quota.
@@ -41,7 +42,7 @@ impl Store {
     ) -> Result<Submission> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
-            teams::find(tx, team).await?;
+            teams::check_may_play(tx, team).await?;
             quota.check(bundles::usage(tx, team, day_of(now)).await?, bundle.bytes)?;
             let id = SubmissionId::new();
             submissions::insert(tx, id, team, &bundle, now).await?;

@@ -24,6 +24,7 @@ impl Store {
                 id,
                 name: name.clone(),
                 created_at,
+                disqualified: None,
             };
             teams::insert(tx, &team, token_hash).await?;
             tx.record(Subject::Team(id), Event::TeamCreated { name });

@@ -41,7 +41,7 @@ impl Store {
         let id = Text(stage.id);
         let newest = sqlx::query_scalar!(
             r#"SELECT MAX(revision) AS "revision: u32" FROM evaluations
-               WHERE stage_id = ? AND state = 'finished'"#,
+               WHERE stage_id = ? AND state = 'finished' AND voided_at IS NULL"#,
             id,
         );
         let newest = newest.fetch_one(&self.database.read).await?;
@@ -49,7 +49,7 @@ impl Store {
     }
 
     /// What the board of a stage is made of, by one revision of its rules: each team's newest evaluation that is
-    /// finished under it, in the teams' order of names. Ranks and tiers are the scoring's.
+    /// finished under it and was not voided, of teams that are not disqualified, in the teams' order of names. Ranks and tiers are the scoring's.
     pub async fn board(&self, stage: StageId, revision: u32) -> Result<Vec<BoardRecord>> {
         let stage = Text(stage);
         let rows = sqlx::query!(
@@ -65,9 +65,11 @@ impl Store {
                JOIN evaluations e ON e.rowid = (SELECT n.rowid FROM evaluations n
                                                 WHERE n.team_id = t.id AND n.stage_id = ?1
                                                   AND n.revision = ?2 AND n.state = 'finished'
+                                                  AND n.voided_at IS NULL
                                                 ORDER BY n.day DESC LIMIT 1)
                JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
                JOIN submissions s ON s.id = e.submission_id
+               WHERE t.disqualified_at IS NULL
                ORDER BY t.name"#,
             stage,
             revision,
@@ -81,6 +83,7 @@ impl Store {
                     id: row.team.0,
                     name: row.name.0,
                     created_at: row.invited_at.0,
+                    disqualified: None,
                 },
                 submission: row.submission.0,
                 submitted_at: row.submitted_at.0,

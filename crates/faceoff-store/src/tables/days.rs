@@ -24,7 +24,8 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<(Day, u
         r#"SELECT d.stage_id AS "stage: Text<StageId>", d.day AS "day: Text<Date>", d.cut_at AS "cut_at: Instant",
                   d.released_at AS "released_at: Instant",
                   (SELECT COUNT(*) FROM evaluations e
-                   WHERE e.stage_id = d.stage_id AND e.day = d.day AND e.state = 'finished') AS "finished!: u32"
+                   WHERE e.stage_id = d.stage_id AND e.day = d.day AND e.state = 'finished'
+                     AND e.voided_at IS NULL) AS "finished!: u32"
            FROM days d ORDER BY d.cut_at DESC, d.day DESC, d.stage_id"#
     )
     .fetch_all(connection)
@@ -67,6 +68,18 @@ pub(crate) async fn newest(
         cut_at: row.cut_at.0,
         released_at: row.released_at.map(|at| at.0),
     }))
+}
+
+/// Has the day had its cut?
+pub(crate) async fn exists(connection: &mut SqliteConnection, of: StageDay) -> Result<bool> {
+    let (stage, day) = (Text(of.stage), Text(of.date));
+    Ok(sqlx::query_scalar!(
+        r#"SELECT EXISTS (SELECT 1 FROM days WHERE stage_id = ? AND day = ?) AS "exists!: bool""#,
+        stage,
+        day
+    )
+    .fetch_one(connection)
+    .await?)
 }
 
 /// Is the day released?

@@ -1,7 +1,7 @@
 use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
-    tables::{plan::RunPlan, runs::RunState},
+    tables::{plan::RunPlan, rulings::Ruling, runs::RunState},
 };
 use faceoff_types::{
     EvaluationId, EvaluationResult, Profile, RunId, StageDay, StageId, SubmissionId, Task, TeamId,
@@ -32,6 +32,8 @@ pub struct Evaluation {
     pub plan: RunPlan,
     /// When it was queued.
     pub created_at: Timestamp,
+    /// It does not count, if it was.
+    pub voided: Option<Ruling>,
     /// How far it is.
     pub state: EvaluationState,
 }
@@ -115,6 +117,8 @@ pub(crate) struct EvaluationRow {
     dataset: Option<String>,
     dataset_blake3: Option<String>,
     reason: Option<String>,
+    voided_at: Option<Instant>,
+    voided_for: Option<String>,
 }
 
 impl EvaluationRow {
@@ -191,6 +195,7 @@ impl EvaluationRow {
             run: self.run_id.0,
             plan,
             created_at: self.created_at.0,
+            voided: Ruling::of(self.voided_at, self.voided_for),
             state,
         })
     }
@@ -214,7 +219,7 @@ macro_rules! select_evaluations {
                       e.created_at AS "created_at: Instant", e.state,
                       e.finished_at AS "finished_at: Instant",
                       e.result AS "result: Json<EvaluationResult>", e.dataset, e.dataset_blake3,
-                      e.reason
+                      e.reason, e.voided_at AS "voided_at: Instant", e.voided_for
                FROM evaluations e JOIN runs r ON r.id = e.run_id 
                LEFT JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day "# + $tail
             $(, $argument)*
@@ -472,4 +477,75 @@ pub(crate) async fn count_open(
     )
     .fetch_one(connection)
     .await?)
+}
+
+/// How an evaluation stands to a ruling.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Standing {
+    pub(crate) id: EvaluationId,
+    pub(crate) run: RunId,
+    pub(crate) is_open: bool,
+    /// It has ended by the agent's doing, and counts.
+    pub(crate) counts: bool,
+}
+
+/// How the evaluations of a day stand.
+pub(crate) async fn standings_of_day(
+    connection: &mut SqliteConnection,
+    of: StageDay,
+) -> Result<Vec<Standing>> {
+    let (stage, day) = (Text(of.stage), Text(of.date));
+    let rows = sqlx::query!(
+        r#"SELECT id AS "id: Text<EvaluationId>", run_id AS "run: Text<RunId>",
+                  state = 'open' AS "is_open!: bool",
+                  state IN ('finished', 'agent_failed') AND voided_at IS NULL AS "counts!: bool"
+           FROM evaluations WHERE stage_id = ? AND day = ? ORDER BY created_at, id"#,
+        stage,
+        day
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows
+        .into_iter()
+        .map(|row| Standing {
+            id: row.id.0,
+            run: row.run.0,
+            is_open: row.is_open,
+            counts: row.counts,
+        })
+        .collect())
+}
+
+/// Which evaluations of a team are not over.
+pub(crate) async fn open_of_team(
+    connection: &mut SqliteConnection,
+    team: TeamId,
+) -> Result<Vec<(EvaluationId, RunId)>> {
+    let team = Text(team);
+    let rows = sqlx::query!(
+        r#"SELECT id AS "id: Text<EvaluationId>", run_id AS "run: Text<RunId>"
+           FROM evaluations WHERE team_id = ? AND state = 'open' ORDER BY created_at, id"#,
+        team
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows.into_iter().map(|row| (row.id.0, row.run.0)).collect())
+}
+
+/// From now on it does not count.
+pub(crate) async fn set_voided(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+    ruling: &Ruling,
+) -> Result<()> {
+    let (id, at) = (Text(id), Instant(ruling.at));
+    sqlx::query!(
+        "UPDATE evaluations SET voided_at = ?, voided_for = ? WHERE id = ?",
+        at,
+        ruling.reason,
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
 }

@@ -10,6 +10,7 @@ pub(crate) mod evaluations;
 pub(crate) mod events;
 pub(crate) mod finalisations;
 pub(crate) mod plan;
+pub(crate) mod rulings;
 pub(crate) mod runs;
 pub(crate) mod season;
 pub(crate) mod shards;

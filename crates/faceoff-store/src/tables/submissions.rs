@@ -152,10 +152,12 @@ pub(crate) async fn of_team(
     .collect()
 }
 
-/// What each team has active, earliest upload first.
+/// What each team that may play has active, earliest upload first.
 pub(crate) async fn active(connection: &mut SqliteConnection) -> Result<Vec<Submission>> {
     select_submissions!(
-        "WHERE s.id IN (SELECT submission_id FROM active_submissions) ORDER BY s.created_at, s.id"
+        "WHERE s.id IN (SELECT a.submission_id FROM active_submissions a JOIN teams t ON t.id = a.team_id
+                         WHERE t.disqualified_at IS NULL)
+         ORDER BY s.created_at, s.id"
     )
     .fetch_all(connection)
     .await?

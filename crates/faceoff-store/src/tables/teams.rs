@@ -1,6 +1,7 @@
 use crate::{
     column::{Bytes32, Instant},
     error::{Result, StoreError},
+    tables::rulings::Ruling,
 };
 use faceoff_types::{TeamId, TeamName};
 use jiff::Timestamp;
@@ -15,12 +16,16 @@ pub struct Team {
     pub name: TeamName,
     /// When it was invited.
     pub created_at: Timestamp,
+    /// It neither plays nor is ranked, if it is.
+    pub disqualified: Option<Ruling>,
 }
 
 struct TeamRow {
     id: Text<TeamId>,
     name: Text<TeamName>,
     created_at: Instant,
+    disqualified_at: Option<Instant>,
+    disqualified_for: Option<String>,
 }
 
 impl From<TeamRow> for Team {
@@ -29,6 +34,7 @@ impl From<TeamRow> for Team {
             id: row.id.0,
             name: row.name.0,
             created_at: row.created_at.0,
+            disqualified: Ruling::of(row.disqualified_at, row.disqualified_for),
         }
     }
 }
@@ -39,7 +45,8 @@ macro_rules! select_teams {
         sqlx::query_as!(
             TeamRow,
             r#"SELECT id AS "id: Text<TeamId>", name AS "name: Text<TeamName>",
-                      created_at AS "created_at: Instant"
+                      created_at AS "created_at: Instant",
+                      disqualified_at AS "disqualified_at: Instant", disqualified_for
                FROM teams "# + $tail
             $(, $argument)*
         )
@@ -116,6 +123,34 @@ pub(crate) async fn set_token(
     match done.rows_affected() {
         0 => Err(StoreError::NotFound("team")),
         _ => Ok(()),
+    }
+}
+
+/// Disqualifies a team, or reinstates it.
+pub(crate) async fn set_disqualified(
+    connection: &mut SqliteConnection,
+    id: TeamId,
+    ruling: Option<&Ruling>,
+) -> Result<()> {
+    let id = Text(id);
+    let at = ruling.map(|ruling| Instant(ruling.at));
+    let reason = ruling.map(|ruling| &ruling.reason);
+    sqlx::query!(
+        "UPDATE teams SET disqualified_at = ?, disqualified_for = ? WHERE id = ?",
+        at,
+        reason,
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Refuses what a disqualified team may not do.
+pub(crate) async fn check_may_play(connection: &mut SqliteConnection, id: TeamId) -> Result<()> {
+    match find(connection, id).await?.disqualified {
+        Some(Ruling { at, reason }) => Err(StoreError::Disqualified { at, reason }),
+        None => Ok(()),
     }
 }
 

@@ -144,6 +144,21 @@ impl Fixture {
         }
     }
 
+    /// Plays and scores all that is queued.
+    pub async fn play_to(&self, score: f64) {
+        while let Some(Claimed { claim, work }) = self.claim().await {
+            match work {
+                Work::Shard { shard, .. } => {
+                    self.play(&claim, &shard, 0).await;
+                }
+                Work::Finalise { .. } => {
+                    self.finish(&claim, score, "d").await;
+                }
+                Work::Smoke { .. } => panic!("no upload waits"),
+            }
+        }
+    }
+
     /// Our fault, as often as it takes to end an evaluation of one shard; its id.
     pub async fn break_next(&mut self) -> EvaluationId {
         let mut broken = None;

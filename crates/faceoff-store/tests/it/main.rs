@@ -21,6 +21,7 @@ mod queue;
 mod releases;
 mod retries;
 mod rulesets;
+mod rulings;
 mod shares;
 mod stages;
 mod teams;

@@ -46,21 +46,6 @@ fn refused<T: std::fmt::Debug>(done: Result<T, StoreError>, words: &[&str]) {
     }
 }
 
-/// Plays all that is queued, to the same score each.
-async fn play_all(f: &Fixture, score: f64) {
-    while let Some(Claimed { claim, work }) = f.claim().await {
-        match work {
-            Work::Shard { shard, .. } => {
-                f.play(&claim, &shard, 0).await;
-            }
-            Work::Finalise { .. } => {
-                f.finish(&claim, score, "d").await;
-            }
-            Work::Smoke { .. } => panic!("no upload waits"),
-        }
-    }
-}
-
 #[tokio::test]
 async fn stages_have_their_own_days_seeds_and_boards() {
     let f = Fixture::new().await;
@@ -93,7 +78,7 @@ async fn stages_have_their_own_days_seeds_and_boards() {
         assert_eq!(found.mismatch, secret.model_mismatch());
         seeds.push(found.episodes);
         f.play(&claimed.claim, &shard, 0).await;
-        play_all(&f, score).await;
+        f.play_to(score).await;
         let board = f.store.board(stage, 1).await.unwrap();
         assert_eq!(board.len(), 1);
         assert_eq!(board[0].result.score, score);
@@ -123,7 +108,7 @@ async fn a_day_is_the_date_in_the_stages_zone() {
     let stage = made(&f, auckland).await.id;
     let day = |started: Vec<Evaluation>| started[0].of.date;
     assert_eq!(day(start(&f, stage).await.unwrap()), date(2026, 3, 1));
-    play_all(&f, 1.0).await;
+    f.play_to(1.0).await;
     // Midnight there is 11:00 UTC.
     f.now = at("2026-03-01T10:59:59Z");
     assert!(matches!(
@@ -193,7 +178,7 @@ async fn other_rules_of_an_open_stage_are_another_revision_and_another_board() {
     f.ready_team("Alpha").await;
     let stage = made(&f, second()).await;
     start(&f, stage.id).await.unwrap();
-    play_all(&f, 10.0).await;
+    f.play_to(10.0).await;
 
     let rules = StageRules {
         episodes_per_task: 2,
@@ -213,7 +198,7 @@ async fn other_rules_of_an_open_stage_are_another_revision_and_another_board() {
     f.now = at("2026-03-02T10:00:00Z");
     let started = start(&f, stage.id).await.unwrap().remove(0);
     assert_eq!((started.revision, started.plan.episodes_per_task), (2, 2));
-    play_all(&f, 20.0).await;
+    f.play_to(20.0).await;
     assert_eq!(f.store.board_revision(&same).await.unwrap(), 2);
     for (revision, score) in [(1, 10.0), (2, 20.0)] {
         let board = f.store.board(stage.id, revision).await.unwrap();

@@ -7,12 +7,15 @@ use super::serve::ADMIN_TOKEN_FILE;
 use crate::{client::Client, config::Config};
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
-use faceoff_http::views::{
-    evaluation::{EvaluationStatus, EvaluationView},
-    event::EventView,
-    season::SeasonView,
+use faceoff_http::{
+    requests::Decision,
+    views::{
+        evaluation::{EvaluationStatus, EvaluationView},
+        event::EventView,
+        season::SeasonView,
+    },
 };
-use faceoff_types::{EvaluationId, TeamId};
+use faceoff_types::{EvaluationId, StageDay, TeamId};
 use jiff::civil::Date;
 use output::{or_none, print};
 use serde_json::Value;
@@ -71,7 +74,7 @@ enum Action {
         #[command(subcommand)]
         action: stage::StageAction,
     },
-    /// Play an evaluation again that was cancelled or failed by the server's fault: same agent, same episodes
+    /// Play an evaluation again that was cancelled, voided or failed by the server's fault: same agent, same episodes
     Rerun {
         /// The evaluation's id
         evaluation: EvaluationId,
@@ -81,6 +84,46 @@ enum Action {
         /// The evaluation's id
         evaluation: EvaluationId,
         /// Shown to the team
+        reason: String,
+    },
+    /// Take a finished evaluation off the boards; without --confirm, say what that would do
+    Void {
+        /// The evaluation's id
+        evaluation: EvaluationId,
+        /// Shown to everybody
+        reason: String,
+        /// The team's name
+        #[arg(long, value_name = "TEAM")]
+        confirm: Option<String>,
+    },
+    /// Take a whole day off the boards, and cancel what is under way; without --confirm, say what that would do
+    VoidDay {
+        /// Its date
+        day: Date,
+        /// Shown to everybody
+        reason: String,
+        /// The stage's name or id
+        #[arg(long)]
+        stage: String,
+        /// The date again
+        #[arg(long, value_name = "DATE")]
+        confirm: Option<String>,
+    },
+    /// Disqualify a team: it neither plays nor is ranked, at once; without --confirm, say what that would do
+    Disqualify {
+        /// The team's name or id
+        team: String,
+        /// Shown to everybody
+        reason: String,
+        /// The team's name
+        #[arg(long, value_name = "TEAM")]
+        confirm: Option<String>,
+    },
+    /// Let a disqualified team play and be ranked again
+    Reinstate {
+        /// The team's name or id
+        team: String,
+        /// Kept in the log
         reason: String,
     },
     /// Show the season, or close it
@@ -193,6 +236,51 @@ impl AdminCommand {
                 let cancelled = client.cancel(evaluation, &reason).await?;
                 print(self.json, &cancelled, || line(&cancelled))
             }
+            Action::Void {
+                evaluation,
+                reason,
+                confirm,
+            } => {
+                let decision = Decision { reason, confirm };
+                let voided = client.void(evaluation, &decision).await?;
+                print(self.json, &voided, || line(&voided))
+            }
+            Action::VoidDay {
+                day,
+                reason,
+                stage,
+                confirm,
+            } => {
+                let stage = stage::find(&client, &stage).await?.id;
+                let of = StageDay { stage, date: day };
+                let decision = Decision { reason, confirm };
+                let voided = client.void_day(of, &decision).await?;
+                print(self.json, &voided, || {
+                    voided
+                        .created
+                        .iter()
+                        .map(line)
+                        .collect::<Vec<_>>()
+                        .join("\n")
+                })
+            }
+            Action::Disqualify {
+                team,
+                reason,
+                confirm,
+            } => {
+                let team = find_team(&client, &team).await?;
+                let decision = Decision { reason, confirm };
+                let team = client.disqualify(team, &decision).await?;
+                print(self.json, &team, || {
+                    format!("{} is disqualified", team.name)
+                })
+            }
+            Action::Reinstate { team, reason } => {
+                let team = find_team(&client, &team).await?;
+                let team = client.reinstate(team, &reason).await?;
+                print(self.json, &team, || format!("{} is reinstated", team.name))
+            }
             Action::Season {
                 action: SeasonAction::Show,
             } => {
@@ -220,8 +308,12 @@ impl AdminCommand {
                     let lines: Vec<_> = teams
                         .iter()
                         .map(|team| {
+                            let disqualified = match &team.disqualified {
+                                Some(ruling) => format!("  disqualified: {}", ruling.reason),
+                                None => String::new(),
+                            };
                             format!(
-                                "{:<40} {}  since {}",
+                                "{:<40} {}  since {}{disqualified}",
                                 team.name,
                                 team.id,
                                 team.created_at.strftime("%Y-%m-%d")
@@ -349,6 +441,10 @@ fn of_season(season: &SeasonView) -> String {
 }
 
 fn line(evaluation: &EvaluationView) -> String {
+    if let Some(ruling) = &evaluation.voided {
+        let (team, id) = (&evaluation.team_name, evaluation.id);
+        return format!("{team:<40} {id}  voided: {}", ruling.reason);
+    }
     let progress = evaluation.progress;
     let state = match &evaluation.status {
         EvaluationStatus::Queued => "queued".to_owned(),

@@ -1,0 +1,179 @@
+//! Decisions of the organiser's: said before they are done, done at once, and seen by everybody.
+
+use crate::site::{ADMIN, GZIP, Site, result};
+use serde_json::{Value, json};
+
+const WHY: &str = "the <table> was tilted";
+
+/// The teams on the board.
+async fn teams(site: &Site) -> Value {
+    let board = site.get("/api/v1/board", None).await.json(200);
+    board["rows"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|row| row["team"].clone())
+        .collect()
+}
+
+/// Asks for a decision twice: without the confirmation nothing is done, and it is told what would be.
+async fn decide(site: &Site, path: &str, confirm: &str, words: &[&str]) -> Value {
+    let ask = async |body: Value| site.post(path, Some(ADMIN), &body).await;
+    for body in [
+        json!({ "reason": WHY }),
+        json!({ "reason": WHY, "confirm": "yes" }),
+    ] {
+        let problem = ask(body).await.problem(409, "not-confirmed", words);
+        assert_eq!(problem["confirm"], confirm);
+    }
+    for reason in ["", " ", &"x".repeat(501)] {
+        ask(json!({ "reason": reason, "confirm": confirm }))
+            .await
+            .problem(422, "invalid-content", &["reason", "1 to 500"]);
+    }
+    ask(json!({ "confirm": confirm }))
+        .await
+        .problem(422, "invalid-content", &["reason"]);
+    ask(json!({ "reason": WHY, "confirm": confirm }))
+        .await
+        .json(200)
+}
+
+#[tokio::test]
+async fn a_voided_evaluation_says_so_everywhere() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let submission = site.valid_submission(&team, "a").await;
+    let path = site.evaluate(&team, &submission).await;
+    site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
+    assert_eq!(teams(&site).await, json!(["Alpha"]));
+    let words = ["Alpha", "2026-03-01", "leave the boards", "rerun"];
+    let voided = decide(&site, &format!("{path}/void"), "Alpha", &words).await;
+    assert_eq!(
+        voided["voided"],
+        json!({ "at": "2026-03-01T10:00:00Z", "reason": WHY })
+    );
+    assert_eq!(voided["state"], "finished");
+    assert_eq!(teams(&site).await, json!([]));
+    let again = json!({ "reason": WHY, "confirm": "Alpha" });
+    site.post(&format!("{path}/void"), Some(ADMIN), &again)
+        .await
+        .problem(409, "conflict", &["counts"]);
+    let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
+    assert_eq!(me["turn"]["evaluation"], json!(null));
+    let page = site.get(&path.replace("/api/v1", ""), None).await.body;
+    assert!(
+        page.contains("Voided") && page.contains("the &#60;table&#62; was tilted"),
+        "{page}"
+    );
+    site.post(&format!("{path}/rerun"), Some(ADMIN), &json!({}))
+        .await
+        .json(201);
+}
+
+#[tokio::test]
+async fn a_day_is_voided_as_a_whole() {
+    let site = Site::start().await;
+    let (alpha, beta) = (site.team("Alpha").await, site.team("Beta").await);
+    let submission = site.valid_submission(&alpha, "a").await;
+    site.valid_submission(&beta, "b").await;
+    site.evaluate(&alpha, &submission).await;
+    site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
+    let stage = site.stage().await;
+    let path = format!("/api/v1/stages/{stage}/days/2026-03-01/void");
+    let words = ["1 evaluations of 2026-03-01", "1 that are under way"];
+    let day = decide(&site, &path, "2026-03-01", &words).await;
+    let states: Vec<_> = day["created"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|one| (one["state"].clone(), one["voided"]["reason"].clone()))
+        .collect();
+    assert_eq!(
+        states,
+        [
+            (json!("finished"), json!(WHY)),
+            (json!("cancelled"), json!(null))
+        ]
+    );
+    for wrong in ["2026-03-02", "yesterday"] {
+        let path = format!("/api/v1/stages/{stage}/days/{wrong}/void");
+        let body = json!({ "reason": WHY, "confirm": wrong });
+        site.post(&path, Some(ADMIN), &body)
+            .await
+            .problem(404, "not-found", &["day"]);
+    }
+}
+
+#[tokio::test]
+async fn a_disqualified_team_is_told_and_shown() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let submission = site.valid_submission(&team, "a").await;
+    site.evaluate(&team, &submission).await;
+    site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
+    site.next_day();
+    let under_way = site.evaluate(&team, &submission).await;
+    let path = format!("/api/v1/teams/{}/disqualify", team.id);
+    let view = decide(
+        &site,
+        &path,
+        "Alpha",
+        &["Alpha", "all boards", "1 of its evaluations"],
+    )
+    .await;
+    assert_eq!(view["disqualified"]["reason"], WHY);
+    assert_eq!(teams(&site).await, json!([]));
+    let board = site.get("/api/v1/board", None).await.json(200);
+    assert_eq!(board["disqualified"][0]["name"], "Alpha");
+    let page = site.get("/", None).await.body;
+    assert!(
+        page.contains("Disqualified") && page.contains("the &#60;table&#62; was tilted"),
+        "{page}"
+    );
+    let cancelled = site.get(&under_way, Some(&team.token)).await.json(200);
+    assert_eq!(cancelled["state"], "cancelled");
+    site.upload(&team.token, GZIP.to_vec()).await.problem(
+        403,
+        "disqualified",
+        &["2026-03-02", "tilted", "reinstate"],
+    );
+    let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
+    assert_eq!(
+        me["team"]["disqualified"]["reason"], WHY,
+        "it may read what it has"
+    );
+
+    let path = format!("/api/v1/teams/{}/reinstate", team.id);
+    let back = site
+        .post(&path, Some(ADMIN), &json!({ "reason": "a mistake" }))
+        .await;
+    assert_eq!(back.json(200).get("disqualified"), None);
+    assert_eq!(teams(&site).await, json!(["Alpha"]));
+    site.post(&path, Some(ADMIN), &json!({ "reason": "a mistake" }))
+        .await
+        .problem(409, "conflict", &["not disqualified"]);
+}
+
+#[tokio::test]
+async fn only_the_organiser_decides() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let submission = site.valid_submission(&team, "a").await;
+    let evaluation = site.evaluate(&team, &submission).await;
+    let stage = site.stage().await;
+    for path in [
+        format!("{evaluation}/void"),
+        format!("/api/v1/stages/{stage}/days/2026-03-01/void"),
+        format!("/api/v1/teams/{}/disqualify", team.id),
+        format!("/api/v1/teams/{}/reinstate", team.id),
+    ] {
+        let body = json!({ "reason": WHY, "confirm": "Alpha" });
+        site.post(&path, None, &body)
+            .await
+            .problem(401, "unauthenticated", &[]);
+        site.post(&path, Some(&team.token), &body)
+            .await
+            .problem(403, "forbidden", &[]);
+    }
+}
