@@ -302,6 +302,13 @@ pub enum Event {
         /// The new ones.
         rules: StageRules,
     },
+    /// Nothing of the queue is begun from now on.
+    QueuePaused {
+        /// As everybody may read it.
+        reason: String,
+    },
+    /// The queue goes on.
+    QueueResumed,
     /// The season has another name.
     SeasonNamed {
         /// The new one.

@@ -4,6 +4,7 @@ use crate::{
     error::Result,
     queue::{self, Standing},
     store::Store,
+    tables::rulings::Ruling,
 };
 use jiff::{SignedDuration, Timestamp};
 use std::sync::atomic::Ordering;
@@ -16,7 +17,7 @@ const PROBE_EVERY: SignedDuration = SignedDuration::from_secs(1);
 const STUCK_AFTER: SignedDuration = SignedDuration::from_secs(60);
 
 /// How the store stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Health {
     /// Can the database be written? It was tried.
     pub database_writable: bool,
@@ -25,7 +26,7 @@ pub struct Health {
 }
 
 /// How the queue stands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum QueueHealth {
     /// What can be done is being done.
     Moving {
@@ -40,6 +41,15 @@ pub enum QueueHealth {
     Paused {
         /// Units that could be begun otherwise.
         waiting: u32,
+    },
+    /// Nothing is begun: the organiser holds it.
+    Held {
+        /// Units under a lease that runs.
+        running: u32,
+        /// Units that could be begun otherwise.
+        waiting: u32,
+        /// Since when, and why.
+        ruling: Ruling,
     },
     /// Work waits, and nobody comes for it.
     Stuck {
@@ -95,6 +105,13 @@ impl Store {
         } = queue::standing(&mut *self.database.read.acquire().await?, now).await?;
         if self.room.is_short() {
             return Ok(QueueHealth::Paused { waiting });
+        }
+        if let Some(ruling) = self.season().await?.paused {
+            return Ok(QueueHealth::Held {
+                running,
+                waiting,
+                ruling,
+            });
         }
         let since_looked = now
             .as_millisecond()

@@ -217,6 +217,19 @@ impl Client {
         read(self.send(request.json(decision)).await?).await
     }
 
+    /// Organiser: holds the queue.
+    pub async fn pause(&self, reason: &str) -> anyhow::Result<()> {
+        let reason = reason.to_owned();
+        let request = self.request(Method::POST, "/queue/pause");
+        self.send(request.json(&Reason { reason })).await.map(drop)
+    }
+
+    /// Organiser: lets the queue go on.
+    pub async fn resume(&self) -> anyhow::Result<()> {
+        let request = self.request(Method::POST, "/queue/resume");
+        self.send(request).await.map(drop)
+    }
+
     /// Organiser: disqualifies a team.
     pub async fn disqualify(&self, id: TeamId, decision: &Decision) -> anyhow::Result<TeamView> {
         let request = self.request(Method::POST, &format!("/teams/{id}/disqualify"));

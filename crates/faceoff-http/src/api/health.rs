@@ -3,6 +3,7 @@
 use crate::{
     app::App,
     problem::{Problem, ProblemKind},
+    views::ruling::RulingView,
 };
 use axum::{Json, extract::State};
 use faceoff_store::QueueHealth;
@@ -21,6 +22,9 @@ pub(crate) struct HealthView {
     running: u32,
     /// Units of work that could be begun.
     waiting: u32,
+    /// The organiser holds the queue: since when, and why; absent otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    paused: Option<RulingView>,
 }
 
 /// The process answers.
@@ -54,6 +58,9 @@ pub(crate) async fn health(State(app): State<App>) -> Result<Json<HealthView>, P
         QueueHealth::Moving {
             running, waiting, ..
         } => (running, waiting, "moving"),
+        QueueHealth::Held {
+            running, waiting, ..
+        } => (running, waiting, "held"),
         QueueHealth::Paused { waiting } => (0, waiting, "paused"),
         QueueHealth::Stuck { waiting, .. } => (0, waiting, "stuck"),
         QueueHealth::Unknown => (0, 0, "unknown"),
@@ -74,14 +81,14 @@ pub(crate) async fn health(State(app): State<App>) -> Result<Json<HealthView>, P
              free: they need more than that; they are tried on"
         ));
     }
-    match health.queue {
+    match &health.queue {
         QueueHealth::Stuck { waiting, since } => {
             missing.push(format!(
                 "{waiting} units of work wait, the first since {since}, and nobody works"
             ));
         }
         QueueHealth::Unknown => missing.push("the queue cannot be read".to_owned()),
-        QueueHealth::Moving { .. } | QueueHealth::Paused { .. } => {}
+        QueueHealth::Moving { .. } | QueueHealth::Held { .. } | QueueHealth::Paused { .. } => {}
     }
     if missing.is_empty() {
         return Ok(Json(HealthView {
@@ -89,6 +96,10 @@ pub(crate) async fn health(State(app): State<App>) -> Result<Json<HealthView>, P
             version: env!("CARGO_PKG_VERSION"),
             running,
             waiting,
+            paused: match health.queue {
+                QueueHealth::Held { ruling, .. } => Some(ruling.into()),
+                _ => None,
+            },
         }));
     }
     // How much is free exactly would tell every team how large the others' uploads are.

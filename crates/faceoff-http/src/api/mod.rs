@@ -55,6 +55,8 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(rulings::void_evaluation))
         .routes(routes!(rulings::void_day))
         .routes(routes!(rulings::disqualify_team))
+        .routes(routes!(rulings::pause_queue))
+        .routes(routes!(rulings::resume_queue))
         .routes(routes!(rulings::reinstate_team))
         .routes(routes!(datasets::dataset))
         .routes(routes!(datasets::violations))

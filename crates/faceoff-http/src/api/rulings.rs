@@ -1,5 +1,6 @@
-//! Decisions of the organiser's against results and teams. Each takes effect at once, has a reason that everybody may
-//! read, and is done only when its request names what it is about.
+//! Decisions of the organiser's against results and teams, and over the queue. Each takes effect at once, has a reason that everybody may
+//! read, and is done only when its request names what it is about, if
+//! it cannot be undone.
 
 use crate::{
     app::App,
@@ -9,7 +10,7 @@ use crate::{
     requests::{Decision, Reason},
     views::{day::DayView, evaluation::EvaluationView, team::TeamView},
 };
-use axum::{Json, extract::State};
+use axum::{Json, extract::State, http::StatusCode};
 use faceoff_store::{Actor, EvaluationState};
 use faceoff_types::{EvaluationId, StageDay, StageId, TeamId};
 
@@ -115,6 +116,39 @@ pub(crate) async fn void_day(
         .await?;
     tracing::info!(day = %of, voided, reason, "day voided");
     DayView::of(&app, of).await.map(Json)
+}
+
+/// Holds the queue: nothing is begun, what is begun is played to its end, days start and wait. `GET /season` tells
+/// everybody.
+#[utoipa::path(
+    post, path = "/queue/pause", tag = "organiser", security(("organiser" = [])), request_body = Reason,
+    responses((status = 204), (status = 409, description = "it is paused"), (status = 422))
+)]
+pub(crate) async fn pause_queue(
+    _: Organiser,
+    State(app): State<App>,
+    Body(Reason { reason }): Body<Reason>,
+) -> Result<StatusCode, Problem> {
+    let reason = checked_reason(&reason)?;
+    let now = app.config.clock.now();
+    app.store.pause_queue(Actor::Organiser, reason, now).await?;
+    tracing::info!(reason, "queue paused");
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Lets a paused queue go on.
+#[utoipa::path(
+    post, path = "/queue/resume", tag = "organiser", security(("organiser" = [])),
+    responses((status = 204), (status = 409, description = "it is not paused"))
+)]
+pub(crate) async fn resume_queue(
+    _: Organiser,
+    State(app): State<App>,
+) -> Result<StatusCode, Problem> {
+    let now = app.config.clock.now();
+    app.store.resume_queue(Actor::Organiser, now).await?;
+    tracing::info!("queue resumed");
+    Ok(StatusCode::NO_CONTENT)
 }
 
 /// Disqualifies a team at once: what it plays is cancelled, it leaves all boards, and neither uploads nor plays.

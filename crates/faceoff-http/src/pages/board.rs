@@ -12,6 +12,7 @@ use crate::{
     views::{
         board::{BoardRow, BoardView},
         evaluation::{EvaluationStatus, EvaluationView, Progress},
+        ruling::RulingView,
         season::SeasonHead,
         stage::{PhaseView, StageView},
         task::TaskView,
@@ -147,6 +148,8 @@ struct Heading {
     /// Of the rules, if the stage has had several.
     rules: Option<String>,
     others: Vec<OtherBoard>,
+    /// The organiser holds the queue.
+    paused: Option<RulingView>,
 }
 
 struct OtherBoard {
@@ -156,7 +159,11 @@ struct OtherBoard {
 }
 
 impl Heading {
-    async fn of(app: &App, board: &BoardView) -> Result<Self, PageProblem> {
+    async fn of(
+        app: &App,
+        board: &BoardView,
+        paused: Option<RulingView>,
+    ) -> Result<Self, PageProblem> {
         let stages = StageView::all(app).await?;
         let mut others = Vec::new();
         let mut heading = None;
@@ -189,11 +196,16 @@ impl Heading {
                     }),
                     stage: stage.name.to_string(),
                     others: Vec::new(),
+                    paused: None,
                 });
             }
         }
         let heading = heading.ok_or_else(|| Problem::internal("a board without its stage"))?;
-        Ok(Self { others, ..heading })
+        Ok(Self {
+            others,
+            paused,
+            ..heading
+        })
     }
 }
 
@@ -241,7 +253,7 @@ pub(super) async fn overall(
     let page = OverallPage {
         frame: Frame::of(&app, season.name, "/"),
         today: today.date,
-        heading: Heading::of(&app, &board).await?,
+        heading: Heading::of(&app, &board, season.paused).await?,
         commitment: season.commitment,
         tiers: by_tier(&board, |row| OverallRow::of(row, setting.as_ref())),
         setting,
@@ -360,7 +372,7 @@ pub(super) async fn by_task(
     let frame = Frame::of(&app, season.name, format!("/tasks/{task}"));
     render(&TaskPage {
         frame,
-        heading: Heading::of(&app, &board).await?,
+        heading: Heading::of(&app, &board, season.paused).await?,
         title,
         aim,
         setting,

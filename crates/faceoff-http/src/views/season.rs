@@ -2,6 +2,7 @@
 
 use super::{
     day::NextCut,
+    ruling::RulingView,
     stage::{self, StageView},
 };
 use crate::{app::AppState, problem::Problem};
@@ -25,6 +26,9 @@ pub struct SeasonView {
     pub created_at: Timestamp,
     /// When it was closed; null while it runs.
     pub closed_at: Option<Timestamp>,
+    /// The organiser holds the queue: since when, and why; absent otherwise. Nothing is begun meanwhile.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub paused: Option<RulingView>,
     /// The season secret, 64 hexadecimal digits; null until the season is closed.
     pub secret: Option<Seed>,
     /// The seed of the season's model mismatch; null until the season is closed.
@@ -70,6 +74,7 @@ impl SeasonView {
             ruleset: RULESET.to_owned(),
             created_at: season.created_at,
             closed_at: season.closed_at,
+            paused: season.paused.map(RulingView::from),
             secret: revealed(season.secret),
             mismatch_seed: revealed(season.secret.model_mismatch()),
             today: stage::current(app).await?.day(app.config.clock.now()).date,
@@ -96,6 +101,7 @@ impl SeasonView {
 pub(crate) struct SeasonHead {
     pub(crate) name: String,
     pub(crate) commitment: String,
+    pub(crate) paused: Option<RulingView>,
 }
 
 impl SeasonHead {
@@ -104,6 +110,7 @@ impl SeasonHead {
         Ok(Self {
             name: season.name,
             commitment: season.commitment,
+            paused: season.paused.map(RulingView::from),
         })
     }
 }

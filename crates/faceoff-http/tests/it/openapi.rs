@@ -42,6 +42,8 @@ async fn the_document_lists_what_is_there_and_nothing_else() {
         "POST /api/v1/evaluations/{id}/cancel",
         "POST /api/v1/evaluations/{id}/rerun",
         "POST /api/v1/evaluations/{id}/void",
+        "POST /api/v1/queue/pause",
+        "POST /api/v1/queue/resume",
         "POST /api/v1/season/close",
         "POST /api/v1/stages",
         "POST /api/v1/stages/{id}/days/{day}/void",

@@ -156,6 +156,49 @@ async fn a_disqualified_team_is_told_and_shown() {
 }
 
 #[tokio::test]
+async fn a_paused_queue_says_so_and_the_server_is_well() {
+    let site = Site::start().await;
+    let ask = async |path: &str, body: Value| site.post(path, Some(ADMIN), &body).await;
+    ask("/api/v1/queue/pause", json!({ "reason": "" }))
+        .await
+        .problem(422, "invalid-content", &["reason"]);
+    let paused = ask("/api/v1/queue/pause", json!({ "reason": WHY })).await;
+    assert_eq!(paused.status, 204);
+    ask("/api/v1/queue/pause", json!({ "reason": WHY }))
+        .await
+        .problem(409, "conflict", &["already"]);
+    let told = json!({ "at": "2026-03-01T10:00:00Z", "reason": WHY });
+    assert_eq!(
+        site.get("/api/v1/season", None).await.json(200)["paused"],
+        told
+    );
+    let health = site.get("/api/v1/health", None).await.json(200);
+    assert_eq!(
+        (&health["status"], &health["paused"]),
+        (&json!("ok"), &told)
+    );
+    for path in ["/", "/tasks/hit"] {
+        let page = site.get(path, None).await.body;
+        assert!(
+            page.contains("Paused</strong> since 2026-03-01 10:00 UTC"),
+            "{page}"
+        );
+    }
+    assert_eq!(ask("/api/v1/queue/resume", json!({})).await.status, 204);
+    ask("/api/v1/queue/resume", json!({}))
+        .await
+        .problem(409, "conflict", &["not paused"]);
+    assert_eq!(
+        site.get("/api/v1/season", None)
+            .await
+            .json(200)
+            .get("paused"),
+        None
+    );
+    assert!(!site.get("/", None).await.body.contains("Paused"));
+}
+
+#[tokio::test]
 async fn only_the_organiser_decides() {
     let site = Site::start().await;
     let team = site.team("Alpha").await;
@@ -167,6 +210,8 @@ async fn only_the_organiser_decides() {
         format!("/api/v1/stages/{stage}/days/2026-03-01/void"),
         format!("/api/v1/teams/{}/disqualify", team.id),
         format!("/api/v1/teams/{}/reinstate", team.id),
+        "/api/v1/queue/pause".to_owned(),
+        "/api/v1/queue/resume".to_owned(),
     ] {
         let body = json!({ "reason": WHY, "confirm": "Alpha" });
         site.post(&path, None, &body)

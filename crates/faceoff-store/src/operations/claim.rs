@@ -89,7 +89,7 @@ impl Store {
     /// Leases the next unit of work for `lease_s` seconds. Finalisations come first; smoke runs and
     /// shards of evaluations share the slots half and half, and the teams that wait for either share
     /// that half equally, by slot time; shards of ablations have what is left. A unit whose lease is
-    /// over is leased again. `None`: nothing to do now (see [`Store::work_signal`]).
+    /// over is leased again. `None`: nothing to do now (see [`Store::work_signal`]), or the queue is paused.
     pub async fn claim(
         &self,
         worker: &str,
@@ -98,6 +98,9 @@ impl Store {
     ) -> Result<Option<Claimed>> {
         let actor = Actor::Worker(worker.to_owned());
         self.write(actor, now, async |tx| {
+            if season::read(tx).await?.paused.is_some() {
+                return Ok(None);
+            }
             let nonce = Uuid::now_v7();
             while let Some(unit) = queue::claim_next(tx, worker, nonce, lease_s, now).await? {
                 let reason = if unit.attempts > MAX_LEASES {

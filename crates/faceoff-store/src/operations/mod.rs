@@ -11,6 +11,7 @@ pub(crate) mod give_back;
 mod heartbeat;
 mod open;
 mod order_ablation;
+mod pause;
 pub(crate) mod purpose;
 mod release_day;
 pub(crate) mod rerun;

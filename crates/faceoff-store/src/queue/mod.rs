@@ -10,5 +10,5 @@ pub use lease::Claim;
 pub(crate) use lease::{Hold, hold, mark_done, release, renew, renew_all, requeue_failed};
 pub(crate) use shares::{Lane, account};
 pub(crate) use units::{
-    Leased, NewUnit, Standing, claim_next, drop_units, end_leases_of, insert, standing,
+    Leased, NewUnit, Standing, claim_next, drop_units, end_leases_of, goes_on, insert, standing,
 };

@@ -39,6 +39,11 @@ pub(crate) async fn insert(tx: &mut Tx, unit: NewUnit, account: Account) -> Resu
     Ok(id)
 }
 
+/// What waits can be claimed again.
+pub(crate) const fn goes_on(tx: &mut Tx) {
+    tx.work_added();
+}
+
 /// A unit just claimed.
 pub(crate) struct Leased {
     pub(crate) id: Text<Uuid>,

@@ -1,6 +1,7 @@
 use crate::{
     column::{Bytes32, Instant},
     error::{Result, StoreError},
+    tables::rulings::Ruling,
 };
 use faceoff_types::Seed;
 use jiff::Timestamp;
@@ -20,12 +21,15 @@ pub struct Season {
     pub created_at: Timestamp,
     /// When it was closed; `None` while it runs.
     pub closed_at: Option<Timestamp>,
+    /// The queue is held, if it is: nothing is begun.
+    pub paused: Option<Ruling>,
 }
 
 pub(crate) async fn read(connection: &mut SqliteConnection) -> Result<Season> {
     let row = sqlx::query!(
         r#"SELECT name, secret AS "secret: Bytes32", created_at AS "created_at: Instant",
-                  closed_at AS "closed_at: Instant" FROM season"#
+                  closed_at AS "closed_at: Instant", paused_at AS "paused_at: Instant", paused_for
+           FROM season"#
     )
     .fetch_optional(connection)
     .await?
@@ -36,6 +40,7 @@ pub(crate) async fn read(connection: &mut SqliteConnection) -> Result<Season> {
         commitment: blake3::hash(&row.secret.0).to_string(),
         created_at: row.created_at.0,
         closed_at: row.closed_at.map(|at| at.0),
+        paused: Ruling::of(row.paused_at, row.paused_for),
     })
 }
 
@@ -53,6 +58,23 @@ pub(crate) async fn rename(connection: &mut SqliteConnection, name: &str) -> Res
         .execute(connection)
         .await?;
     Ok(renamed.rows_affected() > 0)
+}
+
+/// Holds the queue, or lets it go on.
+pub(crate) async fn set_paused(
+    connection: &mut SqliteConnection,
+    ruling: Option<&Ruling>,
+) -> Result<()> {
+    let at = ruling.map(|ruling| Instant(ruling.at));
+    let reason = ruling.map(|ruling| &ruling.reason);
+    sqlx::query!(
+        "UPDATE season SET paused_at = ?, paused_for = ?",
+        at,
+        reason
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
 }
 
 pub(crate) async fn close(connection: &mut SqliteConnection, now: Timestamp) -> Result<()> {

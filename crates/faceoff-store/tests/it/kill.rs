@@ -104,6 +104,22 @@ async fn child() {
                         .unwrap();
                     assert_eq!(finished, Committed::Now);
                     tell(format!("finished {evaluation}"));
+                    // The organiser's acts: each is done or not done.
+                    let played = store.evaluation(evaluation).await.unwrap();
+                    if played.rerun_of.is_some() {
+                        continue;
+                    }
+                    let team = played.team;
+                    let disqualified = store.disqualify_team(Actor::Organiser, team, "a test", now);
+                    disqualified.await.unwrap();
+                    tell(format!("disqualified {team}"));
+                    let reinstated = store.reinstate_team(Actor::Organiser, team, "done", now);
+                    reinstated.await.unwrap();
+                    let voided = store.void_evaluation(Actor::Organiser, evaluation, "why", now);
+                    voided.await.unwrap();
+                    tell(format!("voided {evaluation}"));
+                    let rerun = store.rerun_evaluation(Actor::Organiser, evaluation, now);
+                    tell(format!("evaluation {}", rerun.await.unwrap().id));
                 }
             }
         }
@@ -129,7 +145,16 @@ async fn survives_kill_9() {
         let told = lines.filter(|line| {
             line.split_once(' ').is_some_and(|(what, id)| {
                 id.parse::<uuid::Uuid>().is_ok()
-                    && ["team", "valid", "evaluation", "shard", "finished"].contains(&what)
+                    && [
+                        "team",
+                        "valid",
+                        "evaluation",
+                        "shard",
+                        "finished",
+                        "disqualified",
+                        "voided",
+                    ]
+                    .contains(&what)
             })
         });
         let seen: Vec<String> = told.take(lines_to_live).collect();
@@ -158,7 +183,9 @@ async fn stored(folder: &Path) -> HashSet<String> {
          UNION SELECT 'valid ' || id FROM submissions WHERE state = 'valid'
          UNION SELECT 'evaluation ' || id FROM evaluations
          UNION SELECT 'shard ' || id FROM shards WHERE committed_at IS NOT NULL
-         UNION SELECT 'finished ' || id FROM evaluations WHERE state = 'finished'",
+         UNION SELECT 'finished ' || id FROM evaluations WHERE state = 'finished'
+         UNION SELECT 'voided ' || id FROM evaluations WHERE voided_at IS NOT NULL
+         UNION SELECT 'disqualified ' || subject_id FROM events WHERE kind = 'team_disqualified'",
     )
     .fetch_all(&mut connection)
     .await
@@ -208,10 +235,16 @@ async fn check_consistency(folder: &Path, store: &Store) {
               JOIN units u ON u.id = f.unit_id WHERE (e.state = 'finished') <> (u.state = 'done')"),
         ("a day that is over and not released, or released and not over",
          "SELECT COUNT(*) FROM days d WHERE (d.released_at IS NULL)
-              <> EXISTS (SELECT 1 FROM evaluations e WHERE e.day = d.day AND e.state = 'open')"),
+              <> EXISTS (SELECT 1 FROM evaluations e WHERE e.stage_id = d.stage_id AND e.day = d.day
+                         AND e.state = 'open' AND e.rerun_of IS NULL)"),
         ("a valid submission of a team that has none active",
          "SELECT COUNT(*) FROM submissions s WHERE s.state = 'valid'
               AND NOT EXISTS (SELECT 1 FROM active_submissions a WHERE a.team_id = s.team_id)"),
+        ("a decision without its event",
+         "SELECT (SELECT COUNT(*) FROM evaluations WHERE voided_at IS NOT NULL)
+               + (SELECT COUNT(*) FROM teams WHERE disqualified_at IS NOT NULL)
+               - (SELECT COUNT(*) FROM events WHERE kind IN ('evaluation_voided', 'team_disqualified'))
+               + (SELECT COUNT(*) FROM events WHERE kind = 'team_reinstated')"),
         ("a change without its event",
          "SELECT (SELECT COUNT(*) FROM submissions) + (SELECT COUNT(*) FROM evaluations)
                + (SELECT COUNT(*) FROM shards WHERE committed_at IS NOT NULL)

@@ -96,6 +96,57 @@ async fn a_voided_result_leaves_the_board_and_gives_the_turn_back() {
 }
 
 #[tokio::test]
+async fn a_paused_queue_begins_nothing_and_loses_nothing() {
+    let mut f = Fixture::new().await;
+    let agent = f.ready_team("Alpha").await;
+    let two_shards = RunPlan {
+        tasks: vec![Task::Hit],
+        ..plan()
+    };
+    f.evaluate(agent.id, &two_shards).await;
+    let (claim, _, shard) = f.claim_shard().await;
+    let pause = async |f: &Fixture| f.store.pause_queue(Actor::Organiser, WHY, f.now).await;
+    pause(&f).await.unwrap();
+    refused(pause(&f).await, &["paused already"]);
+    let paused = f.store.season().await.unwrap().paused.unwrap();
+    assert_eq!((paused.at, paused.reason.as_str()), (f.now, WHY));
+    assert!(f.claim().await.is_none());
+    assert_eq!(
+        f.play(&claim, &shard, 0).await,
+        Committed::Now,
+        "what is begun is played"
+    );
+    let health = f.store.health(f.now).await;
+    let held = QueueHealth::Held {
+        running: 0,
+        waiting: 1,
+        ruling: paused,
+    };
+    assert_eq!(health.queue, held);
+    // Days start and wait, for as long as it takes: nothing is stuck.
+    f.later(24 * 3600);
+    f.evaluate(agent.id, &two_shards).await;
+    assert!(f.claim().await.is_none());
+    assert!(matches!(
+        f.store.health(f.now).await.queue,
+        QueueHealth::Held { .. }
+    ));
+
+    let mut signal = f.store.work_signal();
+    signal.mark_unchanged();
+    let resume = async |f: &Fixture| f.store.resume_queue(Actor::Organiser, f.now).await;
+    resume(&f).await.unwrap();
+    assert!(signal.has_changed().unwrap(), "idle slots look again");
+    refused(resume(&f).await, &["not paused"]);
+    f.play_to(1.0).await;
+    let states = f.store.evaluations_of(agent.team).await.unwrap();
+    assert_eq!(states.len(), 2);
+    for evaluation in states {
+        assert!(matches!(evaluation.state, EvaluationState::Finished { .. }));
+    }
+}
+
+#[tokio::test]
 async fn a_voided_day_is_over_at_once() {
     let mut f = Fixture::new().await;
     let [alpha, beta] = [f.ready_team("Alpha").await, f.ready_team("Beta").await];

@@ -109,6 +109,13 @@ enum Action {
         #[arg(long, value_name = "DATE")]
         confirm: Option<String>,
     },
+    /// Hold the queue: nothing is begun, what is begun is played to its end
+    Pause {
+        /// Shown to everybody
+        reason: String,
+    },
+    /// Let a paused queue go on
+    Resume,
     /// Disqualify a team: it neither plays nor is ranked, at once; without --confirm, say what that would do
     Disqualify {
         /// The team's name or id
@@ -263,6 +270,16 @@ impl AdminCommand {
                         .collect::<Vec<_>>()
                         .join("\n")
                 })
+            }
+            Action::Pause { reason } => {
+                client.pause(&reason).await?;
+                let season = client.season().await?;
+                print(self.json, &season, || of_season(&season))
+            }
+            Action::Resume => {
+                client.resume().await?;
+                let season = client.season().await?;
+                print(self.json, &season, || of_season(&season))
             }
             Action::Disqualify {
                 team,
@@ -431,8 +448,15 @@ fn of_season(season: &SeasonView) -> String {
         }
         _ => "open       its secret is published when it is closed".to_owned(),
     };
+    let queue = match &season.paused {
+        Some(ruling) => {
+            let since = ruling.at.strftime("%Y-%m-%d %H:%M UTC");
+            format!("\npaused     since {since}: {}", ruling.reason)
+        }
+        None => String::new(),
+    };
     format!(
-        "{} ({}), {} days played\ncommitment {}\n{state}",
+        "{} ({}), {} days played\ncommitment {}\n{state}{queue}",
         season.name,
         season.ruleset,
         season.days.len(),
