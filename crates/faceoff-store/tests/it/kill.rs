@@ -233,10 +233,14 @@ async fn check_consistency(folder: &Path, store: &Store) {
         ("a finished evaluation whose finalisation is open",
          "SELECT COUNT(*) FROM evaluations e JOIN finalisations f ON f.evaluation_id = e.id
               JOIN units u ON u.id = f.unit_id WHERE (e.state = 'finished') <> (u.state = 'done')"),
-        ("a day that is over and not released, or released and not over",
-         "SELECT COUNT(*) FROM days d WHERE (d.released_at IS NULL)
-              <> EXISTS (SELECT 1 FROM evaluations e WHERE e.stage_id = d.stage_id AND e.day = d.day
-                         AND e.state = 'open' AND e.rerun_of IS NULL)"),
+        ("a day that is over and not released",
+         "SELECT COUNT(*) FROM days d WHERE d.released_at IS NULL
+              AND NOT EXISTS (SELECT 1 FROM evaluations e WHERE e.stage_id = d.stage_id AND e.day = d.day
+                              AND e.state = 'open')"),
+        ("a day that is released and not over, but for what is played again",
+         "SELECT COUNT(*) FROM days d WHERE d.released_at IS NOT NULL
+              AND EXISTS (SELECT 1 FROM evaluations e WHERE e.stage_id = d.stage_id AND e.day = d.day
+                          AND e.state = 'open' AND e.rerun_of IS NULL)"),
         ("a valid submission of a team that has none active",
          "SELECT COUNT(*) FROM submissions s WHERE s.state = 'valid'
               AND NOT EXISTS (SELECT 1 FROM active_submissions a WHERE a.team_id = s.team_id)"),
