@@ -36,7 +36,7 @@ FROM season;
 -- The rules that days were played by, in the order in which they came up.
 CREATE TEMPORARY TABLE played_rules AS
 SELECT r.ruleset, r.profile, r.tasks, r.episodes_per_task, r.max_faults, MIN(e.created_at) AS since,
-       ROW_NUMBER() OVER (ORDER BY MIN(e.created_at), MIN(e.id)) AS revision
+       ROW_NUMBER() OVER (ORDER BY MIN(e.day), MIN(e.created_at), MIN(e.id)) AS revision
 FROM evaluations e JOIN runs r ON r.id = e.run_id
 GROUP BY r.ruleset, r.profile, r.tasks, r.episodes_per_task, r.max_faults;
 

@@ -500,6 +500,49 @@ async fn every_old_row_is_there_and_says_what_it_said() {
 }
 
 #[tokio::test]
+async fn what_was_played_is_a_first_stage_with_a_revision_for_each_of_its_rules() {
+    let folder = tempfile::tempdir().unwrap();
+    old_folder(folder.path()).await;
+    let file = folder.path().join("faceoff.sqlite3");
+    let url = format!("sqlite://{}", file.display());
+    let mut connection = SqliteConnection::connect(&url).await.unwrap();
+    sqlx::query("UPDATE evaluations SET profile = 'ideal' WHERE id = ?")
+        .bind(text(1400))
+        .execute(&mut connection)
+        .await
+        .unwrap();
+    connection.close().await.unwrap();
+
+    let store = Store::open(folder.path()).await.unwrap();
+    let stage = store.stages().await.unwrap().remove(0);
+    assert_eq!(stage.name.as_str(), "Qualifying");
+    assert_eq!((stage.names_seeds, stage.configured), (false, true));
+    let revisions = store.stage_revisions(stage.id).await.unwrap();
+    let told: Vec<_> = revisions
+        .iter()
+        .map(|one| (one.number, one.rules.profile, one.rules.ruleset))
+        .collect();
+    assert_eq!(
+        told,
+        [
+            (1, Profile::Ideal, Ruleset::First),
+            (2, Profile::Evaluation, Ruleset::First)
+        ]
+    );
+    let revision = async |number| store.evaluation(id(number)).await.unwrap().revision;
+    assert_eq!((revision(1400).await, revision(1100).await), (1, 2));
+    assert_eq!(store.board(stage.id, 1).await.unwrap().len(), 1);
+
+    // The same configuration as before, but the ruleset is that of the new program.
+    let (rules, settings) = rules_of(&plan());
+    let now = "2026-03-01T08:30:00Z".parse().unwrap();
+    let told = store.configure_stage(rules.clone(), settings, Zone::UTC, now);
+    told.await.unwrap();
+    let stage = store.stages().await.unwrap().remove(0);
+    assert_eq!((stage.rules.number, stage.rules.rules), (3, rules));
+}
+
+#[tokio::test]
 async fn old_ablations_are_there_run_by_run() {
     let f = migrated().await;
     let newest = async |team| f.store.newest_ablation(id(team)).await.unwrap().unwrap();
