@@ -120,8 +120,17 @@ pub(crate) async fn change_stage(
     let stage = app.store.stage(id).await?;
     let now = app.config.clock.now();
     let is = &stage.rules.rules;
+    let other_rules = change.profile.is_some()
+        || change.tasks.is_some()
+        || change.episodes_per_task.is_some()
+        || change.max_faults.is_some();
     let rules = StageRules {
-        ruleset: Ruleset::CURRENT,
+        // An upgrade of the program alone changes nothing of a stage.
+        ruleset: if other_rules {
+            Ruleset::CURRENT
+        } else {
+            is.ruleset
+        },
         profile: change.profile.unwrap_or(is.profile),
         tasks: change.tasks.unwrap_or_else(|| is.tasks.clone()),
         episodes_per_task: change.episodes_per_task.unwrap_or(is.episodes_per_task),

@@ -411,6 +411,22 @@ async fn the_first_stage_follows_the_configuration_until_a_hand_changes_it() {
 }
 
 #[tokio::test]
+async fn a_closed_season_has_its_stage_and_changes_it_no_more() {
+    let mut f = Fixture::new().await;
+    f.store.close_season(Actor::Organiser, f.now).await.unwrap();
+    f.later(1);
+    let first = f.stage(&plan()).await;
+    let stage = f.store.stage(first).await.unwrap();
+    assert_eq!(f.stage(&small()).await, first);
+    assert_eq!(f.store.stage(first).await.unwrap(), stage);
+    let change = change(&f, first, StageChange::default()).await;
+    assert!(
+        matches!(change, Err(StoreError::SeasonClosed { .. })),
+        "{change:?}"
+    );
+}
+
+#[tokio::test]
 async fn the_current_stage_is_the_open_one_or_the_nearest() {
     let f = Fixture::new().await;
     let current = async |text: &str| {
