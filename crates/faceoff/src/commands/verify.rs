@@ -80,10 +80,20 @@ struct Simulated {
 enum Failure {
     #[error(transparent)]
     Verify(#[from] VerifyError),
-    #[error(transparent)]
-    Season(#[from] SeasonMismatch),
+    #[error("{error}{hint}")]
+    Season {
+        #[source]
+        error: SeasonMismatch,
+        hint: &'static str,
+    },
     #[error("{0:#}")]
     Here(anyhow::Error),
+}
+
+impl From<SeasonMismatch> for Failure {
+    fn from(error: SeasonMismatch) -> Self {
+        Self::Season { error, hint: "" }
+    }
 }
 
 impl From<DatasetError> for Failure {
@@ -96,7 +106,7 @@ impl Failure {
     /// 1 for what differs, 2 for what could not be compared.
     fn code(&self) -> ExitCode {
         match self {
-            Self::Season(_)
+            Self::Season { .. }
             | Self::Verify(
                 VerifyError::Differs(_) | VerifyError::Dataset(DatasetError::Altered(_)),
             ) => ExitCode::from(1),
@@ -173,7 +183,15 @@ impl VerifyCommand {
             day,
         });
         if let Some(claim) = &claim {
-            claim.check(dataset.manifest())?;
+            claim.check(dataset.manifest()).map_err(|error| {
+                if claim.stage.is_some() {
+                    return Failure::from(error);
+                }
+                Failure::Season {
+                    error,
+                    hint: "; if the id of its stage enters the seeds, as the page /season says, give --stage, too",
+                }
+            })?;
         }
         let workers = match self.workers {
             Some(workers) => workers,
