@@ -8,10 +8,12 @@ use faceoff_tests::{
     repository,
     server::{PATIENCE, Server},
 };
-use rustix::net::{
-    AddressFamily, SocketType, bind, connect, socket, sockopt::set_socket_recv_buffer_size,
+use rustix::{
+    net::{AddressFamily, SocketType, bind, connect, socket, sockopt::set_socket_recv_buffer_size},
+    process::{Pid, Resource, Rlimit, getrlimit, prlimit},
 };
 use std::{
+    fs,
     io::{ErrorKind, Read, Write},
     net::{Ipv4Addr, SocketAddrV4, TcpStream},
     thread,
@@ -184,4 +186,49 @@ fn one_address_has_a_share_and_is_told_so() {
     }
     // Others are not concerned.
     assert_eq!(server.get("/api/v1/health", None).status(), 200);
+}
+
+/// Sets the server's limits of descriptors; those that it had.
+fn limit_descriptors(server: &Server, limits: Rlimit) -> Rlimit {
+    let id = i32::try_from(server.process_id()).expect("a process number");
+    let before = prlimit(Pid::from_raw(id), Resource::Nofile, limits);
+    before.expect("whoever started it may limit it")
+}
+
+#[test]
+fn without_a_free_descriptor_who_comes_waits_at_the_door() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    let open = fs::read_dir(format!("/proc/{}/fd", server.process_id())).expect("it runs");
+    let open: Vec<u64> = open
+        .flatten()
+        .filter_map(|entry| entry.file_name().to_string_lossy().parse().ok())
+        .collect();
+    let began = Instant::now();
+    // What is open stays open; nothing is opened.
+    let before = limit_descriptors(
+        &server,
+        Rlimit {
+            current: (0..).find(|number| !open.contains(number)),
+            maximum: getrlimit(Resource::Nofile).maximum,
+        },
+    );
+    let mut stream = TcpStream::connect(server.address()).expect("the system takes it");
+    let asked = b"GET /api/v1/health/live HTTP/1.1\r\nHost: faceoff\r\nConnection: close\r\n\r\n";
+    stream.write_all(asked).expect("the system takes that, too");
+    server.wait_for_log("no connection can be accepted", 1);
+
+    limit_descriptors(&server, before);
+    let mut answer = String::new();
+    stream
+        .read_to_string(&mut answer)
+        .expect("it was waiting, not lost");
+    assert!(answer.contains("alive"), "{answer}");
+    assert_eq!(server.get("/api/v1/health", None).status(), 200);
+    // However long it lasts, the log is short.
+    let told = server
+        .log()
+        .matches("no connection can be accepted")
+        .count();
+    assert_eq!(told, 1, "{}", server.log());
 }

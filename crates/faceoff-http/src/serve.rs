@@ -40,7 +40,7 @@ const ACCEPT_PAUSE: Duration = Duration::from_millis(500);
 /// is refilled only when a third of it is gone: who reads steadily but slowly would look like one who reads
 /// nothing.
 const UNSENT_BYTES: u32 = 128 << 10;
-/// How often the log says that all connections are taken.
+/// How often the log says what lasts: that all connections are taken, or that none can be accepted.
 const TOLD_EVERY: Duration = Duration::from_secs(60);
 
 /// How much of the server strangers may hold, and for how long.
@@ -89,6 +89,7 @@ pub async fn serve(
         listener,
         places: Arc::new(Semaphore::new(limits.open)),
         told: None,
+        told_of_failure: None,
     };
     let addresses = Arc::new(Addresses::new(limits.per_address, limits.exempt));
     let refusal: Arc<[u8]> = refusal(limits.per_address).into();
@@ -129,6 +130,8 @@ struct Door {
     places: Arc<Semaphore>,
     /// When the log last said that all places are taken.
     told: Option<Instant>,
+    /// When it last said that none can be accepted, since one was.
+    told_of_failure: Option<Instant>,
 }
 
 impl Door {
@@ -136,9 +139,7 @@ impl Door {
     /// and none of our descriptors.
     async fn accept(&mut self) -> (TcpStream, SocketAddr, OwnedSemaphorePermit) {
         loop {
-            if self.places.available_permits() == 0
-                && self.told.is_none_or(|told| told.elapsed() > TOLD_EVERY)
-            {
+            if self.places.available_permits() == 0 && is_due(self.told) {
                 tracing::warn!("all connections are taken; more wait until one ends");
                 self.told = Some(Instant::now());
             }
@@ -147,15 +148,26 @@ impl Door {
                 return std::future::pending().await;
             };
             match self.listener.accept().await {
-                Ok((stream, from)) => return (stream, from, place),
+                Ok((stream, from)) => {
+                    self.told_of_failure = None;
+                    return (stream, from, place);
+                }
                 Err(error) if gone(&error) => {}
                 Err(error) => {
-                    tracing::error!(%error, "no connection can be accepted; trying again");
+                    if is_due(self.told_of_failure) {
+                        tracing::error!(%error, "no connection can be accepted; trying again");
+                        self.told_of_failure = Some(Instant::now());
+                    }
                     tokio::time::sleep(ACCEPT_PAUSE).await;
                 }
             }
         }
     }
+}
+
+/// Is the log to say again what it said then?
+fn is_due(told: Option<Instant>) -> bool {
+    told.is_none_or(|told| told.elapsed() > TOLD_EVERY)
 }
 
 /// Did the peer go before it was let in?

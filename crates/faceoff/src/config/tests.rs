@@ -115,6 +115,7 @@ fn init_writes_every_value_with_what_it_means() {
     for (section, name) in [
         ("season", "name"),
         ("evaluation", "at"),
+        ("evaluation", "cron"),
         ("workers", "slots"),
         ("workers", "scratch_dir"),
     ] {
@@ -205,6 +206,46 @@ fn what_cannot_be_is_refused() {
         error.contains("workers.agent_cpus: expected CPUs of [0, 1], got 7"),
         "{error}"
     );
+}
+
+#[test]
+fn a_schedule_is_a_time_or_an_expression_in_a_zone() {
+    let settings = |text: &str| {
+        let config = Config::parse(&format!("[evaluation]\n{text}")).unwrap();
+        let settings = serde_json::to_value(config.settings().unwrap()).unwrap();
+        (
+            settings["schedule"].to_string(),
+            config.evaluation.zone.to_string(),
+        )
+    };
+    let utc = "UTC".to_owned();
+    assert_eq!(settings(""), ("null".into(), utc.clone()));
+    let daily = settings("at = \"06:30\"\ndays_off = [\"2026-12-24\"]\nzone = \"Europe/Berlin\"");
+    assert_eq!(
+        daily,
+        (
+            r#"{"daily":"06:30:00","days_off":["2026-12-24"]}"#.into(),
+            "Europe/Berlin".into()
+        )
+    );
+    let cron = settings("cron = \"0 6 * * 1-5\"");
+    assert_eq!(cron, (r#"{"cron":"0 6 * * 1-5"}"#.into(), utc));
+    for (text, words) in [
+        (
+            "at = \"06:00\"\ncron = \"0 6 * * *\"",
+            "evaluation.cron: there is evaluation.at",
+        ),
+        (
+            "cron = \"6\"",
+            "evaluation.cron: \"6\" is no schedule of five fields",
+        ),
+        ("zone = \"Berlin\"", "Europe/Berlin"),
+        ("at = \"25:00\"", "hour"),
+        ("days_off = [\"Christmas\"]", "Christmas"),
+    ] {
+        let error = error(&format!("[evaluation]\n{text}"));
+        assert!(error.contains(words), "{words:?} is not in {error}");
+    }
 }
 
 #[test]
