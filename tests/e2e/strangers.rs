@@ -225,10 +225,9 @@ fn without_a_free_descriptor_who_comes_waits_at_the_door() {
         .expect("it was waiting, not lost");
     assert!(answer.contains("alive"), "{answer}");
     assert_eq!(server.get("/api/v1/health", None).status(), 200);
-    // However long it lasts, the log is short.
-    let told = server
-        .log()
-        .matches("no connection can be accepted")
-        .count();
-    assert_eq!(told, 1, "{}", server.log());
+    // However long it lasts, the log is short: once a minute.
+    let log = server.log();
+    let told = log.matches("no connection can be accepted").count();
+    let minutes = began.elapsed().as_secs() / 60;
+    assert!(told as u64 <= 1 + minutes, "{log}");
 }

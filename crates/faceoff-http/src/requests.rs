@@ -144,6 +144,14 @@ fn given_or_null<S: Serializer, T: Serialize>(
         .serialize(serializer)
 }
 
+/// What a team calls a submission.
+#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Label {
+    /// 1 to 80 characters; null: nothing.
+    pub label: Option<String>,
+}
+
 /// Why an evaluation is stopped.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]

@@ -161,6 +161,13 @@ pub enum Event {
     },
     /// It is what its team enters at the next cut: the newest that is valid, or the team's choice.
     SubmissionActivated,
+    /// Its team has taken it back: it enters no further day.
+    SubmissionWithdrawn,
+    /// Its team calls it so.
+    SubmissionLabelled {
+        /// None any more, if it is null.
+        label: Option<String>,
+    },
     /// A submission is to play a day.
     EvaluationQueued {
         /// Whose it is.

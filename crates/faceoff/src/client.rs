@@ -7,7 +7,8 @@ use bundle_file::BundleFile;
 use faceoff_http::{
     API_BASE,
     requests::{
-        Cancellation, CloseSeason, Decision, NewStage, NewTeam, Reason, StageChange, StartDay,
+        Cancellation, CloseSeason, Decision, Label, NewStage, NewTeam, Reason, StageChange,
+        StartDay,
     },
     views::{
         board::BoardView,
@@ -297,6 +298,27 @@ impl Client {
     pub async fn activate(&self, id: SubmissionId) -> anyhow::Result<SubmissionView> {
         let request = self.request(Method::POST, &format!("/submissions/{id}/activate"));
         read(self.send(request).await?).await
+    }
+
+    /// Team: its submissions, newest first.
+    pub async fn submissions(&self) -> anyhow::Result<Vec<SubmissionView>> {
+        self.get("/submissions").await
+    }
+
+    /// Team: takes a submission back.
+    pub async fn withdraw(&self, id: SubmissionId) -> anyhow::Result<SubmissionView> {
+        let request = self.request(Method::POST, &format!("/submissions/{id}/withdraw"));
+        read(self.send(request).await?).await
+    }
+
+    /// Team: gives a submission a name, or takes it away.
+    pub async fn label(
+        &self,
+        id: SubmissionId,
+        label: Option<String>,
+    ) -> anyhow::Result<SubmissionView> {
+        let request = self.request(Method::PATCH, &format!("/submissions/{id}"));
+        read(self.send(request.json(&Label { label })).await?).await
     }
 
     /// Organiser: all evaluations of a day (today). Team: its own (all).

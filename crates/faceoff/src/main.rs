@@ -44,6 +44,7 @@ enum Command {
     Submit(commands::submit::SubmitCommand),
     /// Choose which submission plays at the next cut.
     Activate(commands::activate::ActivateCommand),
+    Submissions(commands::submissions::SubmissionsCommand),
     /// Organise a running competition.
     Admin(commands::admin::AdminCommand),
     /// Check what this host offers and what is missing.
@@ -63,6 +64,7 @@ fn main() -> ExitCode {
         Command::Sim(command) => command.run(),
         Command::Submit(command) => command.run(),
         Command::Activate(command) => command.run(),
+        Command::Submissions(command) => command.run(),
         Command::Admin(command) => command.run(),
         Command::Doctor(command) => command.run(),
     };

@@ -44,7 +44,11 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(days::start_day))
         .routes(routes!(events::list_events))
         .routes(routes!(submissions::list_submissions))
-        .routes(routes!(submissions::submission))
+        .routes(routes!(
+            submissions::submission,
+            submissions::label_submission
+        ))
+        .routes(routes!(submissions::withdraw_submission))
         .routes(routes!(submissions::activate_submission))
         .routes(routes!(submissions::evaluate_submission))
         .routes(routes!(ablations::ablation, ablations::order_ablation))

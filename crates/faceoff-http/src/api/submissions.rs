@@ -3,13 +3,17 @@
 use crate::{
     app::App,
     auth::{Caller, TeamCaller},
-    extract::PathParam,
+    extract::{Json as Body, PathParam},
     problem::{Problem, ProblemKind},
+    requests::Label,
     views::submission::SubmissionView,
 };
 use axum::{Json, extract::State};
 use faceoff_store::Actor;
 use faceoff_types::SubmissionId;
+
+/// Longest name that a team has for a submission.
+const MAX_LABEL_CHARS: usize = 80;
 
 /// The calling team's submissions, newest first.
 #[utoipa::path(
@@ -62,6 +66,58 @@ pub(crate) async fn activate_submission(
     let now = app.config.clock.now();
     let submission = app.store.activate_submission(actor, id, now).await?;
     tracing::info!(team = %name, submission = %id, "submission activated");
+    SubmissionView::of(&app, submission).await.map(Json)
+}
+
+/// Takes a submission back: it enters no further day, unless it is chosen again.
+///
+/// If it was active, nothing of the team is. A day that had its cut goes on.
+#[utoipa::path(
+    post, path = "/submissions/{id}/withdraw", tag = "team", security(("team" = [])),
+    params(("id" = SubmissionId, Path)),
+    responses(
+        (status = 200, body = SubmissionView),
+        (status = 404),
+        (status = 409, description = "it is withdrawn, plays no day as it is, or the season is closed"),
+    )
+)]
+pub(crate) async fn withdraw_submission(
+    TeamCaller(team): TeamCaller,
+    State(app): State<App>,
+    PathParam(id): PathParam<SubmissionId>,
+) -> Result<Json<SubmissionView>, Problem> {
+    let (actor, name) = (Actor::Team(team.id), team.name.clone());
+    let found = app.store.submission(id).await;
+    Caller::Team(team).visible("submission", found, |submission| submission.team)?;
+    let now = app.config.clock.now();
+    let submission = app.store.withdraw_submission(actor, id, now).await?;
+    tracing::info!(team = %name, submission = %id, "submission withdrawn");
+    SubmissionView::of(&app, submission).await.map(Json)
+}
+
+/// Gives a submission the name that its team has for it. Only the team and the organiser see it.
+#[utoipa::path(
+    patch, path = "/submissions/{id}", tag = "team", security(("team" = [])),
+    params(("id" = SubmissionId, Path)), request_body = Label,
+    responses((status = 200, body = SubmissionView), (status = 404), (status = 422))
+)]
+pub(crate) async fn label_submission(
+    TeamCaller(team): TeamCaller,
+    State(app): State<App>,
+    PathParam(id): PathParam<SubmissionId>,
+    Body(Label { label }): Body<Label>,
+) -> Result<Json<SubmissionView>, Problem> {
+    let label = label.as_deref().map(str::trim);
+    let chars = label.map_or(1, |label| label.chars().count());
+    if !(1..=MAX_LABEL_CHARS).contains(&chars) {
+        let detail = format!("expected 1 to {MAX_LABEL_CHARS} characters, or null, got {chars}");
+        return Err(Problem::invalid("label", detail));
+    }
+    let actor = Actor::Team(team.id);
+    let found = app.store.submission(id).await;
+    Caller::Team(team).visible("submission", found, |submission| submission.team)?;
+    let now = app.config.clock.now();
+    let submission = app.store.label_submission(actor, id, label, now).await?;
     SubmissionView::of(&app, submission).await.map(Json)
 }
 

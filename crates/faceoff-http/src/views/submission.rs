@@ -29,6 +29,15 @@ pub struct SubmissionView {
     pub timing: Vec<SmokeTiming>,
     /// Is it what its team enters at the next cut?
     pub active: bool,
+    /// When its team took it back: it enters no further day, unless it is chosen again; absent otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub withdrawn_at: Option<Timestamp>,
+    /// What its team calls it; absent without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub label: Option<String>,
+    /// The team's first submission of the same archive, if this is another; absent otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub same_as: Option<SubmissionId>,
     /// The smoke run's verdict.
     #[serde(flatten)]
     pub status: SubmissionStatus,
@@ -90,6 +99,9 @@ impl SubmissionView {
             agent_name: submission.agent_name.map(shown),
             timing: submission.timing,
             active: submission.active,
+            withdrawn_at: submission.withdrawn_at,
+            label: submission.label.map(shown),
+            same_as: submission.same_as,
             status: match submission.state {
                 SubmissionState::Validating => SubmissionStatus::Validating,
                 SubmissionState::Valid => SubmissionStatus::Valid {

@@ -3,7 +3,7 @@ use bytes::Bytes;
 use faceoff_http::{HttpLimits, LeastRate};
 use faceoff_types::SmokeOutcome;
 use reqwest::{Body, Method};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::{convert::Infallible, time::Duration};
 
 /// A bundle of `bytes` bytes, sent in pieces and without a Content-Length.
@@ -316,4 +316,63 @@ async fn another_teams_submission_looks_like_none() {
     site.get("/api/v1/submissions/seventeen", Some(&owner.token))
         .await
         .problem(404, "not-found", &["seventeen", "UUID"]);
+}
+
+#[tokio::test]
+async fn a_team_names_and_withdraws_its_own() {
+    let site = Site::start().await;
+    let (team, other) = (site.team("Alpha").await, site.team("Beta").await);
+    let path = site.valid_submission(&team, "a").await;
+    let name = async |token: &str, body: Value| {
+        let request = site.request(reqwest::Method::PATCH, &path, Some(token));
+        Answer::of(request.json(&body).send().await.unwrap()).await
+    };
+    let named = name(&team.token, json!({ "label": " baseline " }))
+        .await
+        .json(200);
+    assert_eq!(named["label"], "baseline");
+    for wrong in [json!(""), json!("x".repeat(81))] {
+        let body = json!({ "label": wrong });
+        name(&team.token, body)
+            .await
+            .problem(422, "invalid-content", &["label", "1 to 80"]);
+    }
+    name(&team.token, json!({ "name": "x" })).await.problem(
+        422,
+        "invalid-content",
+        &["name", "label"],
+    );
+    let named = name(&team.token, json!({ "label": null })).await.json(200);
+    assert_eq!(named.get("label"), None);
+
+    let withdraw = format!("{path}/withdraw");
+    for (token, status, slug) in [
+        (&other.token[..], 404, "not-found"),
+        (ADMIN, 403, "forbidden"),
+    ] {
+        site.post(&withdraw, Some(token), &json!({}))
+            .await
+            .problem(status, slug, &[]);
+        name(token, json!({ "label": "x" }))
+            .await
+            .problem(status, slug, &[]);
+    }
+    let withdrawn = site
+        .post(&withdraw, Some(&team.token), &json!({}))
+        .await
+        .json(200);
+    assert_eq!(withdrawn["active"], false);
+    assert_eq!(withdrawn["withdrawn_at"], "2026-03-01T10:00:00Z");
+    site.post(&withdraw, Some(&team.token), &json!({}))
+        .await
+        .problem(409, "conflict", &["already"]);
+    let me = site.get("/api/v1/me", Some(&team.token)).await.json(200);
+    assert_eq!(me["active_submission"], json!(null));
+    site.post("/api/v1/days", Some(ADMIN), &json!({}))
+        .await
+        .problem(409, "conflict", &["no team has a valid submission"]);
+    let active = site
+        .post(&format!("{path}/activate"), Some(&team.token), &json!({}))
+        .await;
+    assert_eq!(active.json(200)["active"], true);
 }

@@ -35,6 +35,7 @@ async fn activate(tx: &mut Tx, id: SubmissionId) -> Result<Submission> {
     check_valid(&submission)?;
     let now = tx.now;
     active_submissions::choose(tx, submission.team, id, now).await?;
+    submissions::set_withdrawn(tx, id, None).await?;
     if !submission.active {
         tx.record(Subject::Submission(id), Event::SubmissionActivated);
     }
@@ -43,7 +44,7 @@ async fn activate(tx: &mut Tx, id: SubmissionId) -> Result<Submission> {
 
 impl Store {
     /// Chooses what a team enters at the next cut, and at those after it, until a later upload turns
-    /// valid. A day that had its cut goes on with what was active then. [`StoreError::Conflict`] if the
+    /// valid; also what it had withdrawn. A day that had its cut goes on with what was active then. [`StoreError::Conflict`] if the
     /// submission is not valid (yet); [`StoreError::Disqualified`] if its team is; [`StoreError::SeasonClosed`] once the season is over.
     pub async fn activate_submission(
         &self,

@@ -25,3 +25,4 @@ mod submit;
 mod summaries;
 mod teams;
 pub(crate) mod tidy;
+mod withdraw;

@@ -17,7 +17,7 @@ use jiff::Timestamp;
 
 impl Store {
     /// Stores what a smoke run found. The newest upload that is valid becomes its team's active one,
-    /// unless the team has chosen one since it was uploaded. Idempotent, as [`Store::commit_shard`] is.
+    /// unless the team has chosen one since it was uploaded, or has withdrawn it. Idempotent, as [`Store::commit_shard`] is.
     pub async fn commit_smoke(
         &self,
         claim: &Claim,
@@ -38,9 +38,14 @@ impl Store {
                     submissions::set_valid(tx, id, &agent_name, &timing, &log).await?;
                     tx.record(subject, Event::SubmissionValid { agent_name });
                     let Submission {
-                        team, created_at, ..
+                        team,
+                        created_at,
+                        withdrawn_at,
+                        ..
                     } = submissions::find(tx, id).await?;
-                    if active_submissions::put_newest(tx, team, id, created_at).await? {
+                    if withdrawn_at.is_none()
+                        && active_submissions::put_newest(tx, team, id, created_at).await?
+                    {
                         tx.record(subject, Event::SubmissionActivated);
                     }
                 }

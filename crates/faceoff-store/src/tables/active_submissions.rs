@@ -45,3 +45,18 @@ pub(crate) async fn choose(
     .await?;
     Ok(())
 }
+
+/// Its team has none active any more, if it was this one.
+pub(crate) async fn remove(
+    connection: &mut SqliteConnection,
+    submission: SubmissionId,
+) -> Result<()> {
+    let submission = Text(submission);
+    sqlx::query!(
+        "DELETE FROM active_submissions WHERE submission_id = ?",
+        submission
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}

@@ -25,6 +25,12 @@ pub struct Submission {
     pub timing: Vec<SmokeTiming>,
     /// Is it what its team enters at the next cut?
     pub active: bool,
+    /// When its team took it back: it enters no further day, unless it is chosen again.
+    pub withdrawn_at: Option<Timestamp>,
+    /// What its team calls it.
+    pub label: Option<String>,
+    /// The team's first submission of the same archive, if this is another.
+    pub same_as: Option<SubmissionId>,
 }
 
 /// A submission's way through its smoke run. The agent's log is read by itself
@@ -68,6 +74,9 @@ struct SubmissionRow {
     reason: Option<String>,
     timing: Option<Json<Vec<SmokeTiming>>>,
     active: bool,
+    withdrawn_at: Option<Instant>,
+    label: Option<String>,
+    same_as: Option<Text<SubmissionId>>,
 }
 
 impl TryFrom<SubmissionRow> for Submission {
@@ -100,6 +109,9 @@ impl TryFrom<SubmissionRow> for Submission {
             state,
             timing: row.timing.map_or_else(Vec::new, |timing| timing.0),
             active: row.active,
+            withdrawn_at: row.withdrawn_at.map(|at| at.0),
+            label: row.label,
+            same_as: row.same_as.map(|id| id.0),
         })
     }
 }
@@ -116,7 +128,12 @@ macro_rules! select_submissions {
                       s.timing AS "timing: Json<Vec<SmokeTiming>>",
                       EXISTS (SELECT 1 FROM active_submissions a
                               WHERE a.team_id = s.team_id AND a.submission_id = s.id)
-                      AS "active!: bool"
+                      AS "active!: bool",
+                      s.withdrawn_at AS "withdrawn_at: Instant", s.label,
+                      (SELECT o.id FROM submissions o
+                       WHERE o.team_id = s.team_id AND o.bundle_blake3 = s.bundle_blake3
+                         AND (o.created_at, o.id) < (s.created_at, s.id)
+                       ORDER BY o.created_at, o.id LIMIT 1) AS "same_as: Text<SubmissionId>"
                FROM submissions s "# + $tail
             $(, $argument)*
         )
@@ -263,5 +280,34 @@ pub(crate) async fn set_validation_error(
     )
     .execute(connection)
     .await?;
+    Ok(())
+}
+
+/// Takes a submission back, or lets it play again.
+pub(crate) async fn set_withdrawn(
+    connection: &mut SqliteConnection,
+    id: SubmissionId,
+    at: Option<Timestamp>,
+) -> Result<()> {
+    let (id, at) = (Text(id), at.map(Instant));
+    sqlx::query!(
+        "UPDATE submissions SET withdrawn_at = ? WHERE id = ?",
+        at,
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+pub(crate) async fn set_label(
+    connection: &mut SqliteConnection,
+    id: SubmissionId,
+    label: Option<&str>,
+) -> Result<()> {
+    let id = Text(id);
+    sqlx::query!("UPDATE submissions SET label = ? WHERE id = ?", label, id)
+        .execute(connection)
+        .await?;
     Ok(())
 }

@@ -404,3 +404,53 @@ async fn the_board_shows_each_teams_newest_finished_day() {
         ]
     );
 }
+
+#[tokio::test]
+async fn what_a_team_withdraws_enters_no_further_day_until_it_is_chosen_again() {
+    let mut f = Fixture::new().await;
+    let team = f.team("Alpha").await;
+    let other = f.ready_team("Beta").await;
+    f.upload(&team).await;
+    let first = f.validate().await;
+    let withdraw = async |f: &Fixture, id| {
+        f.store
+            .withdraw_submission(Actor::Team(team.id), id, f.now)
+            .await
+    };
+    f.evaluate(first.id, &small()).await;
+    let withdrawn = withdraw(&f, first.id).await.unwrap();
+    assert_eq!(
+        (withdrawn.active, withdrawn.withdrawn_at),
+        (false, Some(f.now))
+    );
+    let again = withdraw(&f, first.id).await;
+    assert!(matches!(again, Err(StoreError::Conflict(_))), "{again:?}");
+    // The day that had its cut goes on, the next one is without it.
+    f.play_to(1.0).await;
+    assert_eq!(f.board().await.len(), 2);
+    f.later(24 * 3600);
+    let stage = f.stage(&small()).await;
+    let started = f
+        .store
+        .start_day(Actor::Organiser, stage, f.now)
+        .await
+        .unwrap();
+    let plays: Vec<_> = started.iter().map(|one| one.submission).collect();
+    assert_eq!(plays, [other.id]);
+    f.play_to(2.0).await;
+
+    // Withdrawn before its verdict, a submission does not become active by it.
+    let second = f.upload(&team).await;
+    assert_eq!(second.same_as, Some(first.id), "the same archive");
+    withdraw(&f, second.id).await.unwrap();
+    assert!(!f.validate().await.active);
+    let chosen = f
+        .store
+        .activate_submission(Actor::Team(team.id), first.id, f.now);
+    let chosen = chosen.await.unwrap();
+    assert_eq!((chosen.active, chosen.withdrawn_at), (true, None));
+    let labelled =
+        f.store
+            .label_submission(Actor::Team(team.id), first.id, Some("baseline"), f.now);
+    assert_eq!(labelled.await.unwrap().label.as_deref(), Some("baseline"));
+}

@@ -11,6 +11,7 @@ pub mod init;
 pub mod score;
 pub mod serve;
 pub mod sim;
+pub mod submissions;
 pub mod submit;
 mod team_server;
 pub mod verify;

@@ -48,6 +48,9 @@ impl SubmitCommand {
             "uploaded {} as submission {}",
             submission.file_name, submission.id
         );
+        if let Some(same) = submission.same_as {
+            println!("it is the same archive as submission {same}");
+        }
 
         let submission = verdict(&client, submission).await?;
         let agent = submission.agent_name.as_deref().unwrap_or("the agent");

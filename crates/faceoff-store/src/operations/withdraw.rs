@@ -1,0 +1,66 @@
+//! What a team does with its submissions beside choosing one.
+
+use crate::{
+    error::{Result, StoreError},
+    event::{Actor, Event, Subject},
+    store::Store,
+    tables::{
+        active_submissions, season,
+        submissions::{self, Submission, SubmissionState},
+    },
+};
+use faceoff_types::SubmissionId;
+use jiff::Timestamp;
+
+impl Store {
+    /// Takes a submission back: it enters no further day. If it was active, nothing of its team is, until that chooses
+    /// one or uploads another. A day that had its cut goes on. [`StoreError::Conflict`] if it could not play, or was
+    /// withdrawn; [`StoreError::SeasonClosed`] once the season is over.
+    pub async fn withdraw_submission(
+        &self,
+        actor: Actor,
+        id: SubmissionId,
+        now: Timestamp,
+    ) -> Result<Submission> {
+        self.write(actor, now, async |tx| {
+            season::check_open(tx).await?;
+            let submission = submissions::find(tx, id).await?;
+            if submission.withdrawn_at.is_some() {
+                return Err(StoreError::Conflict("it is withdrawn already".into()));
+            }
+            match submission.state {
+                SubmissionState::Valid | SubmissionState::Validating => {}
+                SubmissionState::Invalid { .. } | SubmissionState::ValidationError { .. } => {
+                    return Err(StoreError::Conflict(
+                        "it plays no day as it is: there is nothing to withdraw".into(),
+                    ));
+                }
+            }
+            submissions::set_withdrawn(tx, id, Some(now)).await?;
+            active_submissions::remove(tx, id).await?;
+            tx.record(Subject::Submission(id), Event::SubmissionWithdrawn);
+            submissions::find(tx, id).await
+        })
+        .await
+    }
+
+    /// Gives a submission the name that its team has for it; `None` takes it away.
+    pub async fn label_submission(
+        &self,
+        actor: Actor,
+        id: SubmissionId,
+        label: Option<&str>,
+        now: Timestamp,
+    ) -> Result<Submission> {
+        self.write(actor, now, async |tx| {
+            let submission = submissions::find(tx, id).await?;
+            if submission.label.as_deref() != label {
+                submissions::set_label(tx, id, label).await?;
+                let label = label.map(str::to_owned);
+                tx.record(Subject::Submission(id), Event::SubmissionLabelled { label });
+            }
+            submissions::find(tx, id).await
+        })
+        .await
+    }
+}

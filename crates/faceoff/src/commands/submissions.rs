@@ -1,0 +1,116 @@
+//! `faceoff submissions`: a team's uploads, and what it does with them.
+
+use super::{submit::next_cut, team_server::TeamServer};
+use anyhow::Context;
+use clap::{Args, Subcommand};
+use faceoff_http::views::submission::{SubmissionStatus, SubmissionView};
+use faceoff_types::SubmissionId;
+
+/// Lists the team's submissions, names them, or takes one back.
+#[derive(Debug, Args)]
+pub struct SubmissionsCommand {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// List them, the newest first
+    List {
+        #[command(flatten)]
+        server: TeamServer,
+    },
+    /// Give one a name that only the team and the organiser see
+    Label {
+        /// The submission's id
+        submission: SubmissionId,
+        /// 1 to 80 characters; left out, it has none
+        label: Option<String>,
+        #[command(flatten)]
+        server: TeamServer,
+    },
+    /// Take one back: it plays no further day, unless `faceoff activate` chooses it again
+    Withdraw {
+        /// The submission's id
+        submission: SubmissionId,
+        #[command(flatten)]
+        server: TeamServer,
+    },
+}
+
+impl SubmissionsCommand {
+    /// Does what was asked.
+    ///
+    /// # Errors
+    /// If the server cannot be reached or refuses.
+    pub fn run(self) -> anyhow::Result<()> {
+        tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()
+            .context("starting the async runtime")?
+            .block_on(self.act())
+    }
+
+    async fn act(self) -> anyhow::Result<()> {
+        match self.action {
+            Action::List { server } => {
+                let submissions = server.client()?.submissions().await?;
+                if submissions.is_empty() {
+                    println!("nothing was uploaded yet: faceoff submit BUNDLE");
+                }
+                for submission in &submissions {
+                    println!("{}", line(submission));
+                }
+            }
+            Action::Label {
+                submission,
+                label,
+                server,
+            } => println!(
+                "{}",
+                line(&server.client()?.label(submission, label).await?)
+            ),
+            Action::Withdraw { submission, server } => {
+                let client = server.client()?;
+                let withdrawn = client.withdraw(submission).await?;
+                println!("{}", line(&withdrawn));
+                let me = client.me().await?;
+                match me.active_submission {
+                    Some(active) => println!("{}", next_cut(&me, active)),
+                    None => println!(
+                        "nothing of the team is active: upload another, or choose one with faceoff activate ID"
+                    ),
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn line(submission: &SubmissionView) -> String {
+    let state = match &submission.status {
+        SubmissionStatus::Validating => "validating".to_owned(),
+        SubmissionStatus::Valid { .. } => "valid".to_owned(),
+        SubmissionStatus::Invalid { reason, .. } => format!("invalid: {reason}"),
+        SubmissionStatus::ValidationError { reason } => format!("not checked: {reason}"),
+    };
+    let mut line = format!(
+        "{}  {}  {}  {state}",
+        submission.id,
+        submission.created_at.strftime("%Y-%m-%d %H:%M UTC"),
+        submission.file_name
+    );
+    if submission.active {
+        line.push_str(", active");
+    }
+    if submission.withdrawn_at.is_some() {
+        line.push_str(", withdrawn");
+    }
+    if let Some(label) = &submission.label {
+        line.push_str(&format!(" “{label}”"));
+    }
+    if let Some(same) = submission.same_as {
+        line.push_str(&format!(", the same archive as {same}"));
+    }
+    line
+}
