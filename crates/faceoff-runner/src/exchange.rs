@@ -262,6 +262,7 @@ impl<'w> Exchange<'w> {
         let evidence = Evidence {
             now,
             kept: taken.map(|taken| taken.kept),
+            most: taken.map_or(Duration::ZERO, |taken| taken.most),
             stolen: taken.map_or(Duration::ZERO, |taken| taken.stolen),
             agent_ran: agent_ran_s.map(TimeLimits::duration),
             apart: self.apart,

@@ -67,6 +67,8 @@ pub(crate) struct Evidence {
     pub now: Instant,
     /// That the agent was kept from running; `None` where the host does not tell.
     pub kept: Option<Duration>,
+    /// More than this cannot have been taken.
+    pub most: Duration,
     /// That there was no CPU at all: nobody ran, even if a kernel counts it as somebody's run time.
     pub stolen: Duration,
     /// That the agent itself ran, since its last answer.
@@ -138,6 +140,7 @@ impl Wait {
         let Evidence {
             now,
             kept,
+            most,
             stolen,
             agent_ran,
             apart,
@@ -152,7 +155,7 @@ impl Wait {
         };
         let ran = agent_ran.map_or(wall, |ran| ran.min(wall.saturating_sub(stolen)));
         let proven = kept
-            .map(|kept| kept.max(self.unlet) + overslept)
+            .map(|kept| kept.max(self.unlet.min(most)) + overslept)
             // Whatever the rest says: while it ran, it was not kept from running.
             .map(|proven| proven.min(wall.saturating_sub(ran)));
         watch.taken(self.asked, now, proven).min(wall)
@@ -204,6 +207,7 @@ mod tests {
         Evidence {
             now,
             kept: Some(MS(others_ms)),
+            most: MS(others_ms),
             stolen: Duration::ZERO,
             agent_ran: Some(MS(agent_ms)),
             apart,
@@ -242,6 +246,23 @@ mod tests {
             MS(0),
             "no cgroup, no excuse"
         );
+    }
+
+    #[test]
+    fn what_looks_found_is_believed_as_far_as_somebody_can_have_taken_it() {
+        let asked = Instant::now();
+        let mut wait = Wait::begin(None, asked, asked, MS(1000));
+        wait.unlet = MS(30);
+        let taken = |most| {
+            let evidence = Evidence {
+                most: MS(most),
+                ..evidence(asked + MS(40), 5, 1, false)
+            };
+            wait.taken(&Counters, evidence)
+        };
+        assert_eq!(taken(50), MS(30));
+        assert_eq!(taken(20), MS(20));
+        assert_eq!(taken(0), MS(5), "what the counters prove stays");
     }
 
     #[test]

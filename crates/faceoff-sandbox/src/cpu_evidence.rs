@@ -64,6 +64,9 @@ pub struct CpuReading {
 pub struct Taken {
     /// For how long it was kept from running.
     pub kept: Duration,
+    /// More than this cannot have been taken of it: what others ran on its CPUs and what was stolen, less what its
+    /// own quota held it up.
+    pub most: Duration,
     /// How much of the span there was no CPU at all, for a machine below a virtual one held it up. Kernels
     /// differ in whether that is also the run time of whoever was on it.
     pub stolen: Duration,
@@ -173,10 +176,13 @@ impl CpuEvidence {
         });
         let kept = since_begun.max(since_glance).unwrap_or_default();
         // The earlier reading is the one of the longer span.
-        let stolen = glance.or(begun).map(|from| stolen(from, &now));
+        let from = glance.or(begun);
         Some(Taken {
             kept,
-            stolen: stolen.unwrap_or_default(),
+            most: from
+                .map(|from| most(from, &now, precise))
+                .unwrap_or_default(),
+            stolen: from.map(|from| stolen(from, &now)).unwrap_or_default(),
         })
     }
 
@@ -296,6 +302,24 @@ fn kept_waiting(from: &CpuReading, to: &CpuReading, precise: bool) -> Duration {
         .saturating_sub(to.throttled.saturating_sub(from.throttled))
         .max(stolen)
         .min(wall)
+}
+
+/// What others ran and what was stolen, on all CPUs together, less what the agent's own quota held it up.
+fn most(from: &CpuReading, to: &CpuReading, precise: bool) -> Duration {
+    let (mut busy, mut stolen) = (0, 0);
+    for (from, to) in from.ticks.iter().zip(&to.ticks) {
+        let each = std::iter::zip(from.busy, to.busy);
+        busy += each.map(|(from, to)| to.saturating_sub(from)).sum::<u64>();
+        stolen += to.stolen.saturating_sub(from.stolen);
+    }
+    let all = if precise {
+        to.all.saturating_sub(from.all)
+    } else {
+        ticks(busy)
+    };
+    all.saturating_sub(to.agent.saturating_sub(from.agent))
+        .saturating_add(ticks(stolen))
+        .saturating_sub(to.throttled.saturating_sub(from.throttled))
 }
 
 /// What the machine below a virtual one took, in the middle of what its ticks leave open. Of several CPUs one
@@ -501,6 +525,19 @@ mod tests {
         assert_eq!(stolen(&at(10, 3, 7, 6, true)), MS(8), "never more than all");
         assert_eq!(stolen(&at(10, 3, 7, 6, false)), MS(0), "it sleeps");
         assert_eq!(stolen(&at(10, 3, 8, 6, true)), MS(0), "it was let run");
+    }
+
+    #[test]
+    fn no_more_can_have_been_taken_than_others_ran_and_was_stolen() {
+        let begun = Instant::now();
+        let still = [Ticks::default(); 2];
+        let from = reading(begun, 500, 700, &still);
+        let mut to = reading(begun + MS(100), 520, 750, &[cpu(4, 0, 1), cpu(0, 0, 2)]);
+        assert_eq!(most(&from, &to, true), MS(30 + 30));
+        assert_eq!(most(&from, &to, false), MS(20 + 30));
+        to.throttled = MS(45);
+        assert_eq!(most(&from, &to, true), MS(15), "its own quota is its own");
+        assert_eq!(most(&from, &from, true), MS(0));
     }
 
     #[test]
