@@ -44,8 +44,9 @@ async fn activate(tx: &mut Tx, id: SubmissionId) -> Result<Submission> {
 
 impl Store {
     /// Chooses what a team enters at the next cut, and at those after it, until a later upload turns
-    /// valid; also what it had withdrawn. A day that had its cut goes on with what was active then. [`StoreError::Conflict`] if the
-    /// submission is not valid (yet); [`StoreError::Disqualified`] if its team is; [`StoreError::SeasonClosed`] once the season is over.
+    /// valid; also what it had withdrawn. A day that had its cut goes on with what was active then.
+    /// [`StoreError::Conflict`] if the submission is not valid (yet); [`StoreError::Disqualified`] if its team is;
+    /// [`StoreError::SeasonClosed`] once the season is over.
     pub async fn activate_submission(
         &self,
         actor: Actor,

@@ -98,7 +98,7 @@ impl Store {
     ) -> Result<Option<Claimed>> {
         let actor = Actor::Worker(worker.to_owned());
         self.write(actor, now, async |tx| {
-            if season::read(tx).await?.paused.is_some() {
+            if season::is_paused(tx).await? {
                 return Ok(None);
             }
             let nonce = Uuid::now_v7();

@@ -12,7 +12,7 @@ impl Store {
     /// [`StoreError::Conflict`] if it is held.
     pub async fn pause_queue(&self, actor: Actor, reason: &str, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
-            if season::read(tx).await?.paused.is_some() {
+            if season::is_paused(tx).await? {
                 return Err(StoreError::Conflict("the queue is paused already".into()));
             }
             let ruling = Ruling {
@@ -30,7 +30,7 @@ impl Store {
     /// Lets the queue go on. [`StoreError::Conflict`] if it is not held.
     pub async fn resume_queue(&self, actor: Actor, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
-            if season::read(tx).await?.paused.is_none() {
+            if !season::is_paused(tx).await? {
                 return Err(StoreError::Conflict("the queue is not paused".into()));
             }
             season::set_paused(tx, None).await?;

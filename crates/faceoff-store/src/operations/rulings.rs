@@ -10,6 +10,7 @@ use crate::{
         days,
         evaluations::{self, Evaluation, Failure},
         rulings::Ruling,
+        standings,
         teams::{self, Team},
     },
     write::Tx,
@@ -22,7 +23,7 @@ async fn void(tx: &mut Tx, id: EvaluationId, reason: &str) -> Result<()> {
         at: tx.now,
         reason: reason.to_owned(),
     };
-    evaluations::set_voided(tx, id, &ruling).await?;
+    standings::set_voided(tx, id, &ruling).await?;
     let reason = ruling.reason;
     tx.record(Subject::Evaluation(id), Event::EvaluationVoided { reason });
     Ok(())
@@ -40,7 +41,7 @@ impl Store {
     ) -> Result<Evaluation> {
         self.write(actor, now, async |tx| {
             let of = evaluations::entry(tx, id).await?.of;
-            let standings = evaluations::standings_of_day(tx, of).await?;
+            let standings = standings::of_day(tx, of).await?;
             if !standings.iter().any(|standing| standing.id == id && standing.counts) {
                 return Err(StoreError::Conflict(
                     "only an evaluation that is finished, or that its agent failed, and that counts is voided; \
@@ -68,7 +69,7 @@ impl Store {
                 return Err(StoreError::NotFound("day"));
             }
             let mut count = 0;
-            for standing in evaluations::standings_of_day(tx, of).await? {
+            for standing in standings::of_day(tx, of).await? {
                 if standing.is_open {
                     let cancelled = Failure::Cancelled(reason);
                     ends::fail_evaluation(tx, standing.id, standing.run, cancelled).await?;
@@ -110,7 +111,7 @@ impl Store {
             };
             teams::set_disqualified(tx, id, Some(&ruling)).await?;
             let why = format!("the team is disqualified: {reason}");
-            for (evaluation, run) in evaluations::open_of_team(tx, id).await? {
+            for (evaluation, run) in standings::open_of_team(tx, id).await? {
                 ends::fail_evaluation(tx, evaluation, run, Failure::Cancelled(&why)).await?;
             }
             let reason = ruling.reason;

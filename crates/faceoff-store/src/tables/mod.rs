@@ -16,5 +16,6 @@ pub(crate) mod season;
 pub(crate) mod shards;
 pub(crate) mod smoke_runs;
 pub(crate) mod stages;
+pub(crate) mod standings;
 pub(crate) mod submissions;
 pub(crate) mod teams;

@@ -60,6 +60,15 @@ pub(crate) async fn rename(connection: &mut SqliteConnection, name: &str) -> Res
     Ok(renamed.rows_affected() > 0)
 }
 
+/// Is the queue held? Asked at every claim, which needs no more of the season.
+pub(crate) async fn is_paused(connection: &mut SqliteConnection) -> Result<bool> {
+    Ok(sqlx::query_scalar!(
+        r#"SELECT EXISTS (SELECT 1 FROM season WHERE paused_at IS NOT NULL) AS "paused!: bool""#
+    )
+    .fetch_one(connection)
+    .await?)
+}
+
 /// Holds the queue, or lets it go on.
 pub(crate) async fn set_paused(
     connection: &mut SqliteConnection,

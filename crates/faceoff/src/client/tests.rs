@@ -204,3 +204,43 @@ async fn a_season_is_closed_by_its_name() {
     let error = site.organiser.compare(id, id).await.unwrap_err();
     assert!(error.to_string().contains(&id.to_string()), "{error}");
 }
+
+#[tokio::test]
+async fn a_stage_is_changed_by_what_is_said_and_by_nothing_else() {
+    let site = site(64).await;
+    let new = NewStage {
+        name: "Final".into(),
+        opens_at: None,
+        closes_at: Some("2026-03-09T08:00:00Z".parse().unwrap()),
+        zone: Some("Europe/Berlin".parse().unwrap()),
+        profile: None,
+        tasks: None,
+        episodes_per_task: None,
+        max_faults: None,
+        schedule: Some(faceoff_types::Schedule::cron("0 6 * * 1-5").unwrap()),
+        ablation_episodes: None,
+        episodes_per_shard: None,
+    };
+    let made = site.organiser.create_stage(&new).await.unwrap();
+    assert_eq!(made.settings.schedule, new.schedule);
+    let nothing = StageChange::default();
+    let same = site
+        .organiser
+        .change_stage(made.id, &nothing)
+        .await
+        .unwrap();
+    assert_eq!(same, made);
+    // Null is said, and is not the same as nothing.
+    let neither = StageChange {
+        closes_at: Some(None),
+        schedule: Some(None),
+        ..StageChange::default()
+    };
+    let changed = site
+        .organiser
+        .change_stage(made.id, &neither)
+        .await
+        .unwrap();
+    assert_eq!((changed.closes_at, changed.settings.schedule), (None, None));
+    assert_eq!(changed.rules, made.rules);
+}
