@@ -8,17 +8,14 @@
 
 use crate::{
     cpu_clock,
+    cpu_counters::{Ticks, of_cpus, text, throttled, ticks, ticks_of, usage},
     cpu_waits::{KnownThreads, Waits},
 };
 use rustix::process::Pid;
 use std::{
     fs::{self, File},
-    os::unix::fs::FileExt,
     time::{Duration, Instant},
 };
-
-/// `USER_HZ` of every architecture that the seccomp filter knows.
-const TICK: Duration = Duration::from_millis(10);
 
 /// How far counters may lag behind: who runs is charged at the kernel's next tick, of which there are 100 in
 /// a second at least.
@@ -70,17 +67,6 @@ pub struct Taken {
     /// How much of the span there was no CPU at all, for a machine below a virtual one held it up. Kernels
     /// differ in whether that is also the run time of whoever was on it.
     pub stolen: Duration,
-}
-
-/// What one CPU did since the host's start, in ticks.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-struct Ticks {
-    /// In user mode, the same with a nice value, in the kernel; interrupts are not among them.
-    busy: [u64; 3],
-    /// Idle, and idle with a disk at work.
-    idle: [u64; 2],
-    /// Held up by the machine below a virtual one.
-    stolen: u64,
 }
 
 /// Which counters are read first: between two readings others must seem to have run for less.
@@ -222,9 +208,7 @@ impl CpuEvidence {
     fn agent(&self) -> Option<Duration> {
         match &self.run_time {
             RunTime::PerCpu { agent, .. } => of_cpus(&text(agent)?, &self.cpus),
-            RunTime::Whole { agent } => {
-                Some(Duration::from_micros(keyed(&text(agent)?, "usage_usec")?))
-            }
+            RunTime::Whole { agent } => usage(&text(agent)?),
         }
     }
 }
@@ -328,61 +312,6 @@ fn stolen(from: &CpuReading, to: &CpuReading) -> Duration {
     let each = std::iter::zip(&from.ticks, &to.ticks);
     let stolen = each.map(|(from, to)| to.stolen.saturating_sub(from.stolen));
     ticks(stolen.min().unwrap_or_default())
-}
-
-fn ticks(count: u64) -> Duration {
-    TICK * u32::try_from(count).unwrap_or(u32::MAX)
-}
-
-/// A counter file's content; they are short.
-fn text(file: &File) -> Option<String> {
-    let mut bytes = vec![0; 16 << 10];
-    let count = file.read_at(&mut bytes, 0).ok()?;
-    bytes.truncate(count);
-    String::from_utf8(bytes).ok()
-}
-
-/// The sum of some CPUs of `cpuacct.usage_percpu`.
-fn of_cpus(text: &str, cpus: &[usize]) -> Option<Duration> {
-    let each: Vec<&str> = text.split_ascii_whitespace().collect();
-    let sum = cpus
-        .iter()
-        .map(|cpu| each.get(*cpu)?.parse::<u64>().ok())
-        .sum::<Option<u64>>()?;
-    Some(Duration::from_nanos(sum))
-}
-
-/// The lines of some CPUs of `/proc/stat`.
-fn ticks_of(stat: &str, cpus: &[usize]) -> Option<Vec<Ticks>> {
-    let one = |cpu: &usize| {
-        let name = format!("cpu{cpu} ");
-        let line = stat.lines().find_map(|line| line.strip_prefix(&name))?;
-        let numbers: Vec<u64> = line
-            .split_ascii_whitespace()
-            .map_while(|number| number.parse().ok())
-            .collect();
-        let [user, nice, system, idle, waiting, _hard, _soft, stolen, ..] = numbers[..] else {
-            return None;
-        };
-        Some(Ticks {
-            busy: [user, nice, system],
-            idle: [idle, waiting],
-            stolen,
-        })
-    };
-    cpus.iter().map(one).collect()
-}
-
-/// `cpu.stat` of either version.
-fn throttled(stat: &str) -> Option<Duration> {
-    keyed(stat, "throttled_usec")
-        .map(Duration::from_micros)
-        .or_else(|| keyed(stat, "throttled_time").map(Duration::from_nanos))
-}
-
-fn keyed(text: &str, key: &str) -> Option<u64> {
-    text.lines()
-        .find_map(|line| line.strip_prefix(key)?.trim().parse().ok())
 }
 
 #[cfg(test)]
@@ -565,31 +494,5 @@ mod tests {
         assert_eq!(taken(20, cpu(20, 17, 0)), MS(0));
         // Its timers' interrupts came out of idleness: no tick says that somebody ran.
         assert_eq!(taken(1, cpu(1, 2, 0)), MS(0));
-    }
-
-    #[test]
-    fn counters_are_found_in_the_kernels_files() {
-        let stat =
-            "cpu  9 9 9 9 9 9 9 9 0 0\ncpu1 1 2 3 4 5 6 7 8 0 0\ncpu10 0 0 0 0 0 0 0 0\nintr 5\n";
-        let found = Ticks {
-            busy: [1, 2, 3],
-            idle: [4, 5],
-            stolen: 8,
-        };
-        assert_eq!(
-            ticks_of(stat, &[1, 10]),
-            Some(vec![found, Ticks::default()])
-        );
-        assert_eq!(ticks_of(stat, &[0]), None);
-        assert_eq!(
-            of_cpus("10 20 30 \n", &[0, 2]),
-            Some(Duration::from_nanos(40))
-        );
-        assert_eq!(of_cpus("10\n", &[1]), None);
-        let v1 = "nr_periods 4\nnr_throttled 2\nthrottled_time 1500\n";
-        assert_eq!(throttled(v1), Some(Duration::from_nanos(1500)));
-        let v2 = "usage_usec 70\nnr_throttled 1\nthrottled_usec 3\n";
-        assert_eq!(throttled(v2), Some(Duration::from_micros(3)));
-        assert_eq!(keyed(v2, "usage_usec"), Some(70));
     }
 }

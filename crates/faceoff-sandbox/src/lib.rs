@@ -17,6 +17,7 @@ mod channel;
 mod child_setup;
 mod command_check;
 mod cpu_clock;
+mod cpu_counters;
 mod cpu_evidence;
 mod cpu_waits;
 mod end;
