@@ -1,4 +1,4 @@
-use crate::{config::HttpConfig, summaries::Summaries, uploads::Uploads};
+use crate::{config::HttpConfig, passwords::Passwords, summaries::Summaries, uploads::Uploads};
 use faceoff_store::Store;
 use std::sync::Arc;
 use tokio::sync::Semaphore;
@@ -13,6 +13,7 @@ pub(crate) struct AppState {
     /// One permit per upload that is copied to where it stays.
     pub(crate) storing: Semaphore,
     pub(crate) summaries: Summaries,
+    pub(crate) passwords: Passwords,
 }
 
 /// The disk is no faster for more of them, and each holds files open.
@@ -26,6 +27,7 @@ impl AppState {
             uploads: Arc::new(Uploads::new(config.limits.team_uploads)),
             storing: Semaphore::new(STORING),
             summaries: Summaries::new(store.clone(), config.clock.clone()),
+            passwords: Passwords::default(),
             store,
             config,
         }

@@ -1,25 +1,63 @@
-//! Who is calling: extractors that turn the bearer token into a team or the organiser.
+//! Who is calling: extractors that turn a token, or the cookie of whoever has signed in, into a person, a team or
+//! the host.
 
 use crate::{
     app::App,
     problem::{Problem, ProblemKind},
-    token::{hash_token, same_hash},
+    session,
+    token::hash_token,
 };
 use axum::{
     extract::FromRequestParts,
-    http::{HeaderMap, header, request::Parts},
+    http::{header, request::Parts},
 };
-use faceoff_store::{StoreError, Team};
+use faceoff_store::{Actor, Holder, Person, Refusal, StoreError, Team, Token, TokenKind, Who};
 use faceoff_types::TeamId;
+use jiff::Timestamp;
+use std::sync::Arc;
 
-/// A caller with a valid token.
+/// A caller with a good token.
 #[derive(Debug, Clone)]
-pub(crate) enum Caller {
-    Organiser,
-    Team(Team),
+pub(crate) struct Caller {
+    pub(crate) token: Token,
+    pub(crate) who: Who,
 }
 
 impl Caller {
+    /// As the log has them.
+    pub(crate) const fn actor(&self) -> Actor {
+        match &self.who {
+            Who::Host => Actor::Organiser,
+            Who::Team(team) => Actor::Team(team.id),
+            Who::Organiser(person) | Who::Member(person, _) => Actor::Person(person.id),
+        }
+    }
+
+    /// Whose team they are, or speak for.
+    pub(crate) const fn team(&self) -> Option<&Team> {
+        match &self.who {
+            Who::Host | Who::Organiser(_) => None,
+            Who::Team(team) | Who::Member(_, team) => Some(team),
+        }
+    }
+
+    /// The person, unless it is the host or a team's program.
+    pub(crate) const fn person(&self) -> Option<&Person> {
+        match &self.who {
+            Who::Host | Who::Team(_) => None,
+            Who::Organiser(person) | Who::Member(person, _) => Some(person),
+        }
+    }
+
+    pub(crate) const fn is_organiser(&self) -> bool {
+        matches!(self.who, Who::Host | Who::Organiser(_))
+    }
+
+    /// Is it theirs, or are they an organiser?
+    pub(crate) fn may_see(&self, team: TeamId) -> bool {
+        self.is_organiser() || self.team().is_some_and(|own| own.id == team)
+    }
+
     /// What was `found`, if it is of the caller's `team`; another team's looks like none at all.
     pub(crate) fn visible<T>(
         &self,
@@ -27,61 +65,171 @@ impl Caller {
         found: Result<T, StoreError>,
         team: impl Fn(&T) -> TeamId,
     ) -> Result<T, Problem> {
-        let may_see = |found: &T| match self {
-            Self::Organiser => true,
-            Self::Team(own) => own.id == team(found),
-        };
         match found {
-            Ok(found) if may_see(&found) => Ok(found),
+            Ok(found) if self.may_see(team(&found)) => Ok(found),
             Ok(_) | Err(StoreError::NotFound(_)) => Err(Problem::not_found(what)),
             Err(error) => Err(error.into()),
         }
     }
+
+    /// As the log line and a refusal call them.
+    fn named(&self) -> String {
+        match &self.who {
+            Who::Host => "the organiser's".into(),
+            Who::Organiser(person) => format!("that of the organiser “{}”", person.name),
+            Who::Team(team) => format!("that of the team “{}”", team.name),
+            Who::Member(person, team) => {
+                format!("that of “{}” of the team “{}”", person.name, team.name)
+            }
+        }
+    }
 }
 
-/// Proof that the caller is the organiser.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Organiser;
-
-/// Proof that the caller is this team.
+/// A caller who may organise.
 #[derive(Debug, Clone)]
-pub(crate) struct TeamCaller(pub(crate) Team);
+pub(crate) struct Organiser(Caller);
 
-fn bearer(headers: &HeaderMap) -> Result<&str, Problem> {
-    let problem = |detail: &str| Err(Problem::new(ProblemKind::Unauthenticated, detail));
-    let Some(value) = headers.get(header::AUTHORIZATION) else {
-        return problem(
-            "no token came; send the header “Authorization: Bearer TOKEN” with your team's token, \
-             or the organiser's",
-        );
-    };
-    match value.to_str().ok().and_then(|value| value.split_once(' ')) {
-        Some((scheme, token))
-            if scheme.eq_ignore_ascii_case("bearer") && !token.trim().is_empty() =>
-        {
-            Ok(token.trim())
-        }
-        _ => problem("the header Authorization is not of the form “Bearer TOKEN”"),
+impl Organiser {
+    /// As the log has them.
+    pub(crate) const fn actor(&self) -> Actor {
+        self.0.actor()
     }
+}
+
+/// A caller who speaks for a team: a member, or a program with the team's own token.
+#[derive(Debug, Clone)]
+pub(crate) struct TeamCaller {
+    pub(crate) team: Team,
+    caller: Caller,
+}
+
+impl TeamCaller {
+    /// As the log has them.
+    pub(crate) const fn actor(&self) -> Actor {
+        self.caller.actor()
+    }
+
+    /// What was `found`, if it is the team's.
+    pub(crate) fn visible<T>(
+        &self,
+        what: &str,
+        found: Result<T, StoreError>,
+        team: impl Fn(&T) -> TeamId,
+    ) -> Result<T, Problem> {
+        self.caller.visible(what, found, team)
+    }
+}
+
+/// What came with the request, if anything.
+enum Presented<'a> {
+    Bearer(&'a str),
+    Cookie(&'a str),
+}
+
+fn presented<'a>(parts: &'a Parts) -> Result<Option<Presented<'a>>, Problem> {
+    if let Some(value) = parts.headers.get(header::AUTHORIZATION) {
+        return match value.to_str().ok().and_then(|value| value.split_once(' ')) {
+            Some((scheme, token))
+                if scheme.eq_ignore_ascii_case("bearer") && !token.trim().is_empty() =>
+            {
+                Ok(Some(Presented::Bearer(token.trim())))
+            }
+            _ => Err(Problem::new(
+                ProblemKind::Unauthenticated,
+                "the header Authorization is not of the form “Bearer TOKEN”",
+            )),
+        };
+    }
+    let Some(cookie) = session::cookie(&parts.headers) else {
+        return Ok(None);
+    };
+    // A cookie comes with whatever a foreign page makes the browser send.
+    if !parts.method.is_safe() {
+        session::check_own_page(&parts.headers)?;
+    }
+    Ok(Some(Presented::Cookie(cookie)))
+}
+
+async fn caller(parts: &Parts, app: &App) -> Result<Option<Caller>, Problem> {
+    let (token, kind) = match presented(parts)? {
+        None => return Ok(None),
+        Some(Presented::Bearer(token)) => (token, TokenKind::Key),
+        Some(Presented::Cookie(token)) => (token, TokenKind::Session),
+    };
+    let now = app.config.clock.now();
+    // A look-up by hash is safe although its time may depend on the hash: nobody can choose a
+    // token whose hash begins as another's does.
+    let holder = app.store.holder(hash_token(token), kind, now).await?;
+    let Holder { token, who } = match holder {
+        Ok(holder) => holder,
+        // Who was signed in once is a visitor, with a cookie that says nothing.
+        Err(_) if kind == TokenKind::Session => return Ok(None),
+        Err(refusal) => return Err(refused(refusal)),
+    };
+    note_use(app, &token, now);
+    Ok(Some(Caller { token, who }))
+}
+
+/// Beside the request, which does not wait for it and does not fail with it.
+fn note_use(app: &App, token: &Token, now: Timestamp) {
+    let is_noted = token
+        .last_used_at
+        .is_some_and(|at| now.duration_since(at) < faceoff_store::LAST_USE);
+    if is_noted {
+        return;
+    }
+    let (app, token) = (Arc::clone(app), token.clone());
+    tokio::spawn(async move {
+        if let Err(error) = app.store.token_used(&token, now).await {
+            tracing::debug!(token = %token.id, %error, "the last use of a token is not noted");
+        }
+    });
+}
+
+fn refused(refusal: Refusal) -> Problem {
+    let shown = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M UTC").to_string();
+    let detail = match refusal {
+        Refusal::Unknown => {
+            "the token is not known; it may have been replaced. Make a new one, or ask the organiser for one".to_owned()
+        }
+        Refusal::WrongKind => {
+            "what came as a token is the cookie of a page; make a token with POST /api/v1/tokens".to_owned()
+        }
+        Refusal::Revoked(at) => format!(
+            "the token was revoked, or its person has left, by {}. Use another one, or ask the organiser for one",
+            shown(at)
+        ),
+        Refusal::Expired(at) => format!(
+            "the token expired on {}. Make a new one, or ask the organiser for one",
+            shown(at)
+        ),
+    };
+    Problem::new(ProblemKind::Unauthenticated, detail)
 }
 
 impl FromRequestParts<App> for Caller {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
-        let hash = hash_token(bearer(&parts.headers)?);
-        if same_hash(&hash, &app.config.admin_token_hash) {
-            return Ok(Self::Organiser);
-        }
-        // A look-up by hash is safe although its time may depend on the hash: nobody can choose a
-        // token whose hash begins as another's does.
-        match app.store.team_by_token_hash(hash).await? {
-            Some(team) => Ok(Self::Team(team)),
-            None => Err(Problem::new(
+        caller(parts, app).await?.ok_or_else(|| {
+            Problem::new(
                 ProblemKind::Unauthenticated,
-                "the token is not known; it may have been replaced. Ask the organiser for a new one",
-            )),
-        }
+                "no token came; send the header “Authorization: Bearer TOKEN” with your token, your team's, or the \
+                 organiser's",
+            )
+        })
+    }
+}
+
+/// Whoever calls: also a visitor without a token. A token that is worth nothing is refused all the same.
+#[derive(Debug, Clone)]
+pub(crate) struct Anybody(pub(crate) Option<Caller>);
+
+impl FromRequestParts<App> for Anybody {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
+        caller(parts, app).await.map(Self)
     }
 }
 
@@ -89,16 +237,17 @@ impl FromRequestParts<App> for Organiser {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
-        match Caller::from_request_parts(parts, app).await? {
-            Caller::Organiser => Ok(Self),
-            Caller::Team(team) => Err(Problem::new(
-                ProblemKind::Forbidden,
-                format!(
-                    "this request needs the organiser's token; yours is that of the team “{}”",
-                    team.name
-                ),
-            )),
+        let caller = Caller::from_request_parts(parts, app).await?;
+        if caller.is_organiser() {
+            return Ok(Self(caller));
         }
+        Err(Problem::new(
+            ProblemKind::Forbidden,
+            format!(
+                "this request needs the organiser's token; yours is {}",
+                caller.named()
+            ),
+        ))
     }
 }
 
@@ -106,12 +255,19 @@ impl FromRequestParts<App> for TeamCaller {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
-        match Caller::from_request_parts(parts, app).await? {
-            Caller::Team(team) => Ok(Self(team)),
-            Caller::Organiser => Err(Problem::new(
+        let caller = Caller::from_request_parts(parts, app).await?;
+        match caller.team() {
+            Some(team) => Ok(Self {
+                team: team.clone(),
+                caller,
+            }),
+            None => Err(Problem::new(
                 ProblemKind::Forbidden,
-                "this request needs a team's token; yours is the organiser's. Use the token that \
-                 POST /api/v1/teams returned",
+                format!(
+                    "this request needs a team's token; yours is {}. Use the token that POST /api/v1/teams \
+                     returned, or a member's",
+                    caller.named()
+                ),
             )),
         }
     }

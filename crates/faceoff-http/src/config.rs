@@ -41,8 +41,9 @@ impl Default for HttpLimits {
 pub struct HttpConfig {
     /// Largest packed bundle, in bytes.
     pub max_bundle_bytes: u64,
-    /// BLAKE3 of the organiser's bearer token ([`token::hash_token`](crate::token::hash_token)).
-    pub admin_token_hash: [u8; 32],
+    /// Where people reach the server, without a slash at its end; links begin with it, and by https cookies are sent
+    /// over TLS only. None: links are paths.
+    pub public_url: Option<String>,
     /// Existing folder for uploads under way, on a disk with room for some bundles.
     pub upload_dir: PathBuf,
     /// Stamps what is written, and tells which day it is.

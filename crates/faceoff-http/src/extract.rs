@@ -1,7 +1,11 @@
 //! Extractors whose rejections are problems that name the place.
 
-use crate::problem::{Problem, ProblemKind};
+use crate::{
+    problem::{Problem, ProblemKind},
+    session,
+};
 use axum::{
+    Form,
     body::Bytes,
     extract::{
         FromRequest, FromRequestParts, Query, RawPathParams, Request, rejection::BytesRejection,
@@ -111,6 +115,29 @@ fn parse<T: DeserializeOwned>((is_json, bytes): (bool, Bytes)) -> Result<T, Prob
         )
     })?;
     Ok(parsed)
+}
+
+/// A form of one of our own pages.
+#[derive(Debug)]
+pub(crate) struct PageForm<T>(pub(crate) T);
+
+impl<S, T> FromRequest<S> for PageForm<T>
+where
+    S: Send + Sync,
+    T: DeserializeOwned,
+{
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
+        session::check_own_page(request.headers())?;
+        let Form(form) = Form::from_request(request, state)
+            .await
+            .map_err(|rejection| {
+                let detail = format!("the form is not understood: {}", rejection.body_text());
+                Problem::new(ProblemKind::InvalidRequest, detail)
+            })?;
+        Ok(Self(form))
+    }
 }
 
 /// The parameters of the path, in its order.

@@ -7,6 +7,7 @@
 //! [`views`] are what can be known of a resource; API and pages both show them, and know nothing of
 //! each other.
 
+mod acts;
 mod api;
 mod app;
 mod auth;
@@ -15,13 +16,16 @@ mod extract;
 mod layers;
 mod pace;
 mod pages;
+mod passwords;
 mod paths;
 pub mod problem;
 mod release;
 pub mod requests;
 mod room;
 mod serve;
+mod session;
 mod summaries;
+mod text;
 pub mod token;
 mod uploads;
 pub mod views;

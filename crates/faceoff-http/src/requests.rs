@@ -1,8 +1,14 @@
 //! What clients send to the API.
 
+mod left_out;
+mod people;
+
+pub use people::*;
+
 use faceoff_types::{Profile, Schedule, StageId, Task, Zone};
 use jiff::Timestamp;
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use left_out::{given, given_or_null};
+use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
 /// A team to create.
@@ -24,6 +30,25 @@ pub struct BoardQuery {
     /// By which of the stage's rules; without it by the newest with results. No board mixes two.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub revision: Option<u32>,
+}
+
+/// Which of the log.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, IntoParams)]
+#[serde(default, deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct EventsQuery {
+    /// Only events before the one with this id: `next_before` of the page before.
+    pub before: Option<i64>,
+    /// Events of a page: 1 to 1000; 100 without it.
+    pub limit: Option<u32>,
+    /// Who caused it: `organiser` (the host), `person:ID`, `team:ID`, `visitor`, `schedule`, `worker:NAME`, `server`;
+    /// `person`, `team` and `worker` name all of them.
+    pub actor: Option<String>,
+    /// What it is about: `season`, `stage:ID`, `day:STAGE/2026-03-01`, `team:ID`, `submission:ID`, `evaluation:ID`, `ablation:ID`,
+    /// `person:ID`, `registration:ID`, `announcement:ID` or `question:ID`.
+    pub subject: Option<String>,
+    /// What happened, e.g. `day_started`.
+    pub kind: Option<String>,
 }
 
 /// Which day is to start.
@@ -124,24 +149,6 @@ pub struct StageChange {
     /// The stage's name, if other rules are to begin while it is open: its board begins anew then.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub confirm: Option<String>,
-}
-
-/// Tells null from what was left out.
-fn given<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
-    deserializer: D,
-) -> Result<Option<Option<T>>, D::Error> {
-    Option::deserialize(deserializer).map(Some)
-}
-
-#[expect(clippy::option_option, reason = "null and left out are told apart")]
-fn given_or_null<S: Serializer, T: Serialize>(
-    value: &Option<Option<T>>,
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
-    value
-        .as_ref()
-        .and_then(Option::as_ref)
-        .serialize(serializer)
 }
 
 /// What a team calls a submission.

@@ -5,17 +5,18 @@
 //! * `protocol`: the same bytes through the session (sandbox, deadlines, serialising, strict
 //!   parsing) with a compiled agent that answers at once;
 //! * `control step`: one step of the simulator alone;
-//! * then the same episodes twice, as a bare loop of session and simulator and as a shard with its
-//!   recording: the difference is what recording costs.
+//! * then the same shard twice, with nothing kept of its steps and with its recording: the difference is what
+//!   recording costs.
 //!
 //! The agent is this very program, started with `--agent` or `--echo`.
 #![expect(clippy::unwrap_used, reason = "a benchmark that cannot go on ends")]
 #![expect(clippy::print_stdout, reason = "a benchmark reports to the terminal")]
 
 use criterion::{BatchSize, Criterion};
-use faceoff_episode::Arena;
+use faceoff_episode::{Arena, Nowhere};
 use faceoff_runner::{
-    AgentEnvironment, Observer, Session, ShardSpec, TimeLimits, bundle::Bundle, run_shard,
+    AgentEnvironment, Counters, Observer, Session, ShardSpec, TimeLimits, bundle::Bundle,
+    play_shard, run_shard,
 };
 use faceoff_sandbox::{Isolation, Limits, Runtime, affinity};
 use faceoff_types::{EpisodeOutcome, Interpolation, Profile, Ruleset, Seed, Task};
@@ -310,7 +311,7 @@ fn steps(criterion: &mut Criterion) {
     let mut turns: Vec<(f64, f64)> = (0..=RECORDING_TURNS)
         .map(|_| {
             let started = cpu_time_s();
-            steps = play_bare(&agent, &env, &spec);
+            steps = play_unrecorded(&agent, &env, &spec);
             let bare_s = cpu_time_s() - started;
             let started = cpu_time_s();
             run_shard(&spec, &agent.bundle, &env, out.path(), &mut Nobody).unwrap();
@@ -339,27 +340,19 @@ fn cpu_time_s() -> f64 {
     now.tv_sec as f64 + 1e-9 * now.tv_nsec as f64
 }
 
-/// What a shard does, without a recording. Returns the number of steps.
-fn play_bare(agent: &InstantAgent, env: &AgentEnvironment, spec: &ShardSpec) -> u32 {
-    let arena = Arena::new(spec.profile, spec.seed, spec.mismatch_seed);
-    let mut session = Session::start(&agent.bundle, env, spec.task.into())
-        .map_err(|(trouble, _)| trouble)
-        .unwrap();
-    let mut steps = 0;
-    for episode in spec.episodes.clone() {
-        let mut world = arena.episode(spec.task, episode, Interpolation::Cubic);
-        session.reset(episode).unwrap();
-        loop {
-            session.step(world.steps(), world.observation()).unwrap();
-            if world.step(session.action()).end.is_some() {
-                break;
-            }
-        }
-        session.end(episode, world.steps()).unwrap();
-        steps += world.steps();
-    }
-    session.finish().unwrap();
-    steps
+/// Plays a shard and keeps nothing of its steps. Returns how many they were.
+fn play_unrecorded(agent: &InstantAgent, env: &AgentEnvironment, spec: &ShardSpec) -> u32 {
+    let mut nowhere = Nowhere;
+    let report = play_shard(
+        spec,
+        &agent.bundle,
+        env,
+        &mut nowhere,
+        &mut Nobody,
+        &Counters,
+    );
+    let outcomes = report.unwrap().outcomes;
+    outcomes.iter().map(|outcome| outcome.steps).sum()
 }
 
 /// Watches nothing.

@@ -31,7 +31,7 @@ pub trait HostWatch: std::fmt::Debug + Sync {
 
 /// Nothing but what is proven.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Counters;
+pub struct Counters;
 
 impl HostWatch for Counters {
     fn taken(&self, _: Instant, _: Instant, proven: Option<Duration>) -> Duration {

@@ -7,7 +7,7 @@ use crate::{
     player::{IfTheHostWins, Player},
 };
 use faceoff_dataset::{Recorder, ShardFolder, ShardReport};
-use faceoff_episode::Arena;
+use faceoff_episode::{Arena, StepSink};
 use faceoff_sandbox::affinity::PinnedElsewhere;
 use faceoff_types::{EpisodeOutcome, SlotTiming};
 use faceoff_wire::work::ShardSpec;
@@ -53,10 +53,28 @@ pub fn run_shard_watched(
     observer: &mut dyn Observer,
     watch: &dyn HostWatch,
 ) -> Result<ShardReport, PlatformFault> {
-    let _pinned = PinnedElsewhere::than(&env.agent_cpus);
-    let mut calibration = Calibration::start(&env.agent_cpus)?;
     let folder = ShardFolder::create(out)?;
     let mut recorder = Recorder::create(&folder, spec.task)?;
+    let report = play_shard(spec, bundle, env, &mut recorder, observer, watch)?;
+    recorder.finish()?;
+    folder.commit(spec, &report)?;
+    Ok(report)
+}
+
+/// Plays a shard and tells `sink` of its steps.
+///
+/// # Errors
+/// As [`run_shard`].
+pub fn play_shard(
+    spec: &ShardSpec,
+    bundle: &Bundle,
+    env: &AgentEnvironment,
+    sink: &mut dyn StepSink,
+    observer: &mut dyn Observer,
+    watch: &dyn HostWatch,
+) -> Result<ShardReport, PlatformFault> {
+    let _pinned = PinnedElsewhere::than(&env.agent_cpus);
+    let mut calibration = Calibration::start(&env.agent_cpus)?;
     let mut player = Player::new(
         bundle,
         env,
@@ -66,7 +84,7 @@ pub fn run_shard_watched(
         watch,
         IfTheHostWins::LastTryCounts,
     );
-    let played = play(spec, &mut player, &mut recorder, observer, &mut calibration);
+    let played = play(spec, &mut player, sink, observer, &mut calibration);
     let (outcomes, stopped_by_faults) = match played {
         Ok(played) => played,
         Err(fault) => {
@@ -77,22 +95,19 @@ pub fn run_shard_watched(
     let timing = calibration.finish(&player, spec.platform_retries);
     let log = player.close()?;
     observer.log(&log);
-    let report = ShardReport {
+    Ok(ShardReport {
         outcomes,
         log,
         stopped_by_faults,
         timing,
-    };
-    recorder.finish()?;
-    folder.commit(spec, &report)?;
-    Ok(report)
+    })
 }
 
 /// Plays the episodes; tells also whether faults ended them early.
 fn play(
     spec: &ShardSpec,
     player: &mut Player<'_>,
-    recorder: &mut Recorder,
+    sink: &mut dyn StepSink,
     observer: &mut dyn Observer,
     calibration: &mut Calibration,
 ) -> Result<(Vec<EpisodeOutcome>, bool), PlatformFault> {
@@ -102,7 +117,7 @@ fn play(
         if observer.cancelled() {
             return Err(PlatformFault::Cancelled);
         }
-        let outcome = player.play(episode, faceoff_sim::EPISODE_STEPS, recorder, &|| {
+        let outcome = player.play(episode, faceoff_sim::EPISODE_STEPS, sink, &|| {
             observer.cancelled()
         })?;
         calibration.between_episodes()?;

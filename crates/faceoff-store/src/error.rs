@@ -44,6 +44,24 @@ pub enum StoreError {
         /// As everybody may read it.
         reason: String,
     },
+    /// The team takes no part any more, by its own wish.
+    #[error("the team retired at {at}")]
+    Retired {
+        /// When.
+        at: Timestamp,
+    },
+    /// Nobody of the team has accepted the terms as they are now.
+    #[error("nobody of the team has accepted version {version} of the terms")]
+    TermsOwed {
+        /// The newest.
+        version: u32,
+    },
+    /// Names that differ only in case count as the same.
+    #[error("a person named {0:?} exists already")]
+    PersonNameTaken(String),
+    /// The link is worth nothing; the text says why.
+    #[error("{0}")]
+    InvitationSpent(String),
     /// The season is over: nothing more is uploaded or evaluated.
     #[error("the season was closed at {closed_at}")]
     SeasonClosed {

@@ -1,130 +1,20 @@
 //! What is recorded of every change: who did what to what. The audit log, and what feeds read.
 
+mod actor;
+mod parse;
+mod subject;
+
+pub use actor::Actor;
+pub use parse::ParseEventError;
+pub use subject::Subject;
+
 use faceoff_types::{
-    AblationId, EvaluationId, RunId, ShardId, StageDay, StageId, StageName, StageRules,
-    StageSettings, SubmissionId, Task, TeamId, TeamName, Zone,
+    DivisionName, EvaluationId, InvitationId, PersonName, RunId, ShardId, StageId, StageName,
+    StageRules, StageSettings, SubmissionId, Task, TeamId, TeamName, TokenId, Zone,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
-use std::{fmt, str::FromStr};
 use uuid::Uuid;
-
-/// Who caused a change.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub enum Actor {
-    /// Whoever holds the organiser's token, or the server's configuration.
-    Organiser,
-    /// Whoever holds the team's token.
-    Team(TeamId),
-    /// The daily start.
-    Schedule,
-    /// A worker's slot, by the name under which it claims.
-    Worker(String),
-    /// What the server does by itself: tidying, derived data.
-    Server,
-}
-
-impl fmt::Display for Actor {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Organiser => f.write_str("organiser"),
-            Self::Team(id) => write!(f, "team:{id}"),
-            Self::Schedule => f.write_str("schedule"),
-            Self::Worker(name) => write!(f, "worker:{name}"),
-            Self::Server => f.write_str("server"),
-        }
-    }
-}
-
-/// Text that is none of an event's parts.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{0:?} is no actor or subject of an event")]
-pub struct ParseEventError(String);
-
-impl FromStr for Actor {
-    type Err = ParseEventError;
-    fn from_str(s: &str) -> Result<Self, Self::Err> {
-        let unknown = || ParseEventError(s.to_owned());
-        Ok(match s.split_once(':') {
-            None if s == "organiser" => Self::Organiser,
-            None if s == "schedule" => Self::Schedule,
-            None if s == "server" => Self::Server,
-            Some(("team", id)) => Self::Team(id.parse().map_err(|_| unknown())?),
-            Some(("worker", name)) => Self::Worker(name.to_owned()),
-            _ => return Err(unknown()),
-        })
-    }
-}
-
-/// What a change is about.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Subject {
-    /// The season, of which a data folder has one.
-    Season,
-    /// A stage.
-    Stage(StageId),
-    /// A day of a stage.
-    Day(StageDay),
-    /// A day from before there were stages.
-    DayOfNone(Date),
-    /// A team.
-    Team(TeamId),
-    /// An upload and its smoke run.
-    Submission(SubmissionId),
-    /// An evaluation with its run and its scoring.
-    Evaluation(EvaluationId),
-    /// An ablation with its runs.
-    Ablation(AblationId),
-}
-
-impl Subject {
-    /// As the columns of the events table have it: kind and id.
-    pub(crate) fn columns(self) -> (&'static str, String) {
-        match self {
-            Self::Season => ("season", String::new()),
-            Self::Stage(id) => ("stage", id.to_string()),
-            Self::Day(of) => ("day", of.to_string()),
-            Self::DayOfNone(date) => ("day", date.to_string()),
-            Self::Team(id) => ("team", id.to_string()),
-            Self::Submission(id) => ("submission", id.to_string()),
-            Self::Evaluation(id) => ("evaluation", id.to_string()),
-            Self::Ablation(id) => ("ablation", id.to_string()),
-        }
-    }
-
-    pub(crate) fn from_columns(kind: &str, id: &str) -> Result<Self, ParseEventError> {
-        let unknown = || ParseEventError(format!("{kind} {id}"));
-        Ok(match kind {
-            "season" => Self::Season,
-            "stage" => Self::Stage(id.parse().map_err(|_| unknown())?),
-            "day" if id.contains('/') => Self::Day(id.parse().map_err(|_| unknown())?),
-            "day" => Self::DayOfNone(id.parse().map_err(|_| unknown())?),
-            "team" => Self::Team(id.parse().map_err(|_| unknown())?),
-            "submission" => Self::Submission(id.parse().map_err(|_| unknown())?),
-            "evaluation" => Self::Evaluation(id.parse().map_err(|_| unknown())?),
-            "ablation" => Self::Ablation(id.parse().map_err(|_| unknown())?),
-            _ => return Err(unknown()),
-        })
-    }
-}
-
-impl fmt::Display for Subject {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (kind, id) = self.columns();
-        match id.as_str() {
-            "" => f.write_str(kind),
-            id => write!(f, "{kind}:{id}"),
-        }
-    }
-}
-
-impl FromStr for Subject {
-    type Err = ParseEventError;
-    fn from_str(s: &str) -> Result<Self, Self::Err> {
-        let (kind, id) = s.split_once(':').unwrap_or((s, ""));
-        Self::from_columns(kind, id)
-    }
-}
 
 /// What happened. The variants' names and fields are stored: new ones may be added, old ones stay.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -135,8 +25,132 @@ pub enum Event {
         /// As it was at the invitation.
         name: TeamName,
     },
-    /// The team has another token; the old one is void.
+    /// The team has another token; all that it had are void.
     TokenReplaced,
+    /// The subject has another token.
+    TokenCreated {
+        /// Which.
+        token: TokenId,
+        /// What its owner calls it.
+        name: String,
+        /// From then on it is worth nothing.
+        expires_at: Option<Timestamp>,
+    },
+    /// A token has another secret; the old one is void.
+    TokenRotated {
+        /// Which.
+        token: TokenId,
+        /// What its owner calls it.
+        name: String,
+    },
+    /// A token is worth nothing any more.
+    TokenRevoked {
+        /// Which.
+        token: TokenId,
+        /// What its owner calls it.
+        name: String,
+    },
+    /// Somebody may join by a link.
+    Invited {
+        /// Which.
+        invitation: InvitationId,
+        /// `organiser`, `member`, `founder` or `return`.
+        role: String,
+        /// For whom.
+        note: String,
+        /// From then on it is worth nothing.
+        expires_at: Timestamp,
+    },
+    /// The link is worth nothing any more.
+    InvitationRevoked {
+        /// Which.
+        invitation: InvitationId,
+    },
+    /// They followed a link.
+    PersonJoined {
+        /// As they are called.
+        name: PersonName,
+        /// Whose member they are; none: an organiser.
+        team: Option<TeamId>,
+    },
+    /// They may do nothing any more.
+    PersonLeft {
+        /// As they were called.
+        name: PersonName,
+    },
+    /// They signed in on a page.
+    SignedIn,
+    /// They have another password.
+    PasswordSet,
+    /// They accepted the terms.
+    TermsAccepted {
+        /// Which.
+        version: u32,
+    },
+    /// There are other terms.
+    TermsPublished {
+        /// From 1.
+        version: u32,
+    },
+    /// Teams are ranked in these.
+    DivisionsSet {
+        /// In their order.
+        divisions: Vec<DivisionName>,
+    },
+    /// Anybody may register a team.
+    RegistrationOpened,
+    /// Teams come by invitation only.
+    RegistrationClosed,
+    /// A team wants to take part.
+    TeamRegistered {
+        /// What it wants to be called.
+        name: TeamName,
+    },
+    /// It does.
+    RegistrationApproved {
+        /// Which.
+        team: TeamId,
+    },
+    /// It does not.
+    RegistrationRefused {
+        /// As who registered may read it.
+        reason: String,
+    },
+    /// The team has another name.
+    TeamRenamed {
+        /// The old one.
+        from: TeamName,
+        /// The new one.
+        to: TeamName,
+    },
+    /// The team tells something else of itself.
+    TeamDescribed {
+        /// Where it is from.
+        affiliation: Option<String>,
+        /// Its page.
+        link: Option<String>,
+        /// In which it is ranked.
+        division: Option<DivisionName>,
+    },
+    /// The team plays no more, by its own wish.
+    TeamRetired,
+    /// The team plays again.
+    TeamReturned,
+    /// Everybody was told something.
+    Announced {
+        /// What it is called.
+        title: String,
+    },
+    /// The team asks.
+    Asked {
+        /// Which.
+        team: TeamId,
+    },
+    /// The organisers have answered.
+    Answered {
+        /// May everybody read it?
+        public: bool,
+    },
     /// A bundle came, and its smoke run is queued.
     SubmissionUploaded {
         /// Whose it is.
@@ -381,40 +395,6 @@ impl Change {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn actors_and_subjects_read_back_as_they_are_written() {
-        let actors = [
-            Actor::Organiser,
-            Actor::Team(TeamId::new()),
-            Actor::Schedule,
-            Actor::Worker("host:1/slot-0".into()),
-            Actor::Server,
-        ];
-        for actor in actors {
-            assert_eq!(actor.to_string().parse(), Ok(actor));
-        }
-        assert!("team:none".parse::<Actor>().is_err());
-        let subjects = [
-            Subject::Season,
-            Subject::Stage(StageId::new()),
-            Subject::Day(StageDay {
-                stage: StageId::new(),
-                date: jiff::civil::date(2026, 3, 1),
-            }),
-            Subject::DayOfNone(jiff::civil::date(2026, 3, 1)),
-            Subject::Team(TeamId::new()),
-            Subject::Submission(SubmissionId::new()),
-            Subject::Evaluation(EvaluationId::new()),
-            Subject::Ablation(AblationId::new()),
-        ];
-        for subject in subjects {
-            let (kind, id) = subject.columns();
-            assert_eq!(Subject::from_columns(kind, &id), Ok(subject));
-            assert_eq!(subject.to_string().parse(), Ok(subject));
-        }
-        assert!(Subject::from_columns("team", "none").is_err());
-    }
 
     #[test]
     fn names_of_events_are_known_with_and_without_fields() {

@@ -42,13 +42,18 @@ pub use event::{Actor, Change, Event, EventRecord, ParseEventError, Subject};
 pub use health::{Health, QueueHealth};
 pub use log::LOG_BOUND_BYTES;
 pub use operations::{
+    announcements::MAX_OPEN_QUESTIONS,
     claim::{Claimed, MAX_LEASES, RunSeeds, Work},
     commit::Committed,
     give_back::MAX_ATTEMPTS,
+    invitations::{Code, Joined, Joining, MAX_OPEN_INVITATIONS, NewInvitation},
+    registrations::{MAX_WAITING, NewRegistration},
     rerun::RERUN_PAUSES_S,
     runs::RunOwner,
     stages::{NewStage, StageChange},
+    teams::TeamChange,
     tidy::{RECORDINGS_KEPT, UNCHECKED_KEPT},
+    tokens::{Holder, LAST_USE, MAX_TOKENS, NewToken, Refusal, SESSION, Who},
 };
 pub use queue::Claim;
 pub use reads::{board::BoardRecord, runs::RunFaults};
@@ -56,16 +61,23 @@ pub use room::Room;
 pub use store::Store;
 pub use tables::{
     ablations::{Ablation, AblationState},
+    announcements::Announcement,
     bundles::{UploadQuota, UploadUsage},
     days::Day,
     evaluations::{Evaluation, EvaluationState},
     events::EventFilter,
+    invitations::{Invitation, InvitationState, InvitedAs},
+    people::Person,
     plan::RunPlan,
+    questions::{Question, Reply},
+    registrations::{Registration, RegistrationState},
     rulings::Ruling,
     runs::Run,
     season::Season,
     shards::{Shard, ShardCommit},
     stages::{Revision, Stage, StagePhase},
     submissions::{Submission, SubmissionState},
-    teams::Team,
+    teams::{Team, TeamProfile},
+    terms::Terms,
+    tokens::{Token, TokenKind, TokenOwner},
 };

@@ -96,3 +96,33 @@ id!(
     ShardId,
     "shard"
 );
+id!(
+    /// Somebody with an account: an organiser, or a member of a team.
+    PersonId,
+    "person"
+);
+id!(
+    /// A named key to the API, of a person, a team or the host.
+    TokenId,
+    "token"
+);
+id!(
+    /// A link by which one person joins, once.
+    InvitationId,
+    "invitation"
+);
+id!(
+    /// A team's wish to take part.
+    RegistrationId,
+    "registration"
+);
+id!(
+    /// What the organisers tell everybody.
+    AnnouncementId,
+    "announcement"
+);
+id!(
+    /// What a team asks the organisers.
+    QuestionId,
+    "question"
+);

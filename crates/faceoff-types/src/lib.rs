@@ -41,11 +41,12 @@ pub use fault::{AgentFault, AgentFaultKind, Phase};
 pub use full_disk::tells_of_full_disk;
 pub use harmless::{harmless, is_harmless};
 pub use ids::{
-    AblationId, EvaluationId, ParseIdError, RunId, ShardId, StageId, SubmissionId, TeamId,
+    AblationId, AnnouncementId, EvaluationId, InvitationId, ParseIdError, PersonId, QuestionId,
+    RegistrationId, RunId, ShardId, StageId, SubmissionId, TeamId, TokenId,
 };
 pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, UnknownInterpolation};
 pub use limits::{AgentLimits, BundleLimits, ResourceLimits, TimeLimits};
-pub use names::{InvalidName, StageName, TeamName};
+pub use names::{DivisionName, InvalidName, PersonName, StageName, TeamName};
 pub use outcome::{EpisodeEnd, EpisodeOutcome};
 pub use profile::{Factor, Factors, ParseProfileError, Profile};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult, ViolationCounts};

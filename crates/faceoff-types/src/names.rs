@@ -5,7 +5,7 @@ use std::{fmt, str::FromStr};
 /// The longest name, in characters.
 const MAX_CHARS: usize = 40;
 
-/// Why a text is no name of a team or a stage.
+/// Why a text is no name of a team, a stage, a person or a division.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("a {kind} name {why}")]
 pub struct InvalidName {
@@ -96,6 +96,16 @@ name!(
     /// A stage's name, of the same characters as a team's.
     StageName,
     "stage"
+);
+name!(
+    /// A person's name, by which they sign in, of the same characters as a team's.
+    PersonName,
+    "person's"
+);
+name!(
+    /// A division's name, of the same characters as a team's.
+    DivisionName,
+    "division"
 );
 
 #[cfg(test)]

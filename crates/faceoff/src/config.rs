@@ -61,6 +61,9 @@ pub struct Config {
 pub struct ServerConfig {
     /// Address of API and pages. Bind a public address only behind a proxy that speaks TLS.
     pub listen: SocketAddr,
+    /// The address by which people reach the server, for links: of http or https, without a slash at its end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub public_url: Option<String>,
     /// Folder of the database, the artifacts and the organiser's token.
     pub data_dir: PathBuf,
     /// Bytes that must stay free on the disks of `data_dir` and `workers.scratch_dir`; below, the queue
@@ -72,6 +75,7 @@ impl Default for ServerConfig {
     fn default() -> Self {
         Self {
             listen: SocketAddr::from(([127, 0, 0, 1], 8080)),
+            public_url: None,
             data_dir: PathBuf::from("faceoff-data"),
             min_free_bytes: 1 << 30,
         }

@@ -11,7 +11,7 @@ use crate::{
     views::{ablation::AblationView, stage},
 };
 use axum::{Json, extract::State, http::StatusCode, response::IntoResponse};
-use faceoff_store::{Actor, RunPlan};
+use faceoff_store::RunPlan;
 use faceoff_types::SubmissionId;
 
 /// Episodes of each task and profile, unless the order says otherwise.
@@ -51,7 +51,7 @@ pub(crate) async fn ablation(
     )
 )]
 pub(crate) async fn order_ablation(
-    _: Organiser,
+    organiser: Organiser,
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,
     OptionalJson(wanted): OptionalJson<OrderAblation>,
@@ -63,7 +63,7 @@ pub(crate) async fn order_ablation(
     };
     let ablation = app
         .store
-        .create_ablation(Actor::Organiser, id, &plan, app.config.clock.now())
+        .create_ablation(organiser.actor(), id, &plan, app.config.clock.now())
         .await?;
     tracing::info!(submission = %id, ablation = %ablation.id, "ablation ordered");
     let view = AblationView::of(&app, ablation).await?;

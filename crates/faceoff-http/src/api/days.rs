@@ -12,7 +12,7 @@ use crate::{
     },
 };
 use axum::{Json, extract::State};
-use faceoff_store::{Actor, Stage, StagePhase, StoreError};
+use faceoff_store::{Stage, StagePhase, StoreError};
 use jiff::{Timestamp, civil::Date};
 
 /// Starts a stage's day: what each team has active now plays it, nothing else.
@@ -29,7 +29,7 @@ use jiff::{Timestamp, civil::Date};
     )
 )]
 pub(crate) async fn start_day(
-    _: Organiser,
+    organiser: Organiser,
     State(app): State<App>,
     OptionalJson(wanted): OptionalJson<StartDay>,
 ) -> Result<Json<DayView>, Problem> {
@@ -38,7 +38,7 @@ pub(crate) async fn start_day(
         Some(id) => app.store.stage(id).await?,
         None => the_open_one(&app, now).await?,
     };
-    match app.store.start_day(Actor::Organiser, stage.id, now).await {
+    match app.store.start_day(organiser.actor(), stage.id, now).await {
         Ok(created) => tracing::info!(
             stage = %stage.name, evaluations = created.len(), "the day was started"
         ),

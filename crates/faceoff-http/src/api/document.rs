@@ -20,7 +20,8 @@ use utoipa::{
     modifiers(&Tokens),
     tags(
         (name = "public", description = "For everybody, without a token"),
-        (name = "team", description = "With a team's token"),
+        (name = "people", description = "With anybody's token"),
+        (name = "team", description = "With a team's token, or a member's"),
         (name = "organiser", description = "With the organiser's token"),
     )
 )]
@@ -32,10 +33,13 @@ impl Modify for Tokens {
     fn modify(&self, document: &mut openapi::OpenApi) {
         let components = document.components.get_or_insert_default();
         for (name, description) in [
-            ("team", "A team's token, fo_team_…, from POST /api/v1/teams"),
+            (
+                "team",
+                "A member's token, fo_person_…, or the team's own, fo_team_…",
+            ),
             (
                 "organiser",
-                "The organiser's token, fo_admin_…, made at the server's first start",
+                "An organiser's token, fo_person_…, or the host's, fo_admin_…, made at the server's first start",
             ),
         ] {
             components.add_security_scheme(
@@ -55,7 +59,14 @@ impl Modify for Tokens {
 pub(super) fn describe_errors(document: &mut openapi::OpenApi) {
     let problem = Content::new(Some(Ref::from_schema_name(ProblemBody::name())));
     for item in document.paths.paths.values_mut() {
-        for operation in [&mut item.get, &mut item.post].into_iter().flatten() {
+        let operations = [
+            &mut item.get,
+            &mut item.post,
+            &mut item.put,
+            &mut item.patch,
+            &mut item.delete,
+        ];
+        for operation in operations.into_iter().flatten() {
             for (status, response) in &mut operation.responses.responses {
                 if let RefOr::T(response) = response
                     && status.starts_with(['4', '5'])

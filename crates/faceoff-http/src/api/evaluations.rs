@@ -16,7 +16,6 @@ use axum::{
     http::{StatusCode, header},
     response::{AppendHeaders, IntoResponse},
 };
-use faceoff_store::Actor;
 use faceoff_types::EvaluationId;
 use jiff::civil::Date;
 use serde::Deserialize;
@@ -40,15 +39,15 @@ pub(crate) async fn list_evaluations(
     State(app): State<App>,
     QueryParams(query): QueryParams<DayQuery>,
 ) -> Result<Json<Vec<EvaluationView>>, Problem> {
-    let evaluations = match caller {
-        Caller::Organiser => {
+    let evaluations = match caller.team() {
+        None => {
             let day = match query.day {
                 Some(day) => day,
                 None => stage::current(&app).await?.day(app.config.clock.now()).date,
             };
             EvaluationView::all_on(&app, day).await?
         }
-        Caller::Team(team) => {
+        Some(team) => {
             let mut own = EvaluationView::of_team(&app, team.id).await?;
             own.retain(|evaluation| query.day.is_none_or(|day| evaluation.day == day));
             own
@@ -86,7 +85,7 @@ pub(crate) async fn evaluation(
     )
 )]
 pub(crate) async fn cancel_evaluation(
-    _: Organiser,
+    organiser: Organiser,
     State(app): State<App>,
     PathParam(id): PathParam<EvaluationId>,
     Body(Cancellation { reason }): Body<Cancellation>,
@@ -94,7 +93,7 @@ pub(crate) async fn cancel_evaluation(
     let reason = checked_reason(&reason)?;
     let now = app.config.clock.now();
     app.store
-        .cancel_evaluation(Actor::Organiser, id, reason, now)
+        .cancel_evaluation(organiser.actor(), id, reason, now)
         .await?;
     tracing::info!(evaluation = %id, reason, "evaluation cancelled");
     EvaluationView::find(&app, id).await.map(Json)
@@ -112,14 +111,14 @@ pub(crate) async fn cancel_evaluation(
     )
 )]
 pub(crate) async fn rerun_evaluation(
-    _: Organiser,
+    organiser: Organiser,
     State(app): State<App>,
     PathParam(id): PathParam<EvaluationId>,
 ) -> Result<impl IntoResponse, Problem> {
     let now = app.config.clock.now();
     let rerun = app
         .store
-        .rerun_evaluation(Actor::Organiser, id, now)
+        .rerun_evaluation(organiser.actor(), id, now)
         .await?;
     tracing::info!(evaluation = %id, rerun = %rerun.id, "an evaluation is played again");
     let view = EvaluationView::of(&app, rerun).await?;

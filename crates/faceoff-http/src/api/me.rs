@@ -8,8 +8,8 @@ use axum::{Json, extract::State};
     get, path = "/me", tag = "team", security(("team" = [])), responses((status = 200, body = MeView))
 )]
 pub(crate) async fn me(
-    TeamCaller(team): TeamCaller,
+    caller: TeamCaller,
     State(app): State<App>,
 ) -> Result<Json<MeView>, Problem> {
-    MeView::of(&app, team).await.map(Json)
+    MeView::of(&app, caller.team).await.map(Json)
 }

@@ -2,6 +2,7 @@
 //! [`views`](crate::views).
 
 mod ablations;
+mod announcements;
 mod board;
 mod bundle_stream;
 mod comparisons;
@@ -12,12 +13,18 @@ mod episodes;
 mod evaluations;
 mod events;
 mod health;
+mod invitations;
 mod me;
+mod people;
+mod registrations;
 mod rulings;
 mod season;
+mod sessions;
 mod stages;
 mod submissions;
 mod teams;
+mod terms;
+mod tokens;
 mod upload;
 
 use crate::{app::App, extract::MAX_JSON_BYTES, layers, paths::API_BASE};
@@ -32,13 +39,45 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
     let resources = OpenApiRouter::with_openapi(Document::openapi())
         .routes(routes!(health::health))
         .routes(routes!(health::live))
-        .routes(routes!(season::season))
+        .routes(routes!(season::season, season::change_season))
         .routes(routes!(season::close_season))
         .routes(routes!(board::board))
         .routes(routes!(board::task_board))
         .routes(routes!(me::me))
         .routes(routes!(teams::create_team, teams::list_teams))
         .routes(routes!(teams::replace_token))
+        .routes(routes!(teams::team, teams::change_team))
+        .routes(routes!(teams::retire_team))
+        .routes(routes!(teams::return_team))
+        .routes(routes!(tokens::whoami))
+        .routes(routes!(tokens::list_tokens, tokens::create_token))
+        .routes(routes!(tokens::revoke_token))
+        .routes(routes!(tokens::rotate_token))
+        .routes(routes!(sessions::create_session))
+        .routes(routes!(sessions::end_session))
+        .routes(routes!(people::list_people))
+        .routes(routes!(people::remove_person))
+        .routes(routes!(people::set_password))
+        .routes(routes!(
+            invitations::list_invitations,
+            invitations::create_invitation
+        ))
+        .routes(routes!(invitations::accept_invitation))
+        .routes(routes!(invitations::revoke_invitation))
+        .routes(routes!(
+            registrations::list_registrations,
+            registrations::register
+        ))
+        .routes(routes!(registrations::approve_registration))
+        .routes(routes!(registrations::refuse_registration))
+        .routes(routes!(terms::list_terms, terms::publish_terms))
+        .routes(routes!(terms::accept_terms))
+        .routes(routes!(
+            announcements::list_announcements,
+            announcements::announce
+        ))
+        .routes(routes!(announcements::list_questions, announcements::ask))
+        .routes(routes!(announcements::answer))
         .routes(routes!(stages::list_stages, stages::create_stage))
         .routes(routes!(stages::stage, stages::change_stage))
         .routes(routes!(days::start_day))

@@ -6,12 +6,12 @@ use crate::{
     app::App,
     auth::Organiser,
     extract::{Json as Body, PathParam, PathParams},
-    problem::{Problem, ProblemKind},
+    problem::Problem,
     requests::{Decision, Reason},
     views::{day::DayView, evaluation::EvaluationView, team::TeamView},
 };
 use axum::{Json, extract::State, http::StatusCode};
-use faceoff_store::{Actor, EvaluationState};
+use faceoff_store::EvaluationState;
 use faceoff_types::{EvaluationId, StageDay, StageId, TeamId};
 
 /// Longest reason of a decision.
@@ -28,15 +28,6 @@ pub(super) fn checked_reason(reason: &str) -> Result<&str, Problem> {
     Ok(reason)
 }
 
-/// Refuses a decision that does not name what it is about, and says what it would do.
-fn check_confirmed(decision: &Decision, name: &str, what: &str) -> Result<(), Problem> {
-    if decision.confirm.as_deref() == Some(name) {
-        return Ok(());
-    }
-    let detail = format!("nothing is done yet: {what}. To do it, send “confirm” with {name:?}");
-    Err(Problem::new(ProblemKind::NotConfirmed, detail).with("confirm", name))
-}
-
 /// Takes a finished evaluation off the boards, or a failure of the agent off its team's day: it can be read on, counts
 /// no more, and may be played again (`rerun`).
 #[utoipa::path(
@@ -50,7 +41,7 @@ fn check_confirmed(decision: &Decision, name: &str, what: &str) -> Result<(), Pr
     )
 )]
 pub(crate) async fn void_evaluation(
-    _: Organiser,
+    organiser: Organiser,
     State(app): State<App>,
     PathParam(id): PathParam<EvaluationId>,
     Body(decision): Body<Decision>,
@@ -62,11 +53,11 @@ pub(crate) async fn void_evaluation(
          read; `rerun` can play it again",
         view.day, view.team_name
     );
-    check_confirmed(&decision, view.team_name.as_str(), &what)?;
+    Problem::check_confirmed(decision.confirm.as_deref(), view.team_name.as_str(), &what)?;
     let now = app.config.clock.now();
     let voided = app
         .store
-        .void_evaluation(Actor::Organiser, id, reason, now)
+        .void_evaluation(organiser.actor(), id, reason, now)
         .await?;
     tracing::info!(evaluation = %id, reason, "evaluation voided");
     EvaluationView::of(&app, voided).await.map(Json)
@@ -84,7 +75,7 @@ pub(crate) async fn void_evaluation(
     )
 )]
 pub(crate) async fn void_day(
-    _: Organiser,
+    organiser: Organiser,
     State(app): State<App>,
     day: PathParams<String, 2>,
     Body(decision): Body<Decision>,
@@ -108,11 +99,11 @@ pub(crate) async fn void_day(
          reason {reason:?} for everybody to read",
         of.date
     );
-    check_confirmed(&decision, &of.date.to_string(), &what)?;
+    Problem::check_confirmed(decision.confirm.as_deref(), &of.date.to_string(), &what)?;
     let now = app.config.clock.now();
     let voided = app
         .store
-        .void_day(Actor::Organiser, of, reason, now)
+        .void_day(organiser.actor(), of, reason, now)
         .await?;
     tracing::info!(day = %of, voided, reason, "day voided");
     DayView::of(&app, of).await.map(Json)
@@ -125,13 +116,15 @@ pub(crate) async fn void_day(
     responses((status = 204), (status = 409, description = "it is paused"), (status = 422))
 )]
 pub(crate) async fn pause_queue(
-    _: Organiser,
+    organiser: Organiser,
     State(app): State<App>,
     Body(Reason { reason }): Body<Reason>,
 ) -> Result<StatusCode, Problem> {
     let reason = checked_reason(&reason)?;
     let now = app.config.clock.now();
-    app.store.pause_queue(Actor::Organiser, reason, now).await?;
+    app.store
+        .pause_queue(organiser.actor(), reason, now)
+        .await?;
     tracing::info!(reason, "queue paused");
     Ok(StatusCode::NO_CONTENT)
 }
@@ -142,11 +135,11 @@ pub(crate) async fn pause_queue(
     responses((status = 204), (status = 409, description = "it is not paused"))
 )]
 pub(crate) async fn resume_queue(
-    _: Organiser,
+    organiser: Organiser,
     State(app): State<App>,
 ) -> Result<StatusCode, Problem> {
     let now = app.config.clock.now();
-    app.store.resume_queue(Actor::Organiser, now).await?;
+    app.store.resume_queue(organiser.actor(), now).await?;
     tracing::info!("queue resumed");
     Ok(StatusCode::NO_CONTENT)
 }
@@ -163,7 +156,7 @@ pub(crate) async fn resume_queue(
     )
 )]
 pub(crate) async fn disqualify_team(
-    _: Organiser,
+    organiser: Organiser,
     State(app): State<App>,
     PathParam(id): PathParam<TeamId>,
     Body(decision): Body<Decision>,
@@ -178,11 +171,11 @@ pub(crate) async fn disqualify_team(
         team.name,
         open.count()
     );
-    check_confirmed(&decision, team.name.as_str(), &what)?;
+    Problem::check_confirmed(decision.confirm.as_deref(), team.name.as_str(), &what)?;
     let now = app.config.clock.now();
     let team = app
         .store
-        .disqualify_team(Actor::Organiser, id, reason, now)
+        .disqualify_team(organiser.actor(), id, reason, now)
         .await?;
     tracing::info!(team = %team.name, %id, reason, "team disqualified");
     Ok(Json(team.into()))
@@ -200,7 +193,7 @@ pub(crate) async fn disqualify_team(
     )
 )]
 pub(crate) async fn reinstate_team(
-    _: Organiser,
+    organiser: Organiser,
     State(app): State<App>,
     PathParam(id): PathParam<TeamId>,
     Body(Reason { reason }): Body<Reason>,
@@ -209,7 +202,7 @@ pub(crate) async fn reinstate_team(
     let now = app.config.clock.now();
     let team = app
         .store
-        .reinstate_team(Actor::Organiser, id, reason, now)
+        .reinstate_team(organiser.actor(), id, reason, now)
         .await?;
     tracing::info!(team = %team.name, %id, reason, "team reinstated");
     Ok(Json(team.into()))

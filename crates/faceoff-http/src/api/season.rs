@@ -5,15 +5,40 @@ use crate::{
     auth::Organiser,
     extract::Json as Body,
     problem::Problem,
-    requests::CloseSeason,
+    requests::{CloseSeason, SeasonChange},
     views::season::{SeasonHead, SeasonView},
 };
 use axum::{Json, extract::State};
-use faceoff_store::Actor;
 
 /// The season.
 #[utoipa::path(get, path = "/season", tag = "public", responses((status = 200, body = SeasonView)))]
 pub(crate) async fn season(State(app): State<App>) -> Result<Json<SeasonView>, Problem> {
+    SeasonView::now(&app).await.map(Json)
+}
+
+/// Lets anybody register a team, or nobody; sets the divisions.
+#[utoipa::path(
+    patch, path = "/season", tag = "organiser", security(("organiser" = [])), request_body = SeasonChange,
+    responses(
+        (status = 200, body = SeasonView),
+        (status = 409, description = "a team is in a division that is left out, one is there twice, or the season is closed"),
+        (status = 422),
+    )
+)]
+pub(crate) async fn change_season(
+    organiser: Organiser,
+    State(app): State<App>,
+    Body(change): Body<SeasonChange>,
+) -> Result<Json<SeasonView>, Problem> {
+    let now = app.config.clock.now();
+    app.store
+        .change_season(
+            organiser.actor(),
+            change.takes_registrations,
+            change.divisions.as_deref(),
+            now,
+        )
+        .await?;
     SeasonView::now(&app).await.map(Json)
 }
 
@@ -28,7 +53,7 @@ pub(crate) async fn season(State(app): State<App>) -> Result<Json<SeasonView>, P
     )
 )]
 pub(crate) async fn close_season(
-    _: Organiser,
+    organiser: Organiser,
     State(app): State<App>,
     Body(CloseSeason { confirm }): Body<CloseSeason>,
 ) -> Result<Json<SeasonView>, Problem> {
@@ -40,7 +65,7 @@ pub(crate) async fn close_season(
         return Err(Problem::invalid("confirm", detail));
     }
     let now = app.config.clock.now();
-    app.store.close_season(Actor::Organiser, now).await?;
+    app.store.close_season(organiser.actor(), now).await?;
     tracing::info!(season = name, "season closed; its secret is public");
     SeasonView::now(&app).await.map(Json)
 }

@@ -9,7 +9,7 @@ use crate::{
     views::stage::{self, StageView},
 };
 use axum::{Json, extract::State, http::StatusCode};
-use faceoff_store::{Actor, Stage, StagePhase};
+use faceoff_store::{Stage, StagePhase};
 use faceoff_types::{InvalidStageRules, Ruleset, StageId, StageName, StageRules, StageSettings};
 
 fn name(text: &str) -> Result<StageName, Problem> {
@@ -60,7 +60,7 @@ pub(crate) async fn stage(
     )
 )]
 pub(crate) async fn create_stage(
-    _: Organiser,
+    organiser: Organiser,
     State(app): State<App>,
     Body(new): Body<NewStage>,
 ) -> Result<(StatusCode, Json<StageView>), Problem> {
@@ -93,7 +93,7 @@ pub(crate) async fn create_stage(
     };
     let made = app
         .store
-        .create_stage(Actor::Organiser, wanted, now)
+        .create_stage(organiser.actor(), wanted, now)
         .await?;
     tracing::info!(stage = %made.name, id = %made.id, "stage made");
     let view = StageView::of(&app, made).await?;
@@ -112,7 +112,7 @@ pub(crate) async fn create_stage(
     )
 )]
 pub(crate) async fn change_stage(
-    _: Organiser,
+    organiser: Organiser,
     State(app): State<App>,
     PathParam(id): PathParam<StageId>,
     Body(change): Body<StageChange>,
@@ -161,7 +161,7 @@ pub(crate) async fn change_stage(
     };
     let changed = app
         .store
-        .change_stage(Actor::Organiser, id, wanted, now)
+        .change_stage(organiser.actor(), id, wanted, now)
         .await?;
     tracing::info!(stage = %changed.name, %id, revision = changed.rules.number, "stage changed");
     StageView::of(&app, changed).await.map(Json)

@@ -9,7 +9,6 @@ use crate::{
     views::submission::SubmissionView,
 };
 use axum::{Json, extract::State};
-use faceoff_store::Actor;
 use faceoff_types::SubmissionId;
 
 /// Longest name that a team has for a submission.
@@ -21,10 +20,12 @@ const MAX_LABEL_CHARS: usize = 80;
     responses((status = 200, body = Vec<SubmissionView>))
 )]
 pub(crate) async fn list_submissions(
-    TeamCaller(team): TeamCaller,
+    caller: TeamCaller,
     State(app): State<App>,
 ) -> Result<Json<Vec<SubmissionView>>, Problem> {
-    SubmissionView::of_team(&app, team.id).await.map(Json)
+    SubmissionView::of_team(&app, caller.team.id)
+        .await
+        .map(Json)
 }
 
 /// One submission with its verdict: the reason and the agent's log.
@@ -56,13 +57,13 @@ pub(crate) async fn submission(
     )
 )]
 pub(crate) async fn activate_submission(
-    TeamCaller(team): TeamCaller,
+    caller: TeamCaller,
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,
 ) -> Result<Json<SubmissionView>, Problem> {
-    let (actor, name) = (Actor::Team(team.id), team.name.clone());
+    let (actor, name) = (caller.actor(), &caller.team.name);
     let found = app.store.submission(id).await;
-    Caller::Team(team).visible("submission", found, |submission| submission.team)?;
+    caller.visible("submission", found, |submission| submission.team)?;
     let now = app.config.clock.now();
     let submission = app.store.activate_submission(actor, id, now).await?;
     tracing::info!(team = %name, submission = %id, "submission activated");
@@ -82,13 +83,13 @@ pub(crate) async fn activate_submission(
     )
 )]
 pub(crate) async fn withdraw_submission(
-    TeamCaller(team): TeamCaller,
+    caller: TeamCaller,
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,
 ) -> Result<Json<SubmissionView>, Problem> {
-    let (actor, name) = (Actor::Team(team.id), team.name.clone());
+    let (actor, name) = (caller.actor(), &caller.team.name);
     let found = app.store.submission(id).await;
-    Caller::Team(team).visible("submission", found, |submission| submission.team)?;
+    caller.visible("submission", found, |submission| submission.team)?;
     let now = app.config.clock.now();
     let submission = app.store.withdraw_submission(actor, id, now).await?;
     tracing::info!(team = %name, submission = %id, "submission withdrawn");
@@ -102,7 +103,7 @@ pub(crate) async fn withdraw_submission(
     responses((status = 200, body = SubmissionView), (status = 404), (status = 422))
 )]
 pub(crate) async fn label_submission(
-    TeamCaller(team): TeamCaller,
+    caller: TeamCaller,
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,
     Body(Label { label }): Body<Label>,
@@ -113,9 +114,9 @@ pub(crate) async fn label_submission(
         let detail = format!("expected 1 to {MAX_LABEL_CHARS} characters, or null, got {chars}");
         return Err(Problem::invalid("label", detail));
     }
-    let actor = Actor::Team(team.id);
+    let actor = caller.actor();
     let found = app.store.submission(id).await;
-    Caller::Team(team).visible("submission", found, |submission| submission.team)?;
+    caller.visible("submission", found, |submission| submission.team)?;
     let now = app.config.clock.now();
     let submission = app.store.label_submission(actor, id, label, now).await?;
     SubmissionView::of(&app, submission).await.map(Json)

@@ -1,16 +1,17 @@
-//! Teams and their tokens.
+//! Teams: invited, described, renamed, retired.
 
 use crate::{
+    acts::joining::profile,
     app::App,
-    auth::Organiser,
+    auth::{Caller, Organiser},
     extract::{Json as Body, PathParam},
-    problem::Problem,
-    requests::NewTeam,
-    token::{Token, TokenKind},
+    problem::{Problem, ProblemKind},
+    requests::{self, Confirmation, NewTeam},
+    token::{Secret, SecretKind},
     views::team::{TeamView, TeamWithToken},
 };
 use axum::{Json, extract::State, http::StatusCode};
-use faceoff_store::Actor;
+use faceoff_store::{Team, TeamChange, TeamProfile};
 use faceoff_types::{TeamId, TeamName};
 
 /// Creates a team and returns its token, once.
@@ -23,7 +24,7 @@ use faceoff_types::{TeamId, TeamName};
     )
 )]
 pub(crate) async fn create_team(
-    _: Organiser,
+    organiser: Organiser,
     State(app): State<App>,
     Body(new): Body<NewTeam>,
 ) -> Result<(StatusCode, Json<TeamWithToken>), Problem> {
@@ -31,11 +32,11 @@ pub(crate) async fn create_team(
         .name
         .parse()
         .map_err(|error| Problem::invalid("name", error))?;
-    let token = Token::generate(TokenKind::Team).map_err(Problem::internal)?;
+    let token = Secret::generate(SecretKind::Team).map_err(Problem::internal)?;
     let now = app.config.clock.now();
     let team = app
         .store
-        .create_team(Actor::Organiser, &name, token.hash(), now)
+        .create_team(organiser.actor(), &name, token.hash(), now)
         .await?;
     tracing::info!(team = %team.name, id = %team.id, "team created");
     let view = TeamWithToken {
@@ -57,26 +58,146 @@ pub(crate) async fn list_teams(
     TeamView::all(&app).await.map(Json)
 }
 
-/// Replaces a team's token; the old one is worth nothing from now on.
+/// Replaces a team's own tokens by a new one; the old ones are worth nothing from now on. Its members' stay.
 #[utoipa::path(
     post, path = "/teams/{id}/token", tag = "organiser", security(("organiser" = [])),
     params(("id" = TeamId, Path)),
     responses((status = 200, body = TeamWithToken), (status = 404))
 )]
 pub(crate) async fn replace_token(
-    _: Organiser,
+    organiser: Organiser,
     State(app): State<App>,
     PathParam(id): PathParam<TeamId>,
 ) -> Result<Json<TeamWithToken>, Problem> {
     let team = TeamView::find(&app, id).await?;
-    let token = Token::generate(TokenKind::Team).map_err(Problem::internal)?;
+    let token = Secret::generate(SecretKind::Team).map_err(Problem::internal)?;
     let now = app.config.clock.now();
     app.store
-        .set_team_token(Actor::Organiser, id, token.hash(), now)
+        .set_team_token(organiser.actor(), id, token.hash(), now)
         .await?;
     tracing::info!(team = %team.name, id = %team.id, "team token replaced");
     Ok(Json(TeamWithToken {
         team,
         token: token.as_str().to_owned(),
     }))
+}
+
+/// The caller's own team, or any for an organiser.
+async fn own(app: &App, caller: &Caller, id: TeamId) -> Result<Team, Problem> {
+    let team = app.store.team(id).await;
+    let team = caller.visible("team", team, |team| team.id)?;
+    // Whoever finds a team's token must not rename it, or take it out of the season.
+    if caller.person().is_none() && !caller.is_organiser() {
+        return Err(Problem::new(
+            ProblemKind::Forbidden,
+            "a team's own token changes nothing of the team; a member does, or an organiser",
+        ));
+    }
+    Ok(team)
+}
+
+/// Changes a team's name, or what it tells of itself. By an organiser or a member; the division by an organiser alone.
+#[utoipa::path(
+    patch, path = "/teams/{id}", tag = "people", security(("team" = []), ("organiser" = [])),
+    params(("id" = TeamId, Path)), request_body = requests::TeamChange,
+    responses(
+        (status = 200, body = TeamView),
+        (status = 403), (status = 404),
+        (status = 409, description = "the name is taken, there is no such division, or the season is closed"),
+        (status = 422),
+    )
+)]
+pub(crate) async fn change_team(
+    caller: Caller,
+    State(app): State<App>,
+    PathParam(id): PathParam<TeamId>,
+    Body(change): Body<requests::TeamChange>,
+) -> Result<Json<TeamView>, Problem> {
+    let team = own(&app, &caller, id).await?;
+    if change.division.is_some() && !caller.is_organiser() {
+        return Err(Problem::new(
+            ProblemKind::Forbidden,
+            "division: only an organiser puts a team into another division",
+        ));
+    }
+    let described = requests::FoundedTeam {
+        name: change.name.clone().unwrap_or_else(|| team.name.clone()),
+        affiliation: change.affiliation.unwrap_or(team.profile.affiliation),
+        link: change.link.unwrap_or(team.profile.link),
+        division: change.division.unwrap_or(team.profile.division),
+    };
+    let (_, profile): (_, TeamProfile) = profile(described)?;
+    let change = TeamChange {
+        name: change.name,
+        profile: Some(profile),
+    };
+    let now = app.config.clock.now();
+    let team = app
+        .store
+        .change_team(caller.actor(), id, change, now)
+        .await?;
+    tracing::info!(team = %team.name, %id, actor = %caller.actor(), "team changed");
+    Ok(Json(team.into()))
+}
+
+/// Takes a team out of all days to come, by its own wish: it neither uploads nor plays; its results stay.
+#[utoipa::path(
+    post, path = "/teams/{id}/retire", tag = "people", security(("team" = []), ("organiser" = [])),
+    params(("id" = TeamId, Path)), request_body = Confirmation,
+    responses(
+        (status = 200, body = TeamView),
+        (status = 403), (status = 404),
+        (status = 409, description = "not confirmed with the team's name (nothing is done), or it has retired"),
+    )
+)]
+pub(crate) async fn retire_team(
+    caller: Caller,
+    State(app): State<App>,
+    PathParam(id): PathParam<TeamId>,
+    Body(Confirmation { confirm }): Body<Confirmation>,
+) -> Result<Json<TeamView>, Problem> {
+    let team = own(&app, &caller, id).await?;
+    let what = format!(
+        "{} would neither upload nor enter a day from now on; what had its cut goes on, and its results stay",
+        team.name
+    );
+    Problem::check_confirmed(confirm.as_deref(), team.name.as_str(), &what)?;
+    let now = app.config.clock.now();
+    let team = app.store.retire_team(caller.actor(), id, now).await?;
+    tracing::info!(team = %team.name, %id, actor = %caller.actor(), "team retired");
+    Ok(Json(team.into()))
+}
+
+/// Lets a team that has retired play again.
+#[utoipa::path(
+    post, path = "/teams/{id}/return", tag = "people", security(("team" = []), ("organiser" = [])),
+    params(("id" = TeamId, Path)),
+    responses(
+        (status = 200, body = TeamView),
+        (status = 403), (status = 404),
+        (status = 409, description = "it has not retired"),
+    )
+)]
+pub(crate) async fn return_team(
+    caller: Caller,
+    State(app): State<App>,
+    PathParam(id): PathParam<TeamId>,
+) -> Result<Json<TeamView>, Problem> {
+    own(&app, &caller, id).await?;
+    let now = app.config.clock.now();
+    let team = app.store.return_team(caller.actor(), id, now).await?;
+    tracing::info!(team = %team.name, %id, actor = %caller.actor(), "team returned");
+    Ok(Json(team.into()))
+}
+
+/// One team, as everybody may know it.
+#[utoipa::path(
+    get, path = "/teams/{id}", tag = "public", params(("id" = TeamId, Path)),
+    responses((status = 200, body = TeamView), (status = 404))
+)]
+pub(crate) async fn team(
+    State(app): State<App>,
+    PathParam(id): PathParam<TeamId>,
+) -> Result<Json<TeamView>, Problem> {
+    TeamView::find(&app, id).await.map(Json)
 }

@@ -65,12 +65,13 @@ const ARCHIVE_TYPES: [&str; 8] = [
     )
 )]
 pub(crate) async fn create_submission(
-    TeamCaller(team): TeamCaller,
+    caller: TeamCaller,
     State(app): State<App>,
     QueryParams(query): QueryParams<UploadQuery>,
     headers: HeaderMap,
     body: Body,
 ) -> Result<impl IntoResponse, Problem> {
+    let (team, actor) = (caller.team.clone(), caller.actor());
     check_media_type(&headers)?;
     if let Err(refused) = room::check(&app) {
         bundle_stream::discard(body, app.config.limits.upload_rate).await;
@@ -121,7 +122,7 @@ pub(crate) async fn create_submission(
     )
     .await?;
     // A client that goes away ends this handler; what is on disk is brought to its end all the same.
-    let stored = tokio::spawn(store(app, team, uploaded, claimed_name, place));
+    let stored = tokio::spawn(store(app, (team, actor), uploaded, claimed_name, place));
     let submission = stored.await.map_err(Problem::internal)??;
     let location = [(header::LOCATION, paths::submission(submission.id))];
     let view = SubmissionView::new(submission, None);
@@ -165,7 +166,7 @@ fn over_quota(error: StoreError, now: Timestamp) -> Problem {
 /// Makes a submission of what came.
 async fn store(
     app: App,
-    team: Team,
+    (team, actor): (Team, Actor),
     uploaded: Uploaded,
     claimed_name: String,
     _place: Place,
@@ -191,7 +192,7 @@ async fn store(
     let quota = &app.config.limits.upload_quota;
     let created = app
         .store
-        .create_submission(Actor::Team(team.id), team.id, bundle, quota, now)
+        .create_submission(actor, team.id, bundle, quota, now)
         .await;
     match created {
         Ok(submission) => {

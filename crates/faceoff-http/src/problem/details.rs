@@ -84,6 +84,19 @@ impl Problem {
         Self::new(ProblemKind::InvalidContent, format!("{field}: {detail}")).with("field", field)
     }
 
+    /// Refuses what is not `confirmed` by the name of what it is about, and says what it would do.
+    pub(crate) fn check_confirmed(
+        confirmed: Option<&str>,
+        name: &str,
+        what: &str,
+    ) -> Result<(), Self> {
+        if confirmed == Some(name) {
+            return Ok(());
+        }
+        let detail = format!("nothing is done yet: {what}. To do it, send “confirm” with {name:?}");
+        Err(Self::new(ProblemKind::NotConfirmed, detail).with("confirm", name))
+    }
+
     /// Our fault: `cause` goes to the log only.
     pub(crate) fn internal(cause: impl Display) -> Self {
         tracing::error!(%cause, "request failed");

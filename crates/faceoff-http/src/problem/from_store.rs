@@ -42,6 +42,29 @@ impl From<StoreError> for Problem {
                     at.strftime("%Y-%m-%d at %H:%M UTC")
                 ),
             ),
+            StoreError::Retired { at } => Self::new(
+                ProblemKind::Retired,
+                format!(
+                    "the team retired on {} and neither uploads nor plays; POST /api/v1/teams/ID/return lets it play \
+                     again",
+                    at.strftime("%Y-%m-%d at %H:%M UTC")
+                ),
+            ),
+            StoreError::TermsOwed { version } => Self::new(
+                ProblemKind::TermsOwed,
+                format!(
+                    "nobody of the team has accepted version {version} of the terms (GET /api/v1/terms); a member does \
+                     so with POST /api/v1/terms/{version}/accept"
+                ),
+            )
+            .with("version", version),
+            StoreError::PersonNameTaken(name) => Self::new(
+                ProblemKind::PersonNameTaken,
+                format!("a person named {name:?} exists already; choose another name"),
+            ),
+            error @ StoreError::InvitationSpent(_) => {
+                Self::new(ProblemKind::InvitationSpent, error.to_string())
+            }
             error @ StoreError::DayHasCut { .. } => {
                 Self::new(ProblemKind::DayHasCut, error.to_string())
             }

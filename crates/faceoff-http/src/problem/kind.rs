@@ -26,13 +26,19 @@ macro_rules! kinds {
 kinds! {
     Unauthenticated "unauthenticated" UNAUTHORIZED
         "A valid token is needed"
-        "Send the header “Authorization: Bearer TOKEN”. A lost token is replaced by the organiser."
+        "Send the header “Authorization: Bearer TOKEN”, or sign in on the page /sign-in. A lost token is replaced by the organiser."
     Forbidden "forbidden" FORBIDDEN
         "This token may not do that"
         "The token is valid, but of the wrong kind: some requests are a team's, some are the organiser's."
     Disqualified "disqualified" FORBIDDEN
         "The team is disqualified"
         "The organiser has disqualified the team; the detail says when and why. It keeps what it has, and neither uploads nor plays."
+    Retired "retired" FORBIDDEN
+        "The team has retired"
+        "The team takes no part any more, by its own wish. An organiser or a member lets it play again with POST /api/v1/teams/ID/return."
+    TermsOwed "terms-owed" FORBIDDEN
+        "The terms are to be accepted"
+        "There are other terms than the team's members have accepted. One of them reads GET /api/v1/terms and accepts with POST /api/v1/terms/VERSION/accept."
     NotFound "not-found" NOT_FOUND
         "Not found"
         "There is no such thing, or it belongs to another team. Check the id."
@@ -57,6 +63,12 @@ kinds! {
     TeamNameTaken "team-name-taken" CONFLICT
         "The name is taken"
         "Another team has this name. Choose another one, or ask for a new token for the existing team."
+    PersonNameTaken "person-name-taken" CONFLICT
+        "The name is taken"
+        "Another person has this name. Choose another one; whoever has lost their password asks an organiser for a link."
+    InvitationSpent "invitation-spent" CONFLICT
+        "The invitation is worth nothing"
+        "It was accepted, taken back, has expired, or there is none; the detail says which. Ask for another one."
     StageNameTaken "stage-name-taken" CONFLICT
         "The name is taken"
         "Another stage of the season has this name. Choose another one."
@@ -90,6 +102,9 @@ kinds! {
     TooManyUploads "too-many-uploads" TOO_MANY_REQUESTS
         "Too many uploads at once"
         "The team has several uploads under way. Wait until one has ended; nothing of another team's takes these places."
+    TooManySignIns "too-many-sign-ins" TOO_MANY_REQUESTS
+        "Too many wrong passwords"
+        "Wrong passwords came for a name, one after another. Try again after the seconds stated in the header “Retry-After”; tokens work meanwhile."
     DayQuotaSpent "day-quota-spent" TOO_MANY_REQUESTS
         "The day's quota of uploads is spent"
         "A team uploads so many bytes on a UTC day. “limit_bytes” and “used_bytes” state how many; “Retry-After” is the time to midnight UTC."

@@ -1,9 +1,11 @@
 //! What happened, as the organiser reads it.
 
-use faceoff_store::EventRecord;
+use crate::{app::AppState, problem::Problem, requests::EventsQuery};
+use faceoff_store::{Actor, Event, EventFilter, EventRecord, Subject};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
 /// A change, and who made it.
@@ -13,10 +15,14 @@ pub struct EventView {
     pub id: i64,
     /// When it was.
     pub at: Timestamp,
-    /// `organiser`, `team:ID`, `schedule`, `worker:NAME` or `server`.
+    /// `organiser` (the host), `person:ID`, `team:ID`, `visitor`, `schedule`, `worker:NAME` or `server`.
     #[schema(example = "organiser")]
     pub actor: String,
-    /// `season`, or kind and id: `stage:ID`, `day:STAGE/2026-03-01`, `team:ID`, `submission:ID`, `evaluation:ID`, `ablation:ID`.
+    /// The name of the person or the team; absent of others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub actor_name: Option<String>,
+    /// `season`, or kind and id: `stage:ID`, `day:STAGE/2026-03-01`, `team:ID`, `submission:ID`, `evaluation:ID`, `ablation:ID`,
+    /// `person:ID`, `registration:ID`, `announcement:ID`, `question:ID`.
     #[schema(example = "day:2026-03-01")]
     pub subject: String,
     /// What happened.
@@ -36,6 +42,78 @@ pub struct EventsView {
     pub next_before: Option<i64>,
 }
 
+/// Events of a page, unless another number is asked for.
+const PAGE: u32 = 100;
+const LONGEST_PAGE: u32 = 1000;
+
+impl EventsView {
+    /// The events that a query asks for.
+    pub(crate) async fn page(app: &AppState, query: EventsQuery) -> Result<Self, Problem> {
+        let limit = query.limit.unwrap_or(PAGE);
+        if !(1..=LONGEST_PAGE).contains(&limit) {
+            let detail = format!("expected 1 to {LONGEST_PAGE}, got {limit}");
+            return Err(Problem::invalid("limit", detail));
+        }
+        let subject = query.subject.map(|text| subject(&text)).transpose()?;
+        query.actor.as_deref().map(check_actor).transpose()?;
+        if let Some(kind) = &query.kind {
+            Event::check_kind(kind).map_err(|error| Problem::invalid("kind", error))?;
+        }
+        let filter = EventFilter {
+            before: query.before,
+            actor: query.actor,
+            subject,
+            kind: query.kind,
+        };
+        // One more tells whether there is another page.
+        let mut found = app.store.newest_events(&filter, limit + 1).await?;
+        let is_last = found.len() <= limit as usize;
+        found.truncate(limit as usize);
+        let next_before = found.last().filter(|_| !is_last).map(|event| event.id);
+        let names = names(app).await?;
+        let named = |record: EventRecord| {
+            let mut view = EventView::from(record);
+            view.actor_name = names.get(&view.actor).cloned();
+            view
+        };
+        Ok(Self {
+            events: found.into_iter().map(named).collect(),
+            next_before,
+        })
+    }
+}
+
+/// Of everybody who may have changed something, by how the log calls them.
+async fn names(app: &AppState) -> Result<BTreeMap<String, String>, Problem> {
+    let people = app.store.people().await?.into_iter();
+    let teams = app.store.teams().await?.into_iter();
+    let people = people.map(|person| {
+        (
+            Actor::Person(person.id).to_string(),
+            person.name.to_string(),
+        )
+    });
+    let teams = teams.map(|team| (Actor::Team(team.id).to_string(), team.name.to_string()));
+    Ok(people.chain(teams).collect())
+}
+
+fn subject(text: &str) -> Result<Subject, Problem> {
+    text.parse().map_err(|_| {
+        let expected = "season, stage:ID, day:STAGE/DATE, team:ID, submission:ID, evaluation:ID, ablation:ID, \
+                        person:ID, registration:ID, announcement:ID or question:ID";
+        Problem::invalid("subject", format!("expected {expected}, got {text:?}"))
+    })
+}
+
+fn check_actor(text: &str) -> Result<(), Problem> {
+    if matches!(text, "team" | "person" | "worker") || text.parse::<Actor>().is_ok() {
+        return Ok(());
+    }
+    let expected = "organiser, person, person:ID, team, team:ID, visitor, schedule, worker, worker:NAME or server";
+    let detail = format!("expected {expected}, got {text:?}");
+    Err(Problem::invalid("actor", detail))
+}
+
 impl From<EventRecord> for EventView {
     fn from(record: EventRecord) -> Self {
         let mut details = match serde_json::to_value(&record.event) {
@@ -50,6 +128,7 @@ impl From<EventRecord> for EventView {
             id: record.id,
             at: record.at,
             actor: record.actor.to_string(),
+            actor_name: None,
             subject: record.subject.to_string(),
             kind,
             details,

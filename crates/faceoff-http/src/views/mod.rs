@@ -5,18 +5,22 @@
 //! same for everybody; whether a caller may see a thing at all is the API's to check.
 
 pub mod ablation;
+pub mod announcement;
 pub mod board;
 pub mod comparison;
 pub mod day;
 pub mod evaluation;
 pub mod event;
+pub mod invitation;
 pub mod me;
+pub mod person;
 pub mod ruling;
 pub mod season;
 pub mod stage;
 pub mod submission;
 pub mod task;
 pub mod team;
+pub mod token;
 pub mod violations;
 
 /// Text of agents as API and pages show it; what older versions have stored may hold anything.

@@ -6,7 +6,7 @@ use super::{
     stage::{self, StageView},
 };
 use crate::{app::AppState, problem::Problem};
-use faceoff_types::{RULESET, Seed, StageDay, StageId};
+use faceoff_types::{DivisionName, RULESET, Seed, StageDay, StageId};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -29,6 +29,15 @@ pub struct SeasonView {
     /// The organiser holds the queue: since when, and why; absent otherwise. Nothing is begun meanwhile.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub paused: Option<RulingView>,
+    /// May anybody register a team?
+    #[serde(default)]
+    pub takes_registrations: bool,
+    /// In which teams are ranked apart.
+    #[serde(default)]
+    pub divisions: Vec<DivisionName>,
+    /// The newest version of the terms; null: there are none.
+    #[serde(default)]
+    pub terms_version: Option<u32>,
     /// The season secret, 64 hexadecimal digits; null until the season is closed.
     pub secret: Option<Seed>,
     /// The seed of the season's model mismatch; null until the season is closed.
@@ -75,6 +84,9 @@ impl SeasonView {
             created_at: season.created_at,
             closed_at: season.closed_at,
             paused: season.paused.map(RulingView::from),
+            takes_registrations: season.takes_registrations,
+            divisions: app.store.divisions().await?,
+            terms_version: app.store.terms().await?.first().map(|terms| terms.version),
             secret: revealed(season.secret),
             mismatch_seed: revealed(season.secret.model_mismatch()),
             today: stage::current(app).await?.day(app.config.clock.now()).date,

@@ -3,7 +3,7 @@
 use super::ruling::RulingView;
 use crate::{app::AppState, problem::Problem};
 use faceoff_store::Team;
-use faceoff_types::{TeamId, TeamName};
+use faceoff_types::{DivisionName, TeamId, TeamName};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -16,11 +16,23 @@ pub struct TeamView {
     /// As the board shows it.
     #[schema(example = "AiRLIHockey")]
     pub name: TeamName,
-    /// When the organiser invited it.
+    /// When it came.
     pub created_at: Timestamp,
     /// It neither plays nor is ranked, if it is; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub disqualified: Option<RulingView>,
+    /// Where it is from; null: it does not say.
+    #[serde(default)]
+    pub affiliation: Option<String>,
+    /// Its page; null: none.
+    #[serde(default)]
+    pub link: Option<String>,
+    /// In which it is ranked; null: none.
+    #[serde(default)]
+    pub division: Option<DivisionName>,
+    /// Since when it plays no more, by its own wish; null: it plays.
+    #[serde(default)]
+    pub retired_at: Option<Timestamp>,
 }
 
 impl From<Team> for TeamView {
@@ -30,6 +42,10 @@ impl From<Team> for TeamView {
             name: team.name,
             created_at: team.created_at,
             disqualified: team.disqualified.map(RulingView::from),
+            affiliation: team.profile.affiliation,
+            link: team.profile.link,
+            division: team.profile.division,
+            retired_at: team.retired_at,
         }
     }
 }

@@ -130,6 +130,12 @@ impl Site {
         std::fs::create_dir(&upload_dir).unwrap();
         let store = Store::open(folder.path()).await.unwrap();
         let start: Timestamp = "2026-03-01T10:00:00Z".parse().unwrap();
+        assert!(
+            store
+                .set_host_token(hash_token(ADMIN), start)
+                .await
+                .unwrap()
+        );
         store
             .name_season(Actor::Organiser, "Test season", start)
             .await
@@ -140,7 +146,7 @@ impl Site {
         let clock = Arc::clone(&now);
         let config = HttpConfig {
             max_bundle_bytes: MAX_BUNDLE,
-            admin_token_hash: hash_token(ADMIN),
+            public_url: None,
             upload_dir,
             clock: Clock::new(move || *clock.lock().unwrap()),
             limits,

@@ -1,6 +1,7 @@
 //! What people and workers do: transactions over the tables and the queue, each with its events.
 
 mod activate;
+pub(crate) mod announcements;
 pub(crate) mod cancel;
 pub(crate) mod claim;
 pub(crate) mod commit;
@@ -9,10 +10,13 @@ mod enter;
 mod finish;
 pub(crate) mod give_back;
 mod heartbeat;
+pub(crate) mod invitations;
 mod open;
 mod order_ablation;
 mod pause;
+mod people;
 pub(crate) mod purpose;
+pub(crate) mod registrations;
 mod release_day;
 pub(crate) mod rerun;
 mod rulings;
@@ -23,6 +27,7 @@ pub(crate) mod stages;
 mod start_day;
 mod submit;
 mod summaries;
-mod teams;
+pub(crate) mod teams;
 pub(crate) mod tidy;
+pub(crate) mod tokens;
 mod withdraw;

@@ -1,11 +1,44 @@
 use crate::{
-    error::Result,
+    error::{Result, StoreError},
     event::{Actor, Event, Subject},
+    operations::{
+        invitations::add_team,
+        tokens::{NewToken, add, revoke_all},
+    },
     store::Store,
-    tables::teams::{self, Team},
+    tables::{
+        divisions, season,
+        teams::{self, Team, TeamProfile},
+        tokens::{TokenKind, TokenOwner},
+    },
+    write::Tx,
 };
 use faceoff_types::{TeamId, TeamName};
 use jiff::Timestamp;
+
+/// The name of a team's token that came with the team.
+const FIRST: &str = "first";
+
+async fn give_token(tx: &mut Tx, team: TeamId, hash: [u8; 32]) -> Result<()> {
+    let token = NewToken {
+        hash,
+        kind: TokenKind::Key,
+        owner: TokenOwner::Team(team),
+        name: FIRST.to_owned(),
+        expires_at: None,
+    };
+    add(tx, token).await?;
+    Ok(())
+}
+
+/// What of a team is to be another; `None` stays as it is.
+#[derive(Debug, Clone, Default)]
+pub struct TeamChange {
+    /// Its name.
+    pub name: Option<TeamName>,
+    /// What it tells of itself, all of it.
+    pub profile: Option<TeamProfile>,
+}
 
 impl Store {
     /// Creates a team. `token_hash` is the hash of its bearer token; the token itself is never
@@ -18,23 +51,14 @@ impl Store {
         now: Timestamp,
     ) -> Result<Team> {
         self.write(actor, now, async |tx| {
-            let id = TeamId::new();
-            let (name, created_at) = (name.clone(), now);
-            let team = Team {
-                id,
-                name: name.clone(),
-                created_at,
-                disqualified: None,
-            };
-            teams::insert(tx, &team, token_hash).await?;
-            tx.record(Subject::Team(id), Event::TeamCreated { name });
-            // as it is stored, its instant to the millisecond
+            let id = add_team(tx, name.clone(), TeamProfile::default()).await?;
+            give_token(tx, id, token_hash).await?;
             teams::find(tx, id).await
         })
         .await
     }
 
-    /// Replaces a lost token; the old one is void from now on.
+    /// Gives a team another token of its own; all that it had are void from now on. Its members' stay.
     pub async fn set_team_token(
         &self,
         actor: Actor,
@@ -43,9 +67,77 @@ impl Store {
         now: Timestamp,
     ) -> Result<()> {
         self.write(actor, now, async |tx| {
-            teams::set_token(tx, id, token_hash).await?;
+            teams::find(tx, id).await?;
+            revoke_all(tx, TokenOwner::Team(id), None).await?;
+            give_token(tx, id, token_hash).await?;
             tx.record(Subject::Team(id), Event::TokenReplaced);
             Ok(())
+        })
+        .await
+    }
+
+    /// Changes a team's name, or what it tells of itself. [`StoreError::TeamNameTaken`] if another has the name,
+    /// [`StoreError::Conflict`] if there is no such division, [`StoreError::SeasonClosed`] once the season is over.
+    pub async fn change_team(
+        &self,
+        actor: Actor,
+        id: TeamId,
+        change: TeamChange,
+        now: Timestamp,
+    ) -> Result<Team> {
+        self.write(actor, now, async |tx| {
+            season::check_open(tx).await?;
+            let team = teams::find(tx, id).await?;
+            if let Some(name) = change.name.filter(|name| *name != team.name) {
+                teams::set_name(tx, id, &name).await?;
+                let event = Event::TeamRenamed {
+                    from: team.name,
+                    to: name,
+                };
+                tx.record(Subject::Team(id), event);
+            }
+            if let Some(mut profile) = change.profile {
+                if let Some(division) = &profile.division {
+                    profile.division = Some(divisions::check(tx, division).await?);
+                }
+                if profile != team.profile {
+                    teams::set_profile(tx, id, &profile).await?;
+                    let event = Event::TeamDescribed {
+                        affiliation: profile.affiliation,
+                        link: profile.link,
+                        division: profile.division,
+                    };
+                    tx.record(Subject::Team(id), event);
+                }
+            }
+            teams::find(tx, id).await
+        })
+        .await
+    }
+
+    /// Takes a team out of all days to come, by its own wish: it neither uploads nor enters a day. What had its cut goes
+    /// on, and its results stay. [`StoreError::Conflict`] if it has retired.
+    pub async fn retire_team(&self, actor: Actor, id: TeamId, now: Timestamp) -> Result<Team> {
+        self.write(actor, now, async |tx| {
+            if teams::find(tx, id).await?.retired_at.is_some() {
+                return Err(StoreError::Conflict("the team has retired already".into()));
+            }
+            teams::set_retired(tx, id, Some(now)).await?;
+            tx.record(Subject::Team(id), Event::TeamRetired);
+            teams::find(tx, id).await
+        })
+        .await
+    }
+
+    /// Lets a team that has retired play again. [`StoreError::Conflict`] if it has not.
+    pub async fn return_team(&self, actor: Actor, id: TeamId, now: Timestamp) -> Result<Team> {
+        self.write(actor, now, async |tx| {
+            if teams::find(tx, id).await?.retired_at.is_none() {
+                return Err(StoreError::Conflict("the team has not retired".into()));
+            }
+            teams::set_retired(tx, id, None).await?;
+            tx.record(Subject::Team(id), Event::TeamReturned);
+            teams::find(tx, id).await
         })
         .await
     }

@@ -2,10 +2,13 @@ use crate::{
     column::{Instant, Json},
     error::Result,
     store::Store,
-    tables::{stages::Stage, teams::Team},
+    tables::{
+        stages::Stage,
+        teams::{Team, TeamProfile},
+    },
 };
 use faceoff_types::{
-    EvaluationId, EvaluationResult, RunId, StageId, SubmissionId, TeamId, TeamName,
+    DivisionName, EvaluationId, EvaluationResult, RunId, StageId, SubmissionId, TeamId, TeamName,
 };
 use jiff::{Timestamp, civil::Date};
 use sqlx::types::Text;
@@ -54,7 +57,8 @@ impl Store {
         let stage = Text(stage);
         let rows = sqlx::query!(
             r#"/* board */ SELECT t.id AS "team: Text<TeamId>", t.name AS "name: Text<TeamName>",
-                      t.created_at AS "invited_at: Instant",
+                      t.created_at AS "invited_at: Instant", t.affiliation, t.link,
+                      t.division AS "division: Text<DivisionName>", t.retired_at AS "retired_at: Instant",
                       s.id AS "submission: Text<SubmissionId>",
                       s.created_at AS "submitted_at: Instant", s.agent_name,
                       e.id AS "evaluation: Text<EvaluationId>", e.run_id AS "run: Text<RunId>",
@@ -84,6 +88,12 @@ impl Store {
                     name: row.name.0,
                     created_at: row.invited_at.0,
                     disqualified: None,
+                    profile: TeamProfile {
+                        affiliation: row.affiliation,
+                        link: row.link,
+                        division: row.division.map(|name| name.0),
+                    },
+                    retired_at: row.retired_at.map(|at| at.0),
                 },
                 submission: row.submission.0,
                 submitted_at: row.submitted_at.0,

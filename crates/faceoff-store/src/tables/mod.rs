@@ -3,13 +3,19 @@
 
 pub(crate) mod ablations;
 pub(crate) mod active_submissions;
+pub(crate) mod announcements;
 pub(crate) mod bundles;
 pub(crate) mod days;
+pub(crate) mod divisions;
 pub(crate) mod episode_summaries;
 pub(crate) mod evaluations;
 pub(crate) mod events;
 pub(crate) mod finalisations;
+pub(crate) mod invitations;
+pub(crate) mod people;
 pub(crate) mod plan;
+pub(crate) mod questions;
+pub(crate) mod registrations;
 pub(crate) mod rulings;
 pub(crate) mod runs;
 pub(crate) mod season;
@@ -19,3 +25,5 @@ pub(crate) mod stages;
 pub(crate) mod standings;
 pub(crate) mod submissions;
 pub(crate) mod teams;
+pub(crate) mod terms;
+pub(crate) mod tokens;

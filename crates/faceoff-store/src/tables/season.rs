@@ -23,12 +23,15 @@ pub struct Season {
     pub closed_at: Option<Timestamp>,
     /// The queue is held, if it is: nothing is begun.
     pub paused: Option<Ruling>,
+    /// May anybody register a team?
+    pub takes_registrations: bool,
 }
 
 pub(crate) async fn read(connection: &mut SqliteConnection) -> Result<Season> {
     let row = sqlx::query!(
         r#"SELECT name, secret AS "secret: Bytes32", created_at AS "created_at: Instant",
-                  closed_at AS "closed_at: Instant", paused_at AS "paused_at: Instant", paused_for
+                  closed_at AS "closed_at: Instant", paused_at AS "paused_at: Instant", paused_for,
+                  takes_registrations AS "takes_registrations: bool"
            FROM season"#
     )
     .fetch_optional(connection)
@@ -41,6 +44,7 @@ pub(crate) async fn read(connection: &mut SqliteConnection) -> Result<Season> {
         created_at: row.created_at.0,
         closed_at: row.closed_at.map(|at| at.0),
         paused: Ruling::of(row.paused_at, row.paused_for),
+        takes_registrations: row.takes_registrations,
     })
 }
 
@@ -83,6 +87,16 @@ pub(crate) async fn set_paused(
     )
     .execute(connection)
     .await?;
+    Ok(())
+}
+
+pub(crate) async fn set_takes_registrations(
+    connection: &mut SqliteConnection,
+    takes: bool,
+) -> Result<()> {
+    sqlx::query!("UPDATE season SET takes_registrations = ?", takes)
+        .execute(connection)
+        .await?;
     Ok(())
 }
 

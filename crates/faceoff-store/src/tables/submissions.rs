@@ -173,7 +173,7 @@ pub(crate) async fn of_team(
 pub(crate) async fn active(connection: &mut SqliteConnection) -> Result<Vec<Submission>> {
     select_submissions!(
         "WHERE s.id IN (SELECT a.submission_id FROM active_submissions a JOIN teams t ON t.id = a.team_id
-                         WHERE t.disqualified_at IS NULL)
+                         WHERE t.disqualified_at IS NULL AND t.retired_at IS NULL)
          ORDER BY s.created_at, s.id"
     )
     .fetch_all(connection)

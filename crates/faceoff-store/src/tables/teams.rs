@@ -1,9 +1,9 @@
 use crate::{
-    column::{Bytes32, Instant},
+    column::Instant,
     error::{Result, StoreError},
-    tables::rulings::Ruling,
+    tables::{people, rulings::Ruling, terms},
 };
-use faceoff_types::{TeamId, TeamName};
+use faceoff_types::{DivisionName, TeamId, TeamName};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
@@ -18,6 +18,21 @@ pub struct Team {
     pub created_at: Timestamp,
     /// It neither plays nor is ranked, if it is.
     pub disqualified: Option<Ruling>,
+    /// What it tells of itself.
+    pub profile: TeamProfile,
+    /// Since when it plays no more, by its own wish; its results stay.
+    pub retired_at: Option<Timestamp>,
+}
+
+/// What a team tells of itself.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct TeamProfile {
+    /// Where it is from.
+    pub affiliation: Option<String>,
+    /// Its page, an address of http or https.
+    pub link: Option<String>,
+    /// In which it is ranked.
+    pub division: Option<DivisionName>,
 }
 
 struct TeamRow {
@@ -26,6 +41,10 @@ struct TeamRow {
     created_at: Instant,
     disqualified_at: Option<Instant>,
     disqualified_for: Option<String>,
+    affiliation: Option<String>,
+    link: Option<String>,
+    division: Option<Text<DivisionName>>,
+    retired_at: Option<Instant>,
 }
 
 impl From<TeamRow> for Team {
@@ -35,6 +54,12 @@ impl From<TeamRow> for Team {
             name: row.name.0,
             created_at: row.created_at.0,
             disqualified: Ruling::of(row.disqualified_at, row.disqualified_for),
+            profile: TeamProfile {
+                affiliation: row.affiliation,
+                link: row.link,
+                division: row.division.map(|name| name.0),
+            },
+            retired_at: row.retired_at.map(|at| at.0),
         }
     }
 }
@@ -46,7 +71,9 @@ macro_rules! select_teams {
             TeamRow,
             r#"SELECT id AS "id: Text<TeamId>", name AS "name: Text<TeamName>",
                       created_at AS "created_at: Instant",
-                      disqualified_at AS "disqualified_at: Instant", disqualified_for
+                      disqualified_at AS "disqualified_at: Instant", disqualified_for,
+                      affiliation, link, division AS "division: Text<DivisionName>",
+                      retired_at AS "retired_at: Instant"
                FROM teams "# + $tail
             $(, $argument)*
         )
@@ -68,62 +95,70 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: TeamId) -> Resul
         .ok_or(StoreError::NotFound("team"))
 }
 
-pub(crate) async fn by_token_hash(
-    connection: &mut SqliteConnection,
-    token_hash: [u8; 32],
-) -> Result<Option<Team>> {
-    let token_hash = Bytes32(token_hash);
-    let team = select_teams!("WHERE token_hash = ?", token_hash)
-        .fetch_optional(connection)
-        .await?;
-    Ok(team.map(Team::from))
-}
-
 /// [`StoreError::TeamNameTaken`] if the name exists, whatever its case.
-pub(crate) async fn insert(
-    connection: &mut SqliteConnection,
-    team: &Team,
-    token_hash: [u8; 32],
-) -> Result<()> {
+pub(crate) async fn insert(connection: &mut SqliteConnection, team: &Team) -> Result<()> {
     let (id, name) = (Text(team.id), Text(&team.name));
-    let (token_hash, created_at) = (Bytes32(token_hash), Instant(team.created_at));
+    let created_at = Instant(team.created_at);
+    let division = team.profile.division.as_ref().map(DivisionName::as_str);
     sqlx::query!(
-        "INSERT INTO teams (id, name, token_hash, created_at) VALUES (?, ?, ?, ?)",
+        "INSERT INTO teams (id, name, created_at, affiliation, link, division) VALUES (?, ?, ?, ?, ?, ?)",
         id,
         name,
-        token_hash,
         created_at,
+        team.profile.affiliation,
+        team.profile.link,
+        division,
     )
     .execute(connection)
     .await
-    .map_err(|error| {
-        if StoreError::is_duplicate(&error, "teams.name") {
-            StoreError::TeamNameTaken(team.name.to_string())
-        } else {
-            token_error(error)
-        }
-    })?;
+    .map_err(|error| name_taken(error, &team.name))?;
     Ok(())
 }
 
-pub(crate) async fn set_token(
+/// [`StoreError::TeamNameTaken`] if another has the name, whatever its case.
+pub(crate) async fn set_name(
     connection: &mut SqliteConnection,
     id: TeamId,
-    token_hash: [u8; 32],
+    name: &TeamName,
 ) -> Result<()> {
-    let (id, token_hash) = (Text(id), Bytes32(token_hash));
-    let done = sqlx::query!(
-        "UPDATE teams SET token_hash = ? WHERE id = ?",
-        token_hash,
+    let (id, text) = (Text(id), name.as_str());
+    sqlx::query!("UPDATE teams SET name = ? WHERE id = ?", text, id)
+        .execute(connection)
+        .await
+        .map_err(|error| name_taken(error, name))?;
+    Ok(())
+}
+
+pub(crate) async fn set_profile(
+    connection: &mut SqliteConnection,
+    id: TeamId,
+    profile: &TeamProfile,
+) -> Result<()> {
+    let id = Text(id);
+    let division = profile.division.as_ref().map(DivisionName::as_str);
+    sqlx::query!(
+        "UPDATE teams SET affiliation = ?, link = ?, division = ? WHERE id = ?",
+        profile.affiliation,
+        profile.link,
+        division,
         id
     )
     .execute(connection)
-    .await
-    .map_err(token_error)?;
-    match done.rows_affected() {
-        0 => Err(StoreError::NotFound("team")),
-        _ => Ok(()),
-    }
+    .await?;
+    Ok(())
+}
+
+/// Retires a team, or lets it play again.
+pub(crate) async fn set_retired(
+    connection: &mut SqliteConnection,
+    id: TeamId,
+    at: Option<Timestamp>,
+) -> Result<()> {
+    let (id, at) = (Text(id), at.map(Instant));
+    sqlx::query!("UPDATE teams SET retired_at = ? WHERE id = ?", at, id)
+        .execute(connection)
+        .await?;
+    Ok(())
 }
 
 /// Disqualifies a team, or reinstates it.
@@ -146,17 +181,26 @@ pub(crate) async fn set_disqualified(
     Ok(())
 }
 
-/// Refuses what a disqualified team may not do.
+/// Refuses what a team that is disqualified, has retired, or owes its consent to the terms may not do.
 pub(crate) async fn check_may_play(connection: &mut SqliteConnection, id: TeamId) -> Result<()> {
-    match find(connection, id).await?.disqualified {
-        Some(Ruling { at, reason }) => Err(StoreError::Disqualified { at, reason }),
-        None => Ok(()),
+    let team = find(connection, id).await?;
+    if let Some(Ruling { at, reason }) = team.disqualified {
+        return Err(StoreError::Disqualified { at, reason });
+    }
+    if let Some(at) = team.retired_at {
+        return Err(StoreError::Retired { at });
+    }
+    match terms::newest(connection).await? {
+        Some(version) if people::owes_terms(connection, id, version).await? => {
+            Err(StoreError::TermsOwed { version })
+        }
+        _ => Ok(()),
     }
 }
 
-fn token_error(error: sqlx::Error) -> StoreError {
-    if StoreError::is_duplicate(&error, "teams.token_hash") {
-        StoreError::Conflict("another team has this token: draw a new one".into())
+fn name_taken(error: sqlx::Error, name: &TeamName) -> StoreError {
+    if StoreError::is_duplicate(&error, "teams.name") {
+        StoreError::TeamNameTaken(name.to_string())
     } else {
         error.into()
     }

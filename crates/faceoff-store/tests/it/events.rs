@@ -48,6 +48,7 @@ async fn a_submissions_way_to_the_board_is_recorded_step_by_step() {
         kinds(&records),
         [
             "team_created",
+            "token_created",
             "submission_uploaded",
             "submission_valid",
             "submission_activated",
@@ -56,21 +57,22 @@ async fn a_submissions_way_to_the_board_is_recorded_step_by_step() {
             "evaluation_begun",
             "shard_committed",
             "unit_given_back",
+            "token_created",
             "token_replaced",
         ]
     );
     let team = Subject::Team(submission.team);
-    assert_eq!((records[0].subject, records[9].subject), (team, team));
-    assert_eq!(records[1].actor, Actor::Team(submission.team));
-    assert_eq!(records[1].subject, Subject::Submission(submission.id));
+    assert_eq!((records[0].subject, records[11].subject), (team, team));
+    assert_eq!(records[2].actor, Actor::Team(submission.team));
+    assert_eq!(records[2].subject, Subject::Submission(submission.id));
     let slot = Actor::Worker("slot 0".into());
-    for record in &records[6..9] {
+    for record in &records[7..10] {
         assert_eq!(record.actor, slot);
         assert_eq!(record.subject, Subject::Evaluation(evaluation.id));
         assert_eq!(record.at, f.now);
     }
     assert_eq!(
-        records[7].event,
+        records[8].event,
         Event::ShardCommitted {
             run: evaluation.run,
             shard: shard.id,
@@ -81,7 +83,7 @@ async fn a_submissions_way_to_the_board_is_recorded_step_by_step() {
         }
     );
     assert_eq!(
-        records[8].event,
+        records[9].event,
         Event::UnitGivenBack {
             unit: claim.unit,
             failures: 1,

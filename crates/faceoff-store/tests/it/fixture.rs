@@ -372,3 +372,18 @@ pub fn result(score: f64) -> EvaluationResult {
         timing: None,
     }
 }
+
+/// What somebody brings who follows the link of this code. Their token has the code's hash, hashed.
+pub fn joining(code_hash: [u8; 32], name: &str) -> Joining {
+    Joining {
+        code_hash,
+        name: Some(name.parse().unwrap()),
+        password: None,
+        team: None,
+        accepted_terms: None,
+        token_hash: *blake3::hash(&code_hash).as_bytes(),
+        token_kind: TokenKind::Key,
+        token_name: "first".into(),
+        token_expires_at: None,
+    }
+}

@@ -52,6 +52,28 @@ async fn child() {
             .await
             .unwrap();
         tell(format!("team {}", team.id));
+        // A person joins, and another leaves: each is done or not done.
+        let code = *blake3::hash(&token_hash).as_bytes();
+        let invitation = NewInvitation {
+            code_hash: code,
+            invited_as: InvitedAs::Member(team.id),
+            note: "a test".into(),
+            expires_at: now + jiff::SignedDuration::from_hours(1),
+        };
+        store
+            .invite(Actor::Organiser, invitation, now)
+            .await
+            .unwrap();
+        let joined = store.join(joining(code, name.as_str()), now).await.unwrap();
+        tell(format!("joined {}", joined.person.id));
+        if round % 2 == 1 {
+            let person = joined.person.id;
+            store
+                .remove_person(Actor::Organiser, person, now)
+                .await
+                .unwrap();
+            tell(format!("left {person}"));
+        }
         store
             .create_submission(
                 Actor::Organiser,
@@ -153,6 +175,8 @@ async fn survives_kill_9() {
                         "finished",
                         "disqualified",
                         "voided",
+                        "joined",
+                        "left",
                     ]
                     .contains(&what)
             })
@@ -185,6 +209,8 @@ async fn stored(folder: &Path) -> HashSet<String> {
          UNION SELECT 'shard ' || id FROM shards WHERE committed_at IS NOT NULL
          UNION SELECT 'finished ' || id FROM evaluations WHERE state = 'finished'
          UNION SELECT 'voided ' || id FROM evaluations WHERE voided_at IS NOT NULL
+         UNION SELECT 'joined ' || id FROM people
+         UNION SELECT 'left ' || id FROM people WHERE left_at IS NOT NULL
          UNION SELECT 'disqualified ' || subject_id FROM events WHERE kind = 'team_disqualified'",
     )
     .fetch_all(&mut connection)
@@ -244,6 +270,16 @@ async fn check_consistency(folder: &Path, store: &Store) {
         ("a valid submission of a team that has none active",
          "SELECT COUNT(*) FROM submissions s WHERE s.state = 'valid'
               AND NOT EXISTS (SELECT 1 FROM active_submissions a WHERE a.team_id = s.team_id)"),
+        ("somebody who joined without a link or a token, or left with one that is good",
+         "SELECT COUNT(*) FROM people p
+              WHERE (SELECT COUNT(*) FROM invitations i WHERE i.accepted_by = p.id) <> 1
+                 OR (SELECT COUNT(*) FROM tokens t WHERE t.person_id = p.id) <> 1
+                 OR (p.left_at IS NULL) <> EXISTS (SELECT 1 FROM tokens t WHERE t.person_id = p.id
+                                                   AND t.revoked_at IS NULL)"),
+        ("an invitation, a person, or their leaving without its event",
+         "SELECT (SELECT COUNT(*) FROM invitations) + (SELECT COUNT(*) FROM people)
+               + (SELECT COUNT(*) FROM people WHERE left_at IS NOT NULL)
+               - (SELECT COUNT(*) FROM events WHERE kind IN ('invited', 'person_joined', 'person_left'))"),
         ("a decision without its event",
          "SELECT (SELECT COUNT(*) FROM evaluations WHERE voided_at IS NOT NULL)
                + (SELECT COUNT(*) FROM teams WHERE disqualified_at IS NOT NULL)

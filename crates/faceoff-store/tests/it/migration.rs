@@ -404,6 +404,11 @@ async fn every_old_row_is_there_and_says_what_it_said() {
     let f = migrated().await;
     let submission = async |number| f.store.submission(id(number)).await.unwrap();
     assert_eq!(submission(1).await.state, SubmissionState::Validating);
+    // The tokens that teams have are good.
+    let token = *blake3::hash(&11_u32.to_le_bytes()).as_bytes();
+    let holder = f.store.holder(token, TokenKind::Key, f.now).await.unwrap();
+    let team = f.store.team(id(11)).await.unwrap();
+    assert_eq!(holder.map(|holder| holder.who), Ok(Who::Team(team)));
     let reason = "no answer".to_owned();
     assert_eq!(
         submission(3).await.state,

@@ -132,7 +132,10 @@ async fn half_made_states_cannot_be_stored() {
         "UPDATE submissions SET state = 'invalid'",
         "UPDATE shards SET committed_at = 1, recording = 'r'",
         "UPDATE units SET state = 'leased'",
-        "INSERT INTO teams (id, name, token_hash, created_at) VALUES ('a', 'b', x'00', 0)",
+        "UPDATE tokens SET hash = x'00'",
+        "UPDATE tokens SET owner = 'person'",
+        "UPDATE tokens SET kind = 'session'",
+        "UPDATE teams SET disqualified_at = 1",
     ] {
         let error = sqlx::raw_sql(sql)
             .execute(&mut connection)

@@ -27,19 +27,17 @@ async fn a_team_is_found_by_its_token_until_that_is_replaced() {
         .await
         .unwrap();
     assert_eq!(f.store.team(team.id).await.unwrap(), team);
-    assert_eq!(
-        f.store.team_by_token_hash([7; 32]).await.unwrap(),
-        Some(team.clone())
-    );
+    let who = async |hash| {
+        let holder = f.store.holder([hash; 32], TokenKind::Key, f.now).await;
+        holder.unwrap().map(|holder| holder.who)
+    };
+    assert_eq!(who(7).await, Ok(Who::Team(team.clone())));
     f.store
         .set_team_token(Actor::Organiser, team.id, [8; 32], f.now)
         .await
         .unwrap();
-    assert_eq!(f.store.team_by_token_hash([7; 32]).await.unwrap(), None);
-    assert_eq!(
-        f.store.team_by_token_hash([8; 32]).await.unwrap(),
-        Some(team)
-    );
+    assert_eq!(who(7).await, Err(Refusal::Revoked(f.now)));
+    assert_eq!(who(8).await, Ok(Who::Team(team)));
 }
 
 #[tokio::test]

@@ -27,6 +27,12 @@ fn now() -> Timestamp {
 async fn site(max_bundle_bytes: u64) -> Site {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).await.unwrap();
+    assert!(
+        store
+            .set_host_token(hash_token(ADMIN), now())
+            .await
+            .unwrap()
+    );
     let rules = StageRules {
         ruleset: Ruleset::CURRENT,
         profile: Profile::Evaluation,
@@ -40,7 +46,7 @@ async fn site(max_bundle_bytes: u64) -> Site {
         .unwrap();
     let config = HttpConfig {
         max_bundle_bytes,
-        admin_token_hash: hash_token(ADMIN),
+        public_url: None,
         upload_dir: folder.path().to_owned(),
         clock: Clock::new(now),
         limits: HttpLimits::default(),

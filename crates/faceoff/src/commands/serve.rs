@@ -5,7 +5,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use faceoff_http::{
     ConnectionLimits, HttpConfig,
-    token::{Token, TokenKind, hash_token},
+    token::{Secret, SecretKind, hash_token},
 };
 use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime, affinity, probe_host};
 use faceoff_store::{Actor, Room, Store};
@@ -143,16 +143,21 @@ async fn serve(
     empty_folder(&upload_dir)?;
     let scratch_dir = config.scratch_dir();
     private_folder(&scratch_dir)?;
-    let admin_token_hash = admin_token(&data_dir)?;
-
     let watched = vec![data_dir.clone(), scratch_dir.clone()];
     let store = Store::open(&data_dir)
         .await
         .with_context(|| format!("opening the data folder {}", data_dir.display()))?
         .with_room(Room::new(watched, config.server.min_free_bytes));
+    let now = Timestamp::now();
+    if !store.set_host_token(admin_token(&data_dir)?, now).await? {
+        let file = data_dir.join(ADMIN_TOKEN_FILE);
+        tracing::warn!(file = %file.display(), "the token in the file was revoked; making another one");
+        fs::remove_file(&file).with_context(|| format!("removing {}", file.display()))?;
+        store.set_host_token(admin_token(&data_dir)?, now).await?;
+    }
     if let Some(name) = &config.season.name {
         store
-            .name_season(Actor::Organiser, name, jiff::Timestamp::now())
+            .name_season(Actor::Organiser, name, now)
             .await
             .context("naming the season")?;
     }
@@ -181,7 +186,7 @@ async fn serve(
         store.clone(),
         HttpConfig {
             max_bundle_bytes: config.bundle.packed_bytes,
-            admin_token_hash,
+            public_url: config.server.public_url.clone(),
             upload_dir,
             clock: clock.clone(),
             limits: config.uploads.limits(),
@@ -386,7 +391,7 @@ fn admin_token(data_dir: &Path) -> anyhow::Result<[u8; 32]> {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
         Err(error) => return Err(error).with_context(|| format!("reading {}", file.display())),
     }
-    let token = Token::generate(TokenKind::Admin).context("drawing the organiser's token")?;
+    let token = Secret::generate(SecretKind::Admin).context("drawing the organiser's token")?;
     // Written beside and renamed, so that a crash cannot leave half a token behind.
     let fresh = data_dir.join(format!("{ADMIN_TOKEN_FILE}.new"));
     let write = || -> std::io::Result<()> {

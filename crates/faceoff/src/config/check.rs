@@ -32,6 +32,19 @@ impl Config {
 
     /// What types alone cannot say.
     pub(super) fn check(&self) -> anyhow::Result<()> {
+        if let Some(url) = &self.server.public_url {
+            let rest = url
+                .strip_prefix("https://")
+                .or_else(|| url.strip_prefix("http://"));
+            let is_address = rest.is_some_and(|rest| {
+                !rest.is_empty() && !rest.ends_with('/') && !rest.contains(char::is_whitespace)
+            });
+            ensure!(
+                is_address,
+                "server.public_url: expected an address like https://faceoff.example.org, without a slash at its \
+                 end, got {url:?}"
+            );
+        }
         let evaluation = &self.evaluation;
         if evaluation.at.is_some() && evaluation.cron.is_some() {
             bail!("evaluation.cron: there is evaluation.at, too; leave one of them out");

@@ -1,0 +1,39 @@
+//! Registering a team.
+
+use super::joining::{link, profile};
+use crate::{
+    app::AppState,
+    problem::Problem,
+    requests::Register,
+    text,
+    token::{Secret, SecretKind},
+    views::invitation::NewRegistrationView,
+};
+use faceoff_store::NewRegistration;
+
+const CONTACT_CHARS: usize = 120;
+
+/// Registers a team, and returns the link that is its first member's once the organisers have approved.
+pub(crate) async fn registered(
+    app: &AppState,
+    register: Register,
+) -> Result<NewRegistrationView, Problem> {
+    let contact = text::line("contact", &register.contact, CONTACT_CHARS)?;
+    let (team_name, profile) = profile(register.team)?;
+    let secret = Secret::generate(SecretKind::Invitation).map_err(Problem::internal)?;
+    let new = NewRegistration {
+        code_hash: secret.hash(),
+        team_name,
+        profile,
+        contact,
+        accepted_terms: register.accepted_terms,
+    };
+    let now = app.config.clock.now();
+    let registration = app.store.register(new, now).await?;
+    tracing::info!(registration = %registration.id, team = %registration.team_name, "registered");
+    Ok(NewRegistrationView {
+        registration: registration.into(),
+        join_link: link(app, secret.as_str()),
+        code: secret.as_str().to_owned(),
+    })
+}

@@ -1,0 +1,120 @@
+//! What is told to everybody, and what teams ask.
+
+use crate::{
+    app::App,
+    auth::{Anybody, Organiser, TeamCaller},
+    extract::{Json as Body, PathParam},
+    problem::Problem,
+    requests::{NewAnnouncement, NewAnswer, NewQuestion},
+    text,
+    views::announcement::{AnnouncementView, QuestionView},
+};
+use axum::{Json, extract::State, http::StatusCode};
+use faceoff_types::QuestionId;
+
+/// Announcements that a list shows.
+const SHOWN: u32 = 500;
+const TITLE_CHARS: usize = 120;
+const TEXT_CHARS: usize = 5000;
+const QUESTION_CHARS: usize = 2000;
+
+/// What the organisers have told everybody, the newest first.
+#[utoipa::path(
+    get, path = "/announcements", tag = "public", responses((status = 200, body = Vec<AnnouncementView>))
+)]
+pub(crate) async fn list_announcements(
+    State(app): State<App>,
+) -> Result<Json<Vec<AnnouncementView>>, Problem> {
+    let announcements = app.store.announcements(SHOWN).await?.into_iter();
+    Ok(Json(announcements.map(AnnouncementView::from).collect()))
+}
+
+/// Tells everybody; what was told stays.
+#[utoipa::path(
+    post, path = "/announcements", tag = "organiser", security(("organiser" = [])), request_body = NewAnnouncement,
+    responses((status = 201, body = AnnouncementView), (status = 422))
+)]
+pub(crate) async fn announce(
+    organiser: Organiser,
+    State(app): State<App>,
+    Body(new): Body<NewAnnouncement>,
+) -> Result<(StatusCode, Json<AnnouncementView>), Problem> {
+    let title = text::line("title", &new.title, TITLE_CHARS)?;
+    let body = text::lines("text", &new.text, TEXT_CHARS)?;
+    let now = app.config.clock.now();
+    let announced = app
+        .store
+        .announce(organiser.actor(), &title, &body, now)
+        .await?;
+    tracing::info!(announcement = %announced.id, "announced");
+    Ok((StatusCode::CREATED, Json(announced.into())))
+}
+
+/// Questions, the newest first: for everybody those with a public answer, for a team also its own, for organisers all.
+#[utoipa::path(
+    get, path = "/questions", tag = "public", responses((status = 200, body = Vec<QuestionView>))
+)]
+pub(crate) async fn list_questions(
+    caller: Anybody,
+    State(app): State<App>,
+) -> Result<Json<Vec<QuestionView>>, Problem> {
+    let questions = app.store.questions().await?.into_iter();
+    let shown = questions.filter_map(|question| {
+        let is_theirs = caller
+            .0
+            .as_ref()
+            .is_some_and(|caller| caller.may_see(question.team));
+        let is_public = question
+            .answer
+            .as_ref()
+            .is_some_and(|answer| answer.is_public);
+        (is_theirs || is_public).then(|| QuestionView::of(question, is_theirs))
+    });
+    Ok(Json(shown.collect()))
+}
+
+/// Asks the organisers. Other teams read it only with a public answer, and never who asked.
+#[utoipa::path(
+    post, path = "/questions", tag = "team", security(("team" = [])), request_body = NewQuestion,
+    responses(
+        (status = 201, body = QuestionView),
+        (status = 409, description = "too many of the team's wait for an answer"),
+        (status = 422),
+    )
+)]
+pub(crate) async fn ask(
+    caller: TeamCaller,
+    State(app): State<App>,
+    Body(new): Body<NewQuestion>,
+) -> Result<(StatusCode, Json<QuestionView>), Problem> {
+    let text = text::lines("text", &new.text, QUESTION_CHARS)?;
+    let now = app.config.clock.now();
+    let question = app
+        .store
+        .ask(caller.actor(), caller.team.id, &text, now)
+        .await?;
+    tracing::info!(question = %question.id, team = %caller.team.name, "asked");
+    Ok((StatusCode::CREATED, Json(QuestionView::of(question, true))))
+}
+
+/// Answers a question, or answers it anew.
+#[utoipa::path(
+    put, path = "/questions/{id}/answer", tag = "organiser", security(("organiser" = [])),
+    params(("id" = QuestionId, Path)), request_body = NewAnswer,
+    responses((status = 200, body = QuestionView), (status = 404), (status = 422))
+)]
+pub(crate) async fn answer(
+    organiser: Organiser,
+    State(app): State<App>,
+    PathParam(id): PathParam<QuestionId>,
+    Body(new): Body<NewAnswer>,
+) -> Result<Json<QuestionView>, Problem> {
+    let text = text::lines("text", &new.text, TEXT_CHARS)?;
+    let now = app.config.clock.now();
+    let question = app
+        .store
+        .answer(organiser.actor(), id, &text, new.public, now)
+        .await?;
+    tracing::info!(question = %id, public = new.public, "answered");
+    Ok(Json(QuestionView::of(question, true)))
+}

@@ -1,0 +1,127 @@
+//! People: who they are, their passwords, and how they leave.
+
+use crate::{
+    app::App,
+    auth::Caller,
+    extract::{Json as Body, PathParam},
+    problem::{Problem, ProblemKind},
+    requests::{Confirmation, NewPassword},
+    views::person::PersonView,
+};
+use axum::{Json, extract::State};
+use faceoff_store::{Person, StoreError, Who};
+use faceoff_types::PersonId;
+
+/// The people whom the caller may see: an organiser everybody, a team its members.
+#[utoipa::path(
+    get, path = "/people", tag = "people", security(("team" = []), ("organiser" = [])),
+    responses((status = 200, body = Vec<PersonView>))
+)]
+pub(crate) async fn list_people(
+    caller: Caller,
+    State(app): State<App>,
+) -> Result<Json<Vec<PersonView>>, Problem> {
+    let people = match caller.team() {
+        Some(team) => app.store.members_of(team.id).await?,
+        None => app.store.people().await?,
+    };
+    Ok(Json(people.into_iter().map(PersonView::from).collect()))
+}
+
+/// The person, if the caller is an organiser or that person; a teammate is seen, and not acted for.
+async fn find(app: &App, caller: &Caller, id: PersonId) -> Result<Person, Problem> {
+    let person = match app.store.person(id).await {
+        Ok(person) => person,
+        Err(StoreError::NotFound(_)) => return Err(Problem::not_found("person")),
+        Err(error) => return Err(error.into()),
+    };
+    let is_self = caller.person().is_some_and(|own| own.id == id);
+    if caller.is_organiser() || is_self {
+        return Ok(person);
+    }
+    match (&caller.who, person.team) {
+        (Who::Member(_, own) | Who::Team(own), Some(team)) if own.id == team => Err(Problem::new(
+            ProblemKind::Forbidden,
+            "only that person may do this, or an organiser",
+        )),
+        _ => Err(Problem::not_found("person")),
+    }
+}
+
+/// Lets a person do nothing any more, at once: their tokens and sessions are revoked. By an organiser, or by
+/// themselves.
+#[utoipa::path(
+    post, path = "/people/{id}/remove", tag = "people", security(("team" = []), ("organiser" = [])),
+    params(("id" = PersonId, Path)), request_body = Confirmation,
+    responses(
+        (status = 200, body = PersonView),
+        (status = 403), (status = 404),
+        (status = 409, description = "not confirmed with the person's name (nothing is done), gone, or the last who can organise"),
+    )
+)]
+pub(crate) async fn remove_person(
+    caller: Caller,
+    State(app): State<App>,
+    PathParam(id): PathParam<PersonId>,
+    Body(Confirmation { confirm }): Body<Confirmation>,
+) -> Result<Json<PersonView>, Problem> {
+    let person = find(&app, &caller, id).await?;
+    let what = format!(
+        "{} could do nothing any more, at once and for good: all tokens and sessions would be revoked; the name stays \
+         with what was done",
+        person.name
+    );
+    Problem::check_confirmed(confirm.as_deref(), person.name.as_str(), &what)?;
+    let now = app.config.clock.now();
+    let person = app.store.remove_person(caller.actor(), id, now).await?;
+    tracing::info!(person = %id, actor = %caller.actor(), "person removed");
+    Ok(Json(person.into()))
+}
+
+/// Sets the caller's password. All their other tokens and sessions are revoked.
+#[utoipa::path(
+    put, path = "/people/{id}/password", tag = "people", security(("team" = []), ("organiser" = [])),
+    params(("id" = PersonId, Path)), request_body = NewPassword,
+    responses(
+        (status = 200, body = PersonView),
+        (status = 403, description = "of another person, or the old one is wrong"),
+        (status = 404), (status = 422), (status = 429, description = "too many wrong ones"),
+    )
+)]
+pub(crate) async fn set_password(
+    caller: Caller,
+    State(app): State<App>,
+    PathParam(id): PathParam<PersonId>,
+    Body(new): Body<NewPassword>,
+) -> Result<Json<PersonView>, Problem> {
+    let person = find(&app, &caller, id).await?;
+    if caller.person().is_none_or(|own| own.id != id) {
+        return Err(Problem::new(
+            ProblemKind::Forbidden,
+            format!(
+                "a password is set by its person alone; make a link for “{}” instead (POST /api/v1/invitations with \
+                 the role “return”)",
+                person.name
+            ),
+        ));
+    }
+    let now = app.config.clock.now();
+    let known = app.store.password_of(person.name.as_str()).await?;
+    if known.is_some() {
+        let old = new.old.unwrap_or_default();
+        let matches = app.passwords.verify(known, old, now).await?;
+        if matches != Some(id) {
+            return Err(Problem::new(
+                ProblemKind::Forbidden,
+                "old: expected the password that there is; nothing was changed",
+            ));
+        }
+    }
+    let hash = app.passwords.hash(new.password).await?;
+    let person = app
+        .store
+        .set_password(caller.actor(), id, &hash, caller.token.id, now)
+        .await?;
+    tracing::info!(person = %id, "password set");
+    Ok(Json(person.into()))
+}

@@ -1,0 +1,93 @@
+//! Teams that want to take part.
+
+use super::rulings::checked_reason;
+use crate::{
+    acts::{joining::good_until, registering::registered},
+    app::App,
+    auth::Organiser,
+    extract::{Json as Body, PathParam},
+    problem::Problem,
+    requests::{Reason, Register},
+    views::invitation::{NewRegistrationView, RegistrationView},
+};
+use axum::{Json, extract::State, http::StatusCode};
+use faceoff_types::RegistrationId;
+
+/// Registers a team, if the season takes registrations: it waits for the organisers.
+#[utoipa::path(
+    post, path = "/registrations", tag = "public", request_body = Register,
+    responses(
+        (status = 201, body = NewRegistrationView),
+        (status = 409, description = "registration is closed, too many wait, the name is taken, or the terms are not accepted"),
+        (status = 422),
+    )
+)]
+pub(crate) async fn register(
+    State(app): State<App>,
+    Body(body): Body<Register>,
+) -> Result<(StatusCode, Json<NewRegistrationView>), Problem> {
+    let view = registered(&app, body).await?;
+    Ok((StatusCode::CREATED, Json(view)))
+}
+
+/// All registrations, the newest first.
+#[utoipa::path(
+    get, path = "/registrations", tag = "organiser", security(("organiser" = [])),
+    responses((status = 200, body = Vec<RegistrationView>))
+)]
+pub(crate) async fn list_registrations(
+    _: Organiser,
+    State(app): State<App>,
+) -> Result<Json<Vec<RegistrationView>>, Problem> {
+    let registrations = app.store.registrations().await?.into_iter();
+    Ok(Json(registrations.map(RegistrationView::from).collect()))
+}
+
+/// Lets a registered team take part: the link of its registration is its first member's for seven days from now on.
+#[utoipa::path(
+    post, path = "/registrations/{id}/approve", tag = "organiser", security(("organiser" = [])),
+    params(("id" = RegistrationId, Path)),
+    responses(
+        (status = 200, body = RegistrationView),
+        (status = 404),
+        (status = 409, description = "it was decided about, or the name is taken meanwhile"),
+    )
+)]
+pub(crate) async fn approve_registration(
+    organiser: Organiser,
+    State(app): State<App>,
+    PathParam(id): PathParam<RegistrationId>,
+) -> Result<Json<RegistrationView>, Problem> {
+    let now = app.config.clock.now();
+    let (registration, team) = app
+        .store
+        .approve_registration(organiser.actor(), id, good_until(now), now)
+        .await?;
+    tracing::info!(registration = %id, team = %team.name, "registration approved");
+    Ok(Json(registration.into()))
+}
+
+/// Refuses a registration.
+#[utoipa::path(
+    post, path = "/registrations/{id}/refuse", tag = "organiser", security(("organiser" = [])),
+    params(("id" = RegistrationId, Path)), request_body = Reason,
+    responses(
+        (status = 200, body = RegistrationView),
+        (status = 404), (status = 409, description = "it was decided about"), (status = 422),
+    )
+)]
+pub(crate) async fn refuse_registration(
+    organiser: Organiser,
+    State(app): State<App>,
+    PathParam(id): PathParam<RegistrationId>,
+    Body(Reason { reason }): Body<Reason>,
+) -> Result<Json<RegistrationView>, Problem> {
+    let reason = checked_reason(&reason)?;
+    let now = app.config.clock.now();
+    let registration = app
+        .store
+        .refuse_registration(organiser.actor(), id, reason, now)
+        .await?;
+    tracing::info!(registration = %id, reason, "registration refused");
+    Ok(Json(registration.into()))
+}

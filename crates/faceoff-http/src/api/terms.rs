@@ -1,0 +1,70 @@
+//! The terms of taking part.
+
+use crate::{
+    app::App,
+    auth::{Caller, Organiser},
+    extract::{Json as Body, PathParam},
+    problem::{Problem, ProblemKind},
+    requests::NewTerms,
+    text,
+    views::{announcement::TermsView, person::PersonView},
+};
+use axum::{Json, extract::State, http::StatusCode};
+
+const TEXT_CHARS: usize = 20_000;
+
+/// All versions of the terms, the newest first; none if taking part needs no consent.
+#[utoipa::path(get, path = "/terms", tag = "public", responses((status = 200, body = Vec<TermsView>)))]
+pub(crate) async fn list_terms(State(app): State<App>) -> Result<Json<Vec<TermsView>>, Problem> {
+    let terms = app.store.terms().await?.into_iter();
+    Ok(Json(terms.map(TermsView::from).collect()))
+}
+
+/// Publishes other terms. Teams upload and choose again once a member has accepted them; what is active plays on.
+#[utoipa::path(
+    post, path = "/terms", tag = "organiser", security(("organiser" = [])), request_body = NewTerms,
+    responses((status = 201, body = TermsView), (status = 409, description = "they are what they were"), (status = 422))
+)]
+pub(crate) async fn publish_terms(
+    organiser: Organiser,
+    State(app): State<App>,
+    Body(new): Body<NewTerms>,
+) -> Result<(StatusCode, Json<TermsView>), Problem> {
+    let text = text::lines("text", &new.text, TEXT_CHARS)?;
+    let now = app.config.clock.now();
+    let terms = app
+        .store
+        .publish_terms(organiser.actor(), &text, now)
+        .await?;
+    tracing::info!(version = terms.version, "terms published");
+    Ok((StatusCode::CREATED, Json(terms.into())))
+}
+
+/// The calling person accepts the terms.
+#[utoipa::path(
+    post, path = "/terms/{version}/accept", tag = "people", security(("team" = []), ("organiser" = [])),
+    params(("version" = u32, Path)),
+    responses(
+        (status = 200, body = PersonView),
+        (status = 403, description = "it is no person who calls"),
+        (status = 409, description = "it is not the newest version"),
+    )
+)]
+pub(crate) async fn accept_terms(
+    caller: Caller,
+    State(app): State<App>,
+    PathParam(version): PathParam<u32>,
+) -> Result<Json<PersonView>, Problem> {
+    let Some(person) = caller.person() else {
+        return Err(Problem::new(
+            ProblemKind::Forbidden,
+            "people accept terms; this token is no person's. A member of the team does so with their own token",
+        ));
+    };
+    let now = app.config.clock.now();
+    let person = app
+        .store
+        .accept_terms(caller.actor(), person.id, version, now)
+        .await?;
+    Ok(Json(person.into()))
+}

@@ -1,0 +1,104 @@
+//! What is told to everybody, and what teams ask.
+
+use crate::{
+    error::{Result, StoreError},
+    event::{Actor, Event, Subject},
+    store::Store,
+    tables::{
+        announcements::{self, Announcement},
+        questions::{self, Question, Reply},
+    },
+};
+use faceoff_types::{AnnouncementId, QuestionId, TeamId};
+use jiff::Timestamp;
+
+/// Questions of a team that wait for an answer at a time.
+pub const MAX_OPEN_QUESTIONS: i64 = 10;
+
+impl Store {
+    /// Tells everybody.
+    pub async fn announce(
+        &self,
+        actor: Actor,
+        title: &str,
+        text: &str,
+        now: Timestamp,
+    ) -> Result<Announcement> {
+        self.write(actor, now, async |tx| {
+            let announcement = Announcement {
+                id: AnnouncementId::new(),
+                at: now,
+                title: title.to_owned(),
+                text: text.to_owned(),
+            };
+            announcements::insert(tx, &announcement).await?;
+            let title = announcement.title.clone();
+            let subject = Subject::Announcement(announcement.id);
+            tx.record(subject, Event::Announced { title });
+            Ok(announcement)
+        })
+        .await
+    }
+
+    /// The newest announcements first, at most so many.
+    pub async fn announcements(&self, limit: u32) -> Result<Vec<Announcement>> {
+        announcements::newest(&mut *self.database.read.acquire().await?, limit).await
+    }
+
+    /// A team asks. [`StoreError::Conflict`] if too many of its questions wait for an answer.
+    pub async fn ask(
+        &self,
+        actor: Actor,
+        team: TeamId,
+        text: &str,
+        now: Timestamp,
+    ) -> Result<Question> {
+        self.write(actor, now, async |tx| {
+            if questions::count_open(tx, team).await? >= MAX_OPEN_QUESTIONS {
+                return Err(StoreError::Conflict(format!(
+                    "{MAX_OPEN_QUESTIONS} questions of the team wait for an answer, and no more than that at a time"
+                )));
+            }
+            let question = Question {
+                id: QuestionId::new(),
+                team,
+                at: now,
+                text: text.to_owned(),
+                answer: None,
+            };
+            questions::insert(tx, &question).await?;
+            tx.record(Subject::Question(question.id), Event::Asked { team });
+            questions::find(tx, question.id).await
+        })
+        .await
+    }
+
+    /// Answers a question, or answers it anew: to the team, or to everybody, who then read the question too.
+    pub async fn answer(
+        &self,
+        actor: Actor,
+        id: QuestionId,
+        text: &str,
+        is_public: bool,
+        now: Timestamp,
+    ) -> Result<Question> {
+        self.write(actor, now, async |tx| {
+            questions::find(tx, id).await?;
+            let answer = Reply {
+                at: now,
+                text: text.to_owned(),
+                is_public,
+            };
+            questions::set_answer(tx, id, &answer).await?;
+            let public = is_public;
+            tx.record(Subject::Question(id), Event::Answered { public });
+            questions::find(tx, id).await
+        })
+        .await
+    }
+
+    /// All questions, the newest first.
+    pub async fn questions(&self) -> Result<Vec<Question>> {
+        questions::all(&mut *self.database.read.acquire().await?).await
+    }
+}

@@ -1,0 +1,55 @@
+use crate::{column::Instant, error::Result};
+use faceoff_types::AnnouncementId;
+use jiff::Timestamp;
+use sqlx::{SqliteConnection, types::Text};
+
+/// What the organisers tell everybody.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Announcement {
+    /// Names it.
+    pub id: AnnouncementId,
+    /// When.
+    pub at: Timestamp,
+    /// One line.
+    pub title: String,
+    /// Plain text.
+    pub text: String,
+}
+
+/// The newest first, at most so many.
+pub(crate) async fn newest(
+    connection: &mut SqliteConnection,
+    limit: u32,
+) -> Result<Vec<Announcement>> {
+    let rows = sqlx::query!(
+        r#"SELECT id AS "id: Text<AnnouncementId>", at AS "at: Instant", title, text
+           FROM announcements ORDER BY at DESC, id DESC LIMIT ?"#,
+        limit
+    )
+    .fetch_all(connection)
+    .await?;
+    let announcements = rows.into_iter().map(|row| Announcement {
+        id: row.id.0,
+        at: row.at.0,
+        title: row.title,
+        text: row.text,
+    });
+    Ok(announcements.collect())
+}
+
+pub(crate) async fn insert(
+    connection: &mut SqliteConnection,
+    announcement: &Announcement,
+) -> Result<()> {
+    let (id, at) = (Text(announcement.id), Instant(announcement.at));
+    sqlx::query!(
+        "INSERT INTO announcements (id, at, title, text) VALUES (?, ?, ?, ?)",
+        id,
+        at,
+        announcement.title,
+        announcement.text
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}

@@ -1,0 +1,71 @@
+use crate::error::{Result, StoreError};
+use faceoff_types::DivisionName;
+use sqlx::{SqliteConnection, types::Text};
+
+/// In the organisers' order.
+pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<DivisionName>> {
+    let names = sqlx::query_scalar!(
+        r#"SELECT name AS "name: Text<DivisionName>" FROM divisions ORDER BY position"#
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(names.into_iter().map(|name| name.0).collect())
+}
+
+/// A division as the organisers wrote it. [`StoreError::Conflict`] if there is none of this name.
+pub(crate) async fn check(
+    connection: &mut SqliteConnection,
+    name: &DivisionName,
+) -> Result<DivisionName> {
+    let all = all(connection).await?;
+    let wanted = name.as_str().to_lowercase();
+    let found = all
+        .iter()
+        .find(|division| division.as_str().to_lowercase() == wanted);
+    found.cloned().ok_or_else(|| {
+        let names: Vec<_> = all.iter().map(|division| format!("“{division}”")).collect();
+        StoreError::Conflict(match names.is_empty() {
+            true => format!("division: this season has no divisions, so leave out “{name}”"),
+            false => format!("division: expected {}, got “{name}”", names.join(" or ")),
+        })
+    })
+}
+
+/// How many teams are in it.
+pub(crate) async fn teams_in(
+    connection: &mut SqliteConnection,
+    name: &DivisionName,
+) -> Result<i64> {
+    let name = name.as_str();
+    Ok(sqlx::query_scalar!(
+        "SELECT COUNT(*) FROM teams WHERE division = ? COLLATE NOCASE",
+        name
+    )
+    .fetch_one(connection)
+    .await?)
+}
+
+pub(crate) async fn insert(
+    connection: &mut SqliteConnection,
+    name: &DivisionName,
+    position: u32,
+) -> Result<()> {
+    let name = name.as_str();
+    sqlx::query!(
+        "INSERT INTO divisions (name, position) VALUES (?1, ?2)
+         ON CONFLICT (name) DO UPDATE SET position = ?2",
+        name,
+        position
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+pub(crate) async fn remove(connection: &mut SqliteConnection, name: &DivisionName) -> Result<()> {
+    let name = name.as_str();
+    sqlx::query!("DELETE FROM divisions WHERE name = ?", name)
+        .execute(connection)
+        .await?;
+    Ok(())
+}

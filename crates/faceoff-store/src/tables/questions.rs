@@ -1,0 +1,123 @@
+use crate::{
+    column::Instant,
+    error::{Result, StoreError},
+};
+use faceoff_types::{QuestionId, TeamId};
+use jiff::Timestamp;
+use sqlx::{SqliteConnection, types::Text};
+
+/// What the organisers have answered.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Reply {
+    /// When.
+    pub at: Timestamp,
+    /// Plain text.
+    pub text: String,
+    /// May everybody read question and answer? Not who asked.
+    pub is_public: bool,
+}
+
+/// What a team asks the organisers.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Question {
+    /// Names it.
+    pub id: QuestionId,
+    /// Who asks.
+    pub team: TeamId,
+    /// When.
+    pub at: Timestamp,
+    /// Plain text.
+    pub text: String,
+    /// None yet.
+    pub answer: Option<Reply>,
+}
+
+struct Row {
+    id: Text<QuestionId>,
+    team_id: Text<TeamId>,
+    asked_at: Instant,
+    text: String,
+    answer: Option<String>,
+    answered_at: Option<Instant>,
+    public: bool,
+}
+
+impl From<Row> for Question {
+    fn from(row: Row) -> Self {
+        let is_public = row.public;
+        let answer = row.answer.zip(row.answered_at);
+        Self {
+            id: row.id.0,
+            team: row.team_id.0,
+            at: row.asked_at.0,
+            text: row.text,
+            answer: answer.map(|(text, at)| Reply {
+                at: at.0,
+                text,
+                is_public,
+            }),
+        }
+    }
+}
+
+/// All of them, the newest first.
+pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Question>> {
+    let rows = sqlx::query_as!(
+        Row,
+        r#"SELECT id AS "id: Text<QuestionId>", team_id AS "team_id: Text<TeamId>", asked_at AS "asked_at: Instant",
+                  text, answer, answered_at AS "answered_at: Instant", public AS "public: bool"
+           FROM questions ORDER BY asked_at DESC, id DESC"#
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows.into_iter().map(Question::from).collect())
+}
+
+pub(crate) async fn find(connection: &mut SqliteConnection, id: QuestionId) -> Result<Question> {
+    let all = all(connection).await?;
+    let found = all.into_iter().find(|question| question.id == id);
+    found.ok_or(StoreError::NotFound("question"))
+}
+
+/// How many of a team's have no answer.
+pub(crate) async fn count_open(connection: &mut SqliteConnection, team: TeamId) -> Result<i64> {
+    let team = Text(team);
+    Ok(sqlx::query_scalar!(
+        "SELECT COUNT(*) FROM questions WHERE team_id = ? AND answer IS NULL",
+        team
+    )
+    .fetch_one(connection)
+    .await?)
+}
+
+pub(crate) async fn insert(connection: &mut SqliteConnection, question: &Question) -> Result<()> {
+    let (id, team, at) = (Text(question.id), Text(question.team), Instant(question.at));
+    sqlx::query!(
+        "INSERT INTO questions (id, team_id, asked_at, text) VALUES (?, ?, ?, ?)",
+        id,
+        team,
+        at,
+        question.text
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+pub(crate) async fn set_answer(
+    connection: &mut SqliteConnection,
+    id: QuestionId,
+    answer: &Reply,
+) -> Result<()> {
+    let (id, at) = (Text(id), Instant(answer.at));
+    sqlx::query!(
+        "UPDATE questions SET answer = ?, answered_at = ?, public = ? WHERE id = ?",
+        answer.text,
+        at,
+        answer.is_public,
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}

@@ -1,0 +1,234 @@
+use crate::{
+    column::{Bytes32, Instant},
+    error::{Result, StoreError},
+};
+use faceoff_types::{DivisionName, RegistrationId, TeamId, TeamName};
+use jiff::Timestamp;
+use sqlx::{SqliteConnection, types::Text};
+
+/// Where a registration stands.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum RegistrationState {
+    /// An organiser has to decide.
+    Waiting,
+    /// There is a team, and its code is an invitation of its first member's.
+    Approved {
+        /// When.
+        at: Timestamp,
+        /// Which.
+        team: TeamId,
+    },
+    /// It takes no part.
+    Refused {
+        /// When.
+        at: Timestamp,
+        /// As who registered may read it.
+        reason: String,
+    },
+}
+
+/// A team that wants to take part.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Registration {
+    /// Names it; tells nothing of its code.
+    pub id: RegistrationId,
+    /// What it wants to be called.
+    pub team_name: TeamName,
+    /// Where it is from.
+    pub affiliation: Option<String>,
+    /// Its page.
+    pub link: Option<String>,
+    /// In which it wants to be ranked.
+    pub division: Option<DivisionName>,
+    /// How the organisers reach it; nobody else sees it.
+    pub contact: String,
+    /// Which terms were accepted.
+    pub accepted_terms: Option<u32>,
+    /// When it came.
+    pub created_at: Timestamp,
+    /// What became of it.
+    pub state: RegistrationState,
+}
+
+struct Row {
+    id: Text<RegistrationId>,
+    team_name: Text<TeamName>,
+    affiliation: Option<String>,
+    link: Option<String>,
+    division: Option<Text<DivisionName>>,
+    contact: String,
+    accepted_terms: Option<u32>,
+    created_at: Instant,
+    decided_at: Option<Instant>,
+    reason: Option<String>,
+    team_id: Option<Text<TeamId>>,
+}
+
+impl From<Row> for Registration {
+    fn from(row: Row) -> Self {
+        let state = match (row.decided_at, row.team_id, row.reason) {
+            (Some(at), Some(team), _) => RegistrationState::Approved {
+                at: at.0,
+                team: team.0,
+            },
+            (Some(at), None, Some(reason)) => RegistrationState::Refused { at: at.0, reason },
+            _ => RegistrationState::Waiting,
+        };
+        Self {
+            id: row.id.0,
+            team_name: row.team_name.0,
+            affiliation: row.affiliation,
+            link: row.link,
+            division: row.division.map(|name| name.0),
+            contact: row.contact,
+            accepted_terms: row.accepted_terms,
+            created_at: row.created_at.0,
+            state,
+        }
+    }
+}
+
+/// `SELECT` of whole registrations; the argument is what follows `FROM registrations`.
+macro_rules! select_registrations {
+    ($tail:literal $(, $argument:expr)*) => {
+        sqlx::query_as!(
+            Row,
+            r#"SELECT id AS "id: Text<RegistrationId>", team_name AS "team_name: Text<TeamName>", affiliation, link,
+                      division AS "division: Text<DivisionName>", contact, accepted_terms AS "accepted_terms: u32",
+                      created_at AS "created_at: Instant", decided_at AS "decided_at: Instant", reason,
+                      team_id AS "team_id: Text<TeamId>"
+               FROM registrations "# + $tail
+            $(, $argument)*
+        )
+    };
+}
+
+/// All that ever came, the newest first.
+pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Registration>> {
+    let rows = select_registrations!("ORDER BY created_at DESC, id DESC")
+        .fetch_all(connection)
+        .await?;
+    Ok(rows.into_iter().map(Registration::from).collect())
+}
+
+pub(crate) async fn find(
+    connection: &mut SqliteConnection,
+    id: RegistrationId,
+) -> Result<Registration> {
+    let id = Text(id);
+    select_registrations!("WHERE id = ?", id)
+        .fetch_optional(connection)
+        .await?
+        .map(Registration::from)
+        .ok_or(StoreError::NotFound("registration"))
+}
+
+pub(crate) async fn by_code(
+    connection: &mut SqliteConnection,
+    code_hash: [u8; 32],
+) -> Result<Option<Registration>> {
+    let code_hash = Bytes32(code_hash);
+    let row = select_registrations!("WHERE code_hash = ?", code_hash)
+        .fetch_optional(connection)
+        .await?;
+    Ok(row.map(Registration::from))
+}
+
+/// The hash of the code that who registered has.
+pub(crate) async fn code_hash(
+    connection: &mut SqliteConnection,
+    id: RegistrationId,
+) -> Result<[u8; 32]> {
+    let id = Text(id);
+    let hash = sqlx::query_scalar!(
+        r#"SELECT code_hash AS "hash: Bytes32" FROM registrations WHERE id = ?"#,
+        id
+    )
+    .fetch_one(connection)
+    .await?;
+    Ok(hash.0)
+}
+
+pub(crate) async fn count_waiting(connection: &mut SqliteConnection) -> Result<i64> {
+    Ok(
+        sqlx::query_scalar!("SELECT COUNT(*) FROM registrations WHERE state = 'waiting'")
+            .fetch_one(connection)
+            .await?,
+    )
+}
+
+/// Does one of this name wait?
+pub(crate) async fn waits(connection: &mut SqliteConnection, name: &TeamName) -> Result<bool> {
+    let name = name.as_str();
+    Ok(sqlx::query_scalar!(
+        r#"SELECT EXISTS (SELECT 1 FROM registrations WHERE state = 'waiting' AND team_name = ? COLLATE NOCASE)
+                  AS "waits!: bool""#,
+        name
+    )
+    .fetch_one(connection)
+    .await?)
+}
+
+pub(crate) async fn insert(
+    connection: &mut SqliteConnection,
+    registration: &Registration,
+    code_hash: [u8; 32],
+) -> Result<()> {
+    let (id, code_hash) = (Text(registration.id), Bytes32(code_hash));
+    let name = registration.team_name.as_str();
+    let division = registration.division.as_ref().map(DivisionName::as_str);
+    let created_at = Instant(registration.created_at);
+    sqlx::query!(
+        "INSERT INTO registrations (id, code_hash, team_name, affiliation, link, division, contact, accepted_terms,
+                                    created_at, state)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, 'waiting')",
+        id,
+        code_hash,
+        name,
+        registration.affiliation,
+        registration.link,
+        division,
+        registration.contact,
+        registration.accepted_terms,
+        created_at,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+pub(crate) async fn set_approved(
+    connection: &mut SqliteConnection,
+    id: RegistrationId,
+    team: TeamId,
+    at: Timestamp,
+) -> Result<()> {
+    let (id, team, at) = (Text(id), Text(team), Instant(at));
+    sqlx::query!(
+        "UPDATE registrations SET state = 'approved', decided_at = ?, team_id = ? WHERE id = ?",
+        at,
+        team,
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+pub(crate) async fn set_refused(
+    connection: &mut SqliteConnection,
+    id: RegistrationId,
+    reason: &str,
+    at: Timestamp,
+) -> Result<()> {
+    let (id, at) = (Text(id), Instant(at));
+    sqlx::query!(
+        "UPDATE registrations SET state = 'refused', decided_at = ?, reason = ? WHERE id = ?",
+        at,
+        reason,
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}

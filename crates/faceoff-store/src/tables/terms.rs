@@ -1,0 +1,51 @@
+use crate::{column::Instant, error::Result};
+use jiff::Timestamp;
+use sqlx::SqliteConnection;
+
+/// What taking part means, as people accept it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Terms {
+    /// From 1; the newest is what counts.
+    pub version: u32,
+    /// When it was published.
+    pub since: Timestamp,
+    /// Plain text.
+    pub text: String,
+}
+
+/// All versions, the newest first.
+pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Terms>> {
+    let rows = sqlx::query!(
+        r#"SELECT version AS "version: u32", since AS "since: Instant", text FROM terms ORDER BY version DESC"#
+    )
+    .fetch_all(connection)
+    .await?;
+    let terms = rows.into_iter().map(|row| Terms {
+        version: row.version,
+        since: row.since.0,
+        text: row.text,
+    });
+    Ok(terms.collect())
+}
+
+/// The newest version's number, if there are terms.
+pub(crate) async fn newest(connection: &mut SqliteConnection) -> Result<Option<u32>> {
+    Ok(
+        sqlx::query_scalar!(r#"SELECT MAX(version) AS "version: u32" FROM terms"#)
+            .fetch_one(connection)
+            .await?,
+    )
+}
+
+pub(crate) async fn insert(connection: &mut SqliteConnection, terms: &Terms) -> Result<()> {
+    let since = Instant(terms.since);
+    sqlx::query!(
+        "INSERT INTO terms (version, since, text) VALUES (?, ?, ?)",
+        terms.version,
+        since,
+        terms.text
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}

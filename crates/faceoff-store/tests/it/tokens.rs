@@ -1,0 +1,129 @@
+//! Tokens: what each is worth, and from when on it is worth nothing.
+
+use crate::fixture::*;
+use faceoff_store::*;
+use faceoff_types::TokenId;
+use jiff::{SignedDuration, Timestamp};
+
+fn new(hash: u8, owner: TokenOwner, expires_at: Option<Timestamp>) -> NewToken {
+    NewToken {
+        hash: [hash; 32],
+        kind: TokenKind::Key,
+        owner,
+        name: "laptop".into(),
+        expires_at,
+    }
+}
+
+async fn refusal(f: &Fixture, hash: u8) -> Option<Refusal> {
+    let holder = f.store.holder([hash; 32], TokenKind::Key, f.now).await;
+    holder.unwrap().err()
+}
+
+#[tokio::test]
+async fn a_token_is_worth_something_until_it_expires_is_rotated_or_revoked() {
+    let mut f = Fixture::new().await;
+    let team = TokenOwner::Team(f.team("Alpha").await.id);
+    let soon = f.now + SignedDuration::from_secs(60);
+    let create = async |hash, expires_at| {
+        f.store
+            .create_token(Actor::Organiser, new(hash, team, expires_at), f.now)
+            .await
+    };
+    let brief = create(1, Some(soon)).await.unwrap();
+    let long = create(2, None).await.unwrap();
+    assert_eq!((brief.expires_at, long.expires_at), (Some(soon), None));
+    let past = create(3, Some(f.now)).await.unwrap_err();
+    assert!(past.to_string().contains("in the future"), "{past}");
+    let again = create(2, None).await.unwrap_err();
+    assert!(matches!(again, StoreError::Conflict(_)), "{again}");
+    assert_eq!(refusal(&f, 1).await, None);
+    assert_eq!(refusal(&f, 4).await, Some(Refusal::Unknown));
+    let as_cookie = f.store.holder([1; 32], TokenKind::Session, f.now).await;
+    assert_eq!(as_cookie.unwrap().unwrap_err(), Refusal::WrongKind);
+
+    f.store
+        .rotate_token(Actor::Organiser, long.id, [5; 32], f.now)
+        .await
+        .unwrap();
+    assert_eq!(refusal(&f, 2).await, Some(Refusal::Unknown));
+    assert_eq!(refusal(&f, 5).await, None);
+    f.later(60);
+    assert_eq!(refusal(&f, 1).await, Some(Refusal::Expired(soon)));
+    let rotated = f
+        .store
+        .rotate_token(Actor::Organiser, brief.id, [6; 32], f.now)
+        .await;
+    assert!(matches!(rotated, Err(StoreError::Conflict(_))));
+    for _ in 0..2 {
+        let revoked = f.store.revoke_token(Actor::Organiser, long.id, f.now).await;
+        assert_eq!(revoked.unwrap().revoked_at, Some(f.now));
+    }
+    assert_eq!(refusal(&f, 5).await, Some(Refusal::Revoked(f.now)));
+    let unknown = f
+        .store
+        .revoke_token(Actor::Organiser, TokenId::new(), f.now)
+        .await;
+    assert!(matches!(unknown, Err(StoreError::NotFound("token"))));
+    let events = f.store.events_after(0, 100).await.unwrap();
+    let revoked = events
+        .iter()
+        .filter(|record| matches!(record.event, Event::TokenRevoked { .. }));
+    assert_eq!(revoked.count(), 1, "what is revoked is not revoked again");
+}
+
+#[tokio::test]
+async fn the_last_use_is_noted_and_one_owner_has_so_many() {
+    let mut f = Fixture::new().await;
+    let team = f.team("Alpha").await;
+    let owner = TokenOwner::Team(team.id);
+    for hash in 1..u8::try_from(MAX_TOKENS).unwrap() {
+        f.store
+            .create_token(Actor::Organiser, new(hash, owner, None), f.now)
+            .await
+            .unwrap();
+    }
+    let many = f
+        .store
+        .create_token(Actor::Organiser, new(200, owner, None), f.now)
+        .await
+        .unwrap_err();
+    assert!(many.to_string().contains("no more than that"), "{many}");
+    let used = f.store.tokens().await.unwrap().remove(3);
+    assert_eq!(used.last_used_at, None);
+    f.later(90);
+    f.store.token_used(&used, f.now).await.unwrap();
+    let used = f.store.token(used.id).await.unwrap();
+    assert_eq!(used.last_used_at, Some(f.now));
+    // One that is worth nothing makes room.
+    f.store
+        .revoke_token(Actor::Organiser, used.id, f.now)
+        .await
+        .unwrap();
+    f.store
+        .create_token(Actor::Organiser, new(200, owner, None), f.now)
+        .await
+        .unwrap();
+}
+
+#[tokio::test]
+async fn the_hosts_token_follows_its_file_and_stays_revoked() {
+    let f = Fixture::new().await;
+    assert!(f.store.set_host_token([1; 32], f.now).await.unwrap());
+    assert!(f.store.set_host_token([1; 32], f.now).await.unwrap());
+    let other = f
+        .store
+        .create_token(Actor::Organiser, new(9, TokenOwner::Host, None), f.now)
+        .await
+        .unwrap();
+    assert!(f.store.set_host_token([2; 32], f.now).await.unwrap());
+    assert_eq!(refusal(&f, 1).await, Some(Refusal::Revoked(f.now)));
+    assert_eq!(refusal(&f, 2).await, None);
+    assert_eq!(refusal(&f, 9).await, None, "named by hand, it is no file's");
+    assert!(!f.store.set_host_token([1; 32], f.now).await.unwrap());
+    f.store
+        .revoke_token(Actor::Organiser, other.id, f.now)
+        .await
+        .unwrap();
+    assert!(!f.store.set_host_token([9; 32], f.now).await.unwrap());
+}
