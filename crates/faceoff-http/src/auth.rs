@@ -196,7 +196,7 @@ fn refused(refusal: Refusal) -> Problem {
             "what came as a token is the cookie of a page; make a token with POST /api/v1/tokens".to_owned()
         }
         Refusal::Revoked(at) => format!(
-            "the token was revoked, or its person has left, by {}. Use another one, or ask the organiser for one",
+            "the token was revoked or replaced, or its person has left, by {}. Use another one, or ask the organiser for one",
             shown(at)
         ),
         Refusal::Expired(at) => format!(

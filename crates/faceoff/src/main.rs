@@ -45,6 +45,10 @@ enum Command {
     /// Choose which submission plays at the next cut.
     Activate(commands::activate::ActivateCommand),
     Submissions(commands::submissions::SubmissionsCommand),
+    Join(commands::join::JoinCommand),
+    Whoami(commands::whoami::WhoamiCommand),
+    Team(commands::team::TeamCommand),
+    Token(commands::token::TokenCommand),
     /// Organise a running competition.
     Admin(commands::admin::AdminCommand),
     /// Check what this host offers and what is missing.
@@ -65,6 +69,10 @@ fn main() -> ExitCode {
         Command::Submit(command) => command.run(),
         Command::Activate(command) => command.run(),
         Command::Submissions(command) => command.run(),
+        Command::Join(command) => command.run(),
+        Command::Whoami(command) => command.run(),
+        Command::Team(command) => command.run(),
+        Command::Token(command) => command.run(),
         Command::Admin(command) => command.run(),
         Command::Doctor(command) => command.run(),
     };

@@ -53,7 +53,7 @@ pub(super) fn render(page: &impl Template) -> Result<Response, PageProblem> {
 }
 
 /// A problem, shown as a page.
-pub(super) struct PageProblem(Problem);
+pub(super) struct PageProblem(pub(super) Problem);
 
 impl From<Problem> for PageProblem {
     fn from(problem: Problem) -> Self {

@@ -3,20 +3,31 @@
 //! [`views`](crate::views).
 
 mod ablation;
+mod account;
+mod announcements;
 mod assets;
 mod board;
 mod comparison;
 mod evaluation;
 mod figures;
 mod frame;
+mod join;
+mod log;
 mod problems;
+mod register;
 mod season;
+mod sign_in;
 mod unknown;
 
 pub(crate) use unknown::{unknown_method, unknown_path};
 
-use crate::{app::App, layers};
-use axum::{Router, middleware, routing::get};
+use crate::{app::App, extract::MAX_JSON_BYTES, layers};
+use axum::{
+    Router,
+    extract::DefaultBodyLimit,
+    middleware,
+    routing::{get, post},
+};
 use std::time::Duration;
 
 /// All pages and their assets.
@@ -29,7 +40,15 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .route("/season", get(season::page))
         .route("/submissions/{id}/ablation", get(ablation::page))
         .route("/problems", get(problems::page))
+        .route("/announcements", get(announcements::page))
+        .route("/sign-in", get(sign_in::page).post(sign_in::submit))
+        .route("/sign-out", post(sign_in::sign_out))
+        .route("/account", get(account::page))
+        .route("/join/{code}", get(join::page).post(join::submit))
+        .route("/register", get(register::page).post(register::submit))
+        .route("/log", get(log::page))
         .route(assets::STYLE_PATH, get(assets::style))
         .route(assets::ICON_PATH, get(assets::icon))
         .layer(middleware::from_fn_with_state(patience, layers::time_out))
+        .layer(DefaultBodyLimit::max(MAX_JSON_BYTES))
 }

@@ -185,7 +185,7 @@ impl Store {
     /// nothing.
     pub async fn create_token(&self, actor: Actor, new: NewToken, now: Timestamp) -> Result<Token> {
         self.write(actor, now, async |tx| {
-            if let Some(long_ago) = now.checked_sub(SESSION_SHOWN).ok() {
+            if let Ok(long_ago) = now.checked_sub(SESSION_SHOWN) {
                 tokens::forget(tx, long_ago).await?;
             }
             add(tx, new).await

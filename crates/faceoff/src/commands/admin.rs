@@ -1,23 +1,28 @@
 //! `faceoff admin`: organises a running competition through its API.
 
-mod output;
+mod news;
+mod people;
 mod stage;
 
-use super::serve::ADMIN_TOKEN_FILE;
+use super::{
+    output::{or_none, print},
+    serve::ADMIN_TOKEN_FILE,
+    team::team_text,
+    token::{self, TokenAction},
+};
 use crate::{client::Client, config::Config};
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
 use faceoff_http::{
-    requests::Decision,
+    requests::{Decision, TeamChange},
     views::{
         evaluation::{EvaluationStatus, EvaluationView},
         event::EventView,
         season::SeasonView,
     },
 };
-use faceoff_types::{EvaluationId, StageDay, TeamId};
+use faceoff_types::{DivisionName, EvaluationId, QuestionId, StageDay, TeamId, TeamName};
 use jiff::civil::Date;
-use output::{or_none, print};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -58,7 +63,57 @@ enum Action {
         /// 1 to 40 letters, digits, spaces and . _ -
         name: String,
     },
-    /// Replace a team's token; the old one is worth nothing from then on
+    /// Change a team's name or division
+    ChangeTeam {
+        /// The team's name or id
+        team: String,
+        /// Another name
+        #[arg(long, value_name = "NAME")]
+        rename: Option<TeamName>,
+        /// In which it is ranked; empty: none
+        #[arg(long)]
+        division: Option<String>,
+    },
+    /// Invite and remove people, organisers and members of teams
+    People {
+        #[command(subcommand)]
+        action: people::PeopleAction,
+    },
+    /// Let teams register, approve and refuse them, set the divisions
+    Registration {
+        #[command(subcommand)]
+        action: people::RegistrationAction,
+    },
+    /// Make, list, rotate and revoke tokens
+    Token {
+        #[command(subcommand)]
+        action: TokenAction,
+    },
+    /// Tell everybody
+    Announce {
+        /// One line
+        title: String,
+        /// Plain text
+        text: String,
+    },
+    /// List what teams have asked
+    Questions,
+    /// Answer a question
+    Answer {
+        /// The question's id
+        question: QuestionId,
+        /// Plain text
+        text: String,
+        /// Let everybody read question and answer; who asked stays with the organisers
+        #[arg(long)]
+        public: bool,
+    },
+    /// Publish other terms of taking part
+    PublishTerms {
+        /// A text file
+        file: PathBuf,
+    },
+    /// Replace a team's own tokens by one; the old ones are worth nothing from then on
     NewToken {
         /// The team's name or id
         team: String,
@@ -142,10 +197,10 @@ enum Action {
     Teams,
     /// List what was changed, when and by whom, the newest first
     Log {
-        /// Who: organiser, team, team:ID, schedule, worker, worker:NAME or server
+        /// Who: organiser (the host), person:ID, team:ID, visitor, schedule, worker:NAME or server; person, team, worker: all
         #[arg(long)]
         actor: Option<String>,
-        /// About what: season, stage:ID, day:STAGE/DATE, team:ID, submission:ID, evaluation:ID or ablation:ID
+        /// About what: season, stage:ID, day:STAGE/DATE, team:ID, submission:ID, evaluation:ID, person:ID …
         #[arg(long)]
         subject: Option<String>,
         /// What happened, e.g. day_started
@@ -184,11 +239,7 @@ impl AdminCommand {
     /// # Errors
     /// If there is no token, or the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
-        tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()
-            .context("starting the async runtime")?
-            .block_on(self.act())
+        super::block_on(self.act())
     }
 
     async fn act(self) -> anyhow::Result<()> {
@@ -207,6 +258,40 @@ impl AdminCommand {
                     )
                 })
             }
+            Action::ChangeTeam {
+                team,
+                rename,
+                division,
+            } => {
+                let team = find_team(&client, &team).await?;
+                let division = match division.as_deref().map(str::trim) {
+                    None => None,
+                    Some("") => Some(None),
+                    Some(name) => Some(Some(name.parse::<DivisionName>().context("--division")?)),
+                };
+                let change = TeamChange {
+                    name: rename,
+                    division,
+                    ..TeamChange::default()
+                };
+                let team = client.change_team(team, &change).await?;
+                print(self.json, &team, || team_text(&team))
+            }
+            Action::People { action } => people::people(&client, self.json, action).await,
+            Action::Registration { action } => {
+                people::registrations(&client, self.json, action).await
+            }
+            Action::Token { action } => token::act(&client, self.json, action).await,
+            Action::Announce { title, text } => {
+                news::announce(&client, self.json, title, text).await
+            }
+            Action::Questions => news::questions(&client, self.json).await,
+            Action::Answer {
+                question,
+                text,
+                public,
+            } => news::answer(&client, self.json, question, text, public).await,
+            Action::PublishTerms { file } => news::publish_terms(&client, self.json, &file).await,
             Action::NewToken { team } => {
                 let team = find_team(&client, &team).await?;
                 let replaced = client.replace_token(team).await?;
@@ -404,7 +489,10 @@ fn event_line(event: &EventView) -> String {
         "{:>6}  {}  {}  {}  {}  {}",
         event.id,
         event.at.strftime("%Y-%m-%d %H:%M:%S UTC"),
-        event.actor,
+        match &event.actor_name {
+            Some(name) => format!("{} ({name})", event.actor),
+            None => event.actor.clone(),
+        },
         event.kind,
         event.subject,
         details.join(" ")

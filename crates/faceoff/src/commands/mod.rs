@@ -8,15 +8,31 @@ pub mod demo;
 pub mod doctor;
 pub mod eval;
 pub mod init;
+pub mod join;
+mod output;
+mod people;
 pub mod score;
 pub mod serve;
 pub mod sim;
 pub mod submissions;
 pub mod submit;
+pub mod team;
 mod team_server;
+pub mod token;
 pub mod verify;
+pub mod whoami;
 
+use anyhow::Context;
 use std::process::ExitCode;
+
+/// Runs what talks to a server.
+fn block_on<T>(work: impl Future<Output = anyhow::Result<T>>) -> anyhow::Result<T> {
+    tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .context("starting the async runtime")?
+        .block_on(work)
+}
 
 /// Success, or the error with its causes on standard error and status 1.
 pub fn exit_code(outcome: anyhow::Result<()>) -> ExitCode {

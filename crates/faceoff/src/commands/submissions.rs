@@ -1,7 +1,6 @@
 //! `faceoff submissions`: a team's uploads, and what it does with them.
 
 use super::{submit::next_cut, team_server::TeamServer};
-use anyhow::Context;
 use clap::{Args, Subcommand};
 use faceoff_http::views::submission::{SubmissionStatus, SubmissionView};
 use faceoff_types::SubmissionId;
@@ -44,11 +43,7 @@ impl SubmissionsCommand {
     /// # Errors
     /// If the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
-        tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()
-            .context("starting the async runtime")?
-            .block_on(self.act())
+        super::block_on(self.act())
     }
 
     async fn act(self) -> anyhow::Result<()> {

@@ -1,7 +1,9 @@
 //! `faceoff admin stage`: makes, changes and lists the season's stages.
 
-use super::output::{or_none, print};
-use crate::client::Client;
+use crate::{
+    client::Client,
+    commands::output::{or_none, print},
+};
 use anyhow::{Context, bail, ensure};
 use clap::{Args, Subcommand};
 use faceoff_http::{

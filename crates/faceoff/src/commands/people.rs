@@ -1,0 +1,40 @@
+//! How commands print people and invitations.
+
+use faceoff_http::{
+    requests::InvitedRole,
+    views::{invitation::InvitationView, person::PersonView},
+};
+
+/// A person in a list.
+pub(super) fn person_line(person: &PersonView) -> String {
+    let of = match person.team {
+        Some(team) => format!("member of {team}"),
+        None => "organiser".to_owned(),
+    };
+    let left = person.left_at.map_or_else(String::new, |at| {
+        format!("  left {}", at.strftime("%Y-%m-%d %H:%M UTC"))
+    });
+    format!(
+        "{}  {:<40} {of}  since {}{left}",
+        person.id,
+        person.name,
+        person.joined_at.strftime("%Y-%m-%d")
+    )
+}
+
+/// An invitation in a list.
+pub(super) fn invitation_line(invitation: &InvitationView) -> String {
+    let role = match invitation.role {
+        InvitedRole::Organiser => "organiser",
+        InvitedRole::Member => "member",
+        InvitedRole::Founder => "founder",
+        InvitedRole::Return => "return",
+    };
+    format!(
+        "{}  {role:<10} {:<10} for {}, until {}",
+        invitation.id,
+        invitation.state,
+        invitation.note,
+        invitation.expires_at.strftime("%Y-%m-%d %H:%M UTC")
+    )
+}
