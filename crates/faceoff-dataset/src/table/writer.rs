@@ -19,9 +19,9 @@ const ROW_GROUP_ROWS: usize = 32_768;
 /// Rows after which a page is closed. Whoever reads one episode unpacks a page or two per column;
 /// smaller ones would cost the whole dataset more than they save there.
 const PAGE_ROWS: usize = 1024;
-/// The first level that compresses the streams of leading and of trailing bytes apart; higher ones
-/// gain less than a percent.
-const ZSTD_LEVEL: i32 = 3;
+/// Most of what a recording costs is the search for repetitions in bytes that have none; higher levels search
+/// longer and gain a percent.
+const ZSTD_LEVEL: i32 = 1;
 
 /// One Parquet file being written.
 pub(crate) struct TableWriter {

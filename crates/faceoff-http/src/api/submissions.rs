@@ -108,6 +108,8 @@ pub(crate) async fn label_submission(
     PathParam(id): PathParam<SubmissionId>,
     Body(Label { label }): Body<Label>,
 ) -> Result<Json<SubmissionView>, Problem> {
+    let found = app.store.submission(id).await;
+    caller.visible("submission", found, |submission| submission.team)?;
     let label = label.as_deref().map(str::trim);
     let chars = label.map_or(1, |label| label.chars().count());
     if !(1..=MAX_LABEL_CHARS).contains(&chars) {
@@ -115,8 +117,6 @@ pub(crate) async fn label_submission(
         return Err(Problem::invalid("label", detail));
     }
     let actor = caller.actor();
-    let found = app.store.submission(id).await;
-    caller.visible("submission", found, |submission| submission.team)?;
     let now = app.config.clock.now();
     let submission = app.store.label_submission(actor, id, label, now).await?;
     SubmissionView::of(&app, submission).await.map(Json)

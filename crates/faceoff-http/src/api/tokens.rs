@@ -97,8 +97,8 @@ pub(crate) async fn create_token(
     State(app): State<App>,
     Body(new): Body<requests::NewToken>,
 ) -> Result<(StatusCode, Json<NewTokenView>), Problem> {
-    let name = text::line("name", &new.name, NAME_CHARS)?;
     let owner = owner(&caller, new.team)?;
+    let name = text::line("name", &new.name, NAME_CHARS)?;
     let kind = match owner {
         TokenOwner::Host => SecretKind::Admin,
         TokenOwner::Team(id) => {

@@ -14,6 +14,7 @@ mod events;
 mod openapi;
 mod people;
 mod problems;
+mod roles;
 mod room;
 mod rulings;
 mod season;

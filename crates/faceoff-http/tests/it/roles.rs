@@ -1,0 +1,315 @@
+//! Every route for every role: who may, who may not, and for whom there is nothing to see.
+
+use crate::site::{ADMIN, Answer, GZIP, Site, text};
+use reqwest::Method;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+
+/// Who calls, in the order of the table's columns.
+const ROLES: [&str; 7] = [
+    "visitor",
+    "another team's program",
+    "another team's member",
+    "the team's program",
+    "its member",
+    "an organiser",
+    "the host",
+];
+
+/// What a request answers, as far as its role decides it: `+` it is for them (done, or refused for what it asks), `?`
+/// no token, `-` not with this one, `0` there is nothing for them to see.
+///
+/// The ids in paths are those of the team, of its member, and of what it uploaded and played.
+const TABLE: &[(&str, &str)] = &[
+    ("GET /announcements", "+++++++"),
+    ("POST /announcements", "?----++"),
+    ("GET /board", "+++++++"),
+    ("GET /board/{task}", "+++++++"),
+    ("POST /days", "?----++"),
+    ("GET /evaluations", "?++++++"),
+    ("GET /evaluations/{id}", "?00++++"),
+    ("POST /evaluations/{id}/cancel", "?----++"),
+    ("GET /evaluations/{id}/compare/{other}", "+++++++"),
+    ("GET /evaluations/{id}/dataset", "?00++++"),
+    ("POST /evaluations/{id}/rerun", "?----++"),
+    ("GET /evaluations/{id}/violations", "?00++++"),
+    ("POST /evaluations/{id}/void", "?----++"),
+    ("GET /events", "?----++"),
+    ("GET /health", "+++++++"),
+    ("GET /health/live", "+++++++"),
+    ("GET /invitations", "?++++++"),
+    ("POST /invitations", "?-+-+++"),
+    ("POST /invitations/accept", "+++++++"),
+    ("DELETE /invitations/{id}", "?000+++"),
+    ("GET /me", "?++++--"),
+    ("GET /people", "?++++++"),
+    ("PUT /people/{id}/password", "?00-+--"),
+    ("POST /people/{id}/remove", "?00-+++"),
+    ("GET /questions", "+++++++"),
+    ("POST /questions", "?++++--"),
+    ("PUT /questions/{id}/answer", "?----++"),
+    ("POST /queue/pause", "?----++"),
+    ("POST /queue/resume", "?----++"),
+    ("GET /registrations", "?----++"),
+    ("POST /registrations", "+++++++"),
+    ("POST /registrations/{id}/approve", "?----++"),
+    ("POST /registrations/{id}/refuse", "?----++"),
+    ("GET /season", "+++++++"),
+    ("PATCH /season", "?----++"),
+    ("POST /season/close", "?----++"),
+    ("POST /sessions", "+++++++"),
+    ("DELETE /sessions/current", "?++++++"),
+    ("GET /stages", "+++++++"),
+    ("POST /stages", "?----++"),
+    ("GET /stages/{id}", "+++++++"),
+    ("PATCH /stages/{id}", "?----++"),
+    ("POST /stages/{id}/days/{day}/void", "?----++"),
+    ("GET /submissions", "?++++--"),
+    ("POST /submissions", "?++++--"),
+    ("GET /submissions/{id}", "?00++++"),
+    ("PATCH /submissions/{id}", "?00++--"),
+    ("GET /submissions/{id}/ablation", "?00++++"),
+    ("POST /submissions/{id}/ablation", "?----++"),
+    ("POST /submissions/{id}/activate", "?00++--"),
+    ("POST /submissions/{id}/evaluations", "+++++++"),
+    ("POST /submissions/{id}/withdraw", "?00++--"),
+    ("GET /teams", "?----++"),
+    ("POST /teams", "?----++"),
+    ("GET /teams/{id}", "+++++++"),
+    ("PATCH /teams/{id}", "?00-+++"),
+    ("POST /teams/{id}/disqualify", "?----++"),
+    ("POST /teams/{id}/reinstate", "?----++"),
+    ("POST /teams/{id}/retire", "?00-+++"),
+    ("POST /teams/{id}/return", "?00-+++"),
+    ("POST /teams/{id}/token", "?----++"),
+    ("GET /terms", "+++++++"),
+    ("POST /terms", "?----++"),
+    ("POST /terms/{version}/accept", "?-+-++-"),
+    ("GET /tokens", "?++++++"),
+    ("POST /tokens", "?-+-+++"),
+    ("DELETE /tokens/{id}", "?00++++"),
+    ("POST /tokens/{id}/rotate", "?00++++"),
+    ("GET /whoami", "?++++++"),
+];
+
+/// A body that gets past parsing, and does nothing that the next role would trip over.
+fn body(route: &str) -> Value {
+    match route {
+        "POST /announcements" => json!({ "title": "", "text": "" }),
+        "POST /days" => json!({ "stage": "00000000-0000-7000-8000-000000000000" }),
+        "POST /evaluations/{id}/cancel" | "POST /registrations/{id}/refuse" => {
+            json!({ "reason": "" })
+        }
+        "POST /evaluations/{id}/void"
+        | "POST /stages/{id}/days/{day}/void"
+        | "POST /teams/{id}/disqualify"
+        | "POST /teams/{id}/reinstate"
+        | "POST /queue/pause" => json!({ "reason": "" }),
+        "POST /invitations" => json!({ "role": "member", "note": "" }),
+        "POST /invitations/accept" => json!({ "code": "" }),
+        "PUT /people/{id}/password" => json!({ "old": "", "password": "" }),
+        "POST /questions" | "POST /terms" => json!({ "text": "" }),
+        "PUT /questions/{id}/answer" => json!({ "text": "", "public": false }),
+        "POST /registrations" => json!({ "team": { "name": "A" }, "contact": "" }),
+        "POST /season/close" => json!({ "confirm": "" }),
+        "POST /sessions" => json!({ "name": "", "password": "" }),
+        "POST /stages" => json!({ "name": "" }),
+        "POST /submissions/{id}/ablation" => json!({ "episodes_per_task": 0 }),
+        "PATCH /submissions/{id}" => json!({ "label": "" }),
+        "POST /teams" | "POST /tokens" => json!({ "name": "" }),
+        _ => json!({}),
+    }
+}
+
+struct Cast {
+    site: Site,
+    /// In the order of [`ROLES`].
+    tokens: Vec<Option<String>>,
+    /// What stands in a path's `{id}`, by the word before it.
+    ids: BTreeMap<&'static str, String>,
+}
+
+impl Cast {
+    async fn gather() -> Self {
+        let site = Site::start().await;
+        let (alpha, beta) = (site.team("Alpha").await, site.team("Beta").await);
+        let mut invited = Vec::new();
+        for (name, role) in [
+            (
+                "Ada",
+                json!({ "role": "member", "team": alpha.id, "note": "Ada" }),
+            ),
+            (
+                "Bob",
+                json!({ "role": "member", "team": beta.id, "note": "Bob" }),
+            ),
+            ("Grace", json!({ "role": "organiser", "note": "Grace" })),
+            (
+                "nobody yet",
+                json!({ "role": "member", "team": alpha.id, "note": "Carl" }),
+            ),
+        ] {
+            let made = site
+                .post("/api/v1/invitations", Some(ADMIN), &role)
+                .await
+                .json(201);
+            if name == "nobody yet" {
+                invited.push(("invitations", text(&made["id"])));
+                continue;
+            }
+            let join = json!({ "code": made["code"], "name": name });
+            let joined = site
+                .post("/api/v1/invitations/accept", None, &join)
+                .await
+                .json(201);
+            invited.push((name, text(&joined["secret"])));
+            if name == "Ada" {
+                invited.push(("people", text(&joined["person"]["id"])));
+            }
+        }
+        let of = |who: &str| {
+            let found = invited.iter().find(|(name, _)| *name == who);
+            found.unwrap().1.clone()
+        };
+        let submission = site.valid_submission(&alpha, "a").await;
+        let evaluation = site.evaluate(&alpha, &submission).await;
+        site.finish(&crate::site::result([0.5; 3], 10.0)).await;
+        let question = site
+            .post(
+                "/api/v1/questions",
+                Some(&alpha.token),
+                &json!({ "text": "?" }),
+            )
+            .await
+            .json(201);
+        let tokens = site.get("/api/v1/tokens", Some(ADMIN)).await.json(200);
+        let own = tokens
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|token| token["team"] == json!(alpha.id));
+        let last = |path: &str| path.rsplit('/').next().unwrap().to_owned();
+        let ids = BTreeMap::from([
+            ("evaluations", last(&evaluation)),
+            ("submissions", last(&submission)),
+            ("teams", alpha.id.clone()),
+            ("stages", site.stage().await.to_string()),
+            ("questions", text(&question["id"])),
+            ("tokens", text(&own.unwrap()["id"])),
+            ("people", of("people")),
+            ("invitations", of("invitations")),
+            (
+                "registrations",
+                "00000000-0000-7000-8000-000000000000".into(),
+            ),
+        ]);
+        let tokens = vec![
+            None,
+            Some(beta.token),
+            Some(of("Bob")),
+            Some(alpha.token),
+            Some(of("Ada")),
+            Some(of("Grace")),
+            Some(ADMIN.to_owned()),
+        ];
+        Self { site, tokens, ids }
+    }
+
+    fn path(&self, route: &str) -> String {
+        let (_, path) = route.split_once(' ').unwrap();
+        let resource = path.split('/').nth(1).unwrap();
+        let none = String::new();
+        let id = self.ids.get(resource).unwrap_or(&none);
+        let path = path
+            .replace("{id}", id)
+            .replace("{other}", id)
+            .replace("{task}", "hit")
+            .replace("{day}", "2020-01-01")
+            .replace("{version}", "7");
+        format!("/api/v1{path}")
+    }
+
+    async fn ask(&self, route: &str, role: usize) -> Answer {
+        let (method, _) = route.split_once(' ').unwrap();
+        let method: Method = method.parse().unwrap();
+        let token = self.tokens[role].as_deref();
+        let mut request = self.site.request(method.clone(), &self.path(route), token);
+        request = match route {
+            "POST /submissions" => request
+                .header("content-type", "text/plain")
+                .body(GZIP.to_vec()),
+            _ if method == Method::GET => request,
+            _ => request.json(&body(route)),
+        };
+        Answer::of(request.send().await.unwrap()).await
+    }
+}
+
+fn seen(route: &str, answer: &Answer) -> char {
+    let problem: Value = serde_json::from_str(&answer.body).unwrap_or_default();
+    match (answer.status.as_u16(), problem["type"].as_str()) {
+        (401, Some("/problems#unauthenticated")) => '?',
+        (403, Some("/problems#forbidden")) => '-',
+        (404, Some("/problems#not-found")) => '0',
+        // The dataset of this test is none that could be read; whoever gets so far may read it.
+        (500, _) if route.ends_with("/violations") => '+',
+        (500.., _) => panic!("{route}: {answer:?}"),
+        _ => '+',
+    }
+}
+
+#[tokio::test]
+async fn every_route_answers_each_role_as_the_table_says() {
+    let site = Site::start().await;
+    let document = site.get("/api/v1/openapi.json", None).await.json(200);
+    let mut routes: Vec<String> = Vec::new();
+    for (path, item) in document["paths"].as_object().unwrap() {
+        for method in item.as_object().unwrap().keys() {
+            let path = path.strip_prefix("/api/v1").unwrap();
+            routes.push(format!("{} {path}", method.to_uppercase()));
+        }
+    }
+    routes.sort();
+    let mut told: Vec<&str> = TABLE.iter().map(|(route, _)| *route).collect();
+    told.sort_unstable();
+    assert_eq!(routes, told, "the table has a row for every route");
+
+    let mut wrong = Vec::new();
+    for (route, expected) in TABLE {
+        // Who signs out, rotates or revokes is somebody else afterwards.
+        let is_drastic = ["DELETE", "rotate", "/token", "accept", "withdraw", "retire"]
+            .iter()
+            .any(|word| route.contains(word));
+        let mut cast = Cast::gather().await;
+        for (role, expected) in expected.chars().enumerate() {
+            if is_drastic && role > 0 {
+                cast = Cast::gather().await;
+            }
+            let answer = cast.ask(route, role).await;
+            let mut seen = seen(route, &answer);
+            // There is none of these; who may ask learns so.
+            if seen == '0' && expected == '+' && answer.body.contains("there is no such") {
+                let whole = [
+                    "registrations",
+                    "POST /days",
+                    "days/{day}/void",
+                    "/ablation",
+                ];
+                if whole.iter().any(|part| route.contains(part)) {
+                    seen = '+';
+                }
+            }
+            // Sign-in refuses what it does not know as everybody's.
+            if seen == '?' && *route == "POST /sessions" {
+                seen = '+';
+            }
+            if seen != expected {
+                wrong.push(format!(
+                    "{route} for {}: expected {expected}, got {seen}: {} {}",
+                    ROLES[role], answer.status, answer.body
+                ));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
