@@ -43,6 +43,10 @@ impl Caller {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Organiser;
 
+/// What the organiser sees of what everybody may ask for: the proof, or why there is none.
+#[derive(Debug)]
+pub(crate) struct PerhapsOrganiser(pub(crate) Result<Organiser, Problem>);
+
 /// Proof that the caller is this team.
 #[derive(Debug, Clone)]
 pub(crate) struct TeamCaller(pub(crate) Team);
@@ -99,6 +103,14 @@ impl FromRequestParts<App> for Organiser {
                 ),
             )),
         }
+    }
+}
+
+impl FromRequestParts<App> for PerhapsOrganiser {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
+        Ok(Self(Organiser::from_request_parts(parts, app).await))
     }
 }
 

@@ -1,7 +1,7 @@
 //! What clients send to the API.
 
-use faceoff_types::{Profile, Schedule, StageId, Task, Zone};
-use jiff::Timestamp;
+use faceoff_types::{DayDeadline, Profile, Schedule, StageId, Task, TeamId, Zone};
+use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use utoipa::{IntoParams, ToSchema};
 
@@ -24,6 +24,33 @@ pub struct BoardQuery {
     /// By which of the stage's rules; without it by the newest with results. No board mixes two.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub revision: Option<u32>,
+    /// The organiser: with what was finished since the boards were frozen.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[param(required = false)]
+    pub live: bool,
+}
+
+/// A day to be played after all.
+#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MissedDay {
+    /// Its date in the stage's zone, one that has passed.
+    pub day: Date,
+    /// Everybody may read it; 1 to 500 characters.
+    pub reason: String,
+}
+
+/// One more evaluation of a day.
+#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ExtraTurn {
+    /// Whose.
+    pub team: TeamId,
+    /// Everybody may read it; 1 to 500 characters.
+    pub reason: String,
+    /// The team's name, if a result of the day that counts is to be replaced. Without it nothing is done then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub confirm: Option<String>,
 }
 
 /// Which day is to start.
@@ -72,6 +99,13 @@ pub struct NewStage {
     /// Episodes of one unit of work.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub episodes_per_shard: Option<u32>,
+    /// Until when a day may be played: "next_cut", "never" or {"hours":30}; left out, until the next cut.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "deadline"
+    )]
+    pub day_deadline: Option<DayDeadline>,
 }
 
 /// What of a stage is to be another; what is left out stays as it is.
@@ -121,9 +155,19 @@ pub struct StageChange {
     /// Episodes of one unit of work.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub episodes_per_shard: Option<u32>,
+    /// Until when a day may be played: "next_cut", "never" or {"hours":30}; days that are under way follow.
+    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "deadline")]
+    pub day_deadline: Option<DayDeadline>,
     /// The stage's name, if other rules are to begin while it is open: its board begins anew then.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub confirm: Option<String>,
+}
+
+/// By way of a value, so that what is no deadline is told as a wrong value and not as wrong JSON.
+fn deadline<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<DayDeadline>, D::Error> {
+    let value = Option::<serde_json::Value>::deserialize(deserializer)?;
+    let parsed = value.map(serde_json::from_value).transpose();
+    parsed.map_err(serde::de::Error::custom)
 }
 
 /// Tells null from what was left out.

@@ -208,6 +208,11 @@ pub enum Event {
         /// As it was told to the team.
         reason: String,
     },
+    /// Its day's deadline came before it was played; the turn is given back.
+    EvaluationNotPlayed {
+        /// As it was told to the team.
+        reason: String,
+    },
     /// Its result does not count any more; the turn is given back.
     EvaluationVoided {
         /// As everybody may read it.
@@ -271,9 +276,31 @@ pub enum Event {
         /// How many.
         evaluations: u32,
     },
+    /// The day's deadline has come: what was left of it is ended, each with an event of its own.
+    DayOverdue {
+        /// How many were not played.
+        not_played: u32,
+    },
     /// The day's seed is public: its last evaluation has ended (before there were cuts: its first
     /// dataset was handed out).
     DayReleased,
+    /// A day that was missed on its date starts after all.
+    MissedDayStarted {
+        /// As everybody may read it.
+        reason: String,
+    },
+    /// It is a turn beside the day's own.
+    ExtraTurnGiven {
+        /// As everybody may read it.
+        reason: String,
+    },
+    /// The stage's boards show from now on what they show now.
+    BoardsFrozen {
+        /// As everybody may read it.
+        reason: String,
+    },
+    /// The stage's boards show everything again.
+    BoardsUnfrozen,
     /// The season has another stage.
     StageCreated {
         /// As it was then.

@@ -51,7 +51,11 @@ pub use operations::{
     tidy::{RECORDINGS_KEPT, UNCHECKED_KEPT},
 };
 pub use queue::Claim;
-pub use reads::{board::BoardRecord, runs::RunFaults};
+pub use reads::{
+    board::{BoardRecord, BoardScope},
+    outlook::{OpenWork, Outlook, QueuePlace},
+    runs::RunFaults,
+};
 pub use room::Room;
 pub use store::Store;
 pub use tables::{
@@ -60,6 +64,7 @@ pub use tables::{
     days::Day,
     evaluations::{Evaluation, EvaluationState},
     events::EventFilter,
+    measured::Measured,
     plan::RunPlan,
     rulings::Ruling,
     runs::Run,

@@ -96,3 +96,8 @@ id!(
     ShardId,
     "shard"
 );
+id!(
+    /// Evaluations that do not count: a trial, or a re-evaluation until it is applied.
+    ProposalId,
+    "proposal"
+);

@@ -8,7 +8,7 @@ use crate::{
     paths,
     problem::Problem,
     requests::Cancellation,
-    views::{evaluation::EvaluationView, stage},
+    views::{evaluation::EvaluationView, queue, stage},
 };
 use axum::{
     Json,
@@ -40,7 +40,7 @@ pub(crate) async fn list_evaluations(
     State(app): State<App>,
     QueryParams(query): QueryParams<DayQuery>,
 ) -> Result<Json<Vec<EvaluationView>>, Problem> {
-    let evaluations = match caller {
+    let mut evaluations = match caller {
         Caller::Organiser => {
             let day = match query.day {
                 Some(day) => day,
@@ -54,6 +54,7 @@ pub(crate) async fn list_evaluations(
             own
         }
     };
+    queue::place_evaluations(&app, &mut evaluations).await?;
     Ok(Json(evaluations))
 }
 

@@ -4,6 +4,7 @@
 mod ablations;
 mod board;
 mod bundle_stream;
+mod capacity;
 mod comparisons;
 mod datasets;
 mod days;
@@ -11,6 +12,7 @@ mod document;
 mod episodes;
 mod evaluations;
 mod events;
+mod freezes;
 mod health;
 mod me;
 mod rulings;
@@ -18,6 +20,7 @@ mod season;
 mod stages;
 mod submissions;
 mod teams;
+mod turns;
 mod upload;
 
 use crate::{app::App, extract::MAX_JSON_BYTES, layers, paths::API_BASE};
@@ -41,7 +44,12 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(teams::replace_token))
         .routes(routes!(stages::list_stages, stages::create_stage))
         .routes(routes!(stages::stage, stages::change_stage))
+        .routes(routes!(capacity::capacity))
         .routes(routes!(days::start_day))
+        .routes(routes!(turns::start_missed_day))
+        .routes(routes!(turns::extra_turn))
+        .routes(routes!(freezes::freeze_boards))
+        .routes(routes!(freezes::unfreeze_boards))
         .routes(routes!(events::list_events))
         .routes(routes!(submissions::list_submissions))
         .routes(routes!(

@@ -29,7 +29,7 @@ pub(super) fn checked_reason(reason: &str) -> Result<&str, Problem> {
 }
 
 /// Refuses a decision that does not name what it is about, and says what it would do.
-fn check_confirmed(decision: &Decision, name: &str, what: &str) -> Result<(), Problem> {
+pub(super) fn check_confirmed(decision: &Decision, name: &str, what: &str) -> Result<(), Problem> {
     if decision.confirm.as_deref() == Some(name) {
         return Ok(());
     }

@@ -1,6 +1,10 @@
 //! An evaluation on its way to a score or a failure.
 
-use super::{ruling::RulingView, task::TaskView};
+use super::{
+    queue::{self, QueueView},
+    ruling::RulingView,
+    task::TaskView,
+};
 use crate::{app::AppState, paths, problem::Problem, views::shown};
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::{Evaluation, EvaluationState};
@@ -32,10 +36,16 @@ pub struct EvaluationView {
     pub day: Date,
     /// When the day's last evaluation had ended, and all of the day came out; null until then.
     pub released_at: Option<Timestamp>,
+    /// What is not played by then is ended, until the day is released; null: however long it takes.
+    pub deadline_at: Option<Timestamp>,
     /// The evaluation that it plays again, one that was cancelled, voided or failed by our fault; absent
     /// otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rerun_of: Option<EvaluationId>,
+    /// It is a turn beside the day's own, and why; absent otherwise. Given after the day's release it plays other
+    /// episodes than the day's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub extra_turn: Option<String>,
     /// It does not count, if it was voided; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub voided: Option<RulingView>,
@@ -49,6 +59,11 @@ pub struct EvaluationView {
     pub created_at: Timestamp,
     /// How far it is.
     pub progress: Progress,
+    /// Where it stands in the queue; absent once it is over.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub queue: Option<QueueView>,
+    /// What happens next.
+    pub next: String,
     /// What has become of it.
     #[serde(flatten)]
     pub status: EvaluationStatus,
@@ -104,6 +119,13 @@ pub enum EvaluationStatus {
         /// What failed.
         reason: String,
     },
+    /// Its day's deadline came before all of it was played: for want of our capacity. The turn is given back.
+    NotPlayed {
+        /// When it was ended.
+        finished_at: Timestamp,
+        /// Which deadline.
+        reason: String,
+    },
     /// Stopped by the organiser.
     Cancelled {
         /// When it was stopped.
@@ -118,6 +140,15 @@ impl EvaluationStatus {
     #[must_use]
     pub const fn is_final(&self) -> bool {
         !matches!(self, Self::Queued | Self::Running | Self::Finalising)
+    }
+
+    /// When its score was published; `None` without one.
+    #[must_use]
+    pub const fn finished_at(&self) -> Option<Timestamp> {
+        match self {
+            Self::Finished { finished_at, .. } => Some(*finished_at),
+            _ => None,
+        }
     }
 }
 
@@ -195,7 +226,8 @@ impl EvaluationView {
         Self::of(app, app.store.evaluation(id).await?).await
     }
 
-    /// With faults and log, if it failed by them and its day is released.
+    /// With its place in the queue while it is under way; with faults and log, if it failed by them and its day is
+    /// released.
     pub(crate) async fn of(app: &AppState, evaluation: Evaluation) -> Result<Self, Problem> {
         let team = app.store.team(evaluation.team).await?;
         let run = evaluation.run;
@@ -207,6 +239,7 @@ impl EvaluationView {
             *faults = Some(of_run.faults.into_iter().map(FaultView::from).collect());
             *log = Some(shown(of_run.log));
         }
+        queue::place_evaluations(app, std::slice::from_mut(&mut view)).await?;
         Ok(view)
     }
 
@@ -265,6 +298,7 @@ impl EvaluationView {
             EvaluationState::Queued
             | EvaluationState::AgentFailed { .. }
             | EvaluationState::PlatformFailed { .. }
+            | EvaluationState::NotPlayed { .. }
             | EvaluationState::Cancelled { .. } => 0,
         };
         let status = match evaluation.state {
@@ -294,6 +328,13 @@ impl EvaluationView {
                 finished_at,
                 reason: shown(reason),
             },
+            EvaluationState::NotPlayed {
+                finished_at,
+                reason,
+            } => EvaluationStatus::NotPlayed {
+                finished_at,
+                reason,
+            },
             EvaluationState::Cancelled {
                 finished_at,
                 reason,
@@ -302,6 +343,7 @@ impl EvaluationView {
                 reason,
             },
         };
+        let voided = evaluation.voided.is_some();
         Self {
             id: evaluation.id,
             submission: evaluation.submission,
@@ -311,7 +353,9 @@ impl EvaluationView {
             revision: evaluation.revision,
             day: evaluation.of.date,
             released_at: evaluation.released_at,
+            deadline_at: evaluation.deadline_at,
             rerun_of: evaluation.rerun_of,
+            extra_turn: evaluation.extra_for,
             voided: evaluation.voided.map(RulingView::from),
             profile: evaluation.plan.profile,
             tasks: evaluation.plan.tasks,
@@ -321,6 +365,8 @@ impl EvaluationView {
                 episodes_done,
                 episodes_total,
             },
+            queue: None,
+            next: queue::next_of_evaluation(&status, released, voided).to_owned(),
             status,
         }
     }

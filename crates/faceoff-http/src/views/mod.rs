@@ -6,11 +6,13 @@
 
 pub mod ablation;
 pub mod board;
+pub mod capacity;
 pub mod comparison;
 pub mod day;
 pub mod evaluation;
 pub mod event;
 pub mod me;
+pub mod queue;
 pub mod ruling;
 pub mod season;
 pub mod stage;

@@ -1,5 +1,6 @@
 //! An uploaded agent and its smoke run's verdict.
 
+use super::queue::{self, QueueView};
 use crate::{app::AppState, problem::Problem, views::shown};
 use faceoff_store::{Submission, SubmissionState};
 use faceoff_types::{SmokeTiming, SubmissionId, TeamId};
@@ -38,6 +39,11 @@ pub struct SubmissionView {
     /// The team's first submission of the same archive, if this is another; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub same_as: Option<SubmissionId>,
+    /// Where its smoke run stands in the queue; absent once there is a verdict.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub queue: Option<QueueView>,
+    /// What happens next.
+    pub next: String,
     /// The smoke run's verdict.
     #[serde(flatten)]
     pub status: SubmissionStatus,
@@ -78,17 +84,37 @@ impl SubmissionView {
     /// With its log.
     pub(crate) async fn of(app: &AppState, submission: Submission) -> Result<Self, Problem> {
         let log = app.store.submission_log(submission.id).await?;
-        Ok(Self::new(submission, log))
+        let mut view = Self::new(submission, log);
+        queue::place_submissions(app, std::slice::from_mut(&mut view)).await?;
+        Ok(view)
     }
 
     /// Of a team, newest first; without their logs, which are long.
     pub(crate) async fn of_team(app: &AppState, team: TeamId) -> Result<Vec<Self>, Problem> {
         let submissions = app.store.submissions_of(team).await?;
         let without_log = |submission| Self::new(submission, None);
-        Ok(submissions.into_iter().map(without_log).collect())
+        let mut views: Vec<Self> = submissions.into_iter().map(without_log).collect();
+        queue::place_submissions(app, &mut views).await?;
+        Ok(views)
     }
 
     pub(crate) fn new(submission: Submission, log: Option<String>) -> Self {
+        let status = match submission.state {
+            SubmissionState::Validating => SubmissionStatus::Validating,
+            SubmissionState::Valid => SubmissionStatus::Valid {
+                log: log.map(shown),
+            },
+            SubmissionState::Invalid { reason } => SubmissionStatus::Invalid {
+                reason: shown(reason),
+                log: log.map(shown),
+            },
+            // It may name a file of the bundle.
+            SubmissionState::ValidationError { reason } => SubmissionStatus::ValidationError {
+                reason: shown(reason),
+            },
+        };
+        let is_withdrawn = submission.withdrawn_at.is_some();
+        let next = queue::next_of_submission(&status, submission.active, is_withdrawn);
         Self {
             id: submission.id,
             team: submission.team,
@@ -102,22 +128,9 @@ impl SubmissionView {
             withdrawn_at: submission.withdrawn_at,
             label: submission.label.map(shown),
             same_as: submission.same_as,
-            status: match submission.state {
-                SubmissionState::Validating => SubmissionStatus::Validating,
-                SubmissionState::Valid => SubmissionStatus::Valid {
-                    log: log.map(shown),
-                },
-                SubmissionState::Invalid { reason } => SubmissionStatus::Invalid {
-                    reason: shown(reason),
-                    log: log.map(shown),
-                },
-                SubmissionState::ValidationError { reason } => {
-                    // It may name a file of the bundle.
-                    SubmissionStatus::ValidationError {
-                        reason: shown(reason),
-                    }
-                }
-            },
+            queue: None,
+            next: next.to_owned(),
+            status,
         }
     }
 }

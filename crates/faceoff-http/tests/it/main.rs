@@ -5,8 +5,10 @@
 )]
 
 mod ablations;
+mod acts;
 mod board;
 mod board_load;
+mod capacity;
 mod comparisons;
 mod days;
 mod evaluations;

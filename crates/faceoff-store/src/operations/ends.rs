@@ -101,6 +101,9 @@ pub(crate) async fn fail_evaluation(
         Failure::Cancelled(reason) => Event::EvaluationCancelled {
             reason: reason.to_owned(),
         },
+        Failure::NotPlayed(reason) => Event::EvaluationNotPlayed {
+            reason: reason.to_owned(),
+        },
     };
     tx.record(Subject::Evaluation(id), event);
     if let Failure::Platform(_) = failure {

@@ -34,6 +34,7 @@ impl Kind {
         NewUnit {
             kind: self.label(),
             lane,
+            batch: 0,
             rest_s: 0,
         }
     }

@@ -5,6 +5,7 @@ pub(crate) mod board;
 mod days;
 pub(crate) mod evaluations;
 mod events;
+pub(crate) mod outlook;
 pub(crate) mod progress;
 pub(crate) mod runs;
 mod season;

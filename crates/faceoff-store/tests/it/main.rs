@@ -2,10 +2,12 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod ablations;
+mod acts;
 mod artifacts;
 mod bundles;
 mod competition;
 mod days;
+mod deadlines;
 mod events;
 mod faults;
 mod fixture;
@@ -16,6 +18,7 @@ mod kill;
 mod migration;
 mod offline_data;
 mod opening;
+mod outlook;
 mod queries;
 mod queue;
 mod releases;

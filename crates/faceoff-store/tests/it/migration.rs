@@ -483,6 +483,7 @@ async fn every_old_row_is_there_and_says_what_it_said() {
     let day = |date, released_at| Day {
         of: StageDay { stage, date },
         cut_at: finished_at,
+        deadline_at: None,
         released_at,
     };
     assert_eq!(

@@ -1,9 +1,11 @@
 //! `faceoff admin`: organises a running competition through its API.
 
+mod day;
 mod output;
+mod season;
 mod stage;
 
-use super::serve::ADMIN_TOKEN_FILE;
+use super::{serve::ADMIN_TOKEN_FILE, team_server::in_queue};
 use crate::{client::Client, config::Config};
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
@@ -12,12 +14,12 @@ use faceoff_http::{
     views::{
         evaluation::{EvaluationStatus, EvaluationView},
         event::EventView,
-        season::SeasonView,
     },
 };
 use faceoff_types::{EvaluationId, StageDay, TeamId};
 use jiff::civil::Date;
 use output::{or_none, print};
+use season::of_season;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -69,6 +71,8 @@ enum Action {
         #[arg(long)]
         stage: Option<String>,
     },
+    #[command(flatten)]
+    Day(day::DayAction),
     /// Make, change or list the stages: their times, rules and schedules
     Stage {
         #[command(subcommand)]
@@ -217,6 +221,7 @@ impl AdminCommand {
                     )
                 })
             }
+            Action::Day(action) => day::act(&client, self.json, action).await,
             Action::Stage { action } => stage::act(&client, self.json, action).await,
             Action::StartDay { stage } => {
                 let stage = match stage {
@@ -440,41 +445,21 @@ async fn find_team(client: &Client, wanted: &str) -> anyhow::Result<TeamId> {
     }
 }
 
-fn of_season(season: &SeasonView) -> String {
-    let state = match (season.closed_at, season.secret) {
-        (Some(closed_at), Some(secret)) => {
-            let closed_at = closed_at.strftime("%Y-%m-%d %H:%M UTC");
-            format!("closed     {closed_at}\nsecret     {secret}")
-        }
-        _ => "open       its secret is published when it is closed".to_owned(),
-    };
-    let queue = match &season.paused {
-        Some(ruling) => {
-            let since = ruling.at.strftime("%Y-%m-%d %H:%M UTC");
-            format!("\npaused     since {since}: {}", ruling.reason)
-        }
-        None => String::new(),
-    };
-    format!(
-        "{} ({}), {} days played\ncommitment {}\n{state}{queue}",
-        season.name,
-        season.ruleset,
-        season.days.len(),
-        season.commitment
-    )
-}
-
 fn line(evaluation: &EvaluationView) -> String {
     if let Some(ruling) = &evaluation.voided {
         let (team, id) = (&evaluation.team_name, evaluation.id);
         return format!("{team:<40} {id}  voided: {}", ruling.reason);
     }
     let progress = evaluation.progress;
+    let place = match &evaluation.queue {
+        Some(queue) => format!(", {}", in_queue(queue)),
+        None => String::new(),
+    };
     let state = match &evaluation.status {
-        EvaluationStatus::Queued => "queued".to_owned(),
+        EvaluationStatus::Queued => format!("queued{place}"),
         EvaluationStatus::Running => {
             format!(
-                "running, {} of {} episodes",
+                "running, {} of {} episodes{place}",
                 progress.episodes_done, progress.episodes_total
             )
         }
@@ -487,6 +472,7 @@ fn line(evaluation: &EvaluationView) -> String {
         ),
         EvaluationStatus::AgentFailed { .. } => "the agent failed".to_owned(),
         EvaluationStatus::PlatformFailed { reason, .. } => format!("our fault: {reason}"),
+        EvaluationStatus::NotPlayed { reason, .. } => format!("not played: {reason}"),
         EvaluationStatus::Cancelled { reason, .. } => format!("cancelled: {reason}"),
     };
     format!("{:<40} {}  {state}", evaluation.team_name, evaluation.id)
