@@ -1,7 +1,7 @@
 //! What is recorded of every change: who did what to what. The audit log, and what feeds read.
 
 use faceoff_types::{
-    AblationId, EvaluationId, RunId, ShardId, StageDay, StageId, StageName, StageRules,
+    AblationId, EvaluationId, ProposalId, RunId, ShardId, StageDay, StageId, StageName, StageRules,
     StageSettings, SubmissionId, Task, TeamId, TeamName, Zone,
 };
 use jiff::{Timestamp, civil::Date};
@@ -75,6 +75,8 @@ pub enum Subject {
     Evaluation(EvaluationId),
     /// An ablation with its runs.
     Ablation(AblationId),
+    /// A trial or a re-evaluation with its runs.
+    Proposal(ProposalId),
 }
 
 impl Subject {
@@ -89,6 +91,7 @@ impl Subject {
             Self::Submission(id) => ("submission", id.to_string()),
             Self::Evaluation(id) => ("evaluation", id.to_string()),
             Self::Ablation(id) => ("ablation", id.to_string()),
+            Self::Proposal(id) => ("proposal", id.to_string()),
         }
     }
 
@@ -103,6 +106,7 @@ impl Subject {
             "submission" => Self::Submission(id.parse().map_err(|_| unknown())?),
             "evaluation" => Self::Evaluation(id.parse().map_err(|_| unknown())?),
             "ablation" => Self::Ablation(id.parse().map_err(|_| unknown())?),
+            "proposal" => Self::Proposal(id.parse().map_err(|_| unknown())?),
             _ => return Err(unknown()),
         })
     }
@@ -246,6 +250,26 @@ pub enum Event {
     AblationFailed {
         /// Whose fault it was and which.
         reason: String,
+    },
+    /// Evaluations are to be played without counting.
+    ProposalMade {
+        /// By whose rules.
+        stage: StageId,
+        /// How many.
+        evaluations: u32,
+        /// The organiser's words.
+        reason: String,
+    },
+    /// All of its evaluations are over.
+    ProposalPlayed,
+    /// What it has played counts; each of its evaluations has an event of its own.
+    ProposalApplied,
+    /// What it has played will never count.
+    ProposalDropped,
+    /// It was played as a part of a proposal, and counts from now on.
+    EvaluationApplied {
+        /// Which.
+        proposal: ProposalId,
     },
     /// Episodes were played and their outcomes stored.
     ShardCommitted {
@@ -434,6 +458,7 @@ mod tests {
             Subject::Submission(SubmissionId::new()),
             Subject::Evaluation(EvaluationId::new()),
             Subject::Ablation(AblationId::new()),
+            Subject::Proposal(ProposalId::new()),
         ];
         for subject in subjects {
             let (kind, id) = subject.columns();

@@ -4,7 +4,7 @@ use crate::{
     error::{Result, StoreError},
     event::{Event, Subject},
     operations::{
-        purpose, release_day, rerun,
+        drafts, purpose, release_day, rerun,
         runs::{self, RunOwner},
     },
     queue,
@@ -56,6 +56,13 @@ pub(crate) async fn run_ended(
         }
         (RunOwner::Evaluation(id), RunEnd::PlatformFailed(reason)) => {
             fail_evaluation(tx, id, run, Failure::Platform(reason)).await
+        }
+        (RunOwner::Draft { id, .. }, RunEnd::Played) => drafts::queue_finalisation(tx, id).await,
+        (RunOwner::Draft { id, proposal }, RunEnd::AgentFailed) => {
+            drafts::fail(tx, id, run, proposal, Failure::Agent).await
+        }
+        (RunOwner::Draft { id, proposal }, RunEnd::PlatformFailed(reason)) => {
+            drafts::fail(tx, id, run, proposal, Failure::Platform(reason)).await
         }
         (RunOwner::Ablation(id), RunEnd::Played) => finish_ablation_if_played(tx, id).await,
         (RunOwner::Ablation(id), RunEnd::AgentFailed) => {

@@ -7,6 +7,7 @@ pub(crate) mod evaluations;
 mod events;
 pub(crate) mod outlook;
 pub(crate) mod progress;
+pub(crate) mod proposals;
 pub(crate) mod runs;
 mod season;
 mod stages;

@@ -124,6 +124,9 @@ enum JobOf {
 /// The lanes whose work counts, or that somebody waits for, are of this urgency or a smaller one.
 const COUNTS: u32 = 1;
 
+/// The lane of what only waits for its score, whether it counts or not.
+const FINALISES: u32 = 0;
+
 fn episode_ms(open: &Open, measured: &Measured) -> Option<f64> {
     let (episodes, ms) = open.done;
     match episodes {
@@ -169,6 +172,7 @@ impl<'a> Jobs<'a> {
         }
         let (of, takes) = match &unit.smoke_of {
             Some(id) => (JobOf::Submission(id.0), self.measured.smoke_ms),
+            None if unit.urgency == FINALISES => (JobOf::Nobody, self.measured.finalisation_ms),
             None => {
                 let team: Option<TeamId> = unit.holder.parse().ok();
                 let each_ms = team.and_then(|team| self.measured.episode_ms_of(team));

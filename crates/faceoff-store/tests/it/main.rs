@@ -19,6 +19,7 @@ mod migration;
 mod offline_data;
 mod opening;
 mod outlook;
+mod proposals;
 mod queries;
 mod queue;
 mod releases;
