@@ -1,6 +1,8 @@
 //! What clients send to the API.
 
-use faceoff_types::{DayDeadline, Profile, Schedule, StageId, Task, TeamId, Zone};
+use faceoff_types::{
+    DayDeadline, EvaluationId, Profile, Schedule, StageId, SubmissionId, Task, TeamId, Zone,
+};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use utoipa::{IntoParams, ToSchema};
@@ -186,6 +188,43 @@ fn given_or_null<S: Serializer, T: Serialize>(
         .as_ref()
         .and_then(Option::as_ref)
         .serialize(serializer)
+}
+
+/// What is to be tried without counting.
+#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Trial {
+    /// A valid one; left out, what every team has active.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub submission: Option<SubmissionId>,
+    /// Kept in the log; 1 to 500 characters.
+    pub reason: String,
+}
+
+/// What is to be played again beside what counts: either `evaluation` or `day`.
+#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewProposal {
+    /// One that counts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub evaluation: Option<EvaluationId>,
+    /// All of a day that count: its date.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub day: Option<Date>,
+    /// By the stage's newest rules, for the board of these; of a day only.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub new_rules: bool,
+    /// Everybody may read it once it is applied; 1 to 500 characters.
+    pub reason: String,
+}
+
+/// That something is meant.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Confirmation {
+    /// The date of the day that it is about. Without it nothing is done, and the answer says what would be.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub confirm: Option<String>,
 }
 
 /// What a team calls a submission.

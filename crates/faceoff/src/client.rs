@@ -1,6 +1,7 @@
 //! A client of the REST API. It reads the very types that the server writes.
 
 mod bundle_file;
+mod proposals;
 
 use anyhow::{Context, bail};
 use bundle_file::BundleFile;

@@ -15,6 +15,7 @@ mod events;
 mod freezes;
 mod health;
 mod me;
+mod proposals;
 mod rulings;
 mod season;
 mod stages;
@@ -50,6 +51,12 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(turns::extra_turn))
         .routes(routes!(freezes::freeze_boards))
         .routes(routes!(freezes::unfreeze_boards))
+        .routes(routes!(proposals::list_proposals))
+        .routes(routes!(proposals::proposal))
+        .routes(routes!(proposals::start_trial))
+        .routes(routes!(proposals::propose))
+        .routes(routes!(proposals::apply_proposal))
+        .routes(routes!(proposals::drop_proposal))
         .routes(routes!(events::list_events))
         .routes(routes!(submissions::list_submissions))
         .routes(routes!(

@@ -177,7 +177,7 @@ pub struct ResultView {
 }
 
 impl ResultView {
-    fn new(result: EvaluationResult, released: bool) -> Self {
+    pub(crate) fn new(result: EvaluationResult, released: bool) -> Self {
         let tasks = result.tasks.iter();
         Self {
             ruleset: result.ruleset,

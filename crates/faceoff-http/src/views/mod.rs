@@ -12,6 +12,7 @@ pub mod day;
 pub mod evaluation;
 pub mod event;
 pub mod me;
+pub mod proposal;
 pub mod queue;
 pub mod ruling;
 pub mod season;

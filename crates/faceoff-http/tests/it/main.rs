@@ -15,6 +15,7 @@ mod evaluations;
 mod events;
 mod openapi;
 mod problems;
+mod proposals;
 mod room;
 mod rulings;
 mod season;

@@ -2,6 +2,7 @@
 
 mod day;
 mod output;
+mod proposal;
 mod season;
 mod stage;
 
@@ -73,6 +74,11 @@ enum Action {
     },
     #[command(flatten)]
     Day(day::DayAction),
+    /// Try a day without counting, or have results evaluated again, and apply or drop that
+    Proposal {
+        #[command(subcommand)]
+        action: proposal::ProposalAction,
+    },
     /// Make, change or list the stages: their times, rules and schedules
     Stage {
         #[command(subcommand)]
@@ -222,6 +228,7 @@ impl AdminCommand {
                 })
             }
             Action::Day(action) => day::act(&client, self.json, action).await,
+            Action::Proposal { action } => proposal::act(&client, self.json, action).await,
             Action::Stage { action } => stage::act(&client, self.json, action).await,
             Action::StartDay { stage } => {
                 let stage = match stage {
