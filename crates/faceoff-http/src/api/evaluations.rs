@@ -8,7 +8,7 @@ use crate::{
     paths,
     problem::Problem,
     requests::Cancellation,
-    views::{evaluation::EvaluationView, queue, stage},
+    views::{evaluation::EvaluationView, stage},
 };
 use axum::{
     Json,
@@ -54,7 +54,7 @@ pub(crate) async fn list_evaluations(
             own
         }
     };
-    queue::place_evaluations(&app, &mut evaluations).await?;
+    EvaluationView::place(&app, &mut evaluations).await?;
     Ok(Json(evaluations))
 }
 

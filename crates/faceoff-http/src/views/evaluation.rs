@@ -3,19 +3,19 @@
 use super::{
     queue::{self, QueueView},
     ruling::RulingView,
-    task::TaskView,
 };
 use crate::{app::AppState, paths, problem::Problem, views::shown};
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::{Evaluation, EvaluationState};
 use faceoff_types::{
-    AgentFault, EvaluationId, EvaluationResult, Profile, Seed, SlotTiming, StageDay, StageId,
-    SubmissionId, Task, TeamId, TeamName, Tier,
+    EvaluationId, Profile, StageDay, StageId, SubmissionId, Task, TeamId, TeamName,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use std::{collections::BTreeMap, sync::Arc};
 use utoipa::ToSchema;
+
+pub use super::evaluation_status::{EvaluationStatus, FaultView, ResultView};
 
 /// One run of a submission over the tasks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -78,149 +78,6 @@ pub struct Progress {
     pub episodes_total: u32,
 }
 
-/// What has become of an evaluation.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(tag = "state", rename_all = "snake_case")]
-pub enum EvaluationStatus {
-    /// It waits for a worker.
-    Queued,
-    /// Episodes are being played.
-    Running,
-    /// All episodes are played, the score is being computed.
-    Finalising,
-    /// It has a score.
-    Finished {
-        /// When the score was published.
-        finished_at: Timestamp,
-        /// The score.
-        result: Box<ResultView>,
-        /// Path of the recorded dataset on this server.
-        dataset: String,
-        /// BLAKE3 of its archive, 64 hexadecimal digits; absent for datasets of older versions.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        dataset_blake3: Option<String>,
-    },
-    /// The agent broke the protocol or a limit too often; no score.
-    AgentFailed {
-        /// When the last of its faults was stored.
-        finished_at: Timestamp,
-        /// What the agent did; absent in lists, and until the day is released.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        faults: Option<Vec<FaultView>>,
-        /// Last part of the agent's standard error; absent in lists, and until the day is released.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        log: Option<String>,
-    },
-    /// Our fault. It is played again, with the same submission on the same episodes: twice by itself,
-    /// then if the organiser wants it.
-    PlatformFailed {
-        /// When we gave it up.
-        finished_at: Timestamp,
-        /// What failed.
-        reason: String,
-    },
-    /// Its day's deadline came before all of it was played: for want of our capacity. The turn is given back.
-    NotPlayed {
-        /// When it was ended.
-        finished_at: Timestamp,
-        /// Which deadline.
-        reason: String,
-    },
-    /// Stopped by the organiser.
-    Cancelled {
-        /// When it was stopped.
-        finished_at: Timestamp,
-        /// The organiser's words.
-        reason: String,
-    },
-}
-
-impl EvaluationStatus {
-    /// Will nothing change any more?
-    #[must_use]
-    pub const fn is_final(&self) -> bool {
-        !matches!(self, Self::Queued | Self::Running | Self::Finalising)
-    }
-
-    /// When its score was published; `None` without one.
-    #[must_use]
-    pub const fn finished_at(&self) -> Option<Timestamp> {
-        match self {
-            Self::Finished { finished_at, .. } => Some(*finished_at),
-            _ => None,
-        }
-    }
-}
-
-/// The score of one evaluation; laid out as `results.json` of the dataset, of which only score and points
-/// are told until the day is released.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct ResultView {
-    /// The rules that it was scored by.
-    pub ruleset: String,
-    /// The perturbations.
-    pub profile: Profile,
-    /// The seed of the day's evaluations, 64 hexadecimal digits; null until the day is released.
-    pub seed: Option<Seed>,
-    /// By task: hit, defend, prepare.
-    pub tasks: BTreeMap<Task, TaskView>,
-    /// Overall score in percent.
-    pub score: f64,
-    /// Penalty points: the maximum over the tasks.
-    pub penalty_points: f64,
-    /// The worst of the tasks' tiers.
-    pub tier: Tier,
-    /// The slots' noise floor and re-runs; absent until the day is released, and in results of older
-    /// versions.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub timing: Option<SlotTiming>,
-}
-
-impl ResultView {
-    pub(crate) fn new(result: EvaluationResult, released: bool) -> Self {
-        let tasks = result.tasks.iter();
-        Self {
-            ruleset: result.ruleset,
-            profile: result.profile,
-            seed: released.then_some(result.seed),
-            tasks: tasks
-                .map(|(task, result)| (*task, TaskView::new(result, released)))
-                .collect(),
-            score: result.score,
-            penalty_points: result.penalty_points,
-            tier: result.tier,
-            timing: result.timing.filter(|_| released),
-        }
-    }
-}
-
-/// Something an agent did wrong.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-pub struct FaultView {
-    /// What it did, in words.
-    pub message: String,
-    /// In which task.
-    pub task: String,
-    /// In which episode; null during start-up.
-    pub episode: Option<u32>,
-    /// At which control step; null outside of an episode.
-    pub step: Option<u32>,
-    /// The offending line, cut, where there was one.
-    pub line: Option<String>,
-}
-
-impl From<AgentFault> for FaultView {
-    fn from(fault: AgentFault) -> Self {
-        Self {
-            message: shown(fault.fault.to_string()),
-            task: fault.contest.to_string(),
-            episode: fault.episode,
-            step: fault.step,
-            line: fault.line.map(shown),
-        }
-    }
-}
-
 impl EvaluationView {
     pub(crate) async fn find(app: &AppState, id: EvaluationId) -> Result<Self, Problem> {
         Self::of(app, app.store.evaluation(id).await?).await
@@ -239,8 +96,20 @@ impl EvaluationView {
             *faults = Some(of_run.faults.into_iter().map(FaultView::from).collect());
             *log = Some(shown(of_run.log));
         }
-        queue::place_evaluations(app, std::slice::from_mut(&mut view)).await?;
+        Self::place(app, std::slice::from_mut(&mut view)).await?;
         Ok(view)
+    }
+
+    /// Tells of those that are under way where they stand. If all are over, nothing is read.
+    pub(crate) async fn place(app: &AppState, views: &mut [Self]) -> Result<(), Problem> {
+        if views.iter().all(|view| view.status.is_final()) {
+            return Ok(());
+        }
+        let outlook = queue::outlook(app).await?;
+        for view in views {
+            view.queue = outlook.evaluations.get(&view.id).copied().map(Into::into);
+        }
+        Ok(())
     }
 
     /// All evaluations of a date, of all stages, in the order in which they were queued; without faults and
@@ -366,7 +235,7 @@ impl EvaluationView {
                 episodes_total,
             },
             queue: None,
-            next: queue::next_of_evaluation(&status, released, voided).to_owned(),
+            next: status.next(released, voided).to_owned(),
             status,
         }
     }

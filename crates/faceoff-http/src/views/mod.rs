@@ -10,6 +10,7 @@ pub mod capacity;
 pub mod comparison;
 pub mod day;
 pub mod evaluation;
+mod evaluation_status;
 pub mod event;
 pub mod me;
 pub mod proposal;

@@ -76,6 +76,31 @@ pub enum SubmissionStatus {
     },
 }
 
+impl SubmissionStatus {
+    /// What happens to a submission next, by itself or by its team.
+    pub(crate) const fn next(&self, active: bool, withdrawn: bool) -> &'static str {
+        match self {
+            Self::Validating => {
+                "A smoke run checks whether it starts, answers and keeps time; if it is valid and the newest, it is \
+             active then, by itself."
+            }
+            Self::Valid { .. } if active => {
+                "It plays at the next cut, unless a later upload turns valid or another one is chosen before."
+            }
+            Self::Valid { .. } if withdrawn => {
+                "It plays no further day, unless it is chosen again; a day that had its cut goes on."
+            }
+            Self::Valid { .. } => "It plays no further day, unless it is chosen.",
+            Self::Invalid { .. } => {
+                "It plays nothing: its bundle is removed. Correct what the reason names, and upload another."
+            }
+            Self::ValidationError { .. } => {
+                "It plays nothing, by our fault: upload it again, which costs no place in the queue of pending uploads."
+            }
+        }
+    }
+}
+
 impl SubmissionView {
     pub(crate) async fn find(app: &AppState, id: SubmissionId) -> Result<Self, Problem> {
         Self::of(app, app.store.submission(id).await?).await
@@ -85,7 +110,7 @@ impl SubmissionView {
     pub(crate) async fn of(app: &AppState, submission: Submission) -> Result<Self, Problem> {
         let log = app.store.submission_log(submission.id).await?;
         let mut view = Self::new(submission, log);
-        queue::place_submissions(app, std::slice::from_mut(&mut view)).await?;
+        Self::place(app, std::slice::from_mut(&mut view)).await?;
         Ok(view)
     }
 
@@ -94,8 +119,23 @@ impl SubmissionView {
         let submissions = app.store.submissions_of(team).await?;
         let without_log = |submission| Self::new(submission, None);
         let mut views: Vec<Self> = submissions.into_iter().map(without_log).collect();
-        queue::place_submissions(app, &mut views).await?;
+        Self::place(app, &mut views).await?;
         Ok(views)
+    }
+
+    /// Tells of those that wait for their smoke run where they stand. If none does, nothing is read.
+    async fn place(app: &AppState, views: &mut [Self]) -> Result<(), Problem> {
+        if views
+            .iter()
+            .all(|view| view.status != SubmissionStatus::Validating)
+        {
+            return Ok(());
+        }
+        let outlook = queue::outlook(app).await?;
+        for view in views {
+            view.queue = outlook.submissions.get(&view.id).copied().map(Into::into);
+        }
+        Ok(())
     }
 
     pub(crate) fn new(submission: Submission, log: Option<String>) -> Self {
@@ -114,7 +154,7 @@ impl SubmissionView {
             },
         };
         let is_withdrawn = submission.withdrawn_at.is_some();
-        let next = queue::next_of_submission(&status, submission.active, is_withdrawn);
+        let next = status.next(submission.active, is_withdrawn);
         Self {
             id: submission.id,
             team: submission.team,
@@ -132,5 +172,59 @@ impl SubmissionView {
             next: next.to_owned(),
             status,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_state_of_a_submission_says_what_happens_next() {
+        let reason = || "a reason".to_owned();
+        let states = [
+            (SubmissionStatus::Validating, false, false, "smoke run"),
+            (
+                SubmissionStatus::Valid { log: None },
+                true,
+                false,
+                "next cut",
+            ),
+            (
+                SubmissionStatus::Valid { log: None },
+                false,
+                true,
+                "chosen again",
+            ),
+            (
+                SubmissionStatus::Valid { log: None },
+                false,
+                false,
+                "unless it is chosen.",
+            ),
+            (
+                SubmissionStatus::Invalid {
+                    reason: reason(),
+                    log: None,
+                },
+                false,
+                false,
+                "upload another",
+            ),
+            (
+                SubmissionStatus::ValidationError { reason: reason() },
+                false,
+                false,
+                "our fault",
+            ),
+        ];
+        let mut texts = BTreeSet::new();
+        for (status, active, withdrawn, words) in &states {
+            let text = status.next(*active, *withdrawn);
+            assert!(text.contains(words), "{words} is not in {text}");
+            texts.insert(text);
+        }
+        assert_eq!(texts.len(), states.len(), "no two say the same");
     }
 }

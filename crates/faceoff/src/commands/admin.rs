@@ -1,24 +1,25 @@
 //! `faceoff admin`: organises a running competition through its API.
 
 mod day;
+mod find;
+mod lines;
 mod output;
 mod proposal;
 mod season;
 mod stage;
 
-use super::{serve::ADMIN_TOKEN_FILE, team_server::in_queue};
+use super::serve::ADMIN_TOKEN_FILE;
 use crate::{client::Client, config::Config};
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
 use faceoff_http::{
     requests::Decision,
-    views::{
-        evaluation::{EvaluationStatus, EvaluationView},
-        event::EventView,
-    },
+    views::{evaluation::EvaluationStatus, event::EventView},
 };
-use faceoff_types::{EvaluationId, StageDay, TeamId};
+use faceoff_types::{EvaluationId, StageDay};
+use find::find_team;
 use jiff::civil::Date;
+use lines::line;
 use output::{or_none, print};
 use season::of_season;
 use serde_json::Value;
@@ -155,7 +156,7 @@ enum Action {
         /// Who: organiser, team, team:ID, schedule, worker, worker:NAME or server
         #[arg(long)]
         actor: Option<String>,
-        /// About what: season, stage:ID, day:STAGE/DATE, team:ID, submission:ID, evaluation:ID or ablation:ID
+        /// About what: season, stage:ID, day:STAGE/DATE, team:ID, submission:ID, evaluation:ID, ablation:ID or proposal:ID
         #[arg(long)]
         subject: Option<String>,
         /// What happened, e.g. day_started
@@ -439,48 +440,4 @@ fn token_of(data_dir: Option<&Path>) -> anyhow::Result<String> {
             file.display()
         )
     })
-}
-
-async fn find_team(client: &Client, wanted: &str) -> anyhow::Result<TeamId> {
-    if let Ok(id) = wanted.parse() {
-        return Ok(id);
-    }
-    let teams = client.teams().await?;
-    match teams.iter().find(|team| team.name.as_str() == wanted) {
-        Some(team) => Ok(team.id),
-        None => bail!("no team is named {wanted:?}; faceoff admin teams lists them"),
-    }
-}
-
-fn line(evaluation: &EvaluationView) -> String {
-    if let Some(ruling) = &evaluation.voided {
-        let (team, id) = (&evaluation.team_name, evaluation.id);
-        return format!("{team:<40} {id}  voided: {}", ruling.reason);
-    }
-    let progress = evaluation.progress;
-    let place = match &evaluation.queue {
-        Some(queue) => format!(", {}", in_queue(queue)),
-        None => String::new(),
-    };
-    let state = match &evaluation.status {
-        EvaluationStatus::Queued => format!("queued{place}"),
-        EvaluationStatus::Running => {
-            format!(
-                "running, {} of {} episodes{place}",
-                progress.episodes_done, progress.episodes_total
-            )
-        }
-        EvaluationStatus::Finalising => "computing the score".to_owned(),
-        EvaluationStatus::Finished { result, .. } => format!(
-            "finished: score {:.1}, {:.1} penalty points, {}",
-            result.score,
-            result.penalty_points,
-            result.tier.title().to_lowercase()
-        ),
-        EvaluationStatus::AgentFailed { .. } => "the agent failed".to_owned(),
-        EvaluationStatus::PlatformFailed { reason, .. } => format!("our fault: {reason}"),
-        EvaluationStatus::NotPlayed { reason, .. } => format!("not played: {reason}"),
-        EvaluationStatus::Cancelled { reason, .. } => format!("cancelled: {reason}"),
-    };
-    format!("{:<40} {}  {state}", evaluation.team_name, evaluation.id)
 }

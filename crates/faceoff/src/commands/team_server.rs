@@ -29,7 +29,7 @@ impl TeamServer {
 }
 
 /// Where something stands in the queue, in words.
-pub(super) fn in_queue(queue: &QueueView) -> String {
+pub fn in_queue(queue: &QueueView) -> String {
     let expected = match queue.expected_at {
         Some(at) => format!("expected to be over {}", at.strftime("%Y-%m-%d %H:%M UTC")),
         None => "nobody can tell yet when it will be over".to_owned(),

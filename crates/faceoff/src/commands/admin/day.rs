@@ -1,6 +1,6 @@
 //! `faceoff admin freeze`, `missed-day`, `extra-turn`: what the organiser does with boards and days beside the schedule.
 
-use super::{find_team, line, output::print, stage};
+use super::{find::find_team, lines::line, output::print, stage};
 use crate::client::Client;
 use clap::Subcommand;
 use faceoff_http::requests::{ExtraTurn, MissedDay};
