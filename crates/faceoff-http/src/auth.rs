@@ -85,6 +85,10 @@ impl Caller {
     }
 }
 
+/// What the organiser sees of what everybody may ask for: the proof, or why there is none.
+#[derive(Debug)]
+pub(crate) struct PerhapsOrganiser(pub(crate) Result<Organiser, Problem>);
+
 /// A caller who may organise.
 #[derive(Debug, Clone)]
 pub(crate) struct Organiser(Caller);
@@ -248,6 +252,14 @@ impl FromRequestParts<App> for Organiser {
                 caller.named()
             ),
         ))
+    }
+}
+
+impl FromRequestParts<App> for PerhapsOrganiser {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
+        Ok(Self(Organiser::from_request_parts(parts, app).await))
     }
 }
 

@@ -1,6 +1,6 @@
 use crate::pace::LeastRate;
 use faceoff_store::UploadQuota;
-use faceoff_types::Clock;
+use faceoff_types::{Clock, TimeLimits};
 use std::{path::PathBuf, time::Duration};
 
 /// How much the web side takes on at a time, and how long it waits.
@@ -36,6 +36,15 @@ impl Default for HttpLimits {
     }
 }
 
+/// What evaluates, as far as the web side tells of it.
+#[derive(Debug, Clone)]
+pub struct Capacity {
+    /// Units of work that are done at the same time.
+    pub slots: u32,
+    /// How long an agent may take.
+    pub time: TimeLimits,
+}
+
 /// What [`router`](crate::router) needs besides the store.
 #[derive(Debug, Clone)]
 pub struct HttpConfig {
@@ -50,4 +59,6 @@ pub struct HttpConfig {
     pub clock: Clock,
     /// Concurrency and patience.
     pub limits: HttpLimits,
+    /// Tells how long what waits will take.
+    pub capacity: Capacity,
 }

@@ -13,6 +13,7 @@ mod app;
 mod auth;
 mod config;
 mod extract;
+mod freeze;
 mod layers;
 mod pace;
 mod pages;
@@ -31,7 +32,7 @@ mod uploads;
 pub mod views;
 
 pub use axum::Router;
-pub use config::{HttpConfig, HttpLimits};
+pub use config::{Capacity, HttpConfig, HttpLimits};
 pub use pace::LeastRate;
 pub use paths::API_BASE;
 pub use serve::{ConnectionLimits, serve};

@@ -5,10 +5,12 @@ mod people;
 
 pub use people::*;
 
-use faceoff_types::{Profile, Schedule, StageId, Task, Zone};
-use jiff::Timestamp;
+use faceoff_types::{
+    DayDeadline, EvaluationId, Profile, Schedule, StageId, SubmissionId, Task, TeamId, Zone,
+};
+use jiff::{Timestamp, civil::Date};
 use left_out::{given, given_or_null};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
 /// A team to create.
@@ -30,6 +32,33 @@ pub struct BoardQuery {
     /// By which of the stage's rules; without it by the newest with results. No board mixes two.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub revision: Option<u32>,
+    /// The organiser: with what was finished since the boards were frozen.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[param(required = false)]
+    pub live: bool,
+}
+
+/// A day to be played after all.
+#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MissedDay {
+    /// Its date in the stage's zone, one that has passed.
+    pub day: Date,
+    /// Everybody may read it; 1 to 500 characters.
+    pub reason: String,
+}
+
+/// One more evaluation of a day.
+#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ExtraTurn {
+    /// Whose.
+    pub team: TeamId,
+    /// Everybody may read it; 1 to 500 characters.
+    pub reason: String,
+    /// The team's name, if a result of the day that counts is to be replaced. Without it nothing is done then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub confirm: Option<String>,
 }
 
 /// Which of the log.
@@ -45,7 +74,7 @@ pub struct EventsQuery {
     /// `person`, `team` and `worker` name all of them.
     pub actor: Option<String>,
     /// What it is about: `season`, `stage:ID`, `day:STAGE/2026-03-01`, `team:ID`, `submission:ID`, `evaluation:ID`, `ablation:ID`,
-    /// `person:ID`, `registration:ID`, `announcement:ID` or `question:ID`.
+    /// `person:ID`, `registration:ID`, `announcement:ID`, `question:ID` or `proposal:ID`.
     pub subject: Option<String>,
     /// What happened, e.g. `day_started`.
     pub kind: Option<String>,
@@ -97,6 +126,13 @@ pub struct NewStage {
     /// Episodes of one unit of work.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub episodes_per_shard: Option<u32>,
+    /// Until when a day may be played: "next_cut", "never" or {"hours":30}; left out, until the next cut.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "deadline"
+    )]
+    pub day_deadline: Option<DayDeadline>,
 }
 
 /// What of a stage is to be another; what is left out stays as it is.
@@ -146,9 +182,47 @@ pub struct StageChange {
     /// Episodes of one unit of work.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub episodes_per_shard: Option<u32>,
+    /// Until when a day may be played: "next_cut", "never" or {"hours":30}; days that are under way follow.
+    #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "deadline")]
+    pub day_deadline: Option<DayDeadline>,
     /// The stage's name, if other rules are to begin while it is open: its board begins anew then.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub confirm: Option<String>,
+}
+
+/// By way of a value, so that what is no deadline is told as a wrong value and not as wrong JSON.
+fn deadline<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<DayDeadline>, D::Error> {
+    let value = Option::<serde_json::Value>::deserialize(deserializer)?;
+    let parsed = value.map(serde_json::from_value).transpose();
+    parsed.map_err(serde::de::Error::custom)
+}
+
+/// What is to be tried without counting.
+#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Trial {
+    /// A valid one; left out, what every team has active.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub submission: Option<SubmissionId>,
+    /// Kept in the log; 1 to 500 characters.
+    pub reason: String,
+}
+
+/// What is to be played again beside what counts: either `evaluation` or `day`.
+#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewProposal {
+    /// One that counts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub evaluation: Option<EvaluationId>,
+    /// All of a day that count: its date.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub day: Option<Date>,
+    /// By the stage's newest rules, for the board of these; of a day only.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub new_rules: bool,
+    /// Everybody may read it once it is applied; 1 to 500 characters.
+    pub reason: String,
 }
 
 /// What a team calls a submission.

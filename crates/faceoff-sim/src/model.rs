@@ -1,6 +1,6 @@
 //! The numbers of the KUKA LBR iiwa 14 with rod and mallet (MODEL, "Arm").
 
-pub use faceoff_types::{JOINTS, SUBSTEPS};
+pub use faceoff_types::{CONTROL_STEP_S, JOINTS, SUBSTEPS};
 
 /// Degrees of freedom of the plant: the driven joints and the two hinges of the universal joint.
 pub const DOFS: usize = 9;
@@ -258,9 +258,6 @@ pub const GRAVITY_M_S2: f64 = 9.81;
 
 /// The length of a physics step, s.
 pub const SUBSTEP_S: f64 = 0.001;
-
-/// The length of a control step, s.
-pub const CONTROL_STEP_S: f64 = 0.02;
 
 /// Joint positions at the start of an episode, rad: the reference's inverse kinematics for the mallet
 /// at (0.65, 0, 0.1645), to the digits of its recordings (RULES, "Tasks").

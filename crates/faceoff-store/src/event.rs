@@ -9,8 +9,8 @@ pub use parse::ParseEventError;
 pub use subject::Subject;
 
 use faceoff_types::{
-    DivisionName, EvaluationId, InvitationId, PersonName, RunId, ShardId, StageId, StageName,
-    StageRules, StageSettings, SubmissionId, Task, TeamId, TeamName, TokenId, Zone,
+    DivisionName, EvaluationId, InvitationId, PersonName, ProposalId, RunId, ShardId, StageId,
+    StageName, StageRules, StageSettings, SubmissionId, Task, TeamId, TeamName, TokenId, Zone,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
@@ -222,6 +222,11 @@ pub enum Event {
         /// As it was told to the team.
         reason: String,
     },
+    /// Its day's deadline came before it was played; the turn is given back.
+    EvaluationNotPlayed {
+        /// As it was told to the team.
+        reason: String,
+    },
     /// Its result does not count any more; the turn is given back.
     EvaluationVoided {
         /// As everybody may read it.
@@ -256,6 +261,26 @@ pub enum Event {
         /// Whose fault it was and which.
         reason: String,
     },
+    /// Evaluations are to be played without counting.
+    ProposalMade {
+        /// By whose rules.
+        stage: StageId,
+        /// How many.
+        evaluations: u32,
+        /// The organiser's words.
+        reason: String,
+    },
+    /// All of its evaluations are over.
+    ProposalPlayed,
+    /// What it has played counts; each of its evaluations has an event of its own.
+    ProposalApplied,
+    /// What it has played will never count.
+    ProposalDropped,
+    /// It was played as a part of a proposal, and counts from now on.
+    EvaluationApplied {
+        /// Which.
+        proposal: ProposalId,
+    },
     /// Episodes were played and their outcomes stored.
     ShardCommitted {
         /// What they are a part of.
@@ -285,9 +310,31 @@ pub enum Event {
         /// How many.
         evaluations: u32,
     },
+    /// The day's deadline has come: what was left of it is ended, each with an event of its own.
+    DayOverdue {
+        /// How many were not played.
+        not_played: u32,
+    },
     /// The day's seed is public: its last evaluation has ended (before there were cuts: its first
     /// dataset was handed out).
     DayReleased,
+    /// A day that was missed on its date starts after all.
+    MissedDayStarted {
+        /// As everybody may read it.
+        reason: String,
+    },
+    /// It is a turn beside the day's own.
+    ExtraTurnGiven {
+        /// As everybody may read it.
+        reason: String,
+    },
+    /// The stage's boards show from now on what they show now.
+    BoardsFrozen {
+        /// As everybody may read it.
+        reason: String,
+    },
+    /// The stage's boards show everything again.
+    BoardsUnfrozen,
     /// The season has another stage.
     StageCreated {
         /// As it was then.

@@ -47,6 +47,7 @@ pub use operations::{
     commit::Committed,
     give_back::MAX_ATTEMPTS,
     invitations::{Code, Joined, Joining, MAX_OPEN_INVITATIONS, NewInvitation},
+    proposals::Reevaluation,
     registrations::{MAX_WAITING, NewRegistration},
     rerun::RERUN_PAUSES_S,
     runs::RunOwner,
@@ -56,7 +57,11 @@ pub use operations::{
     tokens::{Holder, LAST_USE, MAX_TOKENS, NewToken, Refusal, SESSION, Who},
 };
 pub use queue::Claim;
-pub use reads::{board::BoardRecord, runs::RunFaults};
+pub use reads::{
+    board::{BoardRecord, BoardScope},
+    outlook::{OpenWork, Outlook, QueuePlace},
+    runs::RunFaults,
+};
 pub use room::Room;
 pub use store::Store;
 pub use tables::{
@@ -64,11 +69,14 @@ pub use tables::{
     announcements::Announcement,
     bundles::{UploadQuota, UploadUsage},
     days::Day,
+    drafts::Draft,
     evaluations::{Evaluation, EvaluationState},
     events::EventFilter,
     invitations::{Invitation, InvitationState, InvitedAs},
+    measured::Measured,
     people::Person,
     plan::RunPlan,
+    proposals::{Proposal, ProposalKind, Settled},
     questions::{Question, Reply},
     registrations::{Registration, RegistrationState},
     rulings::Ruling,

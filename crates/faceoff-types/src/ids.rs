@@ -126,3 +126,8 @@ id!(
     QuestionId,
     "question"
 );
+id!(
+    /// Evaluations that do not count: a trial, or a re-evaluation until it is applied.
+    ProposalId,
+    "proposal"
+);

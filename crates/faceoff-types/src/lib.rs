@@ -10,6 +10,7 @@ mod clock;
 mod computation_time;
 mod constraint;
 mod contest;
+mod day_deadline;
 mod fault;
 mod full_disk;
 mod harmless;
@@ -37,12 +38,13 @@ pub use clock::Clock;
 pub use computation_time::ComputationTime;
 pub use constraint::{Constraint, Violations};
 pub use contest::{Contest, Side};
+pub use day_deadline::{DayDeadline, LONGEST_DEADLINE_H, ParseDayDeadlineError};
 pub use fault::{AgentFault, AgentFaultKind, Phase};
 pub use full_disk::tells_of_full_disk;
 pub use harmless::{harmless, is_harmless};
 pub use ids::{
-    AblationId, AnnouncementId, EvaluationId, InvitationId, ParseIdError, PersonId, QuestionId,
-    RegistrationId, RunId, ShardId, StageId, SubmissionId, TeamId, TokenId,
+    AblationId, AnnouncementId, EvaluationId, InvitationId, ParseIdError, PersonId, ProposalId,
+    QuestionId, RegistrationId, RunId, ShardId, StageId, SubmissionId, TeamId, TokenId,
 };
 pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, UnknownInterpolation};
 pub use limits::{AgentLimits, BundleLimits, ResourceLimits, TimeLimits};
@@ -58,7 +60,7 @@ pub use seed::{ParseSeedError, Seed};
 pub use seed_label::{ParseSeedLabelError, SeedLabel};
 pub use smoke_outcome::{SmokeOutcome, SmokeTiming};
 pub use stage::{InvalidStageRules, ParseStageDayError, StageDay, StageRules, StageSettings};
-pub use task::{MAX_EPISODES_PER_TASK, ParseTaskError, Task};
+pub use task::{CONTROL_STEP_S, EPISODE_STEPS, MAX_EPISODES_PER_TASK, ParseTaskError, Task};
 pub use tier::Tier;
 pub use timing::{RoundTrips, SlotTiming};
 pub use zone::{UnknownZone, Zone};

@@ -1,6 +1,7 @@
 //! What an agent may use and how long it may take. Whoever orders a run states them, whoever carries
 //! it out enforces them.
 
+use crate::{CONTROL_STEP_S, EPISODE_STEPS};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
@@ -128,6 +129,21 @@ impl TimeLimits {
     /// No wait for an agent is longer.
     pub const LONGEST: Duration = Duration::from_secs(3600);
 
+    /// The longest that an agent can hold a slot with so many episodes in so many shards, of which it may break
+    /// `max_faults` and be started again each time: the sum of all its budgets, seconds. What the host takes is not in it.
+    #[must_use]
+    pub fn longest_s(&self, episodes: u32, shards: u32, max_faults: u32) -> f64 {
+        let process_s = self.startup_s + self.bye_s;
+        let control_s = f64::from(EPISODE_STEPS) * CONTROL_STEP_S;
+        let episode_s = control_s * self.episode_control_times
+            + self.episode_extra_s
+            + self.step_s
+            + self.reset_mean_s;
+        f64::from(shards) * (process_s + self.resets_extra_s + self.reset_s)
+            + f64::from(max_faults) * process_s
+            + f64::from(episodes) * episode_s
+    }
+
     /// How many of so many episodes may be played again because of the host.
     #[must_use]
     pub fn host_noise_reruns_of(&self, episodes: u32) -> u32 {
@@ -142,5 +158,17 @@ impl TimeLimits {
     pub fn duration(limit_s: f64) -> Duration {
         let given = Duration::try_from_secs_f64(limit_s);
         given.map_or(Self::LONGEST, |limit| limit.min(Self::LONGEST))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_longest_shard_is_the_one_that_the_handbook_tells() {
+        // docs/operating.md: 11 × 125 + 50 + 50 × 23 = 2575 s
+        let longest_s = TimeLimits::default().longest_s(50, 1, 10);
+        assert!((longest_s - 2575.0).abs() < 1e-9, "{longest_s}");
     }
 }

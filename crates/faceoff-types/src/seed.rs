@@ -1,4 +1,4 @@
-use crate::{StageId, SubmissionId, Task};
+use crate::{EvaluationId, ProposalId, StageId, SubmissionId, Task};
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize, de::Error as _};
 use std::{fmt, str::FromStr};
@@ -63,6 +63,18 @@ impl Seed {
     #[must_use]
     pub fn smoke(&self, submission: SubmissionId) -> Self {
         self.derive("smoke", submission.as_uuid().as_bytes())
+    }
+
+    /// Season secret → the seed of an extra turn of a day whose own seed is public: that of no other evaluation.
+    #[must_use]
+    pub fn extra(&self, evaluation: EvaluationId) -> Self {
+        self.derive("extra", evaluation.as_uuid().as_bytes())
+    }
+
+    /// Season secret → the seed of all evaluations of a trial.
+    #[must_use]
+    pub fn trial(&self, proposal: ProposalId) -> Self {
+        self.derive("trial", proposal.as_uuid().as_bytes())
     }
 
     /// Season secret (or a local seed) → the seed of the season's model mismatch.

@@ -1,4 +1,4 @@
-use crate::{StageDay, seed::Seed};
+use crate::{EvaluationId, ProposalId, StageDay, seed::Seed};
 use jiff::civil::Date;
 use std::{fmt, str::FromStr};
 
@@ -13,6 +13,10 @@ pub enum SeedLabel {
     StageDay(StageDay),
     /// All ablations of the season. Its text is `ablation`.
     Ablation,
+    /// An extra turn of a day whose own seed is public. Its text is `extra/` and the evaluation's id.
+    Extra(EvaluationId),
+    /// All of a trial. Its text is `trial/` and the id of the proposal.
+    Trial(ProposalId),
 }
 
 impl SeedLabel {
@@ -23,6 +27,8 @@ impl SeedLabel {
             Self::Day(day) => season_secret.day(day),
             Self::StageDay(of) => season_secret.stage(of.stage).day(of.date),
             Self::Ablation => season_secret.ablation(),
+            Self::Extra(id) => season_secret.extra(id),
+            Self::Trial(id) => season_secret.trial(id),
         }
     }
 }
@@ -33,6 +39,8 @@ impl fmt::Display for SeedLabel {
             Self::Day(day) => day.fmt(f),
             Self::StageDay(of) => of.fmt(f),
             Self::Ablation => f.write_str("ablation"),
+            Self::Extra(id) => write!(f, "extra/{id}"),
+            Self::Trial(id) => write!(f, "trial/{id}"),
         }
     }
 }
@@ -40,24 +48,21 @@ impl fmt::Display for SeedLabel {
 /// Text that is no seed label.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "not a seed label: expected a day as YYYY-MM-DD, a stage's as ID/YYYY-MM-DD, or “ablation”"
+    "not a seed label: expected a day as YYYY-MM-DD, a stage's as ID/YYYY-MM-DD, “ablation”, “extra/ID” or “trial/ID”"
 )]
 pub struct ParseSeedLabelError;
 
 impl FromStr for SeedLabel {
     type Err = ParseSeedLabelError;
     fn from_str(s: &str) -> Result<Self, Self::Err> {
-        match s {
-            "ablation" => Ok(Self::Ablation),
-            label if label.contains('/') => label
-                .parse()
-                .map(Self::StageDay)
-                .map_err(|_| ParseSeedLabelError),
-            label => label
-                .parse()
-                .map(Self::Day)
-                .map_err(|_| ParseSeedLabelError),
-        }
+        let parsed = match s.split_once('/') {
+            None if s == "ablation" => return Ok(Self::Ablation),
+            None => s.parse().ok().map(Self::Day),
+            Some(("extra", id)) => id.parse().ok().map(Self::Extra),
+            Some(("trial", id)) => id.parse().ok().map(Self::Trial),
+            Some(_) => s.parse().ok().map(Self::StageDay),
+        };
+        parsed.ok_or(ParseSeedLabelError)
     }
 }
 
@@ -78,10 +83,29 @@ mod tests {
         assert_eq!(staged.seed(&secret), secret.stage(stage).day(day));
         assert_ne!(staged.seed(&secret), secret.day(day));
         assert_ne!(staged.seed(&secret), of(StageId::new()).seed(&secret));
-        for label in [SeedLabel::Day(day), staged, SeedLabel::Ablation] {
+        let [extra, trial] = [
+            SeedLabel::Extra(EvaluationId::new()),
+            SeedLabel::Trial(ProposalId::new()),
+        ];
+        assert_ne!(extra.seed(&secret), trial.seed(&secret));
+        let another = SeedLabel::Extra(EvaluationId::new());
+        assert_ne!(extra.seed(&secret), another.seed(&secret));
+        for label in [
+            SeedLabel::Day(day),
+            staged,
+            SeedLabel::Ablation,
+            extra,
+            trial,
+        ] {
             assert_eq!(label.to_string().parse(), Ok(label));
         }
-        for wrong in ["someday", "stage/2026-03-01", "/2026-03-01"] {
+        for wrong in [
+            "someday",
+            "stage/2026-03-01",
+            "/2026-03-01",
+            "extra/",
+            "trial/1",
+        ] {
             assert!(wrong.parse::<SeedLabel>().is_err(), "{wrong}");
         }
     }

@@ -1,4 +1,7 @@
-use crate::{MAX_EPISODES_PER_TASK, Profile, Ruleset, Schedule, StageId, Task};
+use crate::{
+    DayDeadline, LONGEST_DEADLINE_H, MAX_EPISODES_PER_TASK, Profile, Ruleset, Schedule, StageId,
+    Task,
+};
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
@@ -63,6 +66,8 @@ pub struct StageSettings {
     pub ablation_episodes: u32,
     /// Episodes of one unit of work; at least one.
     pub episodes_per_shard: u32,
+    /// Until when what its cut has started may be played.
+    pub day_deadline: DayDeadline,
 }
 
 impl Default for StageSettings {
@@ -71,6 +76,7 @@ impl Default for StageSettings {
             schedule: None,
             ablation_episodes: 0,
             episodes_per_shard: 50,
+            day_deadline: DayDeadline::NextCut,
         }
     }
 }
@@ -86,6 +92,11 @@ impl StageSettings {
         }
         if self.ablation_episodes > MAX_EPISODES_PER_TASK {
             return Err(InvalidStageRules::Ablations(self.ablation_episodes));
+        }
+        if let DayDeadline::Hours(hours) = self.day_deadline
+            && !(1..=LONGEST_DEADLINE_H).contains(&hours)
+        {
+            return Err(InvalidStageRules::Deadline(hours));
         }
         Ok(())
     }
@@ -106,6 +117,9 @@ pub enum InvalidStageRules {
     /// More than are ever played.
     #[error("ablation_episodes: expected at most {MAX_EPISODES_PER_TASK}, got {0}")]
     Ablations(u32),
+    /// A day without time, or with more than any has.
+    #[error("day_deadline: expected 1 to {LONGEST_DEADLINE_H} hours, got {0}")]
+    Deadline(u32),
 }
 
 impl StageRules {
@@ -158,6 +172,13 @@ mod tests {
             ..settings.clone()
         };
         assert_eq!(none.check(), Err(InvalidStageRules::Shards(0)));
+        for hours in [0, LONGEST_DEADLINE_H + 1] {
+            let none = StageSettings {
+                day_deadline: DayDeadline::Hours(hours),
+                ..settings.clone()
+            };
+            assert_eq!(none.check(), Err(InvalidStageRules::Deadline(hours)));
+        }
         let many = StageSettings {
             ablation_episodes: u32::MAX,
             ..settings

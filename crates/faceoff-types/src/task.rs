@@ -1,6 +1,12 @@
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
+/// The length of a control step, s (RULES, "Stages").
+pub const CONTROL_STEP_S: f64 = 0.02;
+
+/// Control steps of a qualifying episode, at most.
+pub const EPISODE_STEPS: u32 = 500;
+
 /// Most episodes of a task that one run may play: a hundred times the qualifying stage, where the success
 /// rate is known to ±0.3 %. Whoever scores a run holds its outcomes in memory, some 300 bytes each.
 pub const MAX_EPISODES_PER_TASK: u32 = 100_000;

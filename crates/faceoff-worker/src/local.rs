@@ -45,6 +45,9 @@ impl LocalServer {
         if let Err(error) = self.store.remove_old_recordings(now).await {
             tracing::warn!(%error, "old recordings could not be removed");
         }
+        if let Err(error) = self.store.remove_dropped_datasets(now).await {
+            tracing::warn!(%error, "datasets of dropped proposals could not be removed");
+        }
         if let Err(error) = self.store.checkpoint().await {
             tracing::warn!(%error, "the database's log could not be copied");
         }
@@ -95,6 +98,7 @@ impl LocalServer {
                 part_of: match owner {
                     RunOwner::Evaluation(id) => id.as_uuid(),
                     RunOwner::Ablation(id) => id.as_uuid(),
+                    RunOwner::Draft { id, .. } => id.as_uuid(),
                 },
                 agent: self.agent(bundle),
                 spec: ShardSpec {

@@ -9,7 +9,8 @@ use tokio_util::sync::CancellationToken;
 /// a day is to start within the second that is shown.
 const LONGEST_SLEEP: Duration = Duration::from_secs(1);
 
-/// Starts the days of all stages that have a schedule, each once, at its time, until `shutdown` is cancelled. A
+/// Ends the days whose deadline has come, and starts those of all stages that have a schedule, each once, at its
+/// time, until `shutdown` is cancelled. A
 /// day whose time passed while the server was down is started when it comes up, on the same date still. What a
 /// failing database keeps from starting is tried again every second.
 pub async fn run_schedule(
@@ -30,7 +31,7 @@ pub async fn run_schedule(
                 if !failed {
                     tracing::error!(
                         error = format!("{error:#}"),
-                        "days could not be started; trying again"
+                        "days could not be ended or started; trying again"
                     );
                 }
                 failed = true;
@@ -47,8 +48,12 @@ pub async fn run_schedule(
     }
 }
 
-/// Starts what is due at `now`; when the next day is, if one comes.
+/// Ends and starts what is due at `now`; when the next day is, if one comes.
 async fn start_due(store: &Store, now: Timestamp) -> anyhow::Result<Option<Timestamp>> {
+    let overdue = store.end_overdue_days(now).await;
+    for (of, not_played) in overdue.context("ending the days whose deadline has come")? {
+        tracing::warn!(stage = %of.stage, day = %of.date, not_played, "the day's deadline came before all of it was played");
+    }
     let mut first = None;
     let stages = store.stages().await.context("reading the stages")?;
     for stage in stages {

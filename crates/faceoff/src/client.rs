@@ -2,17 +2,19 @@
 
 mod bundle_file;
 mod people;
+mod proposals;
 
 use anyhow::{Context, bail};
 use bundle_file::BundleFile;
 use faceoff_http::{
     API_BASE,
     requests::{
-        Cancellation, CloseSeason, Decision, Label, NewStage, NewTeam, Reason, StageChange,
-        StartDay,
+        Cancellation, CloseSeason, Decision, ExtraTurn, Label, MissedDay, NewStage, NewTeam,
+        Reason, StageChange, StartDay,
     },
     views::{
         board::BoardView,
+        capacity::CapacityView,
         comparison::ComparisonView,
         day::DayView,
         evaluation::EvaluationView,
@@ -168,6 +170,45 @@ impl Client {
     /// All stages, the first to open first.
     pub async fn stages(&self) -> anyhow::Result<Vec<StageView>> {
         self.get("/stages").await
+    }
+
+    /// Organiser: how the days of a stage fit into their time.
+    pub async fn capacity(&self, id: StageId) -> anyhow::Result<CapacityView> {
+        self.get(&format!("/stages/{id}/capacity")).await
+    }
+
+    /// Organiser: has the boards of a stage stand still.
+    pub async fn freeze(&self, id: StageId, reason: &str) -> anyhow::Result<StageView> {
+        let request = self.request(Method::POST, &format!("/stages/{id}/freeze"));
+        let reason = reason.to_owned();
+        read(self.send(request.json(&Reason { reason })).await?).await
+    }
+
+    /// Organiser: has the boards of a stage show everything again.
+    pub async fn unfreeze(&self, id: StageId) -> anyhow::Result<StageView> {
+        let request = self.request(Method::POST, &format!("/stages/{id}/unfreeze"));
+        read(self.send(request).await?).await
+    }
+
+    /// Organiser: plays a day that was missed.
+    pub async fn start_missed_day(
+        &self,
+        id: StageId,
+        wanted: &MissedDay,
+    ) -> anyhow::Result<DayView> {
+        let request = self.request(Method::POST, &format!("/stages/{id}/days"));
+        read(self.send(request.json(wanted)).await?).await
+    }
+
+    /// Organiser: gives a team one more evaluation of a day.
+    pub async fn extra_turn(
+        &self,
+        of: StageDay,
+        wanted: &ExtraTurn,
+    ) -> anyhow::Result<EvaluationView> {
+        let path = format!("/stages/{}/days/{}/extra-turn", of.stage, of.date);
+        let request = self.request(Method::POST, &path);
+        read(self.send(request.json(wanted)).await?).await
     }
 
     /// Organiser: makes a stage.

@@ -10,7 +10,7 @@ use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::BundleLimits};
 use faceoff_sandbox::{Isolation, Layer, Limits, Runtime, affinity};
 use faceoff_store::UploadQuota;
 use faceoff_types::{
-    InvalidSchedule, Profile, Ruleset, Schedule, StageRules, StageSettings, Task, Zone,
+    DayDeadline, InvalidSchedule, Profile, Ruleset, Schedule, StageRules, StageSettings, Task, Zone,
 };
 use jiff::civil::{Date, Time};
 use serde::{Deserialize, Serialize};
@@ -111,6 +111,8 @@ pub struct EvaluationConfig {
     pub days_off: Vec<Date>,
     /// Time zone of `at` and `cron`; days are dates there.
     pub zone: Zone,
+    /// Until when a day may be played.
+    pub day_deadline: DayDeadline,
     /// More agent faults than this end an evaluation without a score.
     pub max_faults: u32,
     /// Episodes of each task and profile of the ablation that the schedule orders of every submission
@@ -129,6 +131,7 @@ impl Default for EvaluationConfig {
             cron: None,
             days_off: Vec::new(),
             zone: Zone::UTC,
+            day_deadline: DayDeadline::NextCut,
             max_faults: 10,
             ablation_episodes: 0,
         }
@@ -361,6 +364,7 @@ impl Config {
             schedule: schedule.map(|schedule| schedule.without(evaluation.days_off.clone())),
             ablation_episodes: evaluation.ablation_episodes,
             episodes_per_shard: evaluation.episodes_per_shard,
+            day_deadline: evaluation.day_deadline,
         })
     }
 

@@ -107,6 +107,9 @@ async fn released(
             "the evaluation failed by our fault and has no dataset; GET /api/v1/evaluations lists the one \
              that plays it again"
         }
+        EvaluationState::NotPlayed { .. } => {
+            "the evaluation was not played in time and has no dataset"
+        }
         EvaluationState::Cancelled { .. } => "the evaluation was cancelled and has no dataset",
     };
     Err(Problem::new(ProblemKind::Conflict, why_not))

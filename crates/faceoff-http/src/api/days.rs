@@ -68,7 +68,7 @@ async fn the_open_one(app: &AppState, now: Timestamp) -> Result<Stage, Problem> 
     stage::current(app).await
 }
 
-async fn had_its_cut(
+pub(super) async fn had_its_cut(
     app: &AppState,
     stage: &Stage,
     day: Date,

@@ -39,7 +39,7 @@ pub(crate) async fn list_evaluations(
     State(app): State<App>,
     QueryParams(query): QueryParams<DayQuery>,
 ) -> Result<Json<Vec<EvaluationView>>, Problem> {
-    let evaluations = match caller.team() {
+    let mut evaluations = match caller.team() {
         None => {
             let day = match query.day {
                 Some(day) => day,
@@ -53,6 +53,7 @@ pub(crate) async fn list_evaluations(
             own
         }
     };
+    EvaluationView::place(&app, &mut evaluations).await?;
     Ok(Json(evaluations))
 }
 

@@ -5,6 +5,7 @@ mod ablations;
 mod announcements;
 mod board;
 mod bundle_stream;
+mod capacity;
 mod comparisons;
 mod datasets;
 mod days;
@@ -12,10 +13,12 @@ mod document;
 mod episodes;
 mod evaluations;
 mod events;
+mod freezes;
 mod health;
 mod invitations;
 mod me;
 mod people;
+mod proposals;
 mod registrations;
 mod rulings;
 mod season;
@@ -25,6 +28,7 @@ mod submissions;
 mod teams;
 mod terms;
 mod tokens;
+mod turns;
 mod upload;
 
 use crate::{app::App, extract::MAX_JSON_BYTES, layers, paths::API_BASE};
@@ -80,7 +84,18 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(announcements::answer))
         .routes(routes!(stages::list_stages, stages::create_stage))
         .routes(routes!(stages::stage, stages::change_stage))
+        .routes(routes!(capacity::capacity))
         .routes(routes!(days::start_day))
+        .routes(routes!(turns::start_missed_day))
+        .routes(routes!(turns::extra_turn))
+        .routes(routes!(freezes::freeze_boards))
+        .routes(routes!(freezes::unfreeze_boards))
+        .routes(routes!(proposals::list_proposals))
+        .routes(routes!(proposals::proposal))
+        .routes(routes!(proposals::start_trial))
+        .routes(routes!(proposals::propose))
+        .routes(routes!(proposals::apply_proposal))
+        .routes(routes!(proposals::drop_proposal))
         .routes(routes!(events::list_events))
         .routes(routes!(submissions::list_submissions))
         .routes(routes!(

@@ -25,6 +25,7 @@ fn check(rules: &StageRules, settings: &StageSettings) -> Result<(), Problem> {
             InvalidStageRules::Episodes(_) => "episodes_per_task",
             InvalidStageRules::Shards(_) => "episodes_per_shard",
             InvalidStageRules::Ablations(_) => "ablation_episodes",
+            InvalidStageRules::Deadline(_) => "day_deadline",
         };
         Problem::invalid(field, error)
     })
@@ -81,6 +82,7 @@ pub(crate) async fn create_stage(
         episodes_per_shard: new
             .episodes_per_shard
             .unwrap_or(like.settings.episodes_per_shard),
+        day_deadline: new.day_deadline.unwrap_or_default(),
     };
     check(&rules, &settings)?;
     let wanted = faceoff_store::NewStage {
@@ -146,6 +148,7 @@ pub(crate) async fn change_stage(
         episodes_per_shard: change
             .episodes_per_shard
             .unwrap_or(stage.settings.episodes_per_shard),
+        day_deadline: change.day_deadline.unwrap_or(stage.settings.day_deadline),
     };
     check(&rules, &settings)?;
     if rules != *is && stage.phase(now) == StagePhase::Open {

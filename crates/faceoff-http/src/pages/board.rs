@@ -6,6 +6,7 @@ use super::{
 };
 use crate::{
     app::App,
+    auth::PerhapsOrganiser,
     extract::{PathParam, QueryParams},
     problem::Problem,
     requests::BoardQuery,
@@ -36,6 +37,8 @@ struct Who {
     agent: Option<String>,
     evaluation: EvaluationId,
     day: civil::Date,
+    /// Why it is a turn beside the day's own.
+    extra_turn: Option<String>,
     /// How it was evaluated, where the rows of the board differ in that.
     setting: Option<String>,
 }
@@ -74,6 +77,7 @@ impl Who {
             agent: row.agent.clone(),
             evaluation: row.evaluation,
             day: row.day,
+            extra_turn: row.extra_turn.clone(),
             setting: common_setting.is_none().then(|| setting(row)),
         }
     }
@@ -150,6 +154,8 @@ struct Heading {
     others: Vec<OtherBoard>,
     /// The organiser holds the queue.
     paused: Option<RulingView>,
+    /// The organiser has frozen the board.
+    frozen: Option<RulingView>,
 }
 
 struct OtherBoard {
@@ -197,6 +203,7 @@ impl Heading {
                     stage: stage.name.to_string(),
                     others: Vec::new(),
                     paused: None,
+                    frozen: board.frozen.clone(),
                 });
             }
         }
@@ -242,11 +249,12 @@ struct OverallPage {
 /// The overall board.
 pub(super) async fn overall(
     State(app): State<App>,
+    caller: PerhapsOrganiser,
     query: Result<QueryParams<BoardQuery>, Problem>,
 ) -> Result<Response, PageProblem> {
     let QueryParams(query) = query?;
     let season = SeasonHead::now(&app).await?;
-    let board = BoardView::asked(&app, query, None).await?;
+    let board = BoardView::asked(&app, caller, query, None).await?;
     let today = app.store.stage(board.stage).await.map_err(Problem::from)?;
     let today = today.day(app.config.clock.now());
     let setting = common_setting(&board.rows);
@@ -276,6 +284,7 @@ async fn under_way(app: &App, today: StageDay) -> Result<Vec<UnderWay>, PageProb
                 "The agent failed; its team sees why when the day is released"
             }
             EvaluationStatus::PlatformFailed { .. } => "Stopped by our fault",
+            EvaluationStatus::NotPlayed { .. } => "Not played in time: our capacity",
             EvaluationStatus::Cancelled { .. } => "Cancelled by the organiser",
         };
         let moving = !evaluation.status.is_final();
@@ -344,6 +353,7 @@ struct TaskPage {
 pub(super) async fn by_task(
     State(app): State<App>,
     task: Result<PathParam<Task>, Problem>,
+    caller: PerhapsOrganiser,
     query: Result<QueryParams<BoardQuery>, Problem>,
 ) -> Result<Response, PageProblem> {
     let (PathParam(task), QueryParams(query)) = (task?, query?);
@@ -362,7 +372,7 @@ pub(super) async fn by_task(
             "Bring a puck from the border to a good hitting position.",
         ),
     };
-    let mut board = BoardView::asked(&app, query, Some(task)).await?;
+    let mut board = BoardView::asked(&app, caller, query, Some(task)).await?;
     // The board leaves out teams without the task; a row without one could show nothing.
     board.rows.retain(|row| row.tasks.contains_key(&task));
     let setting = common_setting(&board.rows);

@@ -8,10 +8,12 @@ use super::{
 use crate::{
     app::App,
     extract::PathParam,
+    freeze,
     problem::Problem,
     views::{
         ablation,
         evaluation::{EvaluationStatus, EvaluationView, Progress, ResultView},
+        queue::QueueView,
         ruling::RulingView,
         season::SeasonHead,
         submission::SubmissionView,
@@ -23,7 +25,7 @@ use askama::Template;
 use axum::{extract::State, response::Response};
 use faceoff_scoring::{EpisodeSummary, TIER_CHANGE_RESAMPLES};
 use faceoff_store::EvaluationState;
-use faceoff_types::{EvaluationId, Profile, RoundTrips, SlotTiming, StageDay, Task};
+use faceoff_types::{EvaluationId, Profile, RoundTrips, Seed, SlotTiming, StageDay, Task};
 use faceoff_wire::dataset::SlowEpisode;
 use figures::Rate;
 use jiff::{Timestamp, civil};
@@ -261,14 +263,30 @@ struct Page {
     team: String,
     agent: Option<String>,
     voided: Option<RulingView>,
+    extra_turn: Option<String>,
     day: civil::Date,
     profile: Profile,
     /// Path of the page of its submission's ablation, if there is one.
     ablation: Option<String>,
     /// Said when there is no result.
-    state: &'static str,
+    state: String,
     progress: Option<Progress>,
+    /// Where it stands in the queue, in words.
+    place: Option<String>,
+    next: String,
     finished: Option<Finished>,
+}
+
+/// Where an evaluation that is under way stands.
+fn place(queue: &QueueView) -> String {
+    let expected = match queue.expected_at {
+        Some(at) => format!("expected to be over {}", at.strftime("%Y-%m-%d %H:%M UTC")),
+        None => "nobody can tell yet when it will be over".to_owned(),
+    };
+    format!(
+        "Number {} of {} to be over; {expected}.",
+        queue.place, queue.of
+    )
 }
 
 /// One evaluation.
@@ -281,7 +299,9 @@ pub(super) async fn page(
     let submission = SubmissionView::find(&app, view.submission).await?;
     let ablation = ablation::exists(&app, submission.id).await?;
     let season = SeasonHead::now(&app).await?;
+    let frozen = freeze::hides_evaluation(&app, &view).await?;
     let finished = match &view.status {
+        _ if frozen.is_some() => None,
         EvaluationStatus::Finished {
             finished_at,
             result,
@@ -290,7 +310,7 @@ pub(super) async fn page(
         } => {
             let summary = view.summary(&app).await?;
             let others = match view.released_at {
-                Some(_) => others(&app, &view).await?,
+                Some(_) => others(&app, &view, result.seed).await?,
                 None => Vec::new(),
             };
             Some(Finished {
@@ -308,11 +328,22 @@ pub(super) async fn page(
         team: view.team_name.to_string(),
         agent: submission.agent_name,
         voided: view.voided.clone(),
+        extra_turn: view.extra_turn.clone(),
         day: view.day,
         profile: view.profile,
         ablation: ablation.then(|| format!("/submissions/{}/ablation", submission.id)),
-        state: in_words(&view.status),
+        state: match frozen {
+            Some(frozen) => format!(
+                "It is finished. The boards of its stage are frozen since {} ({}): its result is shown once they are \
+                 unfrozen.",
+                frozen.at.strftime("%Y-%m-%d %H:%M UTC"),
+                frozen.reason
+            ),
+            None => in_words(&view.status).to_owned(),
+        },
         progress: (!view.status.is_final()).then_some(view.progress),
+        place: view.queue.as_ref().map(place),
+        next: view.next.clone(),
         finished,
     })
 }
@@ -332,12 +363,20 @@ const fn in_words(status: &EvaluationStatus) -> &'static str {
             "It was stopped by a fault of this server, not of the agent. The same agent plays the same episodes \
              again, unless the fault stays."
         }
+        EvaluationStatus::NotPlayed { .. } => {
+            "Its day's deadline came before all of it was played, for want of this server's capacity: by no fault of \
+             the agent's."
+        }
         EvaluationStatus::Cancelled { .. } => "The organiser cancelled it.",
     }
 }
 
 /// The finished evaluations that can be compared with this one, in the order of their scores.
-async fn others(app: &App, of: &EvaluationView) -> Result<Vec<Other>, PageProblem> {
+async fn others(
+    app: &App,
+    of: &EvaluationView,
+    seed: Option<Seed>,
+) -> Result<Vec<Other>, PageProblem> {
     let same_episodes = |other: &EvaluationView| {
         other.id != of.id
             && other.voided.is_none()
@@ -350,16 +389,18 @@ async fn others(app: &App, of: &EvaluationView) -> Result<Vec<Other>, PageProble
         date: of.day,
     };
     let same_day = EvaluationView::of_day(app, day).await?;
-    let mut others: Vec<_> = same_day
-        .into_iter()
-        .filter(same_episodes)
-        .filter_map(|view| match view.status {
-            EvaluationStatus::Finished { result, .. } => {
-                Some((result.score, view.team_name, view.id))
-            }
-            _ => None,
-        })
-        .collect();
+    let mut others = Vec::new();
+    for view in same_day.into_iter().filter(same_episodes) {
+        if freeze::hides_evaluation(app, &view).await?.is_some() {
+            continue;
+        }
+        // An extra turn may have had episodes of its own.
+        if let EvaluationStatus::Finished { result, .. } = view.status
+            && result.seed == seed
+        {
+            others.push((result.score, view.team_name, view.id));
+        }
+    }
     others.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.2.cmp(&b.2)));
     Ok(others
         .into_iter()

@@ -1,14 +1,15 @@
 //! Who stands where, and how sure that is.
 
-use super::{stage, task::TaskView, team::TeamView};
+use super::{ruling::RulingView, stage, task::TaskView, team::TeamView};
 use crate::{
-    app::AppState, problem::Problem, requests::BoardQuery, summaries::RunSummaries, views::shown,
+    app::AppState, auth::PerhapsOrganiser, problem::Problem, requests::BoardQuery,
+    summaries::RunSummaries, views::shown,
 };
 use faceoff_scoring::{
     BoardEntry, Played, RankedEntry, SIGNIFICANCE, TIER_CHANGE_RESAMPLES, overall_board,
     rank_groups, task_board,
 };
-use faceoff_store::{BoardRecord, Stage};
+use faceoff_store::{BoardRecord, BoardScope, Stage};
 use faceoff_types::{
     EvaluationId, Profile, Seed, StageId, StageName, Task, TeamId, TeamName, Tier,
 };
@@ -41,6 +42,9 @@ pub struct BoardView {
     /// Bootstrap resamples behind each `tier_change_probability`.
     #[schema(example = 2000)]
     pub tier_change_resamples: u32,
+    /// The board shows what it showed then: since when, and why; absent otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frozen: Option<RulingView>,
     /// Teams that are on no board, and why.
     pub disqualified: Vec<TeamView>,
     /// Deployable teams first, then improvable, then non-deployable; inside a tier the higher score,
@@ -69,6 +73,10 @@ pub struct BoardRow {
     pub evaluation: EvaluationId,
     /// The date, in the stage's zone, whose episodes it played.
     pub day: Date,
+    /// It is a turn beside the day's own, and why; absent otherwise. Given after the day's release it played other
+    /// episodes than the other rows of the day.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub extra_turn: Option<String>,
     /// When its score was published.
     pub finished_at: Timestamp,
     /// The rules that it was scored by.
@@ -88,36 +96,54 @@ pub struct BoardRow {
 }
 
 impl BoardView {
-    /// The board that a request asks for: the overall one, or that of one task.
+    /// The board that a request asks for: the overall one, or that of one task. The live one of a frozen stage is the
+    /// organiser's alone.
     pub(crate) async fn asked(
         app: &AppState,
+        caller: PerhapsOrganiser,
         query: BoardQuery,
         task: Option<Task>,
     ) -> Result<Self, Problem> {
+        if query.live {
+            caller.0?;
+        }
         let stage = match query.stage {
             Some(id) => app.store.stage(id).await?,
             None => stage::current(app).await?,
         };
-        Self::of(app, &stage, query.revision, task).await
+        let frozen = app.store.boards_frozen(stage.id).await?;
+        let scope = BoardScope {
+            until: frozen
+                .as_ref()
+                .filter(|_| !query.live)
+                .map(|frozen| frozen.at),
+            ..BoardScope::default()
+        };
+        let revision = match query.revision {
+            Some(number) => number,
+            None => app.store.board_revision_until(&stage, scope.until).await?,
+        };
+        let records = app.store.board_within(stage.id, revision, &scope).await?;
+        let board = Self::of(app, &stage, revision, task, records).await?;
+        Ok(Self {
+            frozen: frozen.map(RulingView::from),
+            ..board
+        })
     }
 
-    /// The overall board of a stage, or that of one task: by one of the stage's revisions, or else by the newest
-    /// with results. A constant number of reads, however many teams there are.
+    /// These records of a stage by one revision of its rules, ranked by all tasks or by one. A constant number of
+    /// reads, however many teams there are.
     pub(crate) async fn of(
         app: &AppState,
         stage: &Stage,
-        revision: Option<u32>,
+        number: u32,
         task: Option<Task>,
+        records: Vec<BoardRecord>,
     ) -> Result<Self, Problem> {
-        let number = match revision {
-            Some(number) => number,
-            None => app.store.board_revision(stage).await?,
-        };
         let mut revisions = app.store.stage_revisions(stage.id).await?.into_iter();
         let Some(revision) = revisions.find(|revision| revision.number == number) else {
             return Err(Problem::not_found("revision of the stage's rules"));
         };
-        let records = app.store.board(stage.id, number).await?;
         let mut disqualified = TeamView::all(app).await?;
         disqualified.retain(|team| team.disqualified.is_some());
         let runs: Vec<_> = records.iter().map(|record| record.run).collect();
@@ -151,6 +177,7 @@ impl BoardView {
             task,
             significance: SIGNIFICANCE,
             tier_change_resamples: TIER_CHANGE_RESAMPLES,
+            frozen: None,
             disqualified,
             rows: rows.collect::<Result<_, Problem>>()?,
         })
@@ -194,6 +221,7 @@ fn row(
         agent: record.agent_name.map(shown),
         evaluation: record.evaluation,
         day: record.day,
+        extra_turn: record.extra_for,
         finished_at: record.finished_at,
         ruleset: result.ruleset,
         profile: result.profile,

@@ -24,7 +24,8 @@ pub struct DayView {
 
 impl DayView {
     pub(crate) async fn of(app: &AppState, of: StageDay) -> Result<Self, Problem> {
-        let created = EvaluationView::of_day(app, of).await?;
+        let mut created = EvaluationView::of_day(app, of).await?;
+        EvaluationView::place(app, &mut created).await?;
         let evaluated: BTreeSet<TeamId> = created.iter().map(|created| created.team).collect();
         let mut without_submission = TeamView::all(app).await?;
         without_submission.retain(|team| !evaluated.contains(&team.id));

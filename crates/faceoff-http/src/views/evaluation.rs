@@ -1,17 +1,21 @@
 //! An evaluation on its way to a score or a failure.
 
-use super::{ruling::RulingView, task::TaskView};
+use super::{
+    queue::{self, QueueView},
+    ruling::RulingView,
+};
 use crate::{app::AppState, paths, problem::Problem, views::shown};
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::{Evaluation, EvaluationState};
 use faceoff_types::{
-    AgentFault, EvaluationId, EvaluationResult, Profile, Seed, SlotTiming, StageDay, StageId,
-    SubmissionId, Task, TeamId, TeamName, Tier,
+    EvaluationId, Profile, StageDay, StageId, SubmissionId, Task, TeamId, TeamName,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
 use std::{collections::BTreeMap, sync::Arc};
 use utoipa::ToSchema;
+
+pub use super::evaluation_status::{EvaluationStatus, FaultView, ResultView};
 
 /// One run of a submission over the tasks.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -32,10 +36,16 @@ pub struct EvaluationView {
     pub day: Date,
     /// When the day's last evaluation had ended, and all of the day came out; null until then.
     pub released_at: Option<Timestamp>,
+    /// What is not played by then is ended, until the day is released; null: however long it takes.
+    pub deadline_at: Option<Timestamp>,
     /// The evaluation that it plays again, one that was cancelled, voided or failed by our fault; absent
     /// otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rerun_of: Option<EvaluationId>,
+    /// It is a turn beside the day's own, and why; absent otherwise. Given after the day's release it plays other
+    /// episodes than the day's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub extra_turn: Option<String>,
     /// It does not count, if it was voided; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub voided: Option<RulingView>,
@@ -49,6 +59,11 @@ pub struct EvaluationView {
     pub created_at: Timestamp,
     /// How far it is.
     pub progress: Progress,
+    /// Where it stands in the queue; absent once it is over.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub queue: Option<QueueView>,
+    /// What happens next.
+    pub next: String,
     /// What has become of it.
     #[serde(flatten)]
     pub status: EvaluationStatus,
@@ -63,139 +78,13 @@ pub struct Progress {
     pub episodes_total: u32,
 }
 
-/// What has become of an evaluation.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(tag = "state", rename_all = "snake_case")]
-pub enum EvaluationStatus {
-    /// It waits for a worker.
-    Queued,
-    /// Episodes are being played.
-    Running,
-    /// All episodes are played, the score is being computed.
-    Finalising,
-    /// It has a score.
-    Finished {
-        /// When the score was published.
-        finished_at: Timestamp,
-        /// The score.
-        result: Box<ResultView>,
-        /// Path of the recorded dataset on this server.
-        dataset: String,
-        /// BLAKE3 of its archive, 64 hexadecimal digits; absent for datasets of older versions.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        dataset_blake3: Option<String>,
-    },
-    /// The agent broke the protocol or a limit too often; no score.
-    AgentFailed {
-        /// When the last of its faults was stored.
-        finished_at: Timestamp,
-        /// What the agent did; absent in lists, and until the day is released.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        faults: Option<Vec<FaultView>>,
-        /// Last part of the agent's standard error; absent in lists, and until the day is released.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        log: Option<String>,
-    },
-    /// Our fault. It is played again, with the same submission on the same episodes: twice by itself,
-    /// then if the organiser wants it.
-    PlatformFailed {
-        /// When we gave it up.
-        finished_at: Timestamp,
-        /// What failed.
-        reason: String,
-    },
-    /// Stopped by the organiser.
-    Cancelled {
-        /// When it was stopped.
-        finished_at: Timestamp,
-        /// The organiser's words.
-        reason: String,
-    },
-}
-
-impl EvaluationStatus {
-    /// Will nothing change any more?
-    #[must_use]
-    pub const fn is_final(&self) -> bool {
-        !matches!(self, Self::Queued | Self::Running | Self::Finalising)
-    }
-}
-
-/// The score of one evaluation; laid out as `results.json` of the dataset, of which only score and points
-/// are told until the day is released.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
-pub struct ResultView {
-    /// The rules that it was scored by.
-    pub ruleset: String,
-    /// The perturbations.
-    pub profile: Profile,
-    /// The seed of the day's evaluations, 64 hexadecimal digits; null until the day is released.
-    pub seed: Option<Seed>,
-    /// By task: hit, defend, prepare.
-    pub tasks: BTreeMap<Task, TaskView>,
-    /// Overall score in percent.
-    pub score: f64,
-    /// Penalty points: the maximum over the tasks.
-    pub penalty_points: f64,
-    /// The worst of the tasks' tiers.
-    pub tier: Tier,
-    /// The slots' noise floor and re-runs; absent until the day is released, and in results of older
-    /// versions.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub timing: Option<SlotTiming>,
-}
-
-impl ResultView {
-    fn new(result: EvaluationResult, released: bool) -> Self {
-        let tasks = result.tasks.iter();
-        Self {
-            ruleset: result.ruleset,
-            profile: result.profile,
-            seed: released.then_some(result.seed),
-            tasks: tasks
-                .map(|(task, result)| (*task, TaskView::new(result, released)))
-                .collect(),
-            score: result.score,
-            penalty_points: result.penalty_points,
-            tier: result.tier,
-            timing: result.timing.filter(|_| released),
-        }
-    }
-}
-
-/// Something an agent did wrong.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-pub struct FaultView {
-    /// What it did, in words.
-    pub message: String,
-    /// In which task.
-    pub task: String,
-    /// In which episode; null during start-up.
-    pub episode: Option<u32>,
-    /// At which control step; null outside of an episode.
-    pub step: Option<u32>,
-    /// The offending line, cut, where there was one.
-    pub line: Option<String>,
-}
-
-impl From<AgentFault> for FaultView {
-    fn from(fault: AgentFault) -> Self {
-        Self {
-            message: shown(fault.fault.to_string()),
-            task: fault.contest.to_string(),
-            episode: fault.episode,
-            step: fault.step,
-            line: fault.line.map(shown),
-        }
-    }
-}
-
 impl EvaluationView {
     pub(crate) async fn find(app: &AppState, id: EvaluationId) -> Result<Self, Problem> {
         Self::of(app, app.store.evaluation(id).await?).await
     }
 
-    /// With faults and log, if it failed by them and its day is released.
+    /// With its place in the queue while it is under way; with faults and log, if it failed by them and its day is
+    /// released.
     pub(crate) async fn of(app: &AppState, evaluation: Evaluation) -> Result<Self, Problem> {
         let team = app.store.team(evaluation.team).await?;
         let run = evaluation.run;
@@ -207,7 +96,20 @@ impl EvaluationView {
             *faults = Some(of_run.faults.into_iter().map(FaultView::from).collect());
             *log = Some(shown(of_run.log));
         }
+        Self::place(app, std::slice::from_mut(&mut view)).await?;
         Ok(view)
+    }
+
+    /// Tells of those that are under way where they stand. If all are over, nothing is read.
+    pub(crate) async fn place(app: &AppState, views: &mut [Self]) -> Result<(), Problem> {
+        if views.iter().all(|view| view.status.is_final()) {
+            return Ok(());
+        }
+        let outlook = queue::outlook(app).await?;
+        for view in views {
+            view.queue = outlook.evaluations.get(&view.id).copied().map(Into::into);
+        }
+        Ok(())
     }
 
     /// All evaluations of a date, of all stages, in the order in which they were queued; without faults and
@@ -265,6 +167,7 @@ impl EvaluationView {
             EvaluationState::Queued
             | EvaluationState::AgentFailed { .. }
             | EvaluationState::PlatformFailed { .. }
+            | EvaluationState::NotPlayed { .. }
             | EvaluationState::Cancelled { .. } => 0,
         };
         let status = match evaluation.state {
@@ -294,6 +197,13 @@ impl EvaluationView {
                 finished_at,
                 reason: shown(reason),
             },
+            EvaluationState::NotPlayed {
+                finished_at,
+                reason,
+            } => EvaluationStatus::NotPlayed {
+                finished_at,
+                reason,
+            },
             EvaluationState::Cancelled {
                 finished_at,
                 reason,
@@ -302,6 +212,7 @@ impl EvaluationView {
                 reason,
             },
         };
+        let voided = evaluation.voided.is_some();
         Self {
             id: evaluation.id,
             submission: evaluation.submission,
@@ -311,7 +222,9 @@ impl EvaluationView {
             revision: evaluation.revision,
             day: evaluation.of.date,
             released_at: evaluation.released_at,
+            deadline_at: evaluation.deadline_at,
             rerun_of: evaluation.rerun_of,
+            extra_turn: evaluation.extra_for,
             voided: evaluation.voided.map(RulingView::from),
             profile: evaluation.plan.profile,
             tasks: evaluation.plan.tasks,
@@ -321,6 +234,8 @@ impl EvaluationView {
                 episodes_done,
                 episodes_total,
             },
+            queue: None,
+            next: status.next(released, voided).to_owned(),
             status,
         }
     }

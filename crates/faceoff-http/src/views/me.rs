@@ -1,6 +1,13 @@
 //! How a team stands today.
 
-use super::{day::NextCut, stage, team::TeamView};
+use super::{
+    day::NextCut,
+    evaluation::EvaluationView,
+    queue::QueueView,
+    stage,
+    submission::{SubmissionStatus, SubmissionView},
+    team::TeamView,
+};
 use crate::{app::AppState, problem::Problem};
 use faceoff_store::{Evaluation, EvaluationState, Team};
 use faceoff_types::{EvaluationId, StageId, SubmissionId};
@@ -17,7 +24,9 @@ pub struct MeView {
     pub turn: TurnView,
     /// What it enters at the next cut; null while it has no valid submission.
     pub active_submission: Option<SubmissionId>,
-    /// When that is; null if none comes.
+    /// What waits for its smoke run or is in it, the newest first.
+    pub validating: Vec<ValidatingView>,
+    /// When that cut is; null if none comes.
     pub next_cut: Option<NextCut>,
     /// Largest packed bundle that the server takes, in bytes.
     pub max_bundle_bytes: u64,
@@ -31,8 +40,25 @@ pub struct TurnView {
     /// The date in its zone.
     pub day: Date,
     /// The evaluation that counts; null before the day's cut, if the team had nothing active then, and
-    /// if it was cancelled, voided or failed by our fault and is not played again.
+    /// if it was cancelled, voided, not played in time or failed by our fault, and is not played again.
     pub evaluation: Option<EvaluationId>,
+    /// Where that stands in the queue; absent if there is none, or it is over.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub queue: Option<QueueView>,
+    /// What happens to it next; absent if there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub next: Option<String>,
+}
+
+/// A submission that has no verdict yet.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ValidatingView {
+    /// Which.
+    pub submission: SubmissionId,
+    /// Where its smoke run stands; null when it has just ended.
+    pub queue: Option<QueueView>,
+    /// What happens next.
+    pub next: String,
 }
 
 impl MeView {
@@ -41,7 +67,9 @@ impl MeView {
         let counts = |evaluation: &Evaluation| {
             let stopped = matches!(
                 evaluation.state,
-                EvaluationState::PlatformFailed { .. } | EvaluationState::Cancelled { .. }
+                EvaluationState::PlatformFailed { .. }
+                    | EvaluationState::NotPlayed { .. }
+                    | EvaluationState::Cancelled { .. }
             );
             !stopped && evaluation.voided.is_none()
         };
@@ -49,16 +77,31 @@ impl MeView {
         let evaluation = evaluations
             .iter()
             .find(|evaluation| evaluation.of == today && counts(evaluation))
-            .map(|evaluation| evaluation.id);
-        let submissions = app.store.submissions_of(team.id).await?;
+            .cloned();
+        let evaluation = match evaluation {
+            Some(evaluation) => Some(EvaluationView::of(app, evaluation).await?),
+            None => None,
+        };
+        let submissions = SubmissionView::of_team(app, team.id).await?;
+        let validating = submissions
+            .iter()
+            .filter(|submission| submission.status == SubmissionStatus::Validating)
+            .map(|submission| ValidatingView {
+                submission: submission.id,
+                queue: submission.queue,
+                next: submission.next.clone(),
+            });
         let active = submissions.iter().find(|submission| submission.active);
         Ok(Self {
             team: team.into(),
             turn: TurnView {
                 stage: today.stage,
                 day: today.date,
-                evaluation,
+                evaluation: evaluation.as_ref().map(|evaluation| evaluation.id),
+                queue: evaluation.as_ref().and_then(|evaluation| evaluation.queue),
+                next: evaluation.map(|evaluation| evaluation.next),
             },
+            validating: validating.collect(),
             active_submission: active.map(|submission| submission.id),
             next_cut: NextCut::first(app).await?,
             max_bundle_bytes: app.config.max_bundle_bytes,

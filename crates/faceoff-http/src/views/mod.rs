@@ -7,13 +7,17 @@
 pub mod ablation;
 pub mod announcement;
 pub mod board;
+pub mod capacity;
 pub mod comparison;
 pub mod day;
 pub mod evaluation;
+mod evaluation_status;
 pub mod event;
 pub mod invitation;
 pub mod me;
 pub mod person;
+pub mod proposal;
+pub mod queue;
 pub mod ruling;
 pub mod season;
 pub mod stage;

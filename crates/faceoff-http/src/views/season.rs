@@ -9,6 +9,7 @@ use crate::{app::AppState, problem::Problem};
 use faceoff_types::{DivisionName, RULESET, Seed, StageDay, StageId};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
 use utoipa::ToSchema;
 
 /// What everybody may know of the season.
@@ -61,8 +62,13 @@ pub struct SeasonDay {
     pub day: Date,
     /// When it started; what each team had active then plays it.
     pub cut_at: Timestamp,
+    /// What is not played by then is ended, and the day released; null: however long it takes.
+    pub deadline_at: Option<Timestamp>,
     /// When its last evaluation had ended and all of it came out; null before.
     pub released_at: Option<Timestamp>,
+    /// It was missed on its date and played later, and why; absent otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub missed: Option<String>,
     /// Its finished evaluations.
     pub finished: u32,
     /// The seed of its evaluations; null until it is released.
@@ -73,6 +79,8 @@ impl SeasonView {
     pub(crate) async fn now(app: &AppState) -> Result<Self, Problem> {
         let season = app.store.season().await?;
         let days = app.store.days().await?;
+        let missed: HashMap<StageDay, String> =
+            app.store.missed_days().await?.into_iter().collect();
         let stages = app.store.stages().await?;
         let seed = |of: StageDay| {
             let stage = stages.iter().find(|stage| stage.id == of.stage)?;
@@ -98,7 +106,9 @@ impl SeasonView {
                     stage: day.of.stage,
                     day: day.of.date,
                     cut_at: day.cut_at,
+                    deadline_at: day.deadline_at,
                     released_at: day.released_at,
+                    missed: missed.get(&day.of).cloned(),
                     finished,
                     seed: day.released_at.and_then(|_| seed(day.of)),
                 })

@@ -1,6 +1,6 @@
 //! A stage: when it is open, by which rules it is played, and when its next day starts.
 
-use super::day::NextCut;
+use super::{day::NextCut, ruling::RulingView};
 use crate::{app::AppState, problem::Problem};
 use faceoff_store::{Revision, Stage, StagePhase};
 use faceoff_types::{StageId, StageName, StageRules, StageSettings, Zone};
@@ -25,6 +25,9 @@ pub struct StageView {
     pub zone: Zone,
     /// When its next day starts; null if none does.
     pub next_cut: Option<NextCut>,
+    /// Its boards show what they showed then: since when, and why; absent otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frozen: Option<RulingView>,
     /// Do the seeds of its days follow from its id? Not of a season's first stage, if that began before there were
     /// stages.
     pub names_seeds: bool,
@@ -102,6 +105,11 @@ impl StageView {
         let revisions = app.store.stage_revisions(stage.id).await?;
         Ok(Self {
             next_cut: NextCut::of(app, &stage).await?,
+            frozen: app
+                .store
+                .boards_frozen(stage.id)
+                .await?
+                .map(RulingView::from),
             phase: stage.phase(app.config.clock.now()).into(),
             id: stage.id,
             name: stage.name,

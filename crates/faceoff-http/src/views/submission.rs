@@ -1,5 +1,6 @@
 //! An uploaded agent and its smoke run's verdict.
 
+use super::queue::{self, QueueView};
 use crate::{app::AppState, problem::Problem, views::shown};
 use faceoff_store::{Submission, SubmissionState};
 use faceoff_types::{SmokeTiming, SubmissionId, TeamId};
@@ -38,6 +39,11 @@ pub struct SubmissionView {
     /// The team's first submission of the same archive, if this is another; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub same_as: Option<SubmissionId>,
+    /// Where its smoke run stands in the queue; absent once there is a verdict.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub queue: Option<QueueView>,
+    /// What happens next.
+    pub next: String,
     /// The smoke run's verdict.
     #[serde(flatten)]
     pub status: SubmissionStatus,
@@ -70,6 +76,31 @@ pub enum SubmissionStatus {
     },
 }
 
+impl SubmissionStatus {
+    /// What happens to a submission next, by itself or by its team.
+    pub(crate) const fn next(&self, active: bool, withdrawn: bool) -> &'static str {
+        match self {
+            Self::Validating => {
+                "A smoke run checks whether it starts, answers and keeps time; if it is valid and the newest, it is \
+             active then, by itself."
+            }
+            Self::Valid { .. } if active => {
+                "It plays at the next cut, unless a later upload turns valid or another one is chosen before."
+            }
+            Self::Valid { .. } if withdrawn => {
+                "It plays no further day, unless it is chosen again; a day that had its cut goes on."
+            }
+            Self::Valid { .. } => "It plays no further day, unless it is chosen.",
+            Self::Invalid { .. } => {
+                "It plays nothing: its bundle is removed. Correct what the reason names, and upload another."
+            }
+            Self::ValidationError { .. } => {
+                "It plays nothing, by our fault: upload it again, which costs no place in the queue of pending uploads."
+            }
+        }
+    }
+}
+
 impl SubmissionView {
     pub(crate) async fn find(app: &AppState, id: SubmissionId) -> Result<Self, Problem> {
         Self::of(app, app.store.submission(id).await?).await
@@ -78,17 +109,52 @@ impl SubmissionView {
     /// With its log.
     pub(crate) async fn of(app: &AppState, submission: Submission) -> Result<Self, Problem> {
         let log = app.store.submission_log(submission.id).await?;
-        Ok(Self::new(submission, log))
+        let mut view = Self::new(submission, log);
+        Self::place(app, std::slice::from_mut(&mut view)).await?;
+        Ok(view)
     }
 
     /// Of a team, newest first; without their logs, which are long.
     pub(crate) async fn of_team(app: &AppState, team: TeamId) -> Result<Vec<Self>, Problem> {
         let submissions = app.store.submissions_of(team).await?;
         let without_log = |submission| Self::new(submission, None);
-        Ok(submissions.into_iter().map(without_log).collect())
+        let mut views: Vec<Self> = submissions.into_iter().map(without_log).collect();
+        Self::place(app, &mut views).await?;
+        Ok(views)
+    }
+
+    /// Tells of those that wait for their smoke run where they stand. If none does, nothing is read.
+    async fn place(app: &AppState, views: &mut [Self]) -> Result<(), Problem> {
+        if views
+            .iter()
+            .all(|view| view.status != SubmissionStatus::Validating)
+        {
+            return Ok(());
+        }
+        let outlook = queue::outlook(app).await?;
+        for view in views {
+            view.queue = outlook.submissions.get(&view.id).copied().map(Into::into);
+        }
+        Ok(())
     }
 
     pub(crate) fn new(submission: Submission, log: Option<String>) -> Self {
+        let status = match submission.state {
+            SubmissionState::Validating => SubmissionStatus::Validating,
+            SubmissionState::Valid => SubmissionStatus::Valid {
+                log: log.map(shown),
+            },
+            SubmissionState::Invalid { reason } => SubmissionStatus::Invalid {
+                reason: shown(reason),
+                log: log.map(shown),
+            },
+            // It may name a file of the bundle.
+            SubmissionState::ValidationError { reason } => SubmissionStatus::ValidationError {
+                reason: shown(reason),
+            },
+        };
+        let is_withdrawn = submission.withdrawn_at.is_some();
+        let next = status.next(submission.active, is_withdrawn);
         Self {
             id: submission.id,
             team: submission.team,
@@ -102,22 +168,63 @@ impl SubmissionView {
             withdrawn_at: submission.withdrawn_at,
             label: submission.label.map(shown),
             same_as: submission.same_as,
-            status: match submission.state {
-                SubmissionState::Validating => SubmissionStatus::Validating,
-                SubmissionState::Valid => SubmissionStatus::Valid {
-                    log: log.map(shown),
-                },
-                SubmissionState::Invalid { reason } => SubmissionStatus::Invalid {
-                    reason: shown(reason),
-                    log: log.map(shown),
-                },
-                SubmissionState::ValidationError { reason } => {
-                    // It may name a file of the bundle.
-                    SubmissionStatus::ValidationError {
-                        reason: shown(reason),
-                    }
-                }
-            },
+            queue: None,
+            next: next.to_owned(),
+            status,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_state_of_a_submission_says_what_happens_next() {
+        let reason = || "a reason".to_owned();
+        let states = [
+            (SubmissionStatus::Validating, false, false, "smoke run"),
+            (
+                SubmissionStatus::Valid { log: None },
+                true,
+                false,
+                "next cut",
+            ),
+            (
+                SubmissionStatus::Valid { log: None },
+                false,
+                true,
+                "chosen again",
+            ),
+            (
+                SubmissionStatus::Valid { log: None },
+                false,
+                false,
+                "unless it is chosen.",
+            ),
+            (
+                SubmissionStatus::Invalid {
+                    reason: reason(),
+                    log: None,
+                },
+                false,
+                false,
+                "upload another",
+            ),
+            (
+                SubmissionStatus::ValidationError { reason: reason() },
+                false,
+                false,
+                "our fault",
+            ),
+        ];
+        let mut texts = BTreeSet::new();
+        for (status, active, withdrawn, words) in &states {
+            let text = status.next(*active, *withdrawn);
+            assert!(text.contains(words), "{words} is not in {text}");
+            texts.insert(text);
+        }
+        assert_eq!(texts.len(), states.len(), "no two say the same");
     }
 }

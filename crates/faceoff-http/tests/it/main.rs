@@ -5,8 +5,10 @@
 )]
 
 mod ablations;
+mod acts;
 mod board;
 mod board_load;
+mod capacity;
 mod comparisons;
 mod days;
 mod evaluations;
@@ -14,6 +16,7 @@ mod events;
 mod openapi;
 mod people;
 mod problems;
+mod proposals;
 mod roles;
 mod room;
 mod rulings;

@@ -2,7 +2,7 @@
 //! and the steps that a worker would take.
 
 use faceoff_http::{
-    ConnectionLimits, HttpConfig, HttpLimits, LeastRate, router, token::hash_token,
+    Capacity, ConnectionLimits, HttpConfig, HttpLimits, LeastRate, router, token::hash_token,
 };
 use faceoff_store::*;
 use faceoff_types::*;
@@ -150,6 +150,10 @@ impl Site {
             upload_dir,
             clock: Clock::new(move || *clock.lock().unwrap()),
             limits,
+            capacity: Capacity {
+                slots: 2,
+                time: TimeLimits::default(),
+            },
         };
         let (url, server) = serve(&store, &config).await;
         let http = reqwest::Client::builder().no_proxy().build().unwrap();

@@ -12,8 +12,7 @@ use crate::{
 use faceoff_types::{EpisodeEnd, Task};
 use std::f64::consts::FRAC_PI_2;
 
-/// Control steps of a qualifying episode.
-pub const EPISODE_STEPS: u32 = 500;
+pub use faceoff_types::EPISODE_STEPS;
 
 /// Numbers of the tasks, table frame.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,7 +1,7 @@
 use super::parse::ParseEventError;
 use faceoff_types::{
-    AblationId, AnnouncementId, EvaluationId, PersonId, QuestionId, RegistrationId, StageDay,
-    StageId, SubmissionId, TeamId,
+    AblationId, AnnouncementId, EvaluationId, PersonId, ProposalId, QuestionId, RegistrationId,
+    StageDay, StageId, SubmissionId, TeamId,
 };
 use jiff::civil::Date;
 use std::{fmt, str::FromStr};
@@ -33,6 +33,8 @@ pub enum Subject {
     Announcement(AnnouncementId),
     /// What a team asks.
     Question(QuestionId),
+    /// A trial or a re-evaluation with its runs.
+    Proposal(ProposalId),
 }
 
 impl Subject {
@@ -51,6 +53,7 @@ impl Subject {
             Self::Registration(id) => ("registration", id.to_string()),
             Self::Announcement(id) => ("announcement", id.to_string()),
             Self::Question(id) => ("question", id.to_string()),
+            Self::Proposal(id) => ("proposal", id.to_string()),
         }
     }
 
@@ -69,6 +72,7 @@ impl Subject {
             "registration" => Self::Registration(id.parse().map_err(|_| unknown())?),
             "announcement" => Self::Announcement(id.parse().map_err(|_| unknown())?),
             "question" => Self::Question(id.parse().map_err(|_| unknown())?),
+            "proposal" => Self::Proposal(id.parse().map_err(|_| unknown())?),
             _ => return Err(unknown()),
         })
     }
@@ -114,6 +118,7 @@ mod tests {
             Subject::Registration(RegistrationId::new()),
             Subject::Announcement(AnnouncementId::new()),
             Subject::Question(QuestionId::new()),
+            Subject::Proposal(ProposalId::new()),
         ];
         for subject in subjects {
             let (kind, id) = subject.columns();

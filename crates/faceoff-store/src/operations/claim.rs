@@ -61,7 +61,7 @@ pub enum Work {
         /// How often it was begun before and broken by us.
         platform_retries: u32,
     },
-    /// Join the recordings of an evaluation whose shards are all committed, and score it.
+    /// Join the recordings of an evaluation whose shards are all committed, and score it, whether it counts or not.
     Finalise {
         /// What is scored.
         evaluation: EvaluationId,
@@ -163,23 +163,30 @@ async fn describe(tx: &mut Tx, unit: &Leased) -> Result<Work> {
             })
         }
         Purpose::Finalise(evaluation) => {
-            let id = evaluations::run_of(tx, evaluation).await?;
-            let (run, seeds) = read_run(tx, id).await?;
-            let of_run = shards::of_run(tx, id).await?;
-            let missing = |what| StoreError::Damaged(format!("evaluation {evaluation}: {what}"));
-            let recordings: Option<Vec<_>> =
-                of_run.into_iter().map(|shard| shard.recording).collect();
-            let agent_name = contestant(tx, id).await?.agent_name;
             tx.advanced(Subject::Evaluation(evaluation));
-            Ok(Work::Finalise {
-                evaluation,
-                run,
-                recordings: recordings.ok_or_else(|| missing("a shard without a recording"))?,
-                agent_name: agent_name.ok_or_else(|| missing("an agent without a name"))?,
-                seeds,
-            })
+            let run = evaluations::run_of(tx, evaluation).await?;
+            finalise(tx, evaluation, run).await
+        }
+        Purpose::FinaliseDraft { id, run, proposal } => {
+            tx.advanced(Subject::Proposal(proposal));
+            finalise(tx, id, run).await
         }
     }
+}
+
+async fn finalise(tx: &mut Tx, evaluation: EvaluationId, id: RunId) -> Result<Work> {
+    let (run, seeds) = read_run(tx, id).await?;
+    let of_run = shards::of_run(tx, id).await?;
+    let missing = |what| StoreError::Damaged(format!("evaluation {evaluation}: {what}"));
+    let recordings: Option<Vec<_>> = of_run.into_iter().map(|shard| shard.recording).collect();
+    let agent_name = contestant(tx, id).await?.agent_name;
+    Ok(Work::Finalise {
+        evaluation,
+        run,
+        recordings: recordings.ok_or_else(|| missing("a shard without a recording"))?,
+        agent_name: agent_name.ok_or_else(|| missing("an agent without a name"))?,
+        seeds,
+    })
 }
 
 async fn read_run(tx: &mut Tx, id: RunId) -> Result<(Run, RunSeeds)> {

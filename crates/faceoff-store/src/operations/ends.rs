@@ -4,7 +4,7 @@ use crate::{
     error::{Result, StoreError},
     event::{Event, Subject},
     operations::{
-        purpose, release_day, rerun,
+        drafts, purpose, release_day, rerun,
         runs::{self, RunOwner},
     },
     queue,
@@ -57,6 +57,13 @@ pub(crate) async fn run_ended(
         (RunOwner::Evaluation(id), RunEnd::PlatformFailed(reason)) => {
             fail_evaluation(tx, id, run, Failure::Platform(reason)).await
         }
+        (RunOwner::Draft { id, .. }, RunEnd::Played) => drafts::queue_finalisation(tx, id).await,
+        (RunOwner::Draft { id, proposal }, RunEnd::AgentFailed) => {
+            drafts::fail(tx, id, run, proposal, Failure::Agent).await
+        }
+        (RunOwner::Draft { id, proposal }, RunEnd::PlatformFailed(reason)) => {
+            drafts::fail(tx, id, run, proposal, Failure::Platform(reason)).await
+        }
         (RunOwner::Ablation(id), RunEnd::Played) => finish_ablation_if_played(tx, id).await,
         (RunOwner::Ablation(id), RunEnd::AgentFailed) => {
             let plan = run_rows::find(tx, run).await?.plan;
@@ -99,6 +106,9 @@ pub(crate) async fn fail_evaluation(
             reason: reason.to_owned(),
         },
         Failure::Cancelled(reason) => Event::EvaluationCancelled {
+            reason: reason.to_owned(),
+        },
+        Failure::NotPlayed(reason) => Event::EvaluationNotPlayed {
             reason: reason.to_owned(),
         },
     };

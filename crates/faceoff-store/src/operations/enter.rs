@@ -6,7 +6,8 @@ use crate::{
     operations::{purpose, runs},
     queue::NewUnit,
     tables::{
-        evaluations::{self, Entry},
+        days,
+        entries::{self, Entry},
         plan::RunPlan,
         runs::Run,
     },
@@ -16,6 +17,8 @@ use faceoff_types::{EvaluationId, Ruleset, RunId, SeedLabel, StageDay, Submissio
 
 /// Who plays a day.
 pub(crate) struct Entrant {
+    /// Of its evaluation.
+    pub(crate) id: EvaluationId,
     pub(crate) submission: SubmissionId,
     pub(crate) team: TeamId,
     pub(crate) rerun_of: Option<EvaluationId>,
@@ -46,13 +49,20 @@ pub(crate) async fn enter(
         seed: turn.seed,
         keeps_recordings: true,
     };
+    // An unfinished day goes on before a later one; what is played of a released day waits with what comes now.
+    let day = days::find(tx, turn.of).await?;
+    let queued_as_of = match day.released_at {
+        None => day.cut_at,
+        Some(_) => tx.now,
+    };
     let unit = NewUnit {
         rest_s,
+        batch: queued_as_of.as_millisecond(),
         ..purpose::SHARD
     };
     runs::create(tx, &run, &[entrant.submission], unit, entrant.team).await?;
     let new = Entry {
-        id: EvaluationId::new(),
+        id: entrant.id,
         submission: entrant.submission,
         team: entrant.team,
         of: turn.of,
@@ -61,7 +71,7 @@ pub(crate) async fn enter(
         rerun_of: entrant.rerun_of,
     };
     let now = tx.now;
-    evaluations::insert(tx, &new, now).await?;
+    entries::insert(tx, &new, now).await?;
     tx.record(
         Subject::Evaluation(new.id),
         Event::EvaluationQueued {

@@ -3,12 +3,13 @@ use crate::{
     event::{Event, Subject},
     operations::{
         commit::{Committed, other_work},
+        drafts as draft_ends,
         purpose::Purpose,
         release_day,
     },
     queue::Claim,
     store::Store,
-    tables::evaluations,
+    tables::{drafts, evaluations},
 };
 use faceoff_types::EvaluationResult;
 use jiff::Timestamp;
@@ -26,17 +27,21 @@ impl Store {
         dataset_blake3: &str,
         now: Timestamp,
     ) -> Result<Committed> {
-        self.commit(claim, now, async |tx, purpose| {
-            let Purpose::Finalise(id) = purpose else {
-                return Err(other_work("finalisation", &purpose));
-            };
-            evaluations::set_finished(tx, id, result, dataset, dataset_blake3, now).await?;
-            let event = Event::EvaluationFinished {
-                score: result.score,
-                dataset_blake3: dataset_blake3.to_owned(),
-            };
-            tx.record(Subject::Evaluation(id), event);
-            release_day::if_over(tx, id).await
+        self.commit(claim, now, async |tx, purpose| match purpose {
+            Purpose::Finalise(id) => {
+                evaluations::set_finished(tx, id, result, dataset, dataset_blake3, now).await?;
+                let event = Event::EvaluationFinished {
+                    score: result.score,
+                    dataset_blake3: dataset_blake3.to_owned(),
+                };
+                tx.record(Subject::Evaluation(id), event);
+                release_day::if_over(tx, id).await
+            }
+            Purpose::FinaliseDraft { id, proposal, .. } => {
+                drafts::set_finished(tx, id, result, dataset, dataset_blake3, now).await?;
+                draft_ends::tell_if_over(tx, proposal).await
+            }
+            other => Err(other_work("finalisation", &other)),
         })
         .await
     }

@@ -2,6 +2,7 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
+        drafts,
         ends::{self, RunEnd},
         purpose::{self, Purpose},
         runs,
@@ -34,6 +35,7 @@ pub(crate) async fn subject(
         Purpose::Smoke(id) => Subject::Submission(*id),
         Purpose::Shard { run, .. } => runs::owner(connection, *run).await?.subject(),
         Purpose::Finalise(id) => Subject::Evaluation(*id),
+        Purpose::FinaliseDraft { proposal, .. } => Subject::Proposal(*proposal),
     })
 }
 
@@ -57,6 +59,9 @@ pub(crate) async fn give_up(tx: &mut Tx, unit: Uuid, label: &str, reason: &str) 
         Ok(Purpose::Finalise(id)) => {
             let run = evaluations::run_of(tx, id).await?;
             ends::fail_evaluation(tx, id, run, Failure::Platform(reason)).await
+        }
+        Ok(Purpose::FinaliseDraft { id, run, proposal }) => {
+            drafts::fail(tx, id, run, proposal, Failure::Platform(reason)).await
         }
         // It is for nothing that could end.
         Err(StoreError::Damaged(_)) => Ok(()),

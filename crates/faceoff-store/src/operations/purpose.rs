@@ -2,12 +2,12 @@ use crate::{
     error::{Result, StoreError},
     queue::{Lane, NewUnit},
     tables::{
-        finalisations,
+        drafts, finalisations,
         shards::{self, Shard},
         smoke_runs,
     },
 };
-use faceoff_types::{EvaluationId, RunId, SubmissionId};
+use faceoff_types::{EvaluationId, ProposalId, RunId, SubmissionId};
 use sqlx::SqliteConnection;
 use uuid::Uuid;
 
@@ -34,6 +34,7 @@ impl Kind {
         NewUnit {
             kind: self.label(),
             lane,
+            batch: 0,
             rest_s: 0,
         }
     }
@@ -48,12 +49,13 @@ const fn lane(name: &'static str, urgency: u32, rank: u32) -> Lane {
 }
 
 // A finalisation runs no agent, is the platform's own, and ends what has had its turn. Smoke runs and
-// shards share the slots half and half, so that neither makes the other wait for long. Ablations do not
-// count: they have what is left.
+// shards share the slots half and half, so that neither makes the other wait for long. Ablations, trials and
+// proposals do not count: they have what is left.
 pub(crate) const FINALISE: NewUnit = Kind::Finalise.waiting_in(lane("finalise", 0, 0));
 pub(crate) const SMOKE: NewUnit = Kind::Smoke.waiting_in(lane("smoke", 1, 0));
 pub(crate) const SHARD: NewUnit = Kind::Shard.waiting_in(lane("shard", 1, 1));
 pub(crate) const ABLATION_SHARD: NewUnit = Kind::Shard.waiting_in(lane("ablation", 2, 0));
+pub(crate) const PROPOSAL_SHARD: NewUnit = Kind::Shard.waiting_in(lane("proposal", 2, 1));
 
 /// Finalisations are done for nobody in particular, in the order in which evaluations were played.
 pub(crate) const PLATFORM: &str = "";
@@ -62,8 +64,16 @@ pub(crate) const PLATFORM: &str = "";
 #[derive(Debug)]
 pub(crate) enum Purpose {
     Smoke(SubmissionId),
-    Shard { run: RunId, shard: Shard },
+    Shard {
+        run: RunId,
+        shard: Shard,
+    },
     Finalise(EvaluationId),
+    FinaliseDraft {
+        id: EvaluationId,
+        run: RunId,
+        proposal: ProposalId,
+    },
 }
 
 /// What the unit with this label is for: the row that refers to it.
@@ -79,9 +89,13 @@ pub(crate) async fn of_unit(
         Some(Kind::Shard) => shards::of_unit(connection, unit)
             .await?
             .map(|(run, shard)| Purpose::Shard { run, shard }),
-        Some(Kind::Finalise) => finalisations::of_unit(connection, unit)
-            .await?
-            .map(Purpose::Finalise),
+        // Applied, a draft is an evaluation.
+        Some(Kind::Finalise) => match finalisations::of_unit(connection, unit).await? {
+            Some(id) => Some(Purpose::Finalise(id)),
+            None => drafts::of_finalisation(connection, unit)
+                .await?
+                .map(|(id, run, proposal)| Purpose::FinaliseDraft { id, run, proposal }),
+        },
         None => None,
     };
     purpose.ok_or_else(|| {

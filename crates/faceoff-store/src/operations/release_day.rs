@@ -4,14 +4,14 @@
 use crate::{
     error::Result,
     event::{Event, Subject},
-    tables::{days, evaluations},
+    tables::{days, entries, evaluations},
     write::Tx,
 };
 use faceoff_types::{EvaluationId, StageDay};
 
 /// Releases the day of an evaluation that has just ended, if it was the last: in the same transaction.
 pub(crate) async fn if_over(tx: &mut Tx, ended: EvaluationId) -> Result<()> {
-    let of = evaluations::entry(tx, ended).await?.of;
+    let of = entries::find(tx, ended).await?.of;
     unless_under_way(tx, of).await
 }
 

@@ -9,7 +9,8 @@ use crate::{
     store::Store,
     tables::{
         days,
-        evaluations::{self, Entry, Evaluation, EvaluationState},
+        entries::{self, Entry},
+        evaluations::{self, Evaluation, EvaluationState},
         runs, season, teams,
     },
     write::Tx,
@@ -24,6 +25,7 @@ pub const RERUN_PAUSES_S: [u32; 2] = [60, 600];
 async fn again(tx: &mut Tx, broken: Entry, rest_s: u32) -> Result<EvaluationId> {
     let run = runs::find(tx, broken.run).await?;
     let entrant = Entrant {
+        id: EvaluationId::new(),
         submission: broken.submission,
         team: broken.team,
         rerun_of: Some(broken.id),
@@ -35,14 +37,17 @@ async fn again(tx: &mut Tx, broken: Entry, rest_s: u32) -> Result<EvaluationId> 
         ruleset: run.ruleset,
         plan: run.plan,
     };
-    enter(tx, entrant, &turn, rest_s).await
+    let id = enter(tx, entrant, &turn, rest_s).await?;
+    entries::follow_extra(tx, id, broken.id).await?;
+    Ok(id)
 }
 
-/// Queues what has just ended by our fault again: unless its day is released, or this was tried often
-/// enough.
+/// Queues what has just ended by our fault again: unless its day is released or past its deadline, or this was
+/// tried often enough.
 pub(crate) async fn after_our_fault(tx: &mut Tx, id: EvaluationId) -> Result<()> {
-    let broken = evaluations::entry(tx, id).await?;
-    if days::is_released(tx, broken.of).await? {
+    let broken = entries::find(tx, id).await?;
+    let day = days::find(tx, broken.of).await?;
+    if day.released_at.is_some() || day.deadline_at.is_some_and(|at| at <= tx.now) {
         return Ok(());
     }
     let times = evaluations::count_broken(tx, broken.team, broken.of).await?;
@@ -53,7 +58,7 @@ pub(crate) async fn after_our_fault(tx: &mut Tx, id: EvaluationId) -> Result<()>
 }
 
 impl Store {
-    /// Plays an evaluation again that was cancelled or voided, or that we broke: what was active at the cut, on the
+    /// Plays an evaluation again that was cancelled or voided, not played in time, or that we broke: what was active at the cut, on the
     /// same episodes, whether the day is released or not. [`StoreError::Conflict`] if it ended otherwise,
     /// or the team has another one of the day that counts; [`StoreError::Disqualified`] if it is; [`StoreError::SeasonClosed`] once the season
     /// is over.
@@ -68,16 +73,18 @@ impl Store {
             let found = reads::evaluations::find(tx, id).await?;
             let ended_without_result = matches!(
                 found.state,
-                EvaluationState::PlatformFailed { .. } | EvaluationState::Cancelled { .. }
+                EvaluationState::PlatformFailed { .. }
+                    | EvaluationState::Cancelled { .. }
+                    | EvaluationState::NotPlayed { .. }
             );
             if !ended_without_result && found.voided.is_none() {
                 return Err(StoreError::Conflict(
-                    "only an evaluation that was cancelled or voided, or that failed by our fault, is played \
-                     again"
+                    "only an evaluation that was cancelled or voided, that was not played in time, or that failed by \
+                     our fault, is played again"
                         .into(),
                 ));
             }
-            let broken = evaluations::entry(tx, id).await?;
+            let broken = entries::find(tx, id).await?;
             teams::check_may_play(tx, broken.team).await?;
             let id = again(tx, broken, 0).await?;
             reads::evaluations::find(tx, id).await

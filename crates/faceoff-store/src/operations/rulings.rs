@@ -7,8 +7,8 @@ use crate::{
     reads,
     store::Store,
     tables::{
-        days,
-        evaluations::{self, Evaluation, Failure},
+        days, entries,
+        evaluations::{Evaluation, Failure},
         rulings::Ruling,
         standings,
         teams::{self, Team},
@@ -18,7 +18,7 @@ use crate::{
 use faceoff_types::{EvaluationId, StageDay, TeamId};
 use jiff::Timestamp;
 
-async fn void(tx: &mut Tx, id: EvaluationId, reason: &str) -> Result<()> {
+pub(crate) async fn void(tx: &mut Tx, id: EvaluationId, reason: &str) -> Result<()> {
     let ruling = Ruling {
         at: tx.now,
         reason: reason.to_owned(),
@@ -40,7 +40,7 @@ impl Store {
         now: Timestamp,
     ) -> Result<Evaluation> {
         self.write(actor, now, async |tx| {
-            let of = evaluations::entry(tx, id).await?.of;
+            let of = entries::find(tx, id).await?.of;
             let standings = standings::of_day(tx, of).await?;
             if !standings.iter().any(|standing| standing.id == id && standing.counts) {
                 return Err(StoreError::Conflict(

@@ -5,13 +5,13 @@ use crate::{
     event::Subject,
     queue::{self, NewUnit},
     tables::{
-        ablations, evaluations, runs,
+        ablations, drafts, evaluations, runs,
         runs::Run,
         shards::{self, Shard},
     },
     write::Tx,
 };
-use faceoff_types::{AblationId, EvaluationId, RunId, ShardId, SubmissionId, TeamId};
+use faceoff_types::{AblationId, EvaluationId, ProposalId, RunId, ShardId, SubmissionId, TeamId};
 use sqlx::SqliteConnection;
 
 /// What a run is a part of.
@@ -21,6 +21,13 @@ pub enum RunOwner {
     Evaluation(EvaluationId),
     /// One profile of it.
     Ablation(AblationId),
+    /// All of one that does not count.
+    Draft {
+        /// Of the evaluation that it becomes.
+        id: EvaluationId,
+        /// What it is a part of.
+        proposal: ProposalId,
+    },
 }
 
 impl RunOwner {
@@ -28,6 +35,7 @@ impl RunOwner {
         match self {
             Self::Evaluation(id) => Subject::Evaluation(id),
             Self::Ablation(id) => Subject::Ablation(id),
+            Self::Draft { proposal, .. } => Subject::Proposal(proposal),
         }
     }
 }
@@ -36,6 +44,9 @@ impl RunOwner {
 pub(crate) async fn owner(connection: &mut SqliteConnection, run: RunId) -> Result<RunOwner> {
     if let Some(id) = evaluations::of_run(connection, run).await? {
         return Ok(RunOwner::Evaluation(id));
+    }
+    if let Some((id, proposal)) = drafts::of_run(connection, run).await? {
+        return Ok(RunOwner::Draft { id, proposal });
     }
     ablations::of_run(connection, run)
         .await?

@@ -2,7 +2,7 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     store::Store,
-    tables::{evaluations, season},
+    tables::{drafts, evaluations, season},
 };
 use jiff::Timestamp;
 
@@ -26,6 +26,13 @@ impl Store {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
             let under_way = evaluations::count_open(tx, None).await?;
+            let proposed = drafts::count_open(tx, None).await?;
+            if proposed > 0 {
+                return Err(StoreError::Conflict(format!(
+                    "{proposed} evaluations of trials and proposals are queued or running: wait until they are over, \
+                     or drop them"
+                )));
+            }
             if under_way > 0 {
                 return Err(StoreError::Conflict(format!(
                     "{under_way} evaluations are queued or running, and closing the season publishes \

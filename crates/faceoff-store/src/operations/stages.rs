@@ -3,6 +3,7 @@
 use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
+    operations::deadlines,
     store::Store,
     tables::{
         days, season,
@@ -154,6 +155,9 @@ async fn change(tx: &mut Tx, stage: &Stage, change: StageChange, by: By) -> Resu
     }
     changed.configured = stage.configured && !by_hand;
     stages::update(tx, &changed).await?;
+    if changed.settings != stage.settings {
+        deadlines::follow(tx, &changed, by == By::Configuration).await?;
+    }
     set_rules(tx, &changed, rules).await
 }
 

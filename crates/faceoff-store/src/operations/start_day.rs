@@ -18,10 +18,10 @@ use crate::{
     },
     write::Tx,
 };
-use faceoff_types::{StageDay, StageId};
-use jiff::Timestamp;
+use faceoff_types::{EvaluationId, StageDay, StageId};
+use jiff::{Timestamp, civil::Date};
 
-fn check_open(stage: &Stage, now: Timestamp) -> Result<()> {
+pub(crate) fn check_open(stage: &Stage, now: Timestamp) -> Result<()> {
     let closed_at = match stage.phase(now) {
         StagePhase::Open => return Ok(()),
         StagePhase::Upcoming => None,
@@ -34,12 +34,59 @@ fn check_open(stage: &Stage, now: Timestamp) -> Result<()> {
     })
 }
 
-async fn cut(tx: &mut Tx, stage: StageId) -> Result<(StageDay, Vec<Evaluation>)> {
+/// Of which date a cut is.
+enum CutOf<'a> {
+    Today,
+    /// One that has passed without, and why it is made up for.
+    Missed {
+        date: Date,
+        reason: &'a str,
+    },
+}
+
+/// Adds a day that is to be played with what is active now.
+async fn insert(tx: &mut Tx, stage: &Stage, of: CutOf<'_>) -> Result<StageDay> {
+    let now = tx.now;
+    let today = stage.day(now);
+    match of {
+        CutOf::Today => {
+            days::insert(tx, today, stage.deadline(today.date, now), now).await?;
+            Ok(today)
+        }
+        CutOf::Missed { date, reason } => {
+            let first = stage.zone.date(stage.opens_at);
+            if date >= today.date {
+                return Err(StoreError::Conflict(format!(
+                    "day: {date} has not passed in the stage's zone, where it is {} now; only a day that was missed \
+                     is made up for",
+                    today.date
+                )));
+            }
+            if date < first {
+                return Err(StoreError::Conflict(format!(
+                    "day: {date} is not of the stage, whose first is {first}"
+                )));
+            }
+            let of = StageDay { date, ..today };
+            days::insert_missed(tx, of, stage.deadline(date, now), reason, now).await?;
+            tx.record(
+                Subject::Day(of),
+                Event::MissedDayStarted {
+                    reason: reason.to_owned(),
+                },
+            );
+            Ok(of)
+        }
+    }
+}
+
+async fn cut(tx: &mut Tx, stage: StageId, of: CutOf<'_>) -> Result<(StageDay, Vec<Evaluation>)> {
     season::check_open(tx).await?;
     let stage = stages::find(tx, stage).await?;
     let now = tx.now;
     check_open(&stage, now)?;
-    let of = stage.day(now);
+    stage.plan().check()?;
+    let of = insert(tx, &stage, of).await?;
     let turn = Turn {
         of,
         revision: stage.rules.number,
@@ -47,11 +94,10 @@ async fn cut(tx: &mut Tx, stage: StageId) -> Result<(StageDay, Vec<Evaluation>)>
         ruleset: stage.rules.rules.ruleset,
         plan: stage.plan(),
     };
-    turn.plan.check()?;
-    days::insert(tx, of, now).await?;
     let mut started = Vec::new();
     for submission in submissions::active(tx).await? {
         let entrant = Entrant {
+            id: EvaluationId::new(),
             submission: submission.id,
             team: submission.team,
             rerun_of: None,
@@ -62,6 +108,16 @@ async fn cut(tx: &mut Tx, stage: StageId) -> Result<(StageDay, Vec<Evaluation>)>
     let evaluations = u32::try_from(started.len()).unwrap_or(u32::MAX);
     tx.record(Subject::Day(of), Event::DayStarted { evaluations });
     Ok((of, started))
+}
+
+fn unless_empty(started: Vec<Evaluation>) -> Result<Vec<Evaluation>> {
+    if started.is_empty() {
+        return Err(StoreError::Conflict(
+            "no team has a valid submission, so nothing was started, and the day still has its cut"
+                .into(),
+        ));
+    }
+    Ok(started)
 }
 
 impl Store {
@@ -76,15 +132,26 @@ impl Store {
         now: Timestamp,
     ) -> Result<Vec<Evaluation>> {
         self.write(actor, now, async |tx| {
-            let (_, started) = cut(tx, stage).await?;
-            if started.is_empty() {
-                return Err(StoreError::Conflict(
-                    "no team has a valid submission, so nothing was started, and the day still has its \
-                     cut"
-                        .into(),
-                ));
-            }
-            Ok(started)
+            let (_, started) = cut(tx, stage, CutOf::Today).await?;
+            unless_empty(started)
+        })
+        .await
+    }
+
+    /// The cut of a day that was missed, on a date of the stage that has passed: as [`start_day`](Self::start_day),
+    /// with what is active at `now`. [`StoreError::DayHasCut`] if the day has had its own, [`StoreError::Conflict`] if
+    /// the date has not passed or is none of the stage's.
+    pub async fn start_missed_day(
+        &self,
+        actor: Actor,
+        of: StageDay,
+        reason: &str,
+        now: Timestamp,
+    ) -> Result<Vec<Evaluation>> {
+        let date = of.date;
+        self.write(actor, now, async |tx| {
+            let (_, started) = cut(tx, of.stage, CutOf::Missed { date, reason }).await?;
+            unless_empty(started)
         })
         .await
     }
@@ -97,7 +164,7 @@ impl Store {
         now: Timestamp,
     ) -> Result<Option<Vec<Evaluation>>> {
         let started = self.write(Actor::Schedule, now, async |tx| {
-            let (of, started) = cut(tx, stage).await?;
+            let (of, started) = cut(tx, stage, CutOf::Today).await?;
             release_day::unless_under_way(tx, of).await?;
             Ok(started)
         });

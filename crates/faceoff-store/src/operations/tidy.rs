@@ -3,7 +3,7 @@ use crate::{
     event::Actor,
     queue::Claim,
     store::Store,
-    tables::{bundles, runs},
+    tables::{bundles, drafts, runs},
 };
 use faceoff_types::RunId;
 use jiff::{SignedDuration, Timestamp};
@@ -50,6 +50,22 @@ impl Store {
             .await?;
         }
         Ok(old.len())
+    }
+
+    /// Removes the datasets of proposals that were dropped; their results stay to be read. Returns how many. A kill half
+    /// way is made up for by the next call.
+    pub async fn remove_dropped_datasets(&self, now: Timestamp) -> Result<usize> {
+        let mut connection = self.database.read.acquire().await?;
+        let dropped = drafts::with_dropped_datasets(&mut connection).await?;
+        drop(connection);
+        for (id, key) in &dropped {
+            self.artifacts().delete(key).await?;
+            self.write(Actor::Server, now, async |tx| {
+                drafts::set_dataset_removed(tx, *id, now).await
+            })
+            .await?;
+        }
+        Ok(dropped.len())
     }
 
     /// Removes the archives of uploads that were refused: at once those that are invalid, after

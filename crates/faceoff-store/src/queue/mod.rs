@@ -2,6 +2,7 @@
 //! What a unit is for is written in the tables that refer to it; its kind is a label that the queue
 //! hands through, and so is whoever its slot time is charged to.
 
+pub(crate) mod forecast;
 mod lease;
 mod shares;
 mod units;

@@ -1,4 +1,5 @@
-//! Who is served next: the lane, and in it the account, that was served least. What a lease takes of a
+//! Who is served next: the lane that was served least, in it the smallest batch, and of that the account that was
+//! served least. What a lease takes of a
 //! slot is charged to both by the database (`slot_time_is_charged`), whatever becomes of the unit.
 
 use crate::{column::Instant, error::Result, write::Tx};

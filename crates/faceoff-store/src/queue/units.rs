@@ -17,20 +17,23 @@ pub(crate) struct NewUnit {
     pub(crate) kind: &'static str,
     /// Where it waits.
     pub(crate) lane: Lane,
+    /// Of a lane, units of a smaller batch are claimed first, whoever they are of.
+    pub(crate) batch: i64,
     /// How long it rests before it can be claimed, seconds.
     pub(crate) rest_s: u32,
 }
 
-/// Queues a unit, claimable after its rest. The account is one of its lane; within it units are claimed in
-/// the order in which they were queued.
+/// Queues a unit, claimable after its rest. The account is one of its lane; within it units of a batch are
+/// claimed in the order in which they were queued.
 pub(crate) async fn insert(tx: &mut Tx, unit: NewUnit, account: Account) -> Result<Uuid> {
     let id = Uuid::now_v7();
     let (id_text, from) = (Text(id), Instant(after(tx.now, unit.rest_s)));
     sqlx::query!(
-        "INSERT INTO units (id, kind, account_no, state, claimable_at) VALUES (?, ?, ?, 'queued', ?)",
+        "INSERT INTO units (id, kind, account_no, batch, state, claimable_at) VALUES (?, ?, ?, ?, 'queued', ?)",
         id_text,
         unit.kind,
         account.0,
+        unit.batch,
         from,
     )
     .execute(&mut **tx)
@@ -69,15 +72,14 @@ pub(crate) async fn claim_next(
            SET state = 'leased', worker = ?1, nonce = ?2, claimable_at = ?3, attempts = attempts + 1,
                progress = 0, charged_ms = ?4
            WHERE queue_no = (
-               SELECT first FROM (
-                   SELECT l.urgency, l.served_ms AS of_lane, l.rank, a.served_ms AS of_account,
-                          (SELECT u.queue_no FROM units u
-                           WHERE u.account_no = a.account_no AND u.state IN ('queued', 'leased')
-                             AND u.claimable_at <= ?5
-                           ORDER BY u.queue_no LIMIT 1) AS first
-                   FROM accounts a JOIN lanes l ON l.lane = a.lane)
-               WHERE first IS NOT NULL
-               ORDER BY urgency, of_lane, rank, of_account, first LIMIT 1)
+               SELECT f.queue_no
+               FROM accounts a JOIN lanes l ON l.lane = a.lane
+               JOIN units f ON f.queue_no =
+                   (SELECT u.queue_no FROM units u
+                    WHERE u.account_no = a.account_no AND u.state IN ('queued', 'leased')
+                      AND u.claimable_at <= ?5
+                    ORDER BY u.batch, u.queue_no LIMIT 1)
+               ORDER BY l.urgency, l.served_ms, l.rank, f.batch, a.served_ms, f.queue_no LIMIT 1)
            RETURNING id AS "id!: Text<Uuid>", kind AS "kind!", attempts AS "attempts!: u32""#,
         worker,
         nonce,

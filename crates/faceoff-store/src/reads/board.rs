@@ -32,29 +32,63 @@ pub struct BoardRecord {
     pub day: Date,
     /// When the day was released; `None` before.
     pub released_at: Option<Timestamp>,
+    /// Why it is a turn beside the day's own; `None` if it is the day's.
+    pub extra_for: Option<String>,
     /// When it was scored.
     pub finished_at: Timestamp,
     /// The score.
     pub result: EvaluationResult,
 }
 
+/// What of a stage's results is left out of its board.
+#[derive(Debug, Clone, Default)]
+pub struct BoardScope {
+    /// What was finished later; `None`: nothing.
+    pub until: Option<Timestamp>,
+    /// These, as if they did not count.
+    pub without: Vec<EvaluationId>,
+}
+
 impl Store {
     /// The newest of a stage's rules that an evaluation is finished under; those of now before there is any.
     pub async fn board_revision(&self, stage: &Stage) -> Result<u32> {
-        let id = Text(stage.id);
+        self.board_revision_until(stage, None).await
+    }
+
+    /// The same of what was finished at `until` or earlier, if that is given.
+    pub async fn board_revision_until(
+        &self,
+        stage: &Stage,
+        until: Option<Timestamp>,
+    ) -> Result<u32> {
+        let (id, until) = (Text(stage.id), until.map(Instant));
         let newest = sqlx::query_scalar!(
             r#"SELECT MAX(revision) AS "revision: u32" FROM evaluations
-               WHERE stage_id = ? AND state = 'finished' AND voided_at IS NULL"#,
+               WHERE stage_id = ?1 AND state = 'finished' AND voided_at IS NULL
+                 AND (?2 IS NULL OR finished_at <= ?2)"#,
             id,
+            until,
         );
         let newest = newest.fetch_one(&self.database.read).await?;
         Ok(newest.unwrap_or(stage.rules.number))
     }
 
-    /// What the board of a stage is made of, by one revision of its rules: each team's newest evaluation that is
-    /// finished under it and was not voided, of teams that are not disqualified, in the teams' order of names. Ranks and tiers are the scoring's.
+    /// What the board of a stage is made of by one revision of its rules, with nothing left out.
     pub async fn board(&self, stage: StageId, revision: u32) -> Result<Vec<BoardRecord>> {
-        let stage = Text(stage);
+        let scope = BoardScope::default();
+        self.board_within(stage, revision, &scope).await
+    }
+
+    /// What the board of a stage is made of, by one revision of its rules: each team's newest evaluation that is
+    /// finished under it and was not voided, of teams that are not disqualified, in the teams' order of names, but for what `scope` leaves out. Ranks and tiers are the scoring's.
+    pub async fn board_within(
+        &self,
+        stage: StageId,
+        revision: u32,
+        scope: &BoardScope,
+    ) -> Result<Vec<BoardRecord>> {
+        let (stage, until) = (Text(stage), scope.until.map(Instant));
+        let without = Json(&scope.without);
         let rows = sqlx::query!(
             r#"/* board */ SELECT t.id AS "team: Text<TeamId>", t.name AS "name: Text<TeamName>",
                       t.created_at AS "invited_at: Instant", t.affiliation, t.link,
@@ -63,13 +97,15 @@ impl Store {
                       s.created_at AS "submitted_at: Instant", s.agent_name,
                       e.id AS "evaluation: Text<EvaluationId>", e.run_id AS "run: Text<RunId>",
                       e.day AS "day: Text<Date>", d.released_at AS "released_at: Instant",
-                      e.finished_at AS "finished_at!: Instant",
+                      e.extra_for, e.finished_at AS "finished_at!: Instant",
                       e.result AS "result!: Json<EvaluationResult>"
                FROM teams t
                JOIN evaluations e ON e.rowid = (SELECT n.rowid FROM evaluations n
                                                 WHERE n.team_id = t.id AND n.stage_id = ?1
                                                   AND n.revision = ?2 AND n.state = 'finished'
                                                   AND n.voided_at IS NULL
+                                                  AND (?3 IS NULL OR n.finished_at <= ?3)
+                                                  AND n.id NOT IN (SELECT value FROM json_each(?4))
                                                 ORDER BY n.day DESC LIMIT 1)
                JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
                JOIN submissions s ON s.id = e.submission_id
@@ -77,6 +113,8 @@ impl Store {
                ORDER BY t.name"#,
             stage,
             revision,
+            until,
+            without,
         )
         .fetch_all(&self.database.read)
         .await?;
@@ -102,6 +140,7 @@ impl Store {
                 run: row.run.0,
                 day: row.day.0,
                 released_at: row.released_at.map(|at| at.0),
+                extra_for: row.extra_for,
                 finished_at: row.finished_at.0,
                 result: row.result.0,
             })

@@ -1,4 +1,4 @@
-//! How far runs are. The one place that looks from what is played to the units that play it.
+//! How far runs are.
 
 use crate::{column::Json, error::Result};
 use faceoff_types::RunId;

@@ -16,6 +16,15 @@ impl Store {
         submissions::of_team(&mut *self.database.read.acquire().await?, team).await
     }
 
+    /// The teams that have a submission active and may play, by their submissions' uploads.
+    pub async fn active_teams(&self) -> Result<Vec<TeamId>> {
+        let active = submissions::active(&mut *self.database.read.acquire().await?).await?;
+        Ok(active
+            .into_iter()
+            .map(|submission| submission.team)
+            .collect())
+    }
+
     /// The tail of the agent's standard error in its smoke run; `None` until that is over, and where
     /// our fault ended it.
     pub async fn submission_log(&self, id: SubmissionId) -> Result<Option<String>> {

@@ -24,6 +24,8 @@ pub struct Evaluation {
     pub revision: u32,
     /// When the day was released; `None` while nothing may be told of its episodes.
     pub released_at: Option<Timestamp>,
+    /// Until when the day may be played; `None`: however long it takes.
+    pub deadline_at: Option<Timestamp>,
     /// The evaluation that it plays again: one that we broke, or that was cancelled.
     pub rerun_of: Option<EvaluationId>,
     /// Its episodes and shards.
@@ -32,6 +34,8 @@ pub struct Evaluation {
     pub plan: RunPlan,
     /// When it was queued.
     pub created_at: Timestamp,
+    /// Why it is a turn beside the day's own; `None` if it is the day's.
+    pub extra_for: Option<String>,
     /// It does not count, if it was.
     pub voided: Option<Ruling>,
     /// How far it is.
@@ -76,6 +80,13 @@ pub enum EvaluationState {
         /// What went wrong.
         reason: String,
     },
+    /// Its day's deadline came before it was played: our capacity. The turn is given back.
+    NotPlayed {
+        /// When it was ended.
+        finished_at: Timestamp,
+        /// As told to the team.
+        reason: String,
+    },
     /// Stopped by an organiser, who may have it played again.
     Cancelled {
         /// When it was stopped.
@@ -102,6 +113,7 @@ pub(crate) struct EvaluationRow {
     day: Text<Date>,
     revision: u32,
     released_at: Option<Instant>,
+    deadline_at: Option<Instant>,
     rerun_of: Option<Text<EvaluationId>>,
     run_id: Text<RunId>,
     profile: Text<Profile>,
@@ -117,6 +129,8 @@ pub(crate) struct EvaluationRow {
     dataset: Option<String>,
     dataset_blake3: Option<String>,
     reason: Option<String>,
+    unplayed: bool,
+    extra_for: Option<String>,
     voided_at: Option<Instant>,
     voided_for: Option<String>,
 }
@@ -175,6 +189,10 @@ impl EvaluationRow {
                 finished_at: finished_at()?,
                 reason: reason()?,
             },
+            ("cancelled", _) if self.unplayed => EvaluationState::NotPlayed {
+                finished_at: finished_at()?,
+                reason: reason()?,
+            },
             ("cancelled", _) => EvaluationState::Cancelled {
                 finished_at: finished_at()?,
                 reason: reason()?,
@@ -191,10 +209,12 @@ impl EvaluationRow {
             },
             revision: self.revision,
             released_at: self.released_at.map(|at| at.0),
+            deadline_at: self.deadline_at.map(|at| at.0),
             rerun_of: self.rerun_of.map(|id| id.0),
             run: self.run_id.0,
             plan,
             created_at: self.created_at.0,
+            extra_for: self.extra_for,
             voided: Ruling::of(self.voided_at, self.voided_for),
             state,
         })
@@ -210,7 +230,7 @@ macro_rules! select_evaluations {
                       e.submission_id AS "submission_id: Text<SubmissionId>",
                       e.team_id AS "team_id: Text<TeamId>", e.stage_id AS "stage_id: Text<StageId>",
                       e.day AS "day: Text<Date>", e.revision AS "revision: u32",
-                      d.released_at AS "released_at: Instant",
+                      d.released_at AS "released_at: Instant", d.deadline_at AS "deadline_at: Instant",
                       e.rerun_of AS "rerun_of: Text<EvaluationId>", e.run_id AS "run_id: Text<RunId>", r.profile AS "profile: Text<Profile>",
                       r.tasks AS "tasks: Json<Vec<Task>>",
                       r.episodes_per_task AS "episodes_per_task: u32",
@@ -219,7 +239,7 @@ macro_rules! select_evaluations {
                       e.created_at AS "created_at: Instant", e.state,
                       e.finished_at AS "finished_at: Instant",
                       e.result AS "result: Json<EvaluationResult>", e.dataset, e.dataset_blake3,
-                      e.reason, e.voided_at AS "voided_at: Instant", e.voided_for
+                      e.reason, e.unplayed AS "unplayed: bool", e.extra_for, e.voided_at AS "voided_at: Instant", e.voided_for
                FROM evaluations e JOIN runs r ON r.id = e.run_id 
                LEFT JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day "# + $tail
             $(, $argument)*
@@ -308,84 +328,6 @@ pub(crate) async fn run_of(connection: &mut SqliteConnection, id: EvaluationId) 
     .ok_or(StoreError::NotFound("evaluation"))
 }
 
-/// What an evaluation is, whatever became of it.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Entry {
-    pub(crate) id: EvaluationId,
-    pub(crate) submission: SubmissionId,
-    pub(crate) team: TeamId,
-    pub(crate) of: StageDay,
-    pub(crate) revision: u32,
-    pub(crate) run: RunId,
-    pub(crate) rerun_of: Option<EvaluationId>,
-}
-
-pub(crate) async fn entry(connection: &mut SqliteConnection, id: EvaluationId) -> Result<Entry> {
-    let id_text = Text(id);
-    let row = sqlx::query!(
-        r#"SELECT submission_id AS "submission: Text<SubmissionId>", team_id AS "team: Text<TeamId>",
-                  stage_id AS "stage: Text<StageId>", day AS "day: Text<Date>", revision AS "revision: u32",
-                  run_id AS "run: Text<RunId>",
-                  rerun_of AS "rerun_of: Text<EvaluationId>"
-           FROM evaluations WHERE id = ?"#,
-        id_text
-    )
-    .fetch_optional(connection)
-    .await?
-    .ok_or(StoreError::NotFound("evaluation"))?;
-    Ok(Entry {
-        id,
-        submission: row.submission.0,
-        team: row.team.0,
-        of: StageDay {
-            stage: row.stage.0,
-            date: row.day.0,
-        },
-        revision: row.revision,
-        run: row.run.0,
-        rerun_of: row.rerun_of.map(|id| id.0),
-    })
-}
-
-/// Adds an evaluation that nobody has begun; [`StoreError::Conflict`] if the team has one of the day
-/// that counts.
-pub(crate) async fn insert(
-    connection: &mut SqliteConnection,
-    new: &Entry,
-    now: Timestamp,
-) -> Result<()> {
-    let (id, submission, team) = (Text(new.id), Text(new.submission), Text(new.team));
-    let (stage, day) = (Text(new.of.stage), Text(new.of.date));
-    let (run, now, rerun_of) = (Text(new.run), Instant(now), new.rerun_of.map(Text));
-    sqlx::query!(
-        "INSERT INTO evaluations (id, submission_id, team_id, stage_id, day, revision, run_id, created_at, state,
-                                  rerun_of)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, 'open', ?)",
-        id,
-        submission,
-        team,
-        stage,
-        day,
-        new.revision,
-        run,
-        now,
-        rerun_of,
-    )
-    .execute(connection)
-    .await
-    .map_err(|error| {
-        if StoreError::is_duplicate(&error, "evaluations.day") {
-            StoreError::Conflict(format!(
-                "the team has another evaluation of {} that counts, or that is under way",
-                new.of.date
-            ))
-        } else {
-            error.into()
-        }
-    })?;
-    Ok(())
-}
-
 /// How many evaluations of a team and day ended by our fault.
 pub(crate) async fn count_broken(
     connection: &mut SqliteConnection,
@@ -415,8 +357,9 @@ pub(crate) async fn set_finished(
 ) -> Result<()> {
     let (id, result, now) = (Text(id), Json(result), Instant(now));
     sqlx::query!(
-        "UPDATE evaluations SET state = 'finished', finished_at = ?, result = ?, dataset = ?,
-                                dataset_blake3 = ?
+        "UPDATE evaluations SET state = 'finished', finished_at = ?, result = ?, dataset = ?, dataset_blake3 = ?,
+                                slot_ms = (SELECT SUM(u.charged_ms) FROM shards s JOIN units u ON u.id = s.unit_id
+                                           WHERE s.run_id = evaluations.run_id)
          WHERE id = ?",
         now,
         result,
@@ -437,6 +380,8 @@ pub(crate) enum Failure<'a> {
     Platform(&'a str),
     /// With why.
     Cancelled(&'a str),
+    /// By its day's deadline, in words for the team.
+    NotPlayed(&'a str),
 }
 
 pub(crate) async fn set_failed(
@@ -449,13 +394,15 @@ pub(crate) async fn set_failed(
     let (state, reason) = match failure {
         Failure::Agent => ("agent_failed", None),
         Failure::Platform(reason) => ("platform_failed", Some(reason)),
-        Failure::Cancelled(reason) => ("cancelled", Some(reason)),
+        Failure::Cancelled(reason) | Failure::NotPlayed(reason) => ("cancelled", Some(reason)),
     };
+    let unplayed = matches!(failure, Failure::NotPlayed(_));
     sqlx::query!(
-        "UPDATE evaluations SET state = ?, finished_at = ?, reason = ? WHERE id = ?",
+        "UPDATE evaluations SET state = ?, finished_at = ?, reason = ?, unplayed = ? WHERE id = ?",
         state,
         now,
         reason,
+        unplayed,
         id,
     )
     .execute(connection)

@@ -158,8 +158,10 @@ pub(crate) async fn with_old_recordings(
 ) -> Result<Vec<RunId>> {
     let before = Instant(before);
     let runs = sqlx::query_scalar!(
-        r#"SELECT r.id AS "id: Text<RunId>" FROM runs r JOIN evaluations e ON e.run_id = r.id
-           WHERE r.keeps_recordings = 1 AND r.recordings_removed_at IS NULL AND e.finished_at <= ?"#,
+        r#"SELECT r.id AS "id: Text<RunId>"
+           FROM runs r LEFT JOIN evaluations e ON e.run_id = r.id LEFT JOIN drafts d ON d.run_id = r.id
+           WHERE r.keeps_recordings = 1 AND r.recordings_removed_at IS NULL
+             AND COALESCE(e.finished_at, d.finished_at) <= ?"#,
         before,
     )
     .fetch_all(connection)

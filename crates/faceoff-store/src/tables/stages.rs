@@ -3,8 +3,10 @@ use crate::{
     error::{Result, StoreError},
     tables::plan::RunPlan,
 };
-use faceoff_types::{SeedLabel, StageDay, StageId, StageName, StageRules, StageSettings, Zone};
-use jiff::{Timestamp, civil::Date};
+use faceoff_types::{
+    DayDeadline, SeedLabel, StageDay, StageId, StageName, StageRules, StageSettings, Zone,
+};
+use jiff::{SignedDuration, Timestamp, civil::Date};
 use sqlx::{SqliteConnection, types::Text};
 
 /// A part of the season with its own days, rules and board.
@@ -97,6 +99,25 @@ impl Stage {
         };
         let (date, at) = schedule.next(from, self.opens_at, &self.zone)?;
         (!ends_before(at)).then_some((date, Some(at)))
+    }
+
+    /// Until when its day of this date, which has its cut at `cut_at`, may be played; `None`: however long it takes.
+    /// The closing of the stage ends no day.
+    #[must_use]
+    pub fn deadline(&self, date: Date, cut_at: Timestamp) -> Option<Timestamp> {
+        match self.settings.day_deadline {
+            DayDeadline::Never => None,
+            DayDeadline::Hours(hours) => cut_at
+                .checked_add(SignedDuration::from_hours(hours.into()))
+                .ok(),
+            DayDeadline::NextCut => {
+                let schedule = self.settings.schedule.as_ref()?;
+                let from = date.tomorrow().ok()?;
+                // A missed day may be played just when another is due.
+                let after = cut_at.checked_add(SignedDuration::from_secs(1)).ok()?;
+                schedule.next(from, after, &self.zone).map(|(_, at)| at)
+            }
+        }
     }
 
     /// What each team plays on a day by the rules as they are now.
@@ -365,6 +386,39 @@ mod tests {
         assert_eq!(next(Some(date(2026, 3, 3)), "2026-03-03T09:00:00Z"), fourth);
         assert_eq!(next(Some(date(2026, 3, 5)), "2026-03-05T09:00:00Z"), None);
         assert_eq!(next(None, "2026-03-05T10:00:00Z"), None, "closed");
+    }
+
+    #[test]
+    fn a_day_may_be_played_until_the_next_cut_or_as_the_stage_says() {
+        let scheduled = stage(Some(Schedule::daily("06:00".parse().unwrap())));
+        let deadline = |stage: &Stage, day: Date, cut_at: &str| {
+            let deadline_at = stage.deadline(day, at(cut_at));
+            deadline_at.map(|at| at.to_string())
+        };
+        let fourth = Some("2026-03-04T05:00:00Z".to_owned());
+        let third = date(2026, 3, 3);
+        assert_eq!(deadline(&scheduled, third, "2026-03-03T05:00:00Z"), fourth);
+        // By hand, early or late: the next date's all the same.
+        assert_eq!(deadline(&scheduled, third, "2026-03-03T00:00:00Z"), fourth);
+        assert_eq!(deadline(&scheduled, third, "2026-03-03T22:00:00Z"), fourth);
+        // Of a missed day it is the first that comes, and of the last one that which would come.
+        let missed = deadline(&scheduled, date(2026, 3, 1), "2026-03-03T05:00:00Z");
+        assert_eq!(missed, fourth);
+        let last = deadline(&scheduled, date(2026, 3, 5), "2026-03-05T05:00:00Z");
+        assert_eq!(last, Some("2026-03-06T05:00:00Z".to_owned()));
+        assert_eq!(deadline(&stage(None), third, "2026-03-03T05:00:00Z"), None);
+        let with = |day_deadline| Stage {
+            settings: StageSettings {
+                day_deadline,
+                ..scheduled.settings.clone()
+            },
+            ..scheduled.clone()
+        };
+        let never = with(DayDeadline::Never);
+        assert_eq!(deadline(&never, third, "2026-03-03T05:00:00Z"), None);
+        let hours = with(DayDeadline::Hours(30));
+        let next = Some("2026-03-04T11:00:00Z".to_owned());
+        assert_eq!(deadline(&hours, third, "2026-03-03T05:00:00Z"), next);
     }
 
     #[test]

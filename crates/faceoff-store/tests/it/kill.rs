@@ -127,8 +127,24 @@ async fn child() {
                     assert_eq!(finished, Committed::Now);
                     tell(format!("finished {evaluation}"));
                     // The organiser's acts: each is done or not done.
-                    let played = store.evaluation(evaluation).await.unwrap();
+                    let Ok(played) = store.evaluation(evaluation).await else {
+                        // Of a trial or a proposal.
+                        apply_played(&store, now, &tell).await;
+                        continue;
+                    };
+                    if played.extra_for.is_some() {
+                        continue;
+                    }
                     if played.rerun_of.is_some() {
+                        let again = Reevaluation::Evaluation(evaluation);
+                        let proposed =
+                            store.propose_reevaluation(Actor::Organiser, again, "why", now);
+                        match proposed.await {
+                            Ok(proposal) => tell(format!("proposal {}", proposal.id)),
+                            // Its day is under way.
+                            Err(StoreError::Conflict(_)) => {}
+                            Err(error) => panic!("{error}"),
+                        }
                         continue;
                     }
                     let team = played.team;
@@ -142,18 +158,110 @@ async fn child() {
                     tell(format!("voided {evaluation}"));
                     let rerun = store.rerun_evaluation(Actor::Organiser, evaluation, now);
                     tell(format!("evaluation {}", rerun.await.unwrap().id));
+                    organise(&store, stage, played.of, now, &tell).await;
                 }
             }
         }
     }
 }
 
+/// The organiser's acts upon boards and days.
+async fn organise(
+    store: &Store,
+    stage: StageId,
+    of: StageDay,
+    now: jiff::Timestamp,
+    tell: &impl Fn(String),
+) {
+    // A life that was killed may have left them frozen.
+    if store.boards_frozen(stage).await.unwrap().is_none() {
+        let frozen = store.freeze_boards(Actor::Organiser, stage, "why", now);
+        frozen.await.unwrap();
+    }
+    let unfrozen = store.unfreeze_boards(Actor::Organiser, stage, now);
+    unfrozen.await.unwrap();
+    let trial = store.propose_trial(Actor::Organiser, stage, None, "why", now);
+    let trial = trial.await.unwrap().id;
+    tell(format!("proposal {trial}"));
+    store
+        .drop_proposal(Actor::Organiser, trial, now)
+        .await
+        .unwrap();
+    tell(format!("dropped {trial}"));
+    // The day before, if nobody has played it; not that of a day that was made up for itself.
+    if !store.missed_days().await.unwrap().is_empty() {
+        return;
+    }
+    let date = of.date.checked_sub(jiff::Span::new().days(1)).unwrap();
+    let missed = StageDay { date, ..of };
+    match store
+        .start_missed_day(Actor::Organiser, missed, "why", now)
+        .await
+    {
+        Ok(started) => {
+            for evaluation in started {
+                tell(format!("evaluation {}", evaluation.id));
+            }
+        }
+        Err(StoreError::DayHasCut { .. } | StoreError::Conflict(_)) => {}
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// Has proposals that are played count, and replaces what counts then by an extra turn.
+async fn apply_played(store: &Store, now: jiff::Timestamp, tell: &impl Fn(String)) {
+    for (proposal, drafts) in open_proposals(store).await {
+        if !drafts.iter().all(|draft| draft.state.is_over()) {
+            continue;
+        }
+        match store.apply_proposal(Actor::Organiser, proposal, now).await {
+            Ok(_) => tell(format!("applied {proposal}")),
+            // A trial that a kill has left.
+            Err(StoreError::Conflict(_)) => {
+                let dropped = store.drop_proposal(Actor::Organiser, proposal, now);
+                dropped.await.unwrap();
+                continue;
+            }
+            Err(error) => panic!("{error}"),
+        }
+        let applied = store.evaluation(drafts[0].id).await.unwrap();
+        let (of, team) = (applied.of, applied.team);
+        let extra = store.extra_turn(Actor::Organiser, of, team, "why", true, now);
+        tell(format!("evaluation {}", extra.await.unwrap().id));
+    }
+}
+
+async fn open_proposals(store: &Store) -> Vec<(ProposalId, Vec<Draft>)> {
+    let mut open = Vec::new();
+    for proposal in store.proposals().await.unwrap() {
+        if proposal.settled.is_none() {
+            let (_, drafts) = store.proposal(proposal.id).await.unwrap();
+            open.push((proposal.id, drafts));
+        }
+    }
+    open
+}
+
 #[tokio::test]
 async fn survives_kill_9() {
+    survive(&[1, 3, 5, 8, 2, 13, 4, 21, 7, 17, 6, 30]).await;
+}
+
+#[tokio::test]
+async fn what_the_organiser_does_survives_kill_9() {
+    let acknowledged = survive(&[60, 31, 47, 80]).await;
+    for what in ["disqualified", "voided", "proposal", "dropped", "applied"] {
+        let told = |write: &String| write.starts_with(what);
+        assert!(acknowledged.iter().any(told), "no life came to {what}");
+    }
+}
+
+/// Lives that are killed after so many lines, on the same folder; all that they told.
+async fn survive(lives: &[usize]) -> HashSet<String> {
     let folder = tempfile::tempdir().unwrap();
     let mut acknowledged = HashSet::new();
     // the kill comes while the child writes on; where, differs from life to life
-    for lines_to_live in [1, 3, 5, 8, 2, 13, 4, 21, 7, 17, 6, 30] {
+    for lines_to_live in lives.iter().copied() {
         let mut child = Command::new(std::env::current_exe().unwrap())
             .args(["--exact", "kill::child", "--ignored", "--nocapture"])
             .env(FOLDER, folder.path())
@@ -177,6 +285,9 @@ async fn survives_kill_9() {
                         "voided",
                         "joined",
                         "left",
+                        "proposal",
+                        "dropped",
+                        "applied",
                     ]
                     .contains(&what)
             })
@@ -197,6 +308,7 @@ async fn survives_kill_9() {
             );
         }
     }
+    acknowledged
 }
 
 /// The writes that the database has, in the child's words.
@@ -208,6 +320,9 @@ async fn stored(folder: &Path) -> HashSet<String> {
          UNION SELECT 'evaluation ' || id FROM evaluations
          UNION SELECT 'shard ' || id FROM shards WHERE committed_at IS NOT NULL
          UNION SELECT 'finished ' || id FROM evaluations WHERE state = 'finished'
+         UNION SELECT 'proposal ' || id FROM proposals
+         UNION SELECT outcome || ' ' || id FROM proposals WHERE outcome IS NOT NULL
+         UNION SELECT 'finished ' || id FROM drafts WHERE state = 'finished'
          UNION SELECT 'voided ' || id FROM evaluations WHERE voided_at IS NOT NULL
          UNION SELECT 'joined ' || id FROM people
          UNION SELECT 'left ' || id FROM people WHERE left_at IS NOT NULL
@@ -266,7 +381,7 @@ async fn check_consistency(folder: &Path, store: &Store) {
         ("a day that is released and not over, but for what is played again",
          "SELECT COUNT(*) FROM days d WHERE d.released_at IS NOT NULL
               AND EXISTS (SELECT 1 FROM evaluations e WHERE e.stage_id = d.stage_id AND e.day = d.day
-                          AND e.state = 'open' AND e.rerun_of IS NULL)"),
+                          AND e.state = 'open' AND e.rerun_of IS NULL AND e.extra_for IS NULL)"),
         ("a valid submission of a team that has none active",
          "SELECT COUNT(*) FROM submissions s WHERE s.state = 'valid'
               AND NOT EXISTS (SELECT 1 FROM active_submissions a WHERE a.team_id = s.team_id)"),
@@ -285,11 +400,26 @@ async fn check_consistency(folder: &Path, store: &Store) {
                + (SELECT COUNT(*) FROM teams WHERE disqualified_at IS NOT NULL)
                - (SELECT COUNT(*) FROM events WHERE kind IN ('evaluation_voided', 'team_disqualified'))
                + (SELECT COUNT(*) FROM events WHERE kind = 'team_reinstated')"),
+        ("a proposal without its drafts, or half settled",
+         "SELECT COUNT(*) FROM proposals p
+              WHERE NOT EXISTS (SELECT 1 FROM drafts d WHERE d.proposal_id = p.id)
+                 OR (p.outcome IS NOT NULL AND EXISTS
+                     (SELECT 1 FROM drafts d WHERE d.proposal_id = p.id AND d.state = 'open'))
+                 OR (p.outcome IS 'applied') <> EXISTS
+                     (SELECT 1 FROM drafts d JOIN evaluations e ON e.id = d.id WHERE d.proposal_id = p.id)"),
+        ("an act without its event",
+         "SELECT (SELECT COUNT(*) FROM evaluations WHERE extra_for IS NOT NULL AND rerun_of IS NULL)
+               + (SELECT COUNT(*) FROM days WHERE missed_for IS NOT NULL)
+               + (SELECT COUNT(*) FROM proposals) + (SELECT COUNT(*) FROM proposals WHERE outcome IS NOT NULL)
+               + (SELECT COUNT(*) FROM frozen_boards)
+               - (SELECT COUNT(*) FROM events WHERE kind IN ('extra_turn_given', 'missed_day_started', 'proposal_made',
+                                                             'proposal_applied', 'proposal_dropped', 'boards_frozen'))
+               + (SELECT COUNT(*) FROM events WHERE kind = 'boards_unfrozen')"),
         ("a change without its event",
          "SELECT (SELECT COUNT(*) FROM submissions) + (SELECT COUNT(*) FROM evaluations)
                + (SELECT COUNT(*) FROM shards WHERE committed_at IS NOT NULL)
                + (SELECT COUNT(*) FROM evaluations WHERE state = 'finished')
-               - (SELECT COUNT(*) FROM events WHERE kind IN ('submission_uploaded', 'evaluation_queued',
+               - (SELECT COUNT(*) FROM events WHERE kind IN ('submission_uploaded', 'evaluation_queued', 'evaluation_applied',
                                                              'shard_committed', 'evaluation_finished'))"),
     ];
     for (breach, sql) in rules {

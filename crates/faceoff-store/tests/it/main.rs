@@ -2,10 +2,12 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod ablations;
+mod acts;
 mod artifacts;
 mod bundles;
 mod competition;
 mod days;
+mod deadlines;
 mod events;
 mod faults;
 mod fixture;
@@ -16,7 +18,9 @@ mod kill;
 mod migration;
 mod offline_data;
 mod opening;
+mod outlook;
 mod people;
+mod proposals;
 mod queries;
 mod queue;
 mod registrations;

@@ -488,6 +488,7 @@ async fn every_old_row_is_there_and_says_what_it_said() {
     let day = |date, released_at| Day {
         of: StageDay { stage, date },
         cut_at: finished_at,
+        deadline_at: None,
         released_at,
     };
     assert_eq!(
@@ -678,6 +679,7 @@ async fn work_goes_on_where_the_old_program_left_it() {
                         assert_eq!(of_ablations, 0, "ablations wait");
                         assert_eq!(seeds.episodes, secret.day(date(2026, 3, 1)));
                     }
+                    RunOwner::Draft { .. } => panic!("there were no proposals"),
                     RunOwner::Ablation(ablation) => {
                         of_ablations += 1;
                         assert_eq!(ablation, id(11_000));

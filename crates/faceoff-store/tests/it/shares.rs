@@ -216,6 +216,11 @@ impl Fixture {
                 cancelled.await.unwrap();
             }
         }
+        // Days are played one after the other; these stand for parts of one.
+        sqlx::query("UPDATE units SET batch = 0")
+            .execute(&mut self.connection().await)
+            .await
+            .unwrap();
         of_submission.expect("it was active at the cut")
     }
 }
@@ -527,7 +532,7 @@ async fn a_claim_looks_at_what_is_open_and_at_no_more() {
     let claims: Vec<String> = query_data()
         .into_iter()
         .map(|(_, data)| data["query"].as_str().unwrap().to_owned())
-        .filter(|sql| sql.starts_with("UPDATE units") && sql.contains("of_account"))
+        .filter(|sql| sql.starts_with("UPDATE units") && sql.contains("FROM accounts a"))
         .collect();
     assert_eq!(claims.len(), 1, "a claim is one statement");
     let explain = sqlx::AssertSqlSafe(format!("EXPLAIN QUERY PLAN {}", claims[0])).into_sql_str();
@@ -538,7 +543,7 @@ async fn a_claim_looks_at_what_is_open_and_at_no_more() {
     let steps: Vec<String> = plan.iter().map(|step| step.get("detail")).collect();
     let of_units: Vec<_> = steps
         .iter()
-        .filter(|step| step.contains(" u ") || step.contains(" units "))
+        .filter(|step| [" u ", " f ", " units "].iter().any(|of| step.contains(of)))
         .collect();
     assert!(of_units.len() >= 2, "{steps:#?}");
     for step in of_units {

@@ -230,6 +230,7 @@ async fn settings_are_no_rules() {
     let settings = StageSettings {
         schedule: Some(Schedule::daily("06:00".parse().unwrap())),
         ablation_episodes: 3,
+        day_deadline: DayDeadline::Hours(30),
         episodes_per_shard: 7,
     };
     let others = StageChange {

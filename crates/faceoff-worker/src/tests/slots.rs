@@ -228,6 +228,56 @@ async fn the_schedule_starts_a_missed_day_once() {
 }
 
 #[tokio::test]
+async fn the_schedule_ends_an_overdue_day_before_the_next_one_starts() {
+    let server = Server::new().await;
+    let first = server.evaluation().await;
+    let first = server.store.evaluation(first).await.unwrap();
+    let stage = server.store.stage(first.of.stage).await.unwrap();
+    // The next day, and the deadline, in 24 hours.
+    let at = server.now().to_zoned(jiff::tz::TimeZone::UTC).time();
+    let settings = StageSettings {
+        schedule: Some(Schedule::daily(at)),
+        ..stage.settings
+    };
+    let scheduled = StageChange {
+        settings: Some(settings),
+        ..StageChange::default()
+    };
+    let scheduled = server
+        .store
+        .change_stage(Actor::Organiser, stage.id, scheduled, server.now());
+    scheduled.await.unwrap();
+    server.pass(24 * 3600);
+    let mut events = server.store.events();
+    let shutdown = CancellationToken::new();
+    let schedule = crate::run_schedule(server.store.clone(), server.clock(), shutdown.clone());
+    let schedule = tokio::spawn(schedule);
+    let mut kinds = Vec::new();
+    for _ in 0..5 {
+        let Change::Recorded(record) = events.recv().await.unwrap() else {
+            panic!("nothing is claimed")
+        };
+        assert_eq!(record.actor, Actor::Schedule);
+        kinds.push(record.event);
+    }
+    assert!(
+        matches!(
+            kinds[..],
+            [
+                Event::DayOverdue { not_played: 1 },
+                Event::EvaluationNotPlayed { .. },
+                Event::DayReleased,
+                Event::EvaluationQueued { .. },
+                Event::DayStarted { evaluations: 1 },
+            ]
+        ),
+        "{kinds:?}"
+    );
+    shutdown.cancel();
+    schedule.await.unwrap().unwrap();
+}
+
+#[tokio::test]
 async fn an_ablation_is_played_on_episodes_of_its_own_in_every_profile() {
     let server = Server::new().await;
     let evaluation = server.evaluation().await;

@@ -2,12 +2,15 @@
 
 use super::*;
 use faceoff_http::{
-    ConnectionLimits, HttpConfig, HttpLimits,
+    Capacity, ConnectionLimits, HttpConfig, HttpLimits,
     token::hash_token,
     views::{evaluation::EvaluationStatus, submission::SubmissionStatus},
 };
 use faceoff_store::{Claimed, Store, Work};
-use faceoff_types::{Clock, Profile, Ruleset, SmokeOutcome, StageRules, StageSettings, Task, Zone};
+use faceoff_types::{
+    Clock, DayDeadline, Profile, Ruleset, SmokeOutcome, StageRules, StageSettings, Task,
+    TimeLimits, Zone,
+};
 use jiff::Timestamp;
 use tempfile::TempDir;
 
@@ -50,6 +53,10 @@ async fn site(max_bundle_bytes: u64) -> Site {
         upload_dir: folder.path().to_owned(),
         clock: Clock::new(now),
         limits: HttpLimits::default(),
+        capacity: Capacity {
+            slots: 1,
+            time: TimeLimits::default(),
+        },
     };
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let url = format!("http://{}/", listener.local_addr().unwrap());
@@ -225,6 +232,7 @@ async fn a_stage_is_changed_by_what_is_said_and_by_nothing_else() {
         max_faults: None,
         schedule: Some(faceoff_types::Schedule::cron("0 6 * * 1-5").unwrap()),
         ablation_episodes: None,
+        day_deadline: Some(DayDeadline::Hours(30)),
         episodes_per_shard: None,
     };
     let made = site.organiser.create_stage(&new).await.unwrap();

@@ -1,7 +1,12 @@
 //! `faceoff admin`: organises a running competition through its API.
 
+mod day;
+mod find;
+mod lines;
 mod news;
 mod people;
+mod proposal;
+mod season;
 mod stage;
 
 use super::{
@@ -15,14 +20,13 @@ use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
 use faceoff_http::{
     requests::{Decision, TeamChange},
-    views::{
-        evaluation::{EvaluationStatus, EvaluationView},
-        event::EventView,
-        season::SeasonView,
-    },
+    views::{evaluation::EvaluationStatus, event::EventView},
 };
-use faceoff_types::{DivisionName, EvaluationId, QuestionId, StageDay, TeamId, TeamName};
+use faceoff_types::{DivisionName, EvaluationId, QuestionId, StageDay, TeamName};
+use find::find_team;
 use jiff::civil::Date;
+use lines::line;
+use season::of_season;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -124,6 +128,13 @@ enum Action {
         #[arg(long)]
         stage: Option<String>,
     },
+    #[command(flatten)]
+    Day(day::DayAction),
+    /// Try a day without counting, or have results evaluated again, and apply or drop that
+    Proposal {
+        #[command(subcommand)]
+        action: proposal::ProposalAction,
+    },
     /// Make, change or list the stages: their times, rules and schedules
     Stage {
         #[command(subcommand)]
@@ -200,7 +211,7 @@ enum Action {
         /// Who: organiser (the host), person:ID, team:ID, visitor, schedule, worker:NAME or server; person, team, worker: all
         #[arg(long)]
         actor: Option<String>,
-        /// About what: season, stage:ID, day:STAGE/DATE, team:ID, submission:ID, evaluation:ID, person:ID …
+        /// About what: season, stage:ID, day:STAGE/DATE, team:ID, submission:ID, evaluation:ID, person:ID, proposal:ID …
         #[arg(long)]
         subject: Option<String>,
         /// What happened, e.g. day_started
@@ -302,6 +313,8 @@ impl AdminCommand {
                     )
                 })
             }
+            Action::Day(action) => day::act(&client, self.json, action).await,
+            Action::Proposal { action } => proposal::act(&client, self.json, action).await,
             Action::Stage { action } => stage::act(&client, self.json, action).await,
             Action::StartDay { stage } => {
                 let stage = match stage {
@@ -515,67 +528,4 @@ fn token_of(data_dir: Option<&Path>) -> anyhow::Result<String> {
             file.display()
         )
     })
-}
-
-async fn find_team(client: &Client, wanted: &str) -> anyhow::Result<TeamId> {
-    if let Ok(id) = wanted.parse() {
-        return Ok(id);
-    }
-    let teams = client.teams().await?;
-    match teams.iter().find(|team| team.name.as_str() == wanted) {
-        Some(team) => Ok(team.id),
-        None => bail!("no team is named {wanted:?}; faceoff admin teams lists them"),
-    }
-}
-
-fn of_season(season: &SeasonView) -> String {
-    let state = match (season.closed_at, season.secret) {
-        (Some(closed_at), Some(secret)) => {
-            let closed_at = closed_at.strftime("%Y-%m-%d %H:%M UTC");
-            format!("closed     {closed_at}\nsecret     {secret}")
-        }
-        _ => "open       its secret is published when it is closed".to_owned(),
-    };
-    let queue = match &season.paused {
-        Some(ruling) => {
-            let since = ruling.at.strftime("%Y-%m-%d %H:%M UTC");
-            format!("\npaused     since {since}: {}", ruling.reason)
-        }
-        None => String::new(),
-    };
-    format!(
-        "{} ({}), {} days played\ncommitment {}\n{state}{queue}",
-        season.name,
-        season.ruleset,
-        season.days.len(),
-        season.commitment
-    )
-}
-
-fn line(evaluation: &EvaluationView) -> String {
-    if let Some(ruling) = &evaluation.voided {
-        let (team, id) = (&evaluation.team_name, evaluation.id);
-        return format!("{team:<40} {id}  voided: {}", ruling.reason);
-    }
-    let progress = evaluation.progress;
-    let state = match &evaluation.status {
-        EvaluationStatus::Queued => "queued".to_owned(),
-        EvaluationStatus::Running => {
-            format!(
-                "running, {} of {} episodes",
-                progress.episodes_done, progress.episodes_total
-            )
-        }
-        EvaluationStatus::Finalising => "computing the score".to_owned(),
-        EvaluationStatus::Finished { result, .. } => format!(
-            "finished: score {:.1}, {:.1} penalty points, {}",
-            result.score,
-            result.penalty_points,
-            result.tier.title().to_lowercase()
-        ),
-        EvaluationStatus::AgentFailed { .. } => "the agent failed".to_owned(),
-        EvaluationStatus::PlatformFailed { reason, .. } => format!("our fault: {reason}"),
-        EvaluationStatus::Cancelled { reason, .. } => format!("cancelled: {reason}"),
-    };
-    format!("{:<40} {}  {state}", evaluation.team_name, evaluation.id)
 }

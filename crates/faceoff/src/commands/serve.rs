@@ -4,7 +4,7 @@ use crate::{config::Config, descriptors::Descriptors, log::LogFormat};
 use anyhow::{Context, bail};
 use clap::Args;
 use faceoff_http::{
-    ConnectionLimits, HttpConfig,
+    Capacity, ConnectionLimits, HttpConfig,
     token::{Secret, SecretKind, hash_token},
 };
 use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime, affinity, probe_host};
@@ -190,6 +190,10 @@ async fn serve(
             upload_dir,
             clock: clock.clone(),
             limits: config.uploads.limits(),
+            capacity: Capacity {
+                slots: u32::try_from(cpus.slots.len()).unwrap_or(u32::MAX),
+                time: config.time.clone(),
+            },
         },
     );
     let mut agent = config.agent_environment();

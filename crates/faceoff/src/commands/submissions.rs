@@ -1,8 +1,14 @@
 //! `faceoff submissions`: a team's uploads, and what it does with them.
 
-use super::{submit::next_cut, team_server::TeamServer};
+use super::{
+    submit::next_cut,
+    team_server::{TeamServer, in_queue},
+};
 use clap::{Args, Subcommand};
-use faceoff_http::views::submission::{SubmissionStatus, SubmissionView};
+use faceoff_http::views::{
+    me::MeView,
+    submission::{SubmissionStatus, SubmissionView},
+};
 use faceoff_types::SubmissionId;
 
 /// Lists the team's submissions, names them, or takes one back.
@@ -16,6 +22,11 @@ pub struct SubmissionsCommand {
 enum Action {
     /// List them, the newest first
     List {
+        #[command(flatten)]
+        server: TeamServer,
+    },
+    /// Tell what plays for the team today, what waits, where it stands in the queue, and what happens next
+    Status {
         #[command(flatten)]
         server: TeamServer,
     },
@@ -57,6 +68,13 @@ impl SubmissionsCommand {
                     println!("{}", line(submission));
                 }
             }
+            Action::Status { server } => {
+                let client = server.client()?;
+                let me = client.me().await?;
+                for line in status(&me) {
+                    println!("{line}");
+                }
+            }
             Action::Label {
                 submission,
                 label,
@@ -82,9 +100,45 @@ impl SubmissionsCommand {
     }
 }
 
+/// How the team stands today, line by line.
+fn status(me: &MeView) -> Vec<String> {
+    let mut lines = Vec::new();
+    match (&me.turn.evaluation, &me.turn.next) {
+        (Some(evaluation), next) => {
+            lines.push(format!("{}: evaluation {evaluation}", me.turn.day));
+            lines.extend(
+                me.turn
+                    .queue
+                    .as_ref()
+                    .map(|queue| format!("  {}", in_queue(queue))),
+            );
+            lines.extend(next.as_ref().map(|next| format!("  next: {next}")));
+        }
+        (None, _) => lines.push(format!("{}: nothing plays for the team", me.turn.day)),
+    }
+    for waiting in &me.validating {
+        lines.push(format!("submission {}: validating", waiting.submission));
+        lines.extend(
+            waiting
+                .queue
+                .as_ref()
+                .map(|queue| format!("  {}", in_queue(queue))),
+        );
+        lines.push(format!("  next: {}", waiting.next));
+    }
+    match me.active_submission {
+        Some(active) => lines.push(format!("submission {active}: {}", next_cut(me, active))),
+        None => lines.push("nothing of the team is active: faceoff submit BUNDLE".to_owned()),
+    }
+    lines
+}
+
 fn line(submission: &SubmissionView) -> String {
     let state = match &submission.status {
-        SubmissionStatus::Validating => "validating".to_owned(),
+        SubmissionStatus::Validating => match &submission.queue {
+            Some(queue) => format!("validating, {}", in_queue(queue)),
+            None => "validating".to_owned(),
+        },
         SubmissionStatus::Valid { .. } => "valid".to_owned(),
         SubmissionStatus::Invalid { reason, .. } => format!("invalid: {reason}"),
         SubmissionStatus::ValidationError { reason } => format!("not checked: {reason}"),

@@ -2,7 +2,7 @@
 
 use super::Config;
 use anyhow::{Context as _, bail, ensure};
-use faceoff_types::MAX_EPISODES_PER_TASK;
+use faceoff_types::{DayDeadline, LONGEST_DEADLINE_H, MAX_EPISODES_PER_TASK};
 use std::collections::BTreeSet;
 
 /// Slots per CPU beyond which none would get on.
@@ -64,6 +64,12 @@ impl Config {
             "evaluation.ablation_episodes: expected at most {MAX_EPISODES_PER_TASK}, got {}",
             evaluation.ablation_episodes
         );
+        if let DayDeadline::Hours(hours) = evaluation.day_deadline {
+            ensure!(
+                (1..=LONGEST_DEADLINE_H).contains(&hours),
+                "evaluation.day_deadline: expected 1 to {LONGEST_DEADLINE_H} hours, got {hours}"
+            );
+        }
         ensure!(
             !evaluation.tasks.is_empty(),
             "evaluation.tasks: expected at least one task"

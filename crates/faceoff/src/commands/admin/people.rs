@@ -1,6 +1,6 @@
 //! `faceoff admin people` and `faceoff admin registration`: who takes part.
 
-use super::find_team;
+use super::find::find_team;
 use crate::{
     client::Client,
     commands::{

@@ -10,7 +10,7 @@ use faceoff_http::{
     requests::{NewStage, StageChange},
     views::stage::{PhaseView, StageView},
 };
-use faceoff_types::{Profile, Schedule, StageId, Task, Zone};
+use faceoff_types::{DayDeadline, Profile, Schedule, StageId, Task, Zone};
 use jiff::{
     Timestamp, Zoned,
     civil::{Date, DateTime, Time},
@@ -20,6 +20,11 @@ use jiff::{
 pub(super) enum StageAction {
     /// List the stages with their times and rules
     List,
+    /// Tell whether the stage's days fit: what there is to play against the slots and the time until the deadline
+    Capacity {
+        /// The stage's name or id
+        stage: String,
+    },
     /// Make a stage: what is left out is as in the stage that is open
     Create {
         /// 1 to 40 letters, digits, spaces and . _ -
@@ -86,6 +91,9 @@ pub(super) struct Wanted {
     /// Episodes of one unit of work
     #[arg(long)]
     episodes_per_shard: Option<u32>,
+    /// Until when a day may be played: next-cut, never, or hours from its cut as 30h
+    #[arg(long, value_name = "DEADLINE")]
+    deadline: Option<DayDeadline>,
 }
 
 impl Wanted {
@@ -148,6 +156,15 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 or_none(stages.iter().map(told).collect(), "no stage")
             })
         }
+        StageAction::Capacity { stage } => {
+            let stage = find(client, &stage).await?;
+            let capacity = client.capacity(stage.id).await?;
+            print(json, &capacity, || {
+                let mut lines = vec![format!("{}, {} slots", capacity.stage_name, capacity.slots)];
+                lines.extend(capacity.days.iter().map(|day| day.summary.clone()));
+                lines.join("\n")
+            })
+        }
         StageAction::Create { name, wanted } => {
             let zone = match &wanted.zone {
                 Some(zone) => zone.clone(),
@@ -169,6 +186,7 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 max_faults: wanted.max_faults,
                 ablation_episodes: wanted.ablation_episodes,
                 episodes_per_shard: wanted.episodes_per_shard,
+                day_deadline: wanted.deadline,
             };
             let made = client.create_stage(&new).await?;
             print(json, &made, || told(&made))
@@ -200,6 +218,7 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 max_faults: wanted.max_faults,
                 ablation_episodes: wanted.ablation_episodes,
                 episodes_per_shard: wanted.episodes_per_shard,
+                day_deadline: wanted.deadline,
                 confirm,
             };
             let changed = client.change_stage(stage.id, &change).await?;
@@ -234,12 +253,13 @@ fn told(stage: &StageView) -> String {
         None => "none".to_owned(),
     };
     format!(
-        "{} ({phase})\n  id       {}\n  times    {} to {closes}, {}\n  next day {next}\n  rules    revision {} since {}: {}, {} \
+        "{} ({phase})\n  id       {}\n  times    {} to {closes}, {}\n  next day {next}\n  deadline {}\n  rules    revision {} since {}: {}, {} \
          episodes of each of {}, at most {} faults",
         stage.name,
         stage.id,
         there(stage.opens_at),
         stage.zone,
+        stage.settings.day_deadline,
         stage.rules.revision,
         there(stage.rules.since),
         rules.profile,

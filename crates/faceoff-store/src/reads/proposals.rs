@@ -1,0 +1,42 @@
+use crate::{
+    error::Result,
+    reads::progress,
+    store::Store,
+    tables::{
+        drafts::{self, Draft},
+        proposals::{self, Proposal},
+    },
+};
+use faceoff_types::ProposalId;
+use sqlx::SqliteConnection;
+
+/// The drafts of a proposal with their progress, in the order in which they were queued.
+pub(crate) async fn drafts_of(
+    connection: &mut SqliteConnection,
+    proposal: ProposalId,
+) -> Result<Vec<Draft>> {
+    let rows = drafts::of_proposal(connection, proposal).await?;
+    let runs: Vec<_> = rows.iter().map(|row| row.run.0).collect();
+    let done = progress::of_runs(connection, &runs).await?;
+    rows.into_iter()
+        .map(|row| {
+            let episodes_done = done.get(&row.run.0).copied().unwrap_or(0);
+            row.into_draft(episodes_done)
+        })
+        .collect()
+}
+
+impl Store {
+    /// All proposals and trials, the newest first.
+    pub async fn proposals(&self) -> Result<Vec<Proposal>> {
+        proposals::all(&mut *self.database.read.acquire().await?).await
+    }
+
+    /// A proposal with its evaluations.
+    pub async fn proposal(&self, id: ProposalId) -> Result<(Proposal, Vec<Draft>)> {
+        let mut tx = self.database.read.begin().await?;
+        let proposal = proposals::find(&mut tx, id).await?;
+        let drafts = drafts_of(&mut tx, id).await?;
+        Ok((proposal, drafts))
+    }
+}

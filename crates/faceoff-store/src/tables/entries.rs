@@ -1,0 +1,122 @@
+//! Evaluations as they are entered: who plays which day, whatever comes of it.
+
+use crate::{
+    column::Instant,
+    error::{Result, StoreError},
+};
+use faceoff_types::{EvaluationId, RunId, StageDay, StageId, SubmissionId, TeamId};
+use jiff::{Timestamp, civil::Date};
+use sqlx::{SqliteConnection, types::Text};
+
+/// What an evaluation is, whatever became of it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Entry {
+    pub(crate) id: EvaluationId,
+    pub(crate) submission: SubmissionId,
+    pub(crate) team: TeamId,
+    pub(crate) of: StageDay,
+    pub(crate) revision: u32,
+    pub(crate) run: RunId,
+    pub(crate) rerun_of: Option<EvaluationId>,
+}
+
+/// The evaluation with this id.
+pub(crate) async fn find(connection: &mut SqliteConnection, id: EvaluationId) -> Result<Entry> {
+    let id_text = Text(id);
+    let row = sqlx::query!(
+        r#"SELECT submission_id AS "submission: Text<SubmissionId>", team_id AS "team: Text<TeamId>",
+                  stage_id AS "stage: Text<StageId>", day AS "day: Text<Date>", revision AS "revision: u32",
+                  run_id AS "run: Text<RunId>",
+                  rerun_of AS "rerun_of: Text<EvaluationId>"
+           FROM evaluations WHERE id = ?"#,
+        id_text
+    )
+    .fetch_optional(connection)
+    .await?
+    .ok_or(StoreError::NotFound("evaluation"))?;
+    Ok(Entry {
+        id,
+        submission: row.submission.0,
+        team: row.team.0,
+        of: StageDay {
+            stage: row.stage.0,
+            date: row.day.0,
+        },
+        revision: row.revision,
+        run: row.run.0,
+        rerun_of: row.rerun_of.map(|id| id.0),
+    })
+}
+
+/// Adds an evaluation that nobody has begun; [`StoreError::Conflict`] if the team has one of the day
+/// that counts.
+pub(crate) async fn insert(
+    connection: &mut SqliteConnection,
+    new: &Entry,
+    now: Timestamp,
+) -> Result<()> {
+    let (id, submission, team) = (Text(new.id), Text(new.submission), Text(new.team));
+    let (stage, day) = (Text(new.of.stage), Text(new.of.date));
+    let (run, now, rerun_of) = (Text(new.run), Instant(now), new.rerun_of.map(Text));
+    sqlx::query!(
+        "INSERT INTO evaluations (id, submission_id, team_id, stage_id, day, revision, run_id, created_at, state,
+                                  rerun_of)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, 'open', ?)",
+        id,
+        submission,
+        team,
+        stage,
+        day,
+        new.revision,
+        run,
+        now,
+        rerun_of,
+    )
+    .execute(connection)
+    .await
+    .map_err(|error| {
+        if StoreError::is_duplicate(&error, "evaluations.day") {
+            StoreError::Conflict(format!(
+                "the team has another evaluation of {} that counts, or that is under way",
+                new.of.date
+            ))
+        } else {
+            error.into()
+        }
+    })?;
+    Ok(())
+}
+
+/// Marks it as a turn beside the day's own.
+pub(crate) async fn set_extra(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+    reason: &str,
+) -> Result<()> {
+    let id = Text(id);
+    sqlx::query!(
+        "UPDATE evaluations SET extra_for = ? WHERE id = ?",
+        reason,
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// What plays an extra turn again is one, too.
+pub(crate) async fn follow_extra(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+    of: EvaluationId,
+) -> Result<()> {
+    let (id, of) = (Text(id), Text(of));
+    sqlx::query!(
+        "UPDATE evaluations SET extra_for = (SELECT o.extra_for FROM evaluations o WHERE o.id = ?) WHERE id = ?",
+        of,
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}

@@ -1,0 +1,48 @@
+//! Which boards stand still.
+
+use crate::{column::Instant, error::Result, tables::rulings::Ruling};
+use faceoff_types::StageId;
+use sqlx::{SqliteConnection, types::Text};
+
+/// Since when the boards of a stage stand still, and why; `None` if they do not.
+pub(crate) async fn find(
+    connection: &mut SqliteConnection,
+    stage: StageId,
+) -> Result<Option<Ruling>> {
+    let stage = Text(stage);
+    let row = sqlx::query!(
+        r#"SELECT frozen_at AS "at: Instant", reason FROM frozen_boards WHERE stage_id = ?"#,
+        stage
+    )
+    .fetch_optional(connection)
+    .await?;
+    Ok(row.map(|row| Ruling {
+        at: row.at.0,
+        reason: row.reason,
+    }))
+}
+
+pub(crate) async fn insert(
+    connection: &mut SqliteConnection,
+    stage: StageId,
+    ruling: &Ruling,
+) -> Result<()> {
+    let (stage, at) = (Text(stage), Instant(ruling.at));
+    sqlx::query!(
+        "INSERT INTO frozen_boards (stage_id, frozen_at, reason) VALUES (?, ?, ?)",
+        stage,
+        at,
+        ruling.reason,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+pub(crate) async fn remove(connection: &mut SqliteConnection, stage: StageId) -> Result<()> {
+    let stage = Text(stage);
+    sqlx::query!("DELETE FROM frozen_boards WHERE stage_id = ?", stage)
+        .execute(connection)
+        .await?;
+    Ok(())
+}
