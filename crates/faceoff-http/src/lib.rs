@@ -24,6 +24,7 @@ mod serve;
 mod summaries;
 pub mod token;
 mod uploads;
+mod viewer;
 pub mod views;
 
 pub use axum::Router;

@@ -1,6 +1,6 @@
 //! What clients send to the API.
 
-use faceoff_types::{Profile, Schedule, StageId, Task, Zone};
+use faceoff_types::{Profile, Publishes, Schedule, StageId, Standings, Task, Zone};
 use jiff::Timestamp;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use utoipa::{IntoParams, ToSchema};
@@ -72,6 +72,15 @@ pub struct NewStage {
     /// Episodes of one unit of work.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub episodes_per_shard: Option<u32>,
+    /// Are its scores hidden from everybody but the organiser? Left out, they are not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blind: Option<bool>,
+    /// When its datasets are there for everybody; left out, at its close.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub publishes: Option<Publishes>,
+    /// What a team's row on its board is made of; left out, its newest evaluation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub standings: Option<Standings>,
 }
 
 /// What of a stage is to be another; what is left out stays as it is.
@@ -121,7 +130,17 @@ pub struct StageChange {
     /// Episodes of one unit of work.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub episodes_per_shard: Option<u32>,
-    /// The stage's name, if other rules are to begin while it is open: its board begins anew then.
+    /// False opens a blind stage, for good once it has scores, also after its close; true only before it has any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub blind: Option<bool>,
+    /// When its datasets are there for everybody; after its close only sooner than it was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub publishes: Option<Publishes>,
+    /// What a team's row on its board is made of.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub standings: Option<Standings>,
+    /// The stage's name, if other rules or standings are to begin while it is open: its board begins anew then, or is
+    /// ordered anew.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub confirm: Option<String>,
 }
@@ -169,6 +188,15 @@ pub struct Decision {
     /// The name of the team, or the date of the day, that it is about. Without it nothing is done, and the answer says
     /// what would be.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub confirm: Option<String>,
+}
+
+/// That something is meant as it was asked.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Confirmation {
+    /// The name of what it is about. Without it nothing is done, and the answer says what would be.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub confirm: Option<String>,
 }
 

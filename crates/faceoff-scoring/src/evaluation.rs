@@ -56,6 +56,7 @@ pub fn score_evaluation(
             .unwrap_or(Tier::Deployable),
         tasks,
         timing: None,
+        variation: Default::default(),
     }
 }
 

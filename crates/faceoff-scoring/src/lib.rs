@@ -16,6 +16,7 @@ mod difference;
 mod episode;
 mod evaluation;
 mod interval;
+mod mean;
 mod paired;
 mod qualifying;
 mod rank_groups;
@@ -37,6 +38,7 @@ pub use episode::{
 };
 pub use evaluation::{overall_score, score_evaluation, task_weight_percent};
 pub use interval::{wilson95, wilson95_of_rate};
+pub use mean::{joined_summary, mean_result};
 pub use paired::{PairedTally, PairingError, SIGNIFICANCE, overall_p_value};
 pub use qualifying::{
     InvalidTaskScore, QUALIFYING_EPISODES, QualifyingRow, QualifyingSheet, TaskRow, TaskScore,

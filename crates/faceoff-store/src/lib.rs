@@ -51,7 +51,7 @@ pub use operations::{
     tidy::{RECORDINGS_KEPT, UNCHECKED_KEPT},
 };
 pub use queue::Claim;
-pub use reads::{board::BoardRecord, runs::RunFaults};
+pub use reads::{board::BoardRecord, runs::RunFaults, standings::BoardDays};
 pub use room::Room;
 pub use store::Store;
 pub use tables::{
@@ -60,6 +60,7 @@ pub use tables::{
     days::Day,
     evaluations::{Evaluation, EvaluationState},
     events::EventFilter,
+    finalised::Finalised,
     plan::RunPlan,
     rulings::Ruling,
     runs::Run,

@@ -338,6 +338,7 @@ impl Config {
             tasks: evaluation.tasks.clone(),
             episodes_per_task: evaluation.episodes_per_task,
             max_faults: evaluation.max_faults,
+            variation: Default::default(),
         }
     }
 
@@ -357,6 +358,7 @@ impl Config {
             schedule: schedule.map(|schedule| schedule.without(evaluation.days_off.clone())),
             ablation_episodes: evaluation.ablation_episodes,
             episodes_per_shard: evaluation.episodes_per_shard,
+            ..StageSettings::default()
         })
     }
 

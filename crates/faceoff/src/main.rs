@@ -44,6 +44,8 @@ enum Command {
     Submit(commands::submit::SubmitCommand),
     /// Choose which submission plays at the next cut.
     Activate(commands::activate::ActivateCommand),
+    /// Make an evaluation of the team's public, with its dataset.
+    Publish(commands::publish::PublishCommand),
     Submissions(commands::submissions::SubmissionsCommand),
     /// Organise a running competition.
     Admin(commands::admin::AdminCommand),
@@ -64,6 +66,7 @@ fn main() -> ExitCode {
         Command::Sim(command) => command.run(),
         Command::Submit(command) => command.run(),
         Command::Activate(command) => command.run(),
+        Command::Publish(command) => command.run(),
         Command::Submissions(command) => command.run(),
         Command::Admin(command) => command.run(),
         Command::Doctor(command) => command.run(),

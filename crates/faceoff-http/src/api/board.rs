@@ -5,7 +5,8 @@ use crate::{
     extract::{PathParam, QueryParams},
     problem::Problem,
     requests::BoardQuery,
-    views::board::BoardView,
+    viewer::Viewer,
+    views::{board::BoardView, sight::Sight},
 };
 use axum::{Json, extract::State};
 use faceoff_types::Task;
@@ -16,10 +17,12 @@ use faceoff_types::Task;
     responses((status = 200, body = BoardView), (status = 404))
 )]
 pub(crate) async fn board(
+    viewer: Viewer,
     State(app): State<App>,
     QueryParams(query): QueryParams<BoardQuery>,
 ) -> Result<Json<BoardView>, Problem> {
-    BoardView::asked(&app, query, None).await.map(Json)
+    let sight = Sight::of(&app, viewer).await?;
+    BoardView::asked(&app, &sight, query, None).await.map(Json)
 }
 
 /// The board of one task, ranked by its success rate and its penalty points.
@@ -28,9 +31,13 @@ pub(crate) async fn board(
     responses((status = 200, body = BoardView), (status = 404))
 )]
 pub(crate) async fn task_board(
+    viewer: Viewer,
     State(app): State<App>,
     PathParam(task): PathParam<Task>,
     QueryParams(query): QueryParams<BoardQuery>,
 ) -> Result<Json<BoardView>, Problem> {
-    BoardView::asked(&app, query, Some(task)).await.map(Json)
+    let sight = Sight::of(&app, viewer).await?;
+    BoardView::asked(&app, &sight, query, Some(task))
+        .await
+        .map(Json)
 }

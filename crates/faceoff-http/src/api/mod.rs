@@ -15,6 +15,7 @@ mod health;
 mod me;
 mod rulings;
 mod season;
+mod sign_off;
 mod stages;
 mod submissions;
 mod teams;
@@ -41,6 +42,8 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(teams::replace_token))
         .routes(routes!(stages::list_stages, stages::create_stage))
         .routes(routes!(stages::stage, stages::change_stage))
+        .routes(routes!(sign_off::start_final_day))
+        .routes(routes!(sign_off::finalise_stage))
         .routes(routes!(days::start_day))
         .routes(routes!(events::list_events))
         .routes(routes!(submissions::list_submissions))
@@ -64,6 +67,7 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(rulings::reinstate_team))
         .routes(routes!(datasets::dataset))
         .routes(routes!(datasets::violations))
+        .routes(routes!(datasets::publish_evaluation))
         .routes(routes!(comparisons::compare))
         .layer(middleware::from_fn_with_state(patience, layers::time_out))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES));

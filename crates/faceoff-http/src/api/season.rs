@@ -6,6 +6,7 @@ use crate::{
     extract::Json as Body,
     problem::Problem,
     requests::CloseSeason,
+    viewer::Viewer,
     views::season::{SeasonHead, SeasonView},
 };
 use axum::{Json, extract::State};
@@ -13,8 +14,11 @@ use faceoff_store::Actor;
 
 /// The season.
 #[utoipa::path(get, path = "/season", tag = "public", responses((status = 200, body = SeasonView)))]
-pub(crate) async fn season(State(app): State<App>) -> Result<Json<SeasonView>, Problem> {
-    SeasonView::now(&app).await.map(Json)
+pub(crate) async fn season(
+    viewer: Viewer,
+    State(app): State<App>,
+) -> Result<Json<SeasonView>, Problem> {
+    SeasonView::now(&app, viewer).await.map(Json)
 }
 
 /// Closes the season for good: its secret becomes public, and nothing more is uploaded or evaluated.
@@ -23,7 +27,7 @@ pub(crate) async fn season(State(app): State<App>) -> Result<Json<SeasonView>, P
     request_body = CloseSeason,
     responses(
         (status = 200, body = SeasonView),
-        (status = 409, description = "evaluations are queued or running, or it is closed already"),
+        (status = 409, description = "evaluations are queued or running, a stage is blind, or it is closed already"),
         (status = 422, description = "not the season's name"),
     )
 )]
@@ -42,5 +46,5 @@ pub(crate) async fn close_season(
     let now = app.config.clock.now();
     app.store.close_season(Actor::Organiser, now).await?;
     tracing::info!(season = name, "season closed; its secret is public");
-    SeasonView::now(&app).await.map(Json)
+    SeasonView::now(&app, Viewer::Organiser).await.map(Json)
 }

@@ -3,17 +3,20 @@
 use super::{
     figures,
     frame::{Frame, PageProblem, render},
+    standing,
 };
 use crate::{
     app::App,
     extract::{PathParam, QueryParams},
     problem::Problem,
     requests::BoardQuery,
+    viewer::Viewer,
     views::{
         board::{BoardRow, BoardView},
         evaluation::{EvaluationStatus, EvaluationView, Progress},
         ruling::RulingView,
         season::SeasonHead,
+        sight::Sight,
         stage::{PhaseView, StageView},
         task::TaskView,
         team::TeamView,
@@ -36,6 +39,8 @@ struct Who {
     agent: Option<String>,
     evaluation: EvaluationId,
     day: civil::Date,
+    /// How many days the row is a mean of, if of several.
+    days: Option<usize>,
     /// How it was evaluated, where the rows of the board differ in that.
     setting: Option<String>,
 }
@@ -50,10 +55,16 @@ fn setting(row: &BoardRow) -> String {
     )
 }
 
-/// Of the task with the most.
+/// Of the task with the most, on a day.
 fn episodes(row: &BoardRow) -> u32 {
     let episodes = row.tasks.values().map(|task| task.episodes);
-    episodes.max().unwrap_or(0)
+    of_a_day(row, episodes.max().unwrap_or(0))
+}
+
+/// Episodes of a day, of those of all that the row is made of.
+fn of_a_day(row: &BoardRow, episodes: u32) -> u32 {
+    let days = u32::try_from(row.evaluations.len()).unwrap_or(u32::MAX);
+    episodes / days.max(1)
 }
 
 /// The setting of the whole board; `None` where its rows differ.
@@ -69,11 +80,14 @@ impl Who {
         Self {
             rank: row.rank,
             rank_group: row.rank_group,
-            tier_change: figures::chance(row.tier_change_probability),
+            tier_change: row
+                .tier_change_probability
+                .map_or_else(|| "not computed of means".to_owned(), figures::chance),
             team: row.team.to_string(),
             agent: row.agent.clone(),
             evaluation: row.evaluation,
             day: row.day,
+            days: (row.evaluations.len() > 1).then_some(row.evaluations.len()),
             setting: common_setting.is_none().then(|| setting(row)),
         }
     }
@@ -150,6 +164,16 @@ struct Heading {
     others: Vec<OtherBoard>,
     /// The organiser holds the queue.
     paused: Option<RulingView>,
+    /// What its rows are, for the table's caption.
+    rows: String,
+    /// What decides in the end, if that is something else.
+    still_to_come: Option<&'static str>,
+    /// Who sees it, if not everybody.
+    blind: Option<&'static str>,
+    /// Is it hidden from the viewer?
+    is_hidden: bool,
+    /// May it change?
+    result: String,
 }
 
 struct OtherBoard {
@@ -162,8 +186,10 @@ impl Heading {
     async fn of(
         app: &App,
         board: &BoardView,
+        sight: &Sight,
         paused: Option<RulingView>,
     ) -> Result<Self, PageProblem> {
+        let is_hidden = sight.is_hidden(board.stage);
         let stages = StageView::all(app).await?;
         let mut others = Vec::new();
         let mut heading = None;
@@ -197,6 +223,11 @@ impl Heading {
                     stage: stage.name.to_string(),
                     others: Vec::new(),
                     paused: None,
+                    rows: standing::rows(board),
+                    still_to_come: standing::still_to_come(board),
+                    blind: standing::blind(board, is_hidden),
+                    is_hidden,
+                    result: standing::result(board),
                 });
             }
         }
@@ -241,34 +272,42 @@ struct OverallPage {
 
 /// The overall board.
 pub(super) async fn overall(
+    viewer: Result<Viewer, Problem>,
     State(app): State<App>,
     query: Result<QueryParams<BoardQuery>, Problem>,
 ) -> Result<Response, PageProblem> {
     let QueryParams(query) = query?;
+    let sight = Sight::of(&app, viewer?).await?;
     let season = SeasonHead::now(&app).await?;
-    let board = BoardView::asked(&app, query, None).await?;
+    let board = BoardView::asked(&app, &sight, query, None).await?;
     let today = app.store.stage(board.stage).await.map_err(Problem::from)?;
     let today = today.day(app.config.clock.now());
     let setting = common_setting(&board.rows);
     let page = OverallPage {
         frame: Frame::of(&app, season.name, "/"),
         today: today.date,
-        heading: Heading::of(&app, &board, season.paused).await?,
+        heading: Heading::of(&app, &board, &sight, season.paused).await?,
         commitment: season.commitment,
         tiers: by_tier(&board, |row| OverallRow::of(row, setting.as_ref())),
         setting,
-        under_way: under_way(&app, today).await?,
+        under_way: under_way(&app, &sight, today).await?,
         disqualified: board.disqualified,
     };
     render(&page)
 }
 
-async fn under_way(app: &App, today: StageDay) -> Result<Vec<UnderWay>, PageProblem> {
-    let evaluations = EvaluationView::current(app, today).await?;
+async fn under_way(
+    app: &App,
+    sight: &Sight,
+    today: StageDay,
+) -> Result<Vec<UnderWay>, PageProblem> {
+    let evaluations = EvaluationView::current(app, sight, today).await?;
     let under_way = evaluations.into_iter().filter_map(|evaluation| {
         let state = match evaluation.status {
             _ if evaluation.voided.is_some() => "Voided by the organiser",
             EvaluationStatus::Finished { .. } => return None,
+            // How it went is not told.
+            EvaluationStatus::AgentFailed { .. } if evaluation.blind => return None,
             EvaluationStatus::Queued => "Queued",
             EvaluationStatus::Running => "Running",
             EvaluationStatus::Finalising => "Computing the score",
@@ -323,7 +362,10 @@ impl TaskRow {
             who: Who::of(row, common_setting),
             rate: Rate::of(result),
             penalty_points: figures::one(result.penalty_points),
-            per_episode: figures::per_episode(result.penalty_points, result.episodes),
+            per_episode: figures::per_episode(
+                result.penalty_points,
+                of_a_day(row, result.episodes),
+            ),
             details: TaskDetails::of(result),
         }
     }
@@ -342,11 +384,13 @@ struct TaskPage {
 
 /// The board of one task.
 pub(super) async fn by_task(
+    viewer: Result<Viewer, Problem>,
     State(app): State<App>,
     task: Result<PathParam<Task>, Problem>,
     query: Result<QueryParams<BoardQuery>, Problem>,
 ) -> Result<Response, PageProblem> {
     let (PathParam(task), QueryParams(query)) = (task?, query?);
+    let sight = Sight::of(&app, viewer?).await?;
     let season = SeasonHead::now(&app).await?;
     let (title, aim) = match task {
         Task::Hit => (
@@ -362,7 +406,7 @@ pub(super) async fn by_task(
             "Bring a puck from the border to a good hitting position.",
         ),
     };
-    let mut board = BoardView::asked(&app, query, Some(task)).await?;
+    let mut board = BoardView::asked(&app, &sight, query, Some(task)).await?;
     // The board leaves out teams without the task; a row without one could show nothing.
     board.rows.retain(|row| row.tasks.contains_key(&task));
     let setting = common_setting(&board.rows);
@@ -372,7 +416,7 @@ pub(super) async fn by_task(
     let frame = Frame::of(&app, season.name, format!("/tasks/{task}"));
     render(&TaskPage {
         frame,
-        heading: Heading::of(&app, &board, season.paused).await?,
+        heading: Heading::of(&app, &board, &sight, season.paused).await?,
         title,
         aim,
         setting,

@@ -9,11 +9,13 @@ use crate::{
     app::App,
     extract::PathParam,
     problem::Problem,
+    viewer::Viewer,
     views::{
         ablation,
         evaluation::{EvaluationStatus, EvaluationView, Progress, ResultView},
         ruling::RulingView,
         season::SeasonHead,
+        sight::Sight,
         submission::SubmissionView,
         task::TaskView,
         violations::ViolationsView,
@@ -267,30 +269,34 @@ struct Page {
     ablation: Option<String>,
     /// Said when there is no result.
     state: &'static str,
+    /// Is its dataset there for everybody?
+    public: bool,
     progress: Option<Progress>,
     finished: Option<Finished>,
 }
 
 /// One evaluation.
 pub(super) async fn page(
+    viewer: Result<Viewer, Problem>,
     State(app): State<App>,
     id: Result<PathParam<EvaluationId>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PathParam(id) = id?;
-    let view = EvaluationView::find(&app, id).await?;
+    let sight = Sight::of(&app, viewer?).await?;
+    let view = EvaluationView::find(&app, &sight, id).await?;
     let submission = SubmissionView::find(&app, view.submission).await?;
     let ablation = ablation::exists(&app, submission.id).await?;
     let season = SeasonHead::now(&app).await?;
     let finished = match &view.status {
         EvaluationStatus::Finished {
             finished_at,
-            result,
+            result: Some(result),
             dataset_blake3,
             ..
         } => {
             let summary = view.summary(&app).await?;
             let others = match view.released_at {
-                Some(_) => others(&app, &view).await?,
+                Some(_) => others(&app, &sight, &view).await?,
                 None => Vec::new(),
             };
             Some(Finished {
@@ -311,15 +317,21 @@ pub(super) async fn page(
         day: view.day,
         profile: view.profile,
         ablation: ablation.then(|| format!("/submissions/{}/ablation", submission.id)),
-        state: in_words(&view.status),
+        state: in_words(&view),
+        public: view.public,
         progress: (!view.status.is_final()).then_some(view.progress),
         finished,
     })
 }
 
 /// What has become of an evaluation without a result.
-const fn in_words(status: &EvaluationStatus) -> &'static str {
-    match status {
+const fn in_words(view: &EvaluationView) -> &'static str {
+    const HIDDEN: &str = "It is over. Its stage is blind: how it went is hidden from everybody until the organiser opens \
+                          the stage, and nobody knows when that is.";
+    match &view.status {
+        EvaluationStatus::Finished { .. } | EvaluationStatus::AgentFailed { .. } if view.blind => {
+            HIDDEN
+        }
         EvaluationStatus::Queued => "It waits for a worker.",
         EvaluationStatus::Running => "Episodes are being played.",
         EvaluationStatus::Finalising => "All episodes are played; the score is being computed.",
@@ -337,7 +349,7 @@ const fn in_words(status: &EvaluationStatus) -> &'static str {
 }
 
 /// The finished evaluations that can be compared with this one, in the order of their scores.
-async fn others(app: &App, of: &EvaluationView) -> Result<Vec<Other>, PageProblem> {
+async fn others(app: &App, sight: &Sight, of: &EvaluationView) -> Result<Vec<Other>, PageProblem> {
     let same_episodes = |other: &EvaluationView| {
         other.id != of.id
             && other.voided.is_none()
@@ -349,14 +361,15 @@ async fn others(app: &App, of: &EvaluationView) -> Result<Vec<Other>, PageProble
         stage: of.stage,
         date: of.day,
     };
-    let same_day = EvaluationView::of_day(app, day).await?;
+    let same_day = EvaluationView::of_day(app, sight, day).await?;
     let mut others: Vec<_> = same_day
         .into_iter()
         .filter(same_episodes)
         .filter_map(|view| match view.status {
-            EvaluationStatus::Finished { result, .. } => {
-                Some((result.score, view.team_name, view.id))
-            }
+            EvaluationStatus::Finished {
+                result: Some(result),
+                ..
+            } => Some((result.score, view.team_name, view.id)),
             _ => None,
         })
         .collect();

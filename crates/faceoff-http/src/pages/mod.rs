@@ -11,6 +11,7 @@ mod figures;
 mod frame;
 mod problems;
 mod season;
+mod standing;
 mod unknown;
 
 pub(crate) use unknown::{unknown_method, unknown_path};

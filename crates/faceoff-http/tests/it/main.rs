@@ -5,6 +5,7 @@
 )]
 
 mod ablations;
+mod blind;
 mod board;
 mod board_load;
 mod comparisons;
@@ -13,12 +14,15 @@ mod evaluations;
 mod events;
 mod openapi;
 mod problems;
+mod publication;
 mod room;
 mod rulings;
 mod season;
 mod seeds;
+mod sign_off;
 mod site;
 mod stages;
+mod standings;
 mod submissions;
 mod teams;
 mod uploads;

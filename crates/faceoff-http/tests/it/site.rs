@@ -449,6 +449,7 @@ async fn stage_by(
         tasks: plan.tasks.clone(),
         episodes_per_task: plan.episodes_per_task,
         max_faults: plan.max_faults,
+        variation: Default::default(),
     };
     let settings = StageSettings {
         schedule,
@@ -580,5 +581,6 @@ pub fn result(rates: [f64; 3], penalty_points: f64) -> EvaluationResult {
             host_noise_reruns: 2,
             platform_retries: 1,
         }),
+        variation: Default::default(),
     }
 }

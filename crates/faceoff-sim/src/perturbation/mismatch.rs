@@ -1,6 +1,5 @@
 //! The season's plant.
 
-use super::settings::{MismatchSettings, PerturbationSettings};
 use crate::{
     dynamics::arm::{Bodies, Kinematics, controller_torques, plant_bias},
     model::{DOFS, EE_DESIRED_HEIGHT_M, INITIAL_Q, JOINTS, LINKS},
@@ -11,7 +10,7 @@ use crate::{
     },
     stream::Stream,
 };
-use faceoff_types::{Factor, Factors, Seed};
+use faceoff_types::{Factor, Factors, MismatchSettings, PerturbationSettings, Seed};
 
 /// Where the static error is looked at: end-effector positions over the table, m, base frame.
 const WORKSPACE_X_M: [f64; 4] = [0.65, 0.85, 1.05, 1.2];

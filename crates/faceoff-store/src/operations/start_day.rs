@@ -37,8 +37,13 @@ fn check_open(stage: &Stage, now: Timestamp) -> Result<()> {
 async fn cut(tx: &mut Tx, stage: StageId) -> Result<(StageDay, Vec<Evaluation>)> {
     season::check_open(tx).await?;
     let stage = stages::find(tx, stage).await?;
+    check_open(&stage, tx.now)?;
+    begin(tx, &stage).await
+}
+
+/// A stage's cut, whether it is open or not.
+pub(crate) async fn begin(tx: &mut Tx, stage: &Stage) -> Result<(StageDay, Vec<Evaluation>)> {
     let now = tx.now;
-    check_open(&stage, now)?;
     let of = stage.day(now);
     let turn = Turn {
         of,
@@ -64,6 +69,13 @@ async fn cut(tx: &mut Tx, stage: StageId) -> Result<(StageDay, Vec<Evaluation>)>
     Ok((of, started))
 }
 
+pub(crate) fn nobody_plays() -> StoreError {
+    StoreError::Conflict(
+        "no team has a valid submission, so nothing was started, and the day still has its cut"
+            .into(),
+    )
+}
+
 impl Store {
     /// The cut of a stage's day at `now`: queues an evaluation of what each team has active, earliest
     /// upload first. [`StoreError::DayHasCut`] if the day has had it, [`StoreError::StageNotOpen`] before and
@@ -78,11 +90,7 @@ impl Store {
         self.write(actor, now, async |tx| {
             let (_, started) = cut(tx, stage).await?;
             if started.is_empty() {
-                return Err(StoreError::Conflict(
-                    "no team has a valid submission, so nothing was started, and the day still has its \
-                     cut"
-                        .into(),
-                ));
+                return Err(nobody_plays());
             }
             Ok(started)
         })

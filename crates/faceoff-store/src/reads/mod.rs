@@ -9,6 +9,7 @@ pub(crate) mod progress;
 pub(crate) mod runs;
 mod season;
 mod stages;
+pub(crate) mod standings;
 mod submissions;
 mod summaries;
 mod teams;

@@ -34,6 +34,8 @@ pub struct Evaluation {
     pub created_at: Timestamp,
     /// It does not count, if it was.
     pub voided: Option<Ruling>,
+    /// When its team made its dataset public, if it did.
+    pub published_at: Option<Timestamp>,
     /// How far it is.
     pub state: EvaluationState,
 }
@@ -119,6 +121,7 @@ pub(crate) struct EvaluationRow {
     reason: Option<String>,
     voided_at: Option<Instant>,
     voided_for: Option<String>,
+    published_at: Option<Instant>,
 }
 
 impl EvaluationRow {
@@ -196,6 +199,7 @@ impl EvaluationRow {
             plan,
             created_at: self.created_at.0,
             voided: Ruling::of(self.voided_at, self.voided_for),
+            published_at: self.published_at.map(|at| at.0),
             state,
         })
     }
@@ -219,7 +223,8 @@ macro_rules! select_evaluations {
                       e.created_at AS "created_at: Instant", e.state,
                       e.finished_at AS "finished_at: Instant",
                       e.result AS "result: Json<EvaluationResult>", e.dataset, e.dataset_blake3,
-                      e.reason, e.voided_at AS "voided_at: Instant", e.voided_for
+                      e.reason, e.voided_at AS "voided_at: Instant", e.voided_for,
+                      e.published_at AS "published_at: Instant"
                FROM evaluations e JOIN runs r ON r.id = e.run_id 
                LEFT JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day "# + $tail
             $(, $argument)*

@@ -9,6 +9,7 @@ pub(crate) mod episode_summaries;
 pub(crate) mod evaluations;
 pub(crate) mod events;
 pub(crate) mod finalisations;
+pub(crate) mod finalised;
 pub(crate) mod plan;
 pub(crate) mod rulings;
 pub(crate) mod runs;

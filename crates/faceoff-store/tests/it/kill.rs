@@ -44,6 +44,7 @@ async fn child() {
     };
     let run = uuid::Uuid::now_v7();
     for round in 0.. {
+        sign_off(&store, &format!("s {} {round}", run.simple()), now, &tell).await;
         let mut token_hash = [0; 32];
         token_hash[..16].copy_from_slice(uuid::Uuid::now_v7().as_bytes());
         let name: TeamName = format!("t {} {round}", run.simple()).parse().unwrap();
@@ -126,6 +127,26 @@ async fn child() {
     }
 }
 
+/// A stage of an hour, without a day, from its making to the signature under it.
+async fn sign_off(store: &Store, name: &str, now: jiff::Timestamp, tell: &impl Fn(String)) {
+    let (rules, settings) = rules_of(&small());
+    let hour = jiff::SignedDuration::from_hours(1);
+    let new = NewStage {
+        name: name.parse().unwrap(),
+        opens_at: now,
+        closes_at: Some(now + hour),
+        zone: Zone::UTC,
+        rules,
+        settings,
+    };
+    let made = store
+        .create_stage(Actor::Organiser, new, now)
+        .await
+        .unwrap();
+    let signed = store.finalise_stage(Actor::Organiser, made.id, now + hour);
+    tell(format!("finalised {}", signed.await.unwrap().id));
+}
+
 #[tokio::test]
 async fn survives_kill_9() {
     let folder = tempfile::tempdir().unwrap();
@@ -152,6 +173,7 @@ async fn survives_kill_9() {
                         "shard",
                         "finished",
                         "disqualified",
+                        "finalised",
                         "voided",
                     ]
                     .contains(&what)
@@ -184,6 +206,7 @@ async fn stored(folder: &Path) -> HashSet<String> {
          UNION SELECT 'evaluation ' || id FROM evaluations
          UNION SELECT 'shard ' || id FROM shards WHERE committed_at IS NOT NULL
          UNION SELECT 'finished ' || id FROM evaluations WHERE state = 'finished'
+         UNION SELECT 'finalised ' || id FROM stages WHERE finalised_at IS NOT NULL
          UNION SELECT 'voided ' || id FROM evaluations WHERE voided_at IS NOT NULL
          UNION SELECT 'disqualified ' || subject_id FROM events WHERE kind = 'team_disqualified'",
     )
@@ -249,6 +272,9 @@ async fn check_consistency(folder: &Path, store: &Store) {
                + (SELECT COUNT(*) FROM teams WHERE disqualified_at IS NOT NULL)
                - (SELECT COUNT(*) FROM events WHERE kind IN ('evaluation_voided', 'team_disqualified'))
                + (SELECT COUNT(*) FROM events WHERE kind = 'team_reinstated')"),
+        ("a signature without its event",
+         "SELECT (SELECT COUNT(*) FROM stages WHERE finalised_at IS NOT NULL)
+               - (SELECT COUNT(*) FROM events WHERE kind = 'stage_finalised')"),
         ("a change without its event",
          "SELECT (SELECT COUNT(*) FROM submissions) + (SELECT COUNT(*) FROM evaluations)
                + (SELECT COUNT(*) FROM shards WHERE committed_at IS NOT NULL)

@@ -23,5 +23,6 @@ mod retries;
 mod rulesets;
 mod rulings;
 mod shares;
+mod sign_off;
 mod stages;
 mod teams;

@@ -231,6 +231,7 @@ async fn settings_are_no_rules() {
         schedule: Some(Schedule::daily("06:00".parse().unwrap())),
         ablation_episodes: 3,
         episodes_per_shard: 7,
+        ..StageSettings::default()
     };
     let others = StageChange {
         settings: Some(settings.clone()),

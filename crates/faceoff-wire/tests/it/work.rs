@@ -117,6 +117,7 @@ fn every_report_round_trips() {
         penalty_points: 327.5,
         tier: Tier::Deployable,
         timing: Some(SlotTiming::default()),
+        variation: Default::default(),
     };
     let reports = [
         WorkReport::Smoke(SmokeOutcome::Valid {

@@ -181,6 +181,7 @@ pub(super) fn result(meta: &EvaluationMeta) -> EvaluationResult {
         penalty_points: 0.0,
         tier: Tier::Deployable,
         timing: None,
+        variation: Default::default(),
     }
 }
 
@@ -419,6 +420,7 @@ pub(super) async fn stage_by(
         tasks: plan.tasks.clone(),
         episodes_per_task: plan.episodes_per_task,
         max_faults: plan.max_faults,
+        variation: Default::default(),
     };
     let settings = StageSettings {
         schedule,

@@ -7,7 +7,9 @@ use faceoff_http::{
     views::{evaluation::EvaluationStatus, submission::SubmissionStatus},
 };
 use faceoff_store::{Claimed, Store, Work};
-use faceoff_types::{Clock, Profile, Ruleset, SmokeOutcome, StageRules, StageSettings, Task, Zone};
+use faceoff_types::{
+    Clock, Profile, Ruleset, SmokeOutcome, StageRules, StageSettings, Standings, Task, Zone,
+};
 use jiff::Timestamp;
 use tempfile::TempDir;
 
@@ -33,6 +35,7 @@ async fn site(max_bundle_bytes: u64) -> Site {
         tasks: vec![Task::Hit],
         episodes_per_task: 1,
         max_faults: 0,
+        variation: Default::default(),
     };
     store
         .configure_stage(rules, StageSettings::default(), Zone::UTC, now())
@@ -220,6 +223,9 @@ async fn a_stage_is_changed_by_what_is_said_and_by_nothing_else() {
         schedule: Some(faceoff_types::Schedule::cron("0 6 * * 1-5").unwrap()),
         ablation_episodes: None,
         episodes_per_shard: None,
+        blind: Some(true),
+        publishes: None,
+        standings: Some(Standings::MeanOfLast(3)),
     };
     let made = site.organiser.create_stage(&new).await.unwrap();
     assert_eq!(made.settings.schedule, new.schedule);

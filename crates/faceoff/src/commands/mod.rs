@@ -8,6 +8,7 @@ pub mod demo;
 pub mod doctor;
 pub mod eval;
 pub mod init;
+pub mod publish;
 pub mod score;
 pub mod serve;
 pub mod sim;

@@ -8,7 +8,7 @@ use faceoff_http::{
     requests::{NewStage, StageChange},
     views::stage::{PhaseView, StageView},
 };
-use faceoff_types::{Profile, Schedule, StageId, Task, Zone};
+use faceoff_types::{Profile, Publishes, Schedule, StageId, Standings, Task, Zone};
 use jiff::{
     Timestamp, Zoned,
     civil::{Date, DateTime, Time},
@@ -40,7 +40,20 @@ pub(super) enum StageAction {
         /// The organiser starts the days
         #[arg(long, conflicts_with_all = ["daily", "cron"])]
         no_schedule: bool,
-        /// The stage's name, if it is open and gets other rules: its board begins anew then
+        /// The stage's name, if it is open and gets other rules or standings: its board begins anew then
+        #[arg(long, value_name = "NAME")]
+        confirm: Option<String>,
+    },
+    /// Start a stage's final day, once, after its close: of a stage with --standings final
+    Final {
+        /// The stage's name or id
+        stage: String,
+    },
+    /// Sign a closed stage's result off: nothing of it changes any more; without --confirm, say what that would do
+    Finalise {
+        /// The stage's name or id
+        stage: String,
+        /// The stage's name
         #[arg(long, value_name = "NAME")]
         confirm: Option<String>,
     },
@@ -84,6 +97,15 @@ pub(super) struct Wanted {
     /// Episodes of one unit of work
     #[arg(long)]
     episodes_per_shard: Option<u32>,
+    /// Hide its scores from everybody but the organiser; `false` opens it, for good once it has scores
+    #[arg(long, value_name = "true|false")]
+    blind: Option<bool>,
+    /// When its datasets are there for everybody: never, at_close or at_release
+    #[arg(long, value_name = "WHEN")]
+    publishes: Option<Publishes>,
+    /// What a team's row on its board is: latest, best, mean_of_last:N, or final
+    #[arg(long, value_name = "HOW")]
+    standings: Option<Standings>,
 }
 
 impl Wanted {
@@ -167,6 +189,9 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 max_faults: wanted.max_faults,
                 ablation_episodes: wanted.ablation_episodes,
                 episodes_per_shard: wanted.episodes_per_shard,
+                blind: wanted.blind,
+                publishes: wanted.publishes,
+                standings: wanted.standings,
             };
             let made = client.create_stage(&new).await?;
             print(json, &made, || told(&made))
@@ -198,10 +223,25 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 max_faults: wanted.max_faults,
                 ablation_episodes: wanted.ablation_episodes,
                 episodes_per_shard: wanted.episodes_per_shard,
+                blind: wanted.blind,
+                publishes: wanted.publishes,
+                standings: wanted.standings,
                 confirm,
             };
             let changed = client.change_stage(stage.id, &change).await?;
             print(json, &changed, || told(&changed))
+        }
+        StageAction::Final { stage } => {
+            let stage = find(client, &stage).await?;
+            let day = client.start_final_day(stage.id).await?;
+            print(json, &day, || {
+                format!("{}: final day, {} started", day.day, day.created.len())
+            })
+        }
+        StageAction::Finalise { stage, confirm } => {
+            let stage = find(client, &stage).await?;
+            let done = client.finalise(stage.id, confirm).await?;
+            print(json, &done, || told(&done))
         }
     }
 }
@@ -231,9 +271,15 @@ fn told(stage: &StageView) -> String {
         Some(next) => next.to_string(),
         None => "none".to_owned(),
     };
+    let result = match &stage.finalised {
+        Some(done) => format!("signed off on {} by {}", there(done.at), done.by),
+        None => "provisional".to_owned(),
+    };
+    let settings = &stage.settings;
+    let blind = if settings.blind { ", blind" } else { "" };
     format!(
-        "{} ({phase})\n  id       {}\n  times    {} to {closes}, {}\n  next day {next}\n  rules    revision {} since {}: {}, {} \
-         episodes of each of {}, at most {} faults",
+        "{} ({phase}{blind})\n  id       {}\n  times    {} to {closes}, {}\n  next day {next}\n  rules    revision {} since {}: {}, {} \
+         episodes of each of {}, at most {} faults\n  board    by {}, {result}\n  datasets public {}",
         stage.name,
         stage.id,
         there(stage.opens_at),
@@ -244,6 +290,12 @@ fn told(stage: &StageView) -> String {
         rules.episodes_per_task,
         tasks.join(", "),
         rules.max_faults,
+        settings.standings,
+        match settings.publishes {
+            Publishes::Never => "if their teams publish them",
+            Publishes::AtClose => "at the close",
+            Publishes::AtRelease => "when their day is released",
+        },
     )
 }
 
