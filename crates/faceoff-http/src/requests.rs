@@ -1,6 +1,9 @@
 //! What clients send to the API.
 
-use faceoff_types::{Profile, Publishes, Schedule, StageId, Standings, Task, Zone};
+use faceoff_types::{
+    PerturbationSettings, Profile, Publishes, Schedule, StageId, Standings, Task, TaskWeights,
+    TierBounds, Zone,
+};
 use jiff::Timestamp;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use utoipa::{IntoParams, ToSchema};
@@ -62,6 +65,15 @@ pub struct NewStage {
     /// More agent faults than this end an evaluation without a score.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_faults: Option<u32>,
+    /// What each task's success rate weighs in the overall score.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weights: Option<TaskWeights>,
+    /// Penalty points per episode up to which an agent is in a tier.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tier_bounds: Option<TierBounds>,
+    /// Magnitudes of the perturbations that the profile switches on; what of it is left out is the ruleset's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub perturbations: Option<Box<PerturbationSettings>>,
     /// When its days start; left out, when the organiser starts them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub schedule: Option<Schedule>,
@@ -116,6 +128,16 @@ pub struct StageChange {
     /// More agent faults than this end an evaluation without a score.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_faults: Option<u32>,
+    /// What each task's success rate weighs in the overall score.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weights: Option<TaskWeights>,
+    /// Penalty points per episode up to which an agent is in a tier.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tier_bounds: Option<TierBounds>,
+    /// Magnitudes of the perturbations that the profile switches on, all of them anew: what of it is left out is the
+    /// ruleset's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub perturbations: Option<Box<PerturbationSettings>>,
     /// When its days start; null: when the organiser starts them.
     #[serde(
         skip_serializing_if = "Option::is_none",

@@ -62,7 +62,13 @@ pub fn run_shard_watched(
         env,
         spec.task,
         spec.episodes.end.saturating_sub(spec.episodes.start),
-        Arena::by(spec.ruleset, spec.profile, spec.seed, spec.mismatch_seed),
+        Arena::by(
+            spec.ruleset,
+            spec.profile,
+            &spec.perturbations,
+            spec.seed,
+            spec.mismatch_seed,
+        ),
         watch,
         IfTheHostWins::LastTryCounts,
     );

@@ -4,11 +4,11 @@ use crate::{
     evaluation::score_evaluation,
     interval::wilson95,
     summary::{EpisodeSummary, TaskSummary},
-    tier::tier_of,
+    tier::tier_within,
 };
 use faceoff_types::{
-    ComputationTimeSummary, EvaluationResult, Ruleset, Seed, Task, TaskResult, UnknownRuleset,
-    ViolationCounts,
+    ComputationTimeSummary, EvaluationResult, Ruleset, Seed, Task, TaskResult, TierBounds,
+    UnknownRuleset, ViolationCounts,
 };
 use std::collections::BTreeMap;
 
@@ -36,14 +36,15 @@ pub fn mean_result(
             .iter()
             .filter_map(|result| result.tasks.get(task))
             .collect();
-        (*task, mean_task(&days))
+        (*task, mean_task(&days, &first.variation.tier_bounds))
     });
     let tasks: BTreeMap<Task, TaskResult> = tasks.collect();
     let seed = joint_seed(results.iter().map(|result| result.seed));
-    Ok(Some(score_evaluation(ruleset, first.profile, seed, tasks)))
+    let mean = score_evaluation(ruleset, first.profile, seed, &first.variation, tasks);
+    Ok(Some(mean))
 }
 
-fn mean_task(days: &[&TaskResult]) -> TaskResult {
+fn mean_task(days: &[&TaskResult], bounds: &TierBounds) -> TaskResult {
     let sum = |of: fn(&TaskResult) -> u32| -> u32 {
         days.iter().fold(0, |sum, day| sum.saturating_add(of(day)))
     };
@@ -72,7 +73,7 @@ fn mean_task(days: &[&TaskResult]) -> TaskResult {
             joint_vel: sum(|day| day.violations.joint_vel),
             computation_time: sum(|day| day.violations.computation_time),
         },
-        tier: tier_of(points, episodes),
+        tier: tier_within(bounds, points, episodes),
         steps,
         computation_time_s: ComputationTimeSummary {
             mean: all_times / (steps.max(1) as f64),
@@ -125,7 +126,8 @@ pub fn joined_summary(summaries: &[&EpisodeSummary]) -> EpisodeSummary {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use faceoff_types::{Profile, Tier};
+    use crate::tier::tier_of;
+    use faceoff_types::{Profile, Tier, Variation};
 
     fn day(seed: u64, successes: u32, penalty_points: f64) -> EvaluationResult {
         let task = TaskResult {
@@ -150,6 +152,7 @@ mod tests {
             Ruleset::CURRENT,
             Profile::Evaluation,
             Seed::from_number(seed),
+            &Variation::default(),
             [(Task::Hit, task)].into(),
         )
     }

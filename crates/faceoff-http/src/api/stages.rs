@@ -10,7 +10,9 @@ use crate::{
 };
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_store::{Actor, Stage, StagePhase};
-use faceoff_types::{Ruleset, StageId, StageName, StageRules, StageSettings, Standings};
+use faceoff_types::{
+    MismatchSettings, Ruleset, StageId, StageName, StageRules, StageSettings, Standings, Variation,
+};
 
 fn name(text: &str) -> Result<StageName, Problem> {
     text.parse()
@@ -20,6 +22,28 @@ fn name(text: &str) -> Result<StageName, Problem> {
 fn check(rules: &StageRules, settings: &StageSettings) -> Result<(), Problem> {
     let checked = rules.check().and_then(|()| settings.check());
     checked.map_err(|error| Problem::invalid(error.field(), error))
+}
+
+/// Refuses magnitudes that no robot of the season meets.
+async fn check_robot(app: &App, rules: &StageRules) -> Result<(), Problem> {
+    let settings = rules.variation.perturbations.clone();
+    if settings.model_mismatch == MismatchSettings::default() {
+        return Ok(());
+    }
+    let seed = app.store.season().await?.secret.model_mismatch();
+    let [least, most] = settings.model_mismatch.static_error_m;
+    let has_robot = move || faceoff_dataset::has_robot(&settings, seed);
+    if tokio::task::spawn_blocking(has_robot)
+        .await
+        .map_err(Problem::internal)?
+    {
+        return Ok(());
+    }
+    let detail = format!(
+        "model_mismatch: of 300 robots drawn by these ranges of mass and gains none has its largest static error within \
+         {least} to {most} m (static_error_m); widen one of them"
+    );
+    Err(Problem::invalid("perturbations", detail))
 }
 
 /// All stages, the first to open first.
@@ -66,7 +90,15 @@ pub(crate) async fn create_stage(
             .episodes_per_task
             .unwrap_or(like.rules.rules.episodes_per_task),
         max_faults: new.max_faults.unwrap_or(like.rules.rules.max_faults),
-        variation: Default::default(),
+        variation: Variation {
+            weights: new.weights.unwrap_or(like.rules.rules.variation.weights),
+            tier_bounds: new
+                .tier_bounds
+                .unwrap_or(like.rules.rules.variation.tier_bounds),
+            perturbations: new
+                .perturbations
+                .unwrap_or(like.rules.rules.variation.perturbations),
+        },
     };
     let default = StageSettings::default();
     let settings = StageSettings {
@@ -80,6 +112,7 @@ pub(crate) async fn create_stage(
         standings: new.standings.unwrap_or(default.standings),
     };
     check(&rules, &settings)?;
+    check_robot(&app, &rules).await?;
     let wanted = faceoff_store::NewStage {
         name: name(&new.name)?,
         opens_at: new.opens_at.unwrap_or(now),
@@ -121,7 +154,10 @@ pub(crate) async fn change_stage(
     let other_rules = change.profile.is_some()
         || change.tasks.is_some()
         || change.episodes_per_task.is_some()
-        || change.max_faults.is_some();
+        || change.max_faults.is_some()
+        || change.weights.is_some()
+        || change.tier_bounds.is_some()
+        || change.perturbations.is_some();
     let rules = StageRules {
         // An upgrade of the program alone changes nothing of a stage.
         ruleset: if other_rules {
@@ -133,7 +169,13 @@ pub(crate) async fn change_stage(
         tasks: change.tasks.unwrap_or_else(|| is.tasks.clone()),
         episodes_per_task: change.episodes_per_task.unwrap_or(is.episodes_per_task),
         max_faults: change.max_faults.unwrap_or(is.max_faults),
-        variation: Default::default(),
+        variation: Variation {
+            weights: change.weights.unwrap_or(is.variation.weights),
+            tier_bounds: change.tier_bounds.unwrap_or(is.variation.tier_bounds),
+            perturbations: change
+                .perturbations
+                .unwrap_or_else(|| is.variation.perturbations.clone()),
+        },
     };
     let settings = StageSettings {
         schedule: change
@@ -150,6 +192,9 @@ pub(crate) async fn change_stage(
         standings: change.standings.unwrap_or(stage.settings.standings),
     };
     check(&rules, &settings)?;
+    if rules.variation.perturbations != is.variation.perturbations {
+        check_robot(&app, &rules).await?;
+    }
     if stage.phase(now) == StagePhase::Open {
         let other_rules = (rules != *is).then(|| begins_anew(&stage));
         let other_order = (settings.standings != stage.settings.standings)

@@ -24,7 +24,7 @@ use crate::{
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
-use faceoff_types::{EvaluationId, StageDay, Task, Tier, ViolationCounts};
+use faceoff_types::{EvaluationId, StageDay, Task, TaskWeights, Tier, TierBounds, ViolationCounts};
 use figures::Rate;
 use jiff::{Timestamp, civil};
 
@@ -98,7 +98,7 @@ struct TierRows<Row> {
     name: &'static str,
     title: &'static str,
     sign: &'static str,
-    bounds: &'static str,
+    bounds: String,
     rows: Vec<Row>,
 }
 
@@ -109,7 +109,7 @@ fn by_tier<Row>(board: &BoardView, row: impl Fn(&BoardRow) -> Row) -> Vec<TierRo
             name: tier.as_str(),
             title: tier.title(),
             sign: figures::tier_sign(tier),
-            bounds: figures::tier_bounds(tier),
+            bounds: figures::tier_bounds(tier, &board.tier_bounds),
             rows: Vec::new(),
         })
         .collect();
@@ -166,6 +166,11 @@ struct Heading {
     paused: Option<RulingView>,
     /// What its rows are, for the table's caption.
     rows: String,
+    /// What the tasks weigh, and the bounds of the tiers.
+    weights: TaskWeights,
+    tier_bounds: TierBounds,
+    /// The perturbations have magnitudes of their own.
+    own_magnitudes: bool,
     /// What decides in the end, if that is something else.
     still_to_come: Option<&'static str>,
     /// Who sees it, if not everybody.
@@ -224,6 +229,9 @@ impl Heading {
                     others: Vec::new(),
                     paused: None,
                     rows: standing::rows(board),
+                    weights: board.weights,
+                    tier_bounds: board.tier_bounds,
+                    own_magnitudes: board.perturbations.is_some(),
                     still_to_come: standing::still_to_come(board),
                     blind: standing::blind(board, is_hidden),
                     is_hidden,

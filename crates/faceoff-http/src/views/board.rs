@@ -17,7 +17,8 @@ use faceoff_scoring::{
 };
 use faceoff_store::Stage;
 use faceoff_types::{
-    EvaluationId, Profile, Seed, StageId, StageName, Standings, Task, TeamId, TeamName, Tier,
+    EvaluationId, PerturbationSettings, Profile, Seed, StageId, StageName, Standings, Task,
+    TaskWeights, TeamId, TeamName, Tier, TierBounds,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
@@ -39,6 +40,13 @@ pub struct BoardView {
     /// The simulator and the scoring that the scores refer to.
     #[schema(example = "airhockey-2023.2")]
     pub ruleset: String,
+    /// What each task's success rate weighs in the overall score.
+    pub weights: TaskWeights,
+    /// Penalty points per episode up to which an agent is in a tier.
+    pub tier_bounds: TierBounds,
+    /// Magnitudes of the perturbations that the profile switches on; absent where they are the ruleset's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub perturbations: Option<Box<PerturbationSettings>>,
     /// What rows are made of in the end.
     pub standings: Standings,
     /// What they are made of at the moment: before a final day, of the newest evaluations, which do not count then.
@@ -146,6 +154,7 @@ impl BoardView {
             None => disqualified.retain(|team| team.disqualified.is_some()),
             Some(finalised) => disqualified.retain(|team| finalised.without.contains(&team.id)),
         }
+        let variation = revision.rules.variation;
         let rows_by = standings::at_the_moment(app, stage).await?;
         let rows = if sight.is_hidden(stage.id) {
             Vec::new()
@@ -158,6 +167,10 @@ impl BoardView {
             revision: number,
             since: revision.since,
             ruleset: revision.rules.ruleset.to_string(),
+            weights: variation.weights,
+            tier_bounds: variation.tier_bounds,
+            perturbations: (*variation.perturbations != PerturbationSettings::default())
+                .then_some(variation.perturbations),
             standings: stage.settings.standings,
             rows_by,
             blind: stage.settings.blind,
@@ -228,6 +241,7 @@ impl Row {
         Played {
             ruleset: &result.ruleset,
             profile: result.profile,
+            variation: &result.variation,
             seed: result.seed,
             mismatch_seed,
             summary: &self.summary,

@@ -84,6 +84,7 @@ impl Side {
         Played {
             ruleset: &self.result.ruleset,
             profile: self.result.profile,
+            variation: &self.result.variation,
             seed: self.result.seed,
             mismatch_seed,
             summary: &self.summary,

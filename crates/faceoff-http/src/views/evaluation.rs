@@ -6,7 +6,7 @@ use faceoff_scoring::EpisodeSummary;
 use faceoff_store::{Evaluation, EvaluationState};
 use faceoff_types::{
     AgentFault, EvaluationId, EvaluationResult, Profile, Seed, SlotTiming, StageDay, StageId,
-    SubmissionId, Task, TeamId, TeamName, Tier,
+    SubmissionId, Task, TeamId, TeamName, Tier, Variation,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
@@ -137,6 +137,9 @@ pub struct ResultView {
     pub ruleset: String,
     /// The perturbations.
     pub profile: Profile,
+    /// What it was played and scored by otherwise than the ruleset has it.
+    #[serde(flatten)]
+    pub variation: Variation,
     /// The seed of the day's evaluations, 64 hexadecimal digits; null until the day is released.
     pub seed: Option<Seed>,
     /// By task: hit, defend, prepare.
@@ -159,6 +162,7 @@ impl ResultView {
         Self {
             ruleset: result.ruleset,
             profile: result.profile,
+            variation: result.variation,
             seed: released.then_some(result.seed),
             tasks: tasks
                 .map(|(task, result)| (*task, TaskView::new(result, released)))

@@ -26,3 +26,4 @@ mod standings;
 mod submissions;
 mod teams;
 mod uploads;
+mod variation;

@@ -345,13 +345,18 @@ impl Site {
                             .collect();
                         (
                             task,
-                            faceoff_scoring::score_task(&of_task, &Default::default()),
+                            faceoff_scoring::score_task(
+                                &of_task,
+                                &Default::default(),
+                                &run.plan.variation.tier_bounds,
+                            ),
                         )
                     });
                     let result = faceoff_scoring::score_evaluation(
                         run.ruleset,
                         run.plan.profile,
                         seeds.episodes,
+                        &run.plan.variation,
                         tasks.into(),
                     );
                     self.publish(&claim, evaluation, &result).await;
@@ -433,6 +438,7 @@ fn plan() -> RunPlan {
         episodes_per_task: 4,
         episodes_per_shard: 4,
         max_faults: 1,
+        variation: Default::default(),
     }
 }
 

@@ -5,6 +5,7 @@ use crate::{
 };
 use faceoff_types::{
     EvaluationId, EvaluationResult, Profile, RunId, StageDay, StageId, SubmissionId, Task, TeamId,
+    Variation,
 };
 use jiff::{Timestamp, civil::Date};
 use sqlx::{SqliteConnection, types::Text};
@@ -111,6 +112,7 @@ pub(crate) struct EvaluationRow {
     episodes_per_task: u32,
     episodes_per_shard: u32,
     max_faults: u32,
+    variation: Option<Json<Variation>>,
     run_state: RunState,
     created_at: Instant,
     state: String,
@@ -140,6 +142,10 @@ impl EvaluationRow {
             episodes_per_task: self.episodes_per_task,
             episodes_per_shard: self.episodes_per_shard,
             max_faults: self.max_faults,
+            variation: self
+                .variation
+                .map(|variation| variation.0)
+                .unwrap_or_default(),
         };
         let finished_at = || {
             self.finished_at
@@ -219,7 +225,8 @@ macro_rules! select_evaluations {
                       r.tasks AS "tasks: Json<Vec<Task>>",
                       r.episodes_per_task AS "episodes_per_task: u32",
                       r.episodes_per_shard AS "episodes_per_shard: u32",
-                      r.max_faults AS "max_faults: u32", r.state AS "run_state: RunState",
+                      r.max_faults AS "max_faults: u32",
+                      r.variation AS "variation: Json<Variation>", r.state AS "run_state: RunState",
                       e.created_at AS "created_at: Instant", e.state,
                       e.finished_at AS "finished_at: Instant",
                       e.result AS "result: Json<EvaluationResult>", e.dataset, e.dataset_blake3,

@@ -114,6 +114,7 @@ impl Stage {
             episodes_per_task: rules.episodes_per_task,
             episodes_per_shard: self.settings.episodes_per_shard,
             max_faults: rules.max_faults,
+            variation: rules.variation.clone(),
         }
     }
 

@@ -305,6 +305,7 @@ pub fn plan() -> RunPlan {
         episodes_per_task: 4,
         episodes_per_shard: 2,
         max_faults: 3,
+        variation: Default::default(),
     }
 }
 

@@ -293,6 +293,7 @@ impl Server {
             episodes_per_task: 4,
             episodes_per_shard: 2,
             max_faults: 10,
+            variation: Default::default(),
         };
         let stage = stage_by(&self.store, &plan, None, self.now()).await;
         let started = self

@@ -8,11 +8,15 @@ use faceoff_http::{
     requests::{NewStage, StageChange},
     views::stage::{PhaseView, StageView},
 };
-use faceoff_types::{Profile, Publishes, Schedule, StageId, Standings, Task, Zone};
+use faceoff_types::{
+    PerturbationSettings, Profile, Publishes, Schedule, StageId, Standings, Task, TaskWeights,
+    TierBounds, Zone,
+};
 use jiff::{
     Timestamp, Zoned,
     civil::{Date, DateTime, Time},
 };
+use std::path::PathBuf;
 
 #[derive(Debug, Subcommand)]
 pub(super) enum StageAction {
@@ -82,6 +86,15 @@ pub(super) struct Wanted {
     /// More agent faults than this: no score
     #[arg(long)]
     max_faults: Option<u32>,
+    /// What hit, defend and prepare weigh in the score, e.g. 0.4,0.4,0.2
+    #[arg(long, value_name = "WEIGHTS")]
+    weights: Option<TaskWeights>,
+    /// Penalty points per episode up to which an agent is deployable, and improvable, e.g. 0.5,1.5
+    #[arg(long, value_name = "BOUNDS")]
+    tier_bounds: Option<TierBounds>,
+    /// A JSON file with magnitudes of the perturbations; what it leaves out is the ruleset's, so {} gives up all others
+    #[arg(long, value_name = "FILE")]
+    perturbations: Option<PathBuf>,
     /// Its days start every day at this time
     #[arg(long, value_name = "HH:MM", conflicts_with = "cron")]
     daily: Option<Time>,
@@ -109,6 +122,22 @@ pub(super) struct Wanted {
 }
 
 impl Wanted {
+    fn perturbations(&self) -> anyhow::Result<Option<Box<PerturbationSettings>>> {
+        let Some(path) = &self.perturbations else {
+            return Ok(None);
+        };
+        let read = || -> anyhow::Result<Box<PerturbationSettings>> {
+            let text = std::fs::read_to_string(path)?;
+            let mut json = serde_json::Deserializer::from_str(&text);
+            let settings: Box<PerturbationSettings> = serde_path_to_error::deserialize(&mut json)?;
+            json.end()?;
+            settings.check()?;
+            Ok(settings)
+        };
+        let settings = read().with_context(|| format!("--perturbations {}", path.display()))?;
+        Ok(Some(settings))
+    }
+
     fn schedule(&self) -> anyhow::Result<Option<Schedule>> {
         let schedule = match (self.daily, &self.cron) {
             (Some(at), _) => Schedule::daily(at),
@@ -179,6 +208,7 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
             };
             let new = NewStage {
                 name,
+                perturbations: wanted.perturbations()?,
                 opens_at: at(&wanted.opens)?,
                 closes_at: at(&wanted.closes)?,
                 schedule: wanted.schedule()?,
@@ -187,6 +217,8 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 tasks: wanted.tasks,
                 episodes_per_task: wanted.episodes,
                 max_faults: wanted.max_faults,
+                weights: wanted.weights,
+                tier_bounds: wanted.tier_bounds,
                 ablation_episodes: wanted.ablation_episodes,
                 episodes_per_shard: wanted.episodes_per_shard,
                 blind: wanted.blind,
@@ -213,6 +245,7 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
             let schedule = wanted.schedule()?.map(Some).or(no_schedule.then_some(None));
             let change = StageChange {
                 name: rename,
+                perturbations: wanted.perturbations()?,
                 opens_at: at(&wanted.opens)?,
                 closes_at: at(&wanted.closes)?.map(Some).or(open_end.then_some(None)),
                 schedule,
@@ -221,6 +254,8 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 tasks: wanted.tasks,
                 episodes_per_task: wanted.episodes,
                 max_faults: wanted.max_faults,
+                weights: wanted.weights,
+                tier_bounds: wanted.tier_bounds,
                 ablation_episodes: wanted.ablation_episodes,
                 episodes_per_shard: wanted.episodes_per_shard,
                 blind: wanted.blind,
@@ -279,7 +314,8 @@ fn told(stage: &StageView) -> String {
     let blind = if settings.blind { ", blind" } else { "" };
     format!(
         "{} ({phase}{blind})\n  id       {}\n  times    {} to {closes}, {}\n  next day {next}\n  rules    revision {} since {}: {}, {} \
-         episodes of each of {}, at most {} faults\n  board    by {}, {result}\n  datasets public {}",
+         episodes of each of {}, at most {} faults\n  score    weights {}, tiers up to {} \
+         points per episode, perturbations {}\n  board    by {}, {result}\n  datasets public {}",
         stage.name,
         stage.id,
         there(stage.opens_at),
@@ -290,6 +326,13 @@ fn told(stage: &StageView) -> String {
         rules.episodes_per_task,
         tasks.join(", "),
         rules.max_faults,
+        rules.variation.weights,
+        rules.variation.tier_bounds,
+        if *rules.variation.perturbations == PerturbationSettings::default() {
+            "as the ruleset has them"
+        } else {
+            "of its own"
+        },
         settings.standings,
         match settings.publishes {
             Publishes::Never => "if their teams publish them",
