@@ -95,6 +95,7 @@ fn slice(criterion: &mut Criterion) {
                 seed,
                 mismatch_seed: seed,
                 max_faults: 0,
+                perturbations: Default::default(),
             };
             let out = dir.path().join(format!("{task}-{start}"));
             record(&spec, &out);
@@ -107,6 +108,7 @@ fn slice(criterion: &mut Criterion) {
         mismatch_seed: seed,
         agent: "noise".to_owned(),
         ruleset: Ruleset::CURRENT,
+        variation: Default::default(),
     };
     let archive = dir.path().join("dataset.zip");
     let megabytes = assemble(&meta, &shards, &archive).unwrap().archive.bytes / 1_000_000;

@@ -60,6 +60,7 @@ pub fn assemble(
     let scored = score(
         meta.ruleset,
         meta.profile,
+        &meta.variation,
         meta.seed,
         Layout::Four,
         played(&shards)?,
@@ -118,6 +119,7 @@ fn write(
         ruleset: meta.ruleset.to_string(),
         simulator: simulator_id().clone(),
         profile: meta.profile,
+        variation: meta.variation.clone(),
         seed: meta.seed,
         mismatch_seed: meta.mismatch_seed,
         agent: meta.agent.clone(),
@@ -150,6 +152,11 @@ fn check(
             return wrong(format!(
                 "shard {name} was played by {}, the evaluation by {}",
                 spec.ruleset, meta.ruleset
+            ));
+        }
+        if spec.perturbations != meta.variation.perturbations {
+            return wrong(format!(
+                "shard {name} was played with other magnitudes of the perturbations than the evaluation"
             ));
         }
         if report.stopped_by_faults {

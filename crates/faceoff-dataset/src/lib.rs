@@ -26,3 +26,4 @@ pub use files::ARCHIVE_FILE;
 pub use recorder::Recorder;
 pub use shard::ShardReport;
 pub use shard_folder::ShardFolder;
+pub use simulator::has_robot;

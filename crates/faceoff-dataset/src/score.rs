@@ -15,7 +15,7 @@ use faceoff_episode::Answered;
 use faceoff_scoring::StepTimes;
 use faceoff_types::{
     ComputationTime, EpisodeEnd, EpisodeOutcome, EvaluationResult, Profile, Ruleset, Seed,
-    SlotTiming, Task,
+    SlotTiming, Task, Variation,
 };
 use faceoff_wire::dataset::{
     ConstraintViolation, SlowEpisode, SlowStep, TaskViolations, ViolationsFile,
@@ -185,6 +185,7 @@ pub(crate) struct Scored {
 pub(crate) fn score(
     ruleset: Ruleset,
     profile: Profile,
+    variation: &Variation,
     seed: Seed,
     layout: Layout,
     played: BTreeMap<Task, Tally>,
@@ -197,7 +198,8 @@ pub(crate) fn score(
     };
     for (task, tally) in played {
         let times = tally.times.finish();
-        tasks.insert(task, faceoff_scoring::score_task(&tally.outcomes, &times));
+        let result = faceoff_scoring::score_task(&tally.outcomes, &times, &variation.tier_bounds);
+        tasks.insert(task, result);
         let [joint_pos, joint_vel, ee, link] = tally.violations;
         let slowest = tally.slowest.unwrap_or_default();
         let computation_time = tally
@@ -216,7 +218,7 @@ pub(crate) fn score(
             },
         );
     }
-    let mut result = faceoff_scoring::score_evaluation(ruleset, profile, seed, tasks);
+    let mut result = faceoff_scoring::score_evaluation(ruleset, profile, seed, variation, tasks);
     result.timing = timing;
     Scored { result, violations }
 }

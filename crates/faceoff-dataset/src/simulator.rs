@@ -15,6 +15,12 @@ pub(crate) fn simulator_id() -> &'static SimulatorId {
     })
 }
 
+/// Has a season a robot by these magnitudes? See [`Plant::can_be_drawn`]; takes up to a second.
+#[must_use]
+pub fn has_robot(settings: &PerturbationSettings, mismatch_seed: Seed) -> bool {
+    Plant::can_be_drawn(settings, mismatch_seed)
+}
+
 fn fingerprint() -> String {
     let mut hasher = blake3::Hasher::new();
     let seed = Seed::from_number(0);

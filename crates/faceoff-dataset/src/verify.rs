@@ -94,13 +94,18 @@ pub fn verify(
     totals.finish(ruleset, dataset)
 }
 
-/// Only the same rules and the same simulator can make the states again.
+/// Only the same rules and the same simulator can make the states again, and only magnitudes that a world can have.
 fn made_here(dataset: &Dataset) -> Result<Ruleset, DatasetError> {
     let (manifest, here) = (dataset.manifest(), simulator_id());
     let ruleset = manifest
         .ruleset
         .parse()
         .map_err(|unknown: UnknownRuleset| DatasetError::Foreign(unknown.to_string()))?;
+    manifest
+        .variation
+        .perturbations
+        .check()
+        .map_err(|error| DatasetError::Foreign(format!("perturbations.{error}")))?;
     if &manifest.simulator != here {
         return Err(DatasetError::Foreign(format!(
             "the dataset was simulated by version {} (fingerprint {}), this is version {} \
@@ -169,6 +174,7 @@ impl Totals {
         let Scored { result, violations } = score(
             ruleset,
             profile,
+            &manifest.variation,
             seed,
             dataset.layout(),
             self.played,

@@ -13,21 +13,29 @@ pub struct Arena {
 }
 
 impl Arena {
-    /// By the current ruleset.
+    /// By the current ruleset, with its magnitudes.
     #[must_use]
     pub fn new(profile: Profile, seed: Seed, mismatch_seed: Seed) -> Self {
-        Self::by(Ruleset::CURRENT, profile, seed, mismatch_seed)
+        let magnitudes = PerturbationSettings::default();
+        Self::by(Ruleset::CURRENT, profile, &magnitudes, seed, mismatch_seed)
     }
 
-    /// With the ruleset's magnitudes. Draws the plant, which takes milliseconds: make one, play many.
+    /// By a ruleset, with magnitudes of the factors that the profile switches on. Draws the plant, which takes
+    /// milliseconds: make one, play many.
     #[must_use]
-    pub fn by(ruleset: Ruleset, profile: Profile, seed: Seed, mismatch_seed: Seed) -> Self {
-        let (factors, settings) = (profile.factors(), PerturbationSettings::default());
+    pub fn by(
+        ruleset: Ruleset,
+        profile: Profile,
+        magnitudes: &PerturbationSettings,
+        seed: Seed,
+        mismatch_seed: Seed,
+    ) -> Self {
+        let factors = profile.factors();
         Self {
             bounds: Bounds::of(ruleset),
-            plant: Plant::under(factors, &settings, mismatch_seed),
+            plant: Plant::under(factors, magnitudes, mismatch_seed),
             factors,
-            settings,
+            settings: magnitudes.clone(),
             seed,
         }
     }

@@ -85,10 +85,6 @@ impl Caller {
     }
 }
 
-/// What the organiser sees of what everybody may ask for: the proof, or why there is none.
-#[derive(Debug)]
-pub(crate) struct PerhapsOrganiser(pub(crate) Result<Organiser, Problem>);
-
 /// A caller who may organise.
 #[derive(Debug, Clone)]
 pub(crate) struct Organiser(Caller);
@@ -233,6 +229,12 @@ impl FromRequestParts<App> for Anybody {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
+        // Another scheme is somebody else's business: a proxy's in front of the pages.
+        let header = parts.headers.get(header::AUTHORIZATION);
+        let scheme = header.and_then(|value| value.as_bytes().get(..7));
+        if scheme.is_some_and(|scheme| !scheme.eq_ignore_ascii_case(b"bearer ")) {
+            return Ok(Self(None));
+        }
         caller(parts, app).await.map(Self)
     }
 }
@@ -252,14 +254,6 @@ impl FromRequestParts<App> for Organiser {
                 caller.named()
             ),
         ))
-    }
-}
-
-impl FromRequestParts<App> for PerhapsOrganiser {
-    type Rejection = Problem;
-
-    async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
-        Ok(Self(Organiser::from_request_parts(parts, app).await))
     }
 }
 

@@ -29,6 +29,7 @@ mod summaries;
 mod text;
 pub mod token;
 mod uploads;
+mod viewer;
 pub mod views;
 
 pub use axum::Router;

@@ -6,7 +6,8 @@ mod people;
 pub use people::*;
 
 use faceoff_types::{
-    DayDeadline, EvaluationId, Profile, Schedule, StageId, SubmissionId, Task, TeamId, Zone,
+    DayDeadline, EvaluationId, PerturbationSettings, Profile, Publishes, Schedule, StageId,
+    Standings, SubmissionId, Task, TaskWeights, TeamId, TierBounds, Zone,
 };
 use jiff::{Timestamp, civil::Date};
 use left_out::{given, given_or_null};
@@ -116,6 +117,15 @@ pub struct NewStage {
     /// More agent faults than this end an evaluation without a score.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_faults: Option<u32>,
+    /// What each task's success rate weighs in the overall score.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub weights: Option<TaskWeights>,
+    /// Penalty points per episode up to which an agent is in a tier.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tier_bounds: Option<TierBounds>,
+    /// Magnitudes of the perturbations that the profile switches on; what of it is left out is the ruleset's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub perturbations: Option<Box<PerturbationSettings>>,
     /// When its days start; left out, when the organiser starts them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub schedule: Option<Schedule>,
@@ -133,6 +143,15 @@ pub struct NewStage {
         deserialize_with = "deadline"
     )]
     pub day_deadline: Option<DayDeadline>,
+    /// Are its scores hidden from everybody but the organiser? Left out, they are not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blind: Option<bool>,
+    /// When its datasets are there for everybody; left out, at its close.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub publishes: Option<Publishes>,
+    /// What a team's row on its board is made of; left out, its newest evaluation.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub standings: Option<Standings>,
 }
 
 /// What of a stage is to be another; what is left out stays as it is.
@@ -168,6 +187,16 @@ pub struct StageChange {
     /// More agent faults than this end an evaluation without a score.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_faults: Option<u32>,
+    /// What each task's success rate weighs in the overall score.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weights: Option<TaskWeights>,
+    /// Penalty points per episode up to which an agent is in a tier.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tier_bounds: Option<TierBounds>,
+    /// Magnitudes of the perturbations that the profile switches on, all of them anew: what of it is left out is the
+    /// ruleset's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub perturbations: Option<Box<PerturbationSettings>>,
     /// When its days start; null: when the organiser starts them.
     #[serde(
         skip_serializing_if = "Option::is_none",
@@ -185,7 +214,17 @@ pub struct StageChange {
     /// Until when a day may be played: "next_cut", "never" or {"hours":30}; days that are under way follow.
     #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "deadline")]
     pub day_deadline: Option<DayDeadline>,
-    /// The stage's name, if other rules are to begin while it is open: its board begins anew then.
+    /// False opens a blind stage, for good once it has scores, also after its close; true only before it has any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub blind: Option<bool>,
+    /// When its datasets are there for everybody; after its close only sooner than it was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub publishes: Option<Publishes>,
+    /// What a team's row on its board is made of.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub standings: Option<Standings>,
+    /// The stage's name, if other rules or standings are to begin while it is open: its board begins anew then, or is
+    /// ordered anew.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub confirm: Option<String>,
 }
@@ -250,6 +289,15 @@ pub struct Decision {
     /// The name of the team, or the date of the day, that it is about. Without it nothing is done, and the answer says
     /// what would be.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub confirm: Option<String>,
+}
+
+/// That something is meant as it was asked.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Confirmation {
+    /// The name of what it is about. Without it nothing is done, and the answer says what would be.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub confirm: Option<String>,
 }
 

@@ -69,8 +69,9 @@ impl Summaries {
 
     async fn summarise(&self, run: RunId) -> Result<EpisodeSummary, Problem> {
         let outcomes = self.store.outcomes(run).await?;
+        let bounds = self.store.run_variation(run).await?.tier_bounds;
         // some ten milliseconds of computation, which other requests need not wait for
-        let summary = tokio::task::spawn_blocking(move || EpisodeSummary::of(&outcomes))
+        let summary = tokio::task::spawn_blocking(move || EpisodeSummary::of(&outcomes, &bounds))
             .await
             .map_err(Problem::internal)?
             .map_err(|error| Problem::internal(format_args!("run {run}: {error}")))?;

@@ -306,6 +306,7 @@ fn steps(criterion: &mut Criterion) {
         seed,
         mismatch_seed: seed.model_mismatch(),
         max_faults: 0,
+        perturbations: Default::default(),
     };
     let mut steps = 0;
     let mut turns: Vec<(f64, f64)> = (0..=RECORDING_TURNS)

@@ -80,7 +80,13 @@ pub fn play_shard(
         env,
         spec.task,
         spec.episodes.end.saturating_sub(spec.episodes.start),
-        Arena::by(spec.ruleset, spec.profile, spec.seed, spec.mismatch_seed),
+        Arena::by(
+            spec.ruleset,
+            spec.profile,
+            &spec.perturbations,
+            spec.seed,
+            spec.mismatch_seed,
+        ),
         watch,
         IfTheHostWins::LastTryCounts,
     );

@@ -83,7 +83,7 @@ mod tests {
     use faceoff_types::{ComputationTime, EpisodeEnd, EpisodeOutcome, Violations};
 
     fn played(outcomes: &[EpisodeOutcome]) -> EpisodeSummary {
-        EpisodeSummary::of(outcomes).unwrap()
+        EpisodeSummary::of(outcomes, &Default::default()).unwrap()
     }
 
     fn run(task: Task, successes: &[bool]) -> Vec<EpisodeOutcome> {

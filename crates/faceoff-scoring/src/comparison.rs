@@ -4,7 +4,7 @@ use crate::{
     paired::{PairedTally, SIGNIFICANCE, overall_p_value},
     summary::EpisodeSummary,
 };
-use faceoff_types::{Profile, Seed, Task};
+use faceoff_types::{Profile, Seed, Task, TaskWeights, Variation};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -15,6 +15,8 @@ pub struct Played<'a> {
     pub ruleset: &'a str,
     /// The perturbations.
     pub profile: Profile,
+    /// What it was played and scored by otherwise than the ruleset has it.
+    pub variation: &'a Variation,
     /// The evaluation's seed: on a server, the day's.
     pub seed: Seed,
     /// The seed of the season's model mismatch.
@@ -33,6 +35,9 @@ pub enum NotPaired {
     /// Other perturbations.
     #[error("profile: the first evaluation played {0}, the second {1}")]
     Profile(Profile, Profile),
+    /// Other weights, bounds or magnitudes: which of them.
+    #[error("{0}: the two evaluations were played or scored by different {0}")]
+    Variation(&'static str),
     /// Other draws.
     #[error("seed: the two evaluations have different seeds (another day, season or --seed)")]
     Seed,
@@ -57,6 +62,7 @@ impl NotPaired {
         match self {
             Self::Ruleset(..) => "ruleset",
             Self::Profile(..) => "profile",
+            Self::Variation(field) => field,
             Self::Seed => "seed",
             Self::MismatchSeed => "mismatch_seed",
             Self::Tasks(_) => "tasks",
@@ -131,9 +137,9 @@ impl Played<'_> {
             .iter()
             .map(|(task, tally)| (*task, paired_difference(tally)))
             .collect();
-        let overall = score_difference(estimates.clone());
+        let overall = score_difference(&self.variation.weights, estimates.clone());
         let [score_a, score_b] = [self, other].map(|played| played.score());
-        let p_value = overall_p_value(&tallies);
+        let p_value = overall_p_value(&self.variation.weights, &tallies);
         let tasks = tallies.into_iter().zip(estimates.into_values());
         Ok(Comparison {
             tasks: tasks
@@ -177,7 +183,7 @@ impl Played<'_> {
         match self.tallies(other) {
             Ok(mut tallies) => {
                 tallies.retain(|any, _| of_interest(any));
-                overall_p_value(&tallies) <= SIGNIFICANCE
+                overall_p_value(&self.weights_of(task), &tallies) <= SIGNIFICANCE
             }
             Err(NotPaired::Seed | NotPaired::Episodes(..)) => {
                 let differences = self.summary.tasks.iter().filter_map(|(any, mine)| {
@@ -186,18 +192,33 @@ impl Played<'_> {
                         [mine, theirs].map(|one| [one.successes.count(), one.successes.episodes()]);
                     Some((*any, unpaired_difference(counts[0], counts[1])))
                 });
-                score_difference(differences.filter(|(any, _)| of_interest(any))).excludes_zero()
+                score_difference(
+                    &self.weights_of(task),
+                    differences.filter(|(any, _)| of_interest(any)),
+                )
+                .excludes_zero()
             }
             Err(_) => true,
         }
     }
 
+    /// Of one task alone the weight does not matter, even if it is none.
+    fn weights_of(&self, task: Option<Task>) -> TaskWeights {
+        match task {
+            None => self.variation.weights,
+            Some(_) => TaskWeights::default(),
+        }
+    }
+
     fn score(&self) -> f64 {
-        overall_score(self.summary.tasks.iter().map(|(task, summary)| {
-            let successes = &summary.successes;
-            let n = f64::from(successes.episodes().max(1));
-            (*task, f64::from(successes.count()) / n)
-        }))
+        overall_score(
+            &self.variation.weights,
+            self.summary.tasks.iter().map(|(task, summary)| {
+                let successes = &summary.successes;
+                let n = f64::from(successes.episodes().max(1));
+                (*task, f64::from(successes.count()) / n)
+            }),
+        )
     }
 
     fn tallies(&self, other: &Self) -> Result<BTreeMap<Task, PairedTally>, NotPaired> {
@@ -209,6 +230,16 @@ impl Played<'_> {
         }
         if self.profile != other.profile {
             return Err(NotPaired::Profile(self.profile, other.profile));
+        }
+        let (mine, theirs) = (self.variation, other.variation);
+        for (field, differs) in [
+            ("perturbations", mine.perturbations != theirs.perturbations),
+            ("weights", mine.weights != theirs.weights),
+            ("tier_bounds", mine.tier_bounds != theirs.tier_bounds),
+        ] {
+            if differs {
+                return Err(NotPaired::Variation(field));
+            }
         }
         if self.mismatch_seed != other.mismatch_seed {
             return Err(NotPaired::MismatchSeed);

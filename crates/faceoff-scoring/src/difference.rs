@@ -2,8 +2,8 @@
 //! estimate as the root of the summed squares of its parts' distances (Newcombe, Statistics in Medicine
 //! 17, 1998; Zou and Donner, Statistics in Medicine 27, 2008).
 
-use crate::{evaluation::task_weight_percent, interval::wilson95, paired::PairedTally};
-use faceoff_types::Task;
+use crate::{evaluation::weight_percent, interval::wilson95, paired::PairedTally};
+use faceoff_types::{Task, TaskWeights};
 
 /// An estimate and its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -87,10 +87,13 @@ pub(crate) fn unpaired_difference(a: [u32; 2], b: [u32; 2]) -> Estimate {
 
 /// The difference of the overall scores in percentage points, from the tasks' differences of rates.
 /// The tasks' episodes are independent of each other.
-pub(crate) fn score_difference(tasks: impl IntoIterator<Item = (Task, Estimate)>) -> Estimate {
+pub(crate) fn score_difference(
+    weights: &TaskWeights,
+    tasks: impl IntoIterator<Item = (Task, Estimate)>,
+) -> Estimate {
     let (mut value, mut below, mut above) = (0.0, 0.0, 0.0);
     for (task, difference) in tasks {
-        let weight = f64::from(task_weight_percent(task));
+        let weight = weight_percent(weights, task);
         value += weight * difference.value;
         below += (weight * difference.below()).powi(2);
         above += (weight * difference.above()).powi(2);
@@ -178,7 +181,7 @@ mod tests {
             low: 0.0,
             high: 0.3,
         };
-        let score = score_difference(Task::ALL.map(|task| (task, one)));
+        let score = score_difference(&TaskWeights::default(), Task::ALL.map(|task| (task, one)));
         assert!((score.value - 10.0).abs() < 1e-12);
         // √(40² + 40² + 20²) = 60
         assert!((score.low - 4.0).abs() < 1e-12, "{score:?}");

@@ -1,26 +1,23 @@
-use faceoff_types::{EvaluationResult, Profile, Ruleset, Seed, Task, TaskResult, Tier};
+use faceoff_types::{
+    EvaluationResult, Profile, Ruleset, Seed, Task, TaskResult, TaskWeights, Tier, Variation,
+};
 use std::collections::BTreeMap;
 
 /// What a task's success rate weighs in the overall score, in percent.
-///
-/// The paper's text speaks of a mean; these weights are those that its qualifying table follows.
-#[must_use]
-pub const fn task_weight_percent(task: Task) -> u32 {
-    match task {
-        Task::Hit | Task::Defend => 40,
-        Task::Prepare => 20,
-    }
+pub(crate) fn weight_percent(weights: &TaskWeights, task: Task) -> f64 {
+    f64::from(weights.of(task).count()) / 1e4
 }
 
 /// The overall score in percent, from success rates as fractions. A task that is not given counts 0.
 ///
-/// Rounded to nine decimals, so that scores that are equal on paper are equal in the computer too and
-/// a board's ties are decided by the rules, not by rounding errors.
+/// The paper's text speaks of a mean; the ruleset's weights are those that its qualifying table follows. Rounded to nine
+/// decimals, so that scores that are equal on paper are equal in the computer too and a board's ties are decided by the
+/// rules, not by rounding errors.
 #[must_use]
-pub fn overall_score(rates: impl IntoIterator<Item = (Task, f64)>) -> f64 {
+pub fn overall_score(weights: &TaskWeights, rates: impl IntoIterator<Item = (Task, f64)>) -> f64 {
     let score: f64 = rates
         .into_iter()
-        .map(|(task, rate)| f64::from(task_weight_percent(task)) * rate)
+        .map(|(task, rate)| weight_percent(weights, task) * rate)
         .sum();
     (score * 1e9).round() / 1e9
 }
@@ -34,6 +31,7 @@ pub fn score_evaluation(
     ruleset: Ruleset,
     profile: Profile,
     seed: Seed,
+    variation: &Variation,
     tasks: BTreeMap<Task, TaskResult>,
 ) -> EvaluationResult {
     EvaluationResult {
@@ -41,6 +39,7 @@ pub fn score_evaluation(
         profile,
         seed,
         score: overall_score(
+            &variation.weights,
             tasks
                 .iter()
                 .map(|(task, result)| (*task, result.success_rate)),
@@ -56,6 +55,7 @@ pub fn score_evaluation(
             .unwrap_or(Tier::Deployable),
         tasks,
         timing: None,
+        variation: variation.clone(),
     }
 }
 
@@ -64,15 +64,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_perfect_agent_scores_100() {
-        assert_eq!(overall_score(Task::ALL.map(|task| (task, 1.0))), 100.0);
-        assert_eq!(Task::ALL.map(task_weight_percent).iter().sum::<u32>(), 100);
+    fn a_perfect_agent_scores_100_whatever_the_weights() {
+        for weights in ["0.4,0.4,0.2", "0.333333,0.333333,0.333334", "1,0,0"] {
+            let weights: TaskWeights = weights.parse().unwrap();
+            assert_eq!(
+                overall_score(&weights, Task::ALL.map(|task| (task, 1.0))),
+                100.0
+            );
+        }
+        let defends: TaskWeights = "0,1,0".parse().unwrap();
+        let rates = [(Task::Hit, 0.9), (Task::Defend, 0.25)];
+        assert_eq!(overall_score(&defends, rates), 25.0);
     }
 
     #[test]
     fn scores_that_are_equal_on_paper_are_equal() {
-        let one = overall_score([(Task::Hit, 0.1), (Task::Defend, 0.2), (Task::Prepare, 0.3)]);
-        let other = overall_score([(Task::Hit, 0.3), (Task::Defend, 0.1), (Task::Prepare, 0.1)]);
+        let score =
+            |rates| overall_score(&TaskWeights::default(), Task::ALL.into_iter().zip(rates));
+        let (one, other) = (score([0.1, 0.2, 0.3]), score([0.3, 0.1, 0.1]));
         assert_eq!((one, other), (18.0, 18.0));
     }
 }

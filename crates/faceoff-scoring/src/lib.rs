@@ -16,6 +16,7 @@ mod difference;
 mod episode;
 mod evaluation;
 mod interval;
+mod mean;
 mod paired;
 mod qualifying;
 mod rank_groups;
@@ -35,8 +36,9 @@ pub use episode::{
     COMPUTATION_TIME_LIMITS_S, COMPUTATION_TIME_MAX_POINTS, EE_POINTS, JOINT_POS_POINTS,
     JOINT_VEL_POINTS, LINK_POINTS, MAX_EPISODE_PENALTY, computation_time_penalty, episode_penalty,
 };
-pub use evaluation::{overall_score, score_evaluation, task_weight_percent};
+pub use evaluation::{overall_score, score_evaluation};
 pub use interval::{wilson95, wilson95_of_rate};
+pub use mean::{joined_summary, mean_result};
 pub use paired::{PairedTally, PairingError, SIGNIFICANCE, overall_p_value};
 pub use qualifying::{
     InvalidTaskScore, QUALIFYING_EPISODES, QualifyingRow, QualifyingSheet, TaskRow, TaskScore,
@@ -46,5 +48,7 @@ pub use step_times::StepTimes;
 pub use successes::Successes;
 pub use summary::{EpisodeSummary, TaskSummary};
 pub use task::score_task;
-pub use tier::{DEPLOYABLE_POINTS_PER_EPISODE, IMPROVABLE_POINTS_PER_EPISODE, tier_of};
+pub use tier::{
+    DEPLOYABLE_POINTS_PER_EPISODE, IMPROVABLE_POINTS_PER_EPISODE, tier_of, tier_within,
+};
 pub use tier_change::TIER_CHANGE_RESAMPLES;

@@ -1,5 +1,5 @@
-use crate::{binomial::FairTosses, evaluation::task_weight_percent, successes::Successes};
-use faceoff_types::Task;
+use crate::{binomial::FairTosses, successes::Successes};
+use faceoff_types::{Task, TaskWeights};
 use std::collections::BTreeMap;
 
 /// Two teams are told apart when a difference like theirs, or a larger one, would come by chance with
@@ -67,7 +67,10 @@ impl PairedTally {
     #[must_use]
     pub fn p_value(&self) -> f64 {
         // One task alone: its weight does not matter.
-        overall_p_value(&BTreeMap::from([(Task::Hit, *self)]))
+        overall_p_value(
+            &TaskWeights::default(),
+            &BTreeMap::from([(Task::Hit, *self)]),
+        )
     }
 }
 
@@ -80,8 +83,16 @@ impl PairedTally {
 /// in either direction. With one task this is McNemar's exact test. All comparisons of differences are
 /// made on integers.
 #[must_use]
-pub fn overall_p_value(tallies: &BTreeMap<Task, PairedTally>) -> f64 {
-    let played = || tallies.iter().filter(|(_, tally)| tally.episodes() > 0);
+pub fn overall_p_value(weights: &TaskWeights, tallies: &BTreeMap<Task, PairedTally>) -> f64 {
+    // What weighs nothing decides nothing.
+    let played = || {
+        let counts = |task: &Task, tally: &PairedTally| {
+            tally.episodes() > 0 && weights.of(*task).count() > 0
+        };
+        tallies
+            .iter()
+            .filter(move |(task, tally)| counts(task, tally))
+    };
     let common = played().fold(1, |common, (_, tally)| {
         lcm(common, i128::from(tally.episodes()))
     });
@@ -91,7 +102,7 @@ pub fn overall_p_value(tallies: &BTreeMap<Task, PairedTally>) -> f64 {
     let mut difference = 0;
     for (task, tally) in played() {
         let weight =
-            i128::from(task_weight_percent(*task)) * (common / i128::from(tally.episodes()));
+            i128::from(weights.of(*task).count()) * (common / i128::from(tally.episodes()));
         *tosses_by_weight.entry(weight).or_default() += tally.only_a + tally.only_b;
         difference += weight * (i128::from(tally.only_a) - i128::from(tally.only_b));
     }
@@ -187,7 +198,12 @@ mod tests {
             [tally(1, 3, 1, 5), tally(2, 0, 2, 3), tally(0, 1, 4, 7)],
             [tally(0, 5, 0, 0), tally(0, 3, 0, 1), tally(0, 0, 3, 3)],
         ];
-        for tallies in cases {
+        let others = ["0.4,0.4,0.2", "0.2,0.3,0.5", "0,0.7,0.3", "1,0,0"];
+        for (tallies, weights) in cases
+            .into_iter()
+            .flat_map(|tallies| others.map(|weights| (tallies, weights)))
+        {
+            let weights: TaskWeights = weights.parse().unwrap();
             let tallies: BTreeMap<_, _> = Task::ALL.into_iter().zip(tallies).collect();
             let difference = |only_a: &dyn Fn(Task) -> u32| -> f64 {
                 tallies
@@ -195,7 +211,7 @@ mod tests {
                     .map(|(task, tally)| {
                         let discordant = tally.only_a + tally.only_b;
                         let lead = 2.0 * f64::from(only_a(*task)) - f64::from(discordant);
-                        f64::from(task_weight_percent(*task)) * lead / f64::from(tally.episodes())
+                        f64::from(weights.of(*task).count()) * lead / f64::from(tally.episodes())
                     })
                     .sum()
             };
@@ -211,11 +227,11 @@ mod tests {
                             .filter(|&i| tosses[i] == task && bits >> i & 1 == 1)
                             .count() as u32
                     };
-                    difference(&heads).abs() >= observed - 1e-9
+                    difference(&heads).abs() >= observed * (1.0 - 1e-9)
                 })
                 .count();
             let expected = extreme as f64 / f64::from(1u32 << tosses.len());
-            let got = overall_p_value(&tallies);
+            let got = overall_p_value(&weights, &tallies);
             assert!((got - expected).abs() < 1e-12, "{got}, expected {expected}");
         }
     }
@@ -225,11 +241,17 @@ mod tests {
         let lead = |task_lead: u32| tally(300, 150 + task_lead, 150, 400 - task_lead);
         let p = |hit, defend, prepare| {
             let leads = [lead(hit), lead(defend), lead(prepare)];
-            overall_p_value(&Task::ALL.into_iter().zip(leads).collect())
+            overall_p_value(
+                &TaskWeights::default(),
+                &Task::ALL.into_iter().zip(leads).collect(),
+            )
         };
         assert!(p(60, 60, 0) < 1e-4);
         assert!(p(5, 0, 0) > 0.5);
         assert_eq!(p(0, 0, 0), 1.0);
-        assert_eq!(overall_p_value(&BTreeMap::new()), 1.0);
+        assert_eq!(
+            overall_p_value(&TaskWeights::default(), &BTreeMap::new()),
+            1.0
+        );
     }
 }

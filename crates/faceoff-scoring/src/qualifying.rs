@@ -1,8 +1,8 @@
 use crate::{
     board::Placing, episode::MAX_EPISODE_PENALTY, evaluation::overall_score,
-    interval::wilson95_of_rate, tier::tier_of, unique_map::UniqueMap,
+    interval::wilson95_of_rate, tier::tier_within, unique_map::UniqueMap,
 };
-use faceoff_types::{Task, TeamName, Tier};
+use faceoff_types::{Task, TaskWeights, TeamName, Tier, TierBounds};
 use serde::{
     Deserialize, Serialize,
     de::{Deserializer, Error, IgnoredAny},
@@ -103,8 +103,8 @@ impl TaskScore {
         })
     }
 
-    fn tier(&self) -> Tier {
-        tier_of(self.penalty_points, self.episodes)
+    fn tier(&self, bounds: &TierBounds) -> Tier {
+        tier_within(bounds, self.penalty_points, self.episodes)
     }
 }
 
@@ -192,25 +192,37 @@ impl QualifyingSheet {
     /// sheet stands for the time of submission.
     #[must_use]
     pub fn board(&self) -> Vec<QualifyingRow> {
+        self.board_by(&TaskWeights::default(), &TierBounds::default())
+    }
+
+    /// As [`Self::board`], by other weights and bounds than the ruleset's.
+    #[must_use]
+    pub fn board_by(&self, weights: &TaskWeights, bounds: &TierBounds) -> Vec<QualifyingRow> {
         let task_ranks = Task::ALL.map(|task| {
             self.ranks(|scores| {
                 let score = scores.0[&task];
-                (score.tier(), score.success_rate, score.penalty_points)
+                (score.tier(bounds), score.success_rate, score.penalty_points)
             })
         });
-        let ranks = self.ranks(|scores| (scores.tier(), scores.score(), scores.penalty_points()));
+        let ranks = self.ranks(|scores| {
+            (
+                scores.tier(bounds),
+                scores.score(weights),
+                scores.penalty_points(),
+            )
+        });
         let mut rows: Vec<_> = (0..)
             .zip(&self.teams)
             .map(|(place, (team, scores))| QualifyingRow {
                 rank: ranks[place],
                 team: team.clone(),
-                tier: scores.tier(),
-                score: scores.score(),
+                tier: scores.tier(bounds),
+                score: scores.score(weights),
                 penalty_points: scores.penalty_points(),
                 tasks: Task::ALL
                     .into_iter()
                     .zip(&task_ranks)
-                    .map(|(task, ranks)| (task, scores.0[&task].row(ranks[place])))
+                    .map(|(task, ranks)| (task, scores.0[&task].row(ranks[place], bounds)))
                     .collect(),
             })
             .collect();
@@ -237,16 +249,17 @@ impl QualifyingSheet {
 }
 
 impl TaskScores {
-    fn tier(&self) -> Tier {
+    fn tier(&self, bounds: &TierBounds) -> Tier {
         self.0
             .values()
-            .map(TaskScore::tier)
+            .map(|score| score.tier(bounds))
             .max()
             .unwrap_or(Tier::Deployable)
     }
 
-    fn score(&self) -> f64 {
+    fn score(&self, weights: &TaskWeights) -> f64 {
         overall_score(
+            weights,
             self.0
                 .iter()
                 .map(|(task, score)| (*task, score.success_rate)),
@@ -262,10 +275,10 @@ impl TaskScores {
 }
 
 impl TaskScore {
-    fn row(&self, rank: u32) -> TaskRow {
+    fn row(&self, rank: u32, bounds: &TierBounds) -> TaskRow {
         TaskRow {
             rank,
-            tier: self.tier(),
+            tier: self.tier(bounds),
             success_rate: self.success_rate,
             success_ci95: wilson95_of_rate(self.success_rate, self.episodes),
             penalty_points: self.penalty_points,

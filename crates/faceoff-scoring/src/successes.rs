@@ -65,6 +65,14 @@ impl Successes {
         self.words.iter().map(|word| word.count_ones()).sum()
     }
 
+    /// Whether each episode was solved, in their order.
+    pub(crate) fn episodes_solved(&self) -> impl Iterator<Item = bool> {
+        (0..self.episodes).map(|episode| {
+            let word = self.words.get((episode / 64) as usize);
+            word.is_some_and(|word| word >> (episode % 64) & 1 == 1)
+        })
+    }
+
     /// Episodes that both solved; those beyond the shorter one's last do not count.
     pub(crate) fn in_common(&self, other: &Self) -> u32 {
         self.words

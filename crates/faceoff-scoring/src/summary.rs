@@ -4,7 +4,7 @@ use crate::{
     successes::Successes,
     tier_change::TierChange,
 };
-use faceoff_types::{EpisodeOutcome, Task};
+use faceoff_types::{EpisodeOutcome, Task, TierBounds};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -38,12 +38,12 @@ impl EpisodeSummary {
     /// another version is to be made again.
     pub const VERSION: u32 = 2;
 
-    /// Sums up an evaluation's episodes, given in any order. The same episodes give the same summary,
+    /// Sums up an evaluation's episodes, given in any order, whose tiers are by these bounds. The same episodes give the same summary,
     /// to the last bit.
     ///
     /// # Errors
     /// If a task's episodes are not 0, 1, … n − 1, each once.
-    pub fn of(outcomes: &[EpisodeOutcome]) -> Result<Self, PairingError> {
+    pub fn of(outcomes: &[EpisodeOutcome], bounds: &TierBounds) -> Result<Self, PairingError> {
         let mut by_task = BTreeMap::<Task, Vec<&EpisodeOutcome>>::new();
         for outcome in outcomes {
             by_task.entry(outcome.task).or_default().push(outcome);
@@ -66,7 +66,7 @@ impl EpisodeSummary {
             let points = episodes.iter().map(|outcome| episode_penalty(outcome));
             (*task, points.collect())
         });
-        let change = TierChange::of(points.collect());
+        let change = TierChange::of(points.collect(), bounds);
         let tasks = by_task.into_iter().map(|(task, episodes)| {
             let summary = TaskSummary {
                 successes: episodes

@@ -2,11 +2,11 @@ use crate::{
     episode::{episode_penalty, has_fault, time_or_fault_penalty},
     interval::wilson95,
     step_times::StepTimes,
-    tier::tier_of,
+    tier::tier_within,
 };
-use faceoff_types::{EpisodeOutcome, TaskResult, ViolationCounts};
+use faceoff_types::{EpisodeOutcome, TaskResult, TierBounds, ViolationCounts};
 
-/// Scores one task from its episodes.
+/// Scores one task from its episodes; its tier is by these bounds.
 ///
 /// `step_times` are the computation times of all answered steps in order of the episodes, so that the
 /// result does not depend on how they were cut into shards.
@@ -17,7 +17,11 @@ use faceoff_types::{EpisodeOutcome, TaskResult, ViolationCounts};
 /// # Panics
 /// If `step_times` holds more or fewer times than it was made for.
 #[must_use]
-pub fn score_task(outcomes: &[EpisodeOutcome], step_times: &StepTimes) -> TaskResult {
+pub fn score_task(
+    outcomes: &[EpisodeOutcome],
+    step_times: &StepTimes,
+    bounds: &TierBounds,
+) -> TaskResult {
     let episodes = count(outcomes, |_| true);
     let successes = count(outcomes, |outcome| outcome.success && !has_fault(outcome));
     // Points are multiples of one half: the sum is exact in any order.
@@ -39,7 +43,7 @@ pub fn score_task(outcomes: &[EpisodeOutcome], step_times: &StepTimes) -> TaskRe
             joint_vel: count(outcomes, |outcome| outcome.violations.joint_vel),
             computation_time: count(outcomes, |outcome| time_or_fault_penalty(outcome) > 0.0),
         },
-        tier: tier_of(penalty_points, episodes),
+        tier: tier_within(bounds, penalty_points, episodes),
         steps: outcomes
             .iter()
             .map(|outcome| u64::from(outcome.steps))

@@ -1,7 +1,7 @@
 //! How sure a tier is: the bootstrap over episodes.
 
-use crate::{episode::MAX_EPISODE_PENALTY, tier::tier_of};
-use faceoff_types::{Task, Tier};
+use crate::{episode::MAX_EPISODE_PENALTY, tier::tier_within};
+use faceoff_types::{Task, Tier, TierBounds};
 use std::collections::BTreeMap;
 
 /// Resamples of the bootstrap: a probability near one half is then known to ±1.1 percentage points
@@ -27,13 +27,13 @@ impl TierChange {
     /// Each resample draws as many episodes of each task as were played, with replacement. The draws
     /// come from BLAKE3 keyed with the penalty points themselves, in ascending order: the same
     /// evaluation always gives the same numbers, whatever the machine, the time or the order of play.
-    pub(crate) fn of(points: BTreeMap<Task, Vec<f64>>) -> Self {
+    pub(crate) fn of(points: BTreeMap<Task, Vec<f64>>, bounds: &TierBounds) -> Self {
         let mut key = blake3::Hasher::new_derive_key(STREAM);
         let tasks: BTreeMap<Task, TaskPoints> = points
             .into_iter()
             .filter(|(_, points)| !points.is_empty())
             .map(|(task, points)| {
-                let played = TaskPoints::new(&points);
+                let played = TaskPoints::new(&points, *bounds);
                 key.update(task.as_str().as_bytes());
                 key.update(&u64::from(played.episodes).to_le_bytes());
                 key.update(&played.halves);
@@ -78,21 +78,24 @@ struct TaskPoints {
     /// Half points of each episode, ascending.
     halves: Vec<u8>,
     episodes: u32,
+    bounds: TierBounds,
     tier: Tier,
 }
 
 impl TaskPoints {
-    fn new(points: &[f64]) -> Self {
+    fn new(points: &[f64], bounds: TierBounds) -> Self {
         let mut halves: Vec<u8> = points
             .iter()
             .map(|points| (2.0 * points).round().clamp(0.0, MAX_HALVES) as u8)
             .collect();
         halves.sort_unstable();
         let episodes = u32::try_from(halves.len()).expect("episodes are numbered with u32");
-        let tier = tier_of_halves(halves.iter().map(|h| u64::from(*h)).sum(), episodes);
+        let sum = halves.iter().map(|h| u64::from(*h)).sum();
+        let tier = tier_of_halves(&bounds, sum, episodes);
         Self {
             halves,
             episodes,
+            bounds,
             tier,
         }
     }
@@ -105,12 +108,12 @@ impl TaskPoints {
         let sum = (0..self.episodes)
             .map(|_| u64::from(self.halves[draws.below(self.episodes)]))
             .sum();
-        tier_of_halves(sum, self.episodes)
+        tier_of_halves(&self.bounds, sum, self.episodes)
     }
 }
 
-fn tier_of_halves(halves: u64, episodes: u32) -> Tier {
-    tier_of(halves as f64 / 2.0, episodes)
+fn tier_of_halves(bounds: &TierBounds, halves: u64, episodes: u32) -> Tier {
+    tier_within(bounds, halves as f64 / 2.0, episodes)
 }
 
 /// Draws from an endless stream of bytes.
@@ -150,7 +153,7 @@ mod tests {
     use statrs::distribution::{Binomial, DiscreteCDF};
 
     fn change(points: &[(Task, Vec<f64>)]) -> TierChange {
-        TierChange::of(points.iter().cloned().collect())
+        TierChange::of(points.iter().cloned().collect(), &TierBounds::default())
     }
 
     /// `broken` of `episodes` cost `points`.

@@ -7,10 +7,9 @@
 use crate::{
     channel::observation::OBSERVATION_WITH_OPPONENT_LEN,
     episode::{Episode, StepOutcome},
-    perturbation::settings::PerturbationSettings,
     robot::plant::Plant,
 };
-use faceoff_types::{Factors, Interpolation, Seed, Task};
+use faceoff_types::{Factors, Interpolation, PerturbationSettings, Seed, Task};
 use rayon::prelude::*;
 
 /// Worlds that a thread takes at a time: below this, handing out work costs more than it gains.

@@ -36,7 +36,6 @@ pub use episode::{
 };
 pub use game::{Game, GameSetup, GameStep, referee::RallyEnd};
 // Actions and joint states are in terms of these.
-pub use faceoff_types::{Interpolation, JOINTS, SUBSTEPS};
-pub use perturbation::settings::PerturbationSettings;
+pub use faceoff_types::{Interpolation, JOINTS, PerturbationSettings, SUBSTEPS};
 pub use robot::plant::Plant;
 pub use world::{Bounds, Divergence, MalletState, Runaway, World};

@@ -47,6 +47,7 @@ fn result(score: f64) -> EvaluationResult {
         penalty_points: 327.5,
         tier: Tier::Deployable,
         timing: None,
+        variation: Default::default(),
     }
 }
 
@@ -171,6 +172,7 @@ fn board(criterion: &mut Criterion) {
             tasks: Task::ALL.to_vec(),
             episodes_per_task: 1000,
             max_faults: 10,
+            variation: Default::default(),
         };
         store
             .configure_stage(rules, StageSettings::default(), Zone::UTC, now)

@@ -232,6 +232,8 @@ pub enum Event {
         /// As everybody may read it.
         reason: String,
     },
+    /// Its team has made its dataset public.
+    EvaluationPublished,
     /// All of a day does not count any more; each of its evaluations has an event of its own.
     DayVoided {
         /// As everybody may read it.
@@ -370,6 +372,13 @@ pub enum Event {
         /// The new ones.
         rules: StageRules,
     },
+    /// Its one day after the close has had its cut; the day has an event of its own.
+    StageFinalStarted {
+        /// Its date.
+        day: Date,
+    },
+    /// Its result is signed off: nothing of it changes any more.
+    StageFinalised,
     /// Nothing of the queue is begun from now on.
     QueuePaused {
         /// As everybody may read it.

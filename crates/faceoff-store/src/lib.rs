@@ -61,6 +61,7 @@ pub use reads::{
     board::{BoardRecord, BoardScope},
     outlook::{OpenWork, Outlook, QueuePlace},
     runs::RunFaults,
+    standings::BoardDays,
 };
 pub use room::Room;
 pub use store::Store;
@@ -72,6 +73,7 @@ pub use tables::{
     drafts::Draft,
     evaluations::{Evaluation, EvaluationState},
     events::EventFilter,
+    finalised::Finalised,
     invitations::{Invitation, InvitationState, InvitedAs},
     measured::Measured,
     people::Person,

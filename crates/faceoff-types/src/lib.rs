@@ -17,8 +17,10 @@ mod harmless;
 mod ids;
 mod interpolation;
 mod limits;
+mod millionths;
 mod names;
 mod outcome;
+mod perturbations;
 mod profile;
 mod result;
 mod ruleset;
@@ -27,9 +29,11 @@ mod seed;
 mod seed_label;
 mod smoke_outcome;
 mod stage;
+mod stage_settings;
 mod task;
 mod tier;
 mod timing;
+mod variation;
 mod zone;
 
 pub use archive_format::ArchiveFormat;
@@ -48,8 +52,13 @@ pub use ids::{
 };
 pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, UnknownInterpolation};
 pub use limits::{AgentLimits, BundleLimits, ResourceLimits, TimeLimits};
+pub use millionths::{Millionths, NotMillionths};
 pub use names::{DivisionName, InvalidName, PersonName, StageName, TeamName};
 pub use outcome::{EpisodeEnd, EpisodeOutcome};
+pub use perturbations::{
+    DelaySettings, DisturbanceSettings, InvalidPerturbation, MismatchSettings, NoiseSettings,
+    PerturbationSettings, TrackingLossSettings,
+};
 pub use profile::{Factor, Factors, ParseProfileError, Profile};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult, ViolationCounts};
 pub use ruleset::{
@@ -59,8 +68,10 @@ pub use schedule::{InvalidSchedule, Schedule};
 pub use seed::{ParseSeedError, Seed};
 pub use seed_label::{ParseSeedLabelError, SeedLabel};
 pub use smoke_outcome::{SmokeOutcome, SmokeTiming};
-pub use stage::{InvalidStageRules, ParseStageDayError, StageDay, StageRules, StageSettings};
+pub use stage::{InvalidStageRules, ParseStageDayError, StageDay, StageRules};
+pub use stage_settings::{MAX_MEAN_DAYS, Publishes, StageSettings, Standings, UnknownSetting};
 pub use task::{CONTROL_STEP_S, EPISODE_STEPS, MAX_EPISODES_PER_TASK, ParseTaskError, Task};
 pub use tier::Tier;
 pub use timing::{RoundTrips, SlotTiming};
+pub use variation::{InvalidVariation, TaskWeights, TierBounds, Variation};
 pub use zone::{UnknownZone, Zone};

@@ -1,4 +1,4 @@
-use crate::{Profile, Seed, SlotTiming, Task, Tier};
+use crate::{Profile, Seed, SlotTiming, Task, Tier, Variation};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -62,6 +62,9 @@ pub struct EvaluationResult {
     pub ruleset: String,
     /// The perturbation profile.
     pub profile: Profile,
+    /// What it was played and scored by otherwise than the ruleset has it.
+    #[serde(flatten)]
+    pub variation: Variation,
     /// The evaluation's seed, 64 hexadecimal digits.
     pub seed: Seed,
     /// The tasks played.

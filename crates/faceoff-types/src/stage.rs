@@ -1,6 +1,6 @@
 use crate::{
-    DayDeadline, LONGEST_DEADLINE_H, MAX_EPISODES_PER_TASK, Profile, Ruleset, Schedule, StageId,
-    Task,
+    LONGEST_DEADLINE_H, MAX_EPISODES_PER_TASK, MAX_MEAN_DAYS, Profile, Ruleset, StageId, Task,
+    Variation, perturbations::InvalidPerturbation,
 };
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
@@ -38,7 +38,7 @@ impl FromStr for StageDay {
 }
 
 /// What scores of a stage depend on. Rows of different rules never stand on one board.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct StageRules {
     /// The simulator and the scoring.
@@ -52,58 +52,13 @@ pub struct StageRules {
     pub episodes_per_task: u32,
     /// More agent faults than this end an evaluation without a score.
     pub max_faults: u32,
-}
-
-/// How a stage goes on, without a score depending on it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
-#[serde(default)]
-pub struct StageSettings {
-    /// When its days start; null: when the organiser starts them.
-    pub schedule: Option<Schedule>,
-    /// Episodes of each task and profile of the ablation that the schedule orders of every submission that it
-    /// starts; 0: none.
-    pub ablation_episodes: u32,
-    /// Episodes of one unit of work; at least one.
-    pub episodes_per_shard: u32,
-    /// Until when what its cut has started may be played.
-    pub day_deadline: DayDeadline,
-}
-
-impl Default for StageSettings {
-    fn default() -> Self {
-        Self {
-            schedule: None,
-            ablation_episodes: 0,
-            episodes_per_shard: 50,
-            day_deadline: DayDeadline::NextCut,
-        }
-    }
-}
-
-impl StageSettings {
-    /// Can a stage go on so?
-    ///
-    /// # Errors
-    /// What is out of bounds.
-    pub fn check(&self) -> Result<(), InvalidStageRules> {
-        if !(1..=MAX_EPISODES_PER_TASK).contains(&self.episodes_per_shard) {
-            return Err(InvalidStageRules::Shards(self.episodes_per_shard));
-        }
-        if self.ablation_episodes > MAX_EPISODES_PER_TASK {
-            return Err(InvalidStageRules::Ablations(self.ablation_episodes));
-        }
-        if let DayDeadline::Hours(hours) = self.day_deadline
-            && !(1..=LONGEST_DEADLINE_H).contains(&hours)
-        {
-            return Err(InvalidStageRules::Deadline(hours));
-        }
-        Ok(())
-    }
+    /// Weights, bounds of the tiers and magnitudes, as far as they are not the ruleset's.
+    #[serde(flatten)]
+    pub variation: Variation,
 }
 
 /// Rules or settings by which nothing could be played.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum InvalidStageRules {
     /// No task, or one twice.
     #[error("tasks: each task at most once, and at least one")]
@@ -120,6 +75,28 @@ pub enum InvalidStageRules {
     /// A day without time, or with more than any has.
     #[error("day_deadline: expected 1 to {LONGEST_DEADLINE_H} hours, got {0}")]
     Deadline(u32),
+    /// A mean of no days, or of more than a board is made of.
+    #[error("standings: a mean is of 1 to {MAX_MEAN_DAYS} days, got {0}")]
+    MeanDays(u32),
+    /// Magnitudes that no world has.
+    #[error("perturbations.{0}")]
+    Perturbations(#[from] InvalidPerturbation),
+}
+
+impl InvalidStageRules {
+    /// The field that is wrong, as JSON has it.
+    #[must_use]
+    pub const fn field(&self) -> &'static str {
+        match self {
+            Self::Tasks => "tasks",
+            Self::Episodes(_) => "episodes_per_task",
+            Self::Shards(_) => "episodes_per_shard",
+            Self::Ablations(_) => "ablation_episodes",
+            Self::Deadline(_) => "day_deadline",
+            Self::MeanDays(_) => "standings",
+            Self::Perturbations(_) => "perturbations",
+        }
+    }
 }
 
 impl StageRules {
@@ -135,6 +112,7 @@ impl StageRules {
         if !(1..=MAX_EPISODES_PER_TASK).contains(&self.episodes_per_task) {
             return Err(InvalidStageRules::Episodes(self.episodes_per_task));
         }
+        self.variation.perturbations.check()?;
         Ok(())
     }
 }
@@ -151,6 +129,7 @@ mod tests {
             tasks: tasks.to_vec(),
             episodes_per_task,
             max_faults: 3,
+            variation: Variation::default(),
         };
         assert_eq!(rules(&Task::ALL, 1).check(), Ok(()));
         assert_eq!(rules(&[], 1).check(), Err(InvalidStageRules::Tasks));
@@ -163,26 +142,18 @@ mod tests {
     }
 
     #[test]
-    fn settings_are_bounded_and_may_be_left_out() {
-        let settings: StageSettings = serde_json::from_str("{}").unwrap();
-        assert_eq!(settings, StageSettings::default());
-        assert_eq!(settings.check(), Ok(()));
-        let none = StageSettings {
-            episodes_per_shard: 0,
-            ..settings.clone()
-        };
-        assert_eq!(none.check(), Err(InvalidStageRules::Shards(0)));
-        for hours in [0, LONGEST_DEADLINE_H + 1] {
-            let none = StageSettings {
-                day_deadline: DayDeadline::Hours(hours),
-                ..settings.clone()
-            };
-            assert_eq!(none.check(), Err(InvalidStageRules::Deadline(hours)));
-        }
-        let many = StageSettings {
-            ablation_episodes: u32::MAX,
-            ..settings
-        };
-        assert_eq!(many.check(), Err(InvalidStageRules::Ablations(u32::MAX)));
+    fn rules_of_before_there_were_variations_are_read_and_written_as_they_were() {
+        let text = r#"{"ruleset":"airhockey-2023.2","profile":"evaluation","tasks":["hit"],"episodes_per_task":4,"max_faults":1}"#;
+        let rules: StageRules = serde_json::from_str(text).unwrap();
+        assert!(rules.variation.is_none());
+        assert_eq!(serde_json::to_string(&rules).unwrap(), text);
+        let mut wild = rules;
+        wild.variation.perturbations.tracking_loss.probability = 2.0;
+        let refused = wild.check().unwrap_err();
+        assert_eq!(refused.field(), "perturbations");
+        assert!(
+            refused.to_string().contains("tracking_loss.probability"),
+            "{refused}"
+        );
     }
 }

@@ -4,7 +4,7 @@
 //! `calibration.json`, `episodes.parquet`, `steps.parquet` and `agent.log`. The layout is versioned by
 //! [`DATASET_SCHEMA`]; `docs/dataset.md` describes every column.
 
-use faceoff_types::{Profile, Seed, SlotTiming, Task};
+use faceoff_types::{Profile, Seed, SlotTiming, Task, Variation};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -22,6 +22,9 @@ pub struct DatasetManifest {
     pub simulator: SimulatorId,
     /// The perturbation profile.
     pub profile: Profile,
+    /// What it was played and scored by otherwise than the ruleset has it.
+    #[serde(flatten)]
+    pub variation: Variation,
     /// The evaluation's seed.
     pub seed: Seed,
     /// The seed of the season's model mismatch.

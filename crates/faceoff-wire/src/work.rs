@@ -4,8 +4,8 @@
 //! derived from: whoever carries it out learns nothing of another day.
 
 use faceoff_types::{
-    AgentLimits, BundleRef, EpisodeOutcome, EvaluationId, EvaluationResult, Profile, Ruleset, Seed,
-    SmokeOutcome, SubmissionId, Task,
+    AgentLimits, BundleRef, EpisodeOutcome, EvaluationId, EvaluationResult, PerturbationSettings,
+    Profile, Ruleset, Seed, SmokeOutcome, SubmissionId, Task, Variation,
 };
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -113,6 +113,9 @@ pub struct ShardSpec {
     /// How often these episodes were begun before and broken by us.
     #[serde(default)]
     pub platform_retries: u32,
+    /// Magnitudes of what the profile switches on; absent: the ruleset's.
+    #[serde(default, skip_serializing_if = "is_the_rulesets")]
+    pub perturbations: Box<PerturbationSettings>,
 }
 
 /// What the dataset of an evaluation says about itself.
@@ -128,6 +131,13 @@ pub struct EvaluationMeta {
     pub agent: String,
     /// The rules it was played by.
     pub ruleset: Ruleset,
+    /// What it was played by and is scored by otherwise than the ruleset has it.
+    #[serde(flatten)]
+    pub variation: Variation,
+}
+
+fn is_the_rulesets(perturbations: &PerturbationSettings) -> bool {
+    *perturbations == PerturbationSettings::default()
 }
 
 const fn first_ruleset() -> Ruleset {

@@ -9,8 +9,8 @@ use bundle_file::BundleFile;
 use faceoff_http::{
     API_BASE,
     requests::{
-        Cancellation, CloseSeason, Decision, ExtraTurn, Label, MissedDay, NewStage, NewTeam,
-        Reason, StageChange, StartDay,
+        Cancellation, CloseSeason, Confirmation, Decision, ExtraTurn, Label, MissedDay, NewStage,
+        NewTeam, Reason, StageChange, StartDay,
     },
     views::{
         board::BoardView,
@@ -225,6 +225,28 @@ impl Client {
     ) -> anyhow::Result<StageView> {
         let request = self.request(Method::PATCH, &format!("/stages/{id}"));
         read(self.send(request.json(change)).await?).await
+    }
+
+    /// Organiser: starts a stage's final day.
+    pub async fn start_final_day(&self, id: StageId) -> anyhow::Result<DayView> {
+        let request = self.request(Method::POST, &format!("/stages/{id}/final"));
+        read(self.send(request).await?).await
+    }
+
+    /// Organiser: signs a stage's result off; `confirm` is its name.
+    pub async fn finalise(
+        &self,
+        id: StageId,
+        confirm: Option<String>,
+    ) -> anyhow::Result<StageView> {
+        let request = self.request(Method::POST, &format!("/stages/{id}/finalise"));
+        read(self.send(request.json(&Confirmation { confirm })).await?).await
+    }
+
+    /// Team: makes an evaluation of its own public.
+    pub async fn publish(&self, id: EvaluationId) -> anyhow::Result<EvaluationView> {
+        let request = self.request(Method::POST, &format!("/evaluations/{id}/publish"));
+        read(self.send(request).await?).await
     }
 
     /// Organiser: plays an evaluation again that was cancelled or failed by the server's fault.

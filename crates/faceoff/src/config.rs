@@ -10,7 +10,8 @@ use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::BundleLimits};
 use faceoff_sandbox::{Isolation, Layer, Limits, Runtime, affinity};
 use faceoff_store::UploadQuota;
 use faceoff_types::{
-    DayDeadline, InvalidSchedule, Profile, Ruleset, Schedule, StageRules, StageSettings, Task, Zone,
+    DayDeadline, InvalidSchedule, PerturbationSettings, Profile, Publishes, Ruleset, Schedule,
+    StageRules, StageSettings, Standings, Task, TaskWeights, TierBounds, Variation, Zone,
 };
 use jiff::civil::{Date, Time};
 use serde::{Deserialize, Serialize};
@@ -118,6 +119,16 @@ pub struct EvaluationConfig {
     /// Episodes of each task and profile of the ablation that the schedule orders of every submission
     /// it starts; 0: none.
     pub ablation_episodes: u32,
+    /// What each task's success rate weighs in the score.
+    pub weights: TaskWeights,
+    /// Penalty points per episode up to which an agent is in a tier.
+    pub tier_bounds: TierBounds,
+    /// Magnitudes of the perturbations that the profile switches on; left out, the ruleset's.
+    pub perturbations: Option<Box<PerturbationSettings>>,
+    /// When datasets of released days are there for everybody.
+    pub publishes: Publishes,
+    /// What a team's row on the board is made of.
+    pub standings: Standings,
 }
 
 impl Default for EvaluationConfig {
@@ -134,6 +145,11 @@ impl Default for EvaluationConfig {
             day_deadline: DayDeadline::NextCut,
             max_faults: 10,
             ablation_episodes: 0,
+            weights: TaskWeights::default(),
+            tier_bounds: TierBounds::default(),
+            perturbations: None,
+            publishes: Publishes::AtClose,
+            standings: Standings::Latest,
         }
     }
 }
@@ -345,6 +361,11 @@ impl Config {
             tasks: evaluation.tasks.clone(),
             episodes_per_task: evaluation.episodes_per_task,
             max_faults: evaluation.max_faults,
+            variation: Variation {
+                weights: evaluation.weights,
+                tier_bounds: evaluation.tier_bounds,
+                perturbations: evaluation.perturbations.clone().unwrap_or_default(),
+            },
         }
     }
 
@@ -365,6 +386,9 @@ impl Config {
             ablation_episodes: evaluation.ablation_episodes,
             episodes_per_shard: evaluation.episodes_per_shard,
             day_deadline: evaluation.day_deadline,
+            publishes: evaluation.publishes,
+            standings: evaluation.standings,
+            ..StageSettings::default()
         })
     }
 

@@ -44,6 +44,8 @@ enum Command {
     Submit(commands::submit::SubmitCommand),
     /// Choose which submission plays at the next cut.
     Activate(commands::activate::ActivateCommand),
+    /// Make an evaluation of the team's public, with its dataset.
+    Publish(commands::publish::PublishCommand),
     Submissions(commands::submissions::SubmissionsCommand),
     Join(commands::join::JoinCommand),
     Whoami(commands::whoami::WhoamiCommand),
@@ -68,6 +70,7 @@ fn main() -> ExitCode {
         Command::Sim(command) => command.run(),
         Command::Submit(command) => command.run(),
         Command::Activate(command) => command.run(),
+        Command::Publish(command) => command.run(),
         Command::Submissions(command) => command.run(),
         Command::Join(command) => command.run(),
         Command::Whoami(command) => command.run(),

@@ -86,7 +86,13 @@ impl Replay {
         let (profile, seed) = (manifest.profile, manifest.seed);
         Self {
             ruleset,
-            arena: Arena::by(ruleset, profile, seed, manifest.mismatch_seed),
+            arena: Arena::by(
+                ruleset,
+                profile,
+                &manifest.variation.perturbations,
+                seed,
+                manifest.mismatch_seed,
+            ),
         }
     }
 

@@ -92,12 +92,21 @@ fn the_dataset_is_whole_and_its_score_is_the_direct_one() {
             let time = Duration::from_nanos(nanoseconds.value(row).unsigned_abs());
             times.add(time.as_secs_f64());
         }
-        tasks.insert(task, faceoff_scoring::score_task(&outcomes, &times));
+        tasks.insert(
+            task,
+            faceoff_scoring::score_task(&outcomes, &times, &Default::default()),
+        );
     }
     let meta = &evaluation.meta;
     let direct = EvaluationResult {
         timing: result.timing,
-        ..faceoff_scoring::score_evaluation(meta.ruleset, meta.profile, meta.seed, tasks)
+        ..faceoff_scoring::score_evaluation(
+            meta.ruleset,
+            meta.profile,
+            meta.seed,
+            &Default::default(),
+            tasks,
+        )
     };
     assert_eq!(result, direct);
 

@@ -8,4 +8,5 @@ mod forgery;
 mod layout_2;
 mod layout_3;
 mod played;
+mod variation;
 mod verify;

@@ -3,10 +3,10 @@
 use arrow_array::RecordBatch;
 use faceoff_dataset::{Assembled, Recorder, RecordingError, ShardFolder, ShardReport, assemble};
 use faceoff_episode::{Answered, EpisodeStart, StepRow, StepSink};
-use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
+use faceoff_sim::{Episode, Interpolation, Plant};
 use faceoff_types::{
     AgentFault, AgentFaultKind, ComputationTime, EpisodeEnd, EpisodeOutcome, Profile, RoundTrips,
-    Ruleset, Seed, SlotTiming, Task,
+    Ruleset, Seed, SlotTiming, Task, Variation,
 };
 use faceoff_wire::work::{EvaluationMeta, ShardSpec};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
@@ -52,6 +52,7 @@ pub fn spec(task: Task, episodes: Range<u32>) -> ShardSpec {
         seed,
         mismatch_seed: seed.model_mismatch(),
         max_faults: 2,
+        perturbations: Default::default(),
     }
 }
 
@@ -59,7 +60,7 @@ pub fn spec(task: Task, episodes: Range<u32>) -> ShardSpec {
 pub fn play(spec: &ShardSpec, agent: Option<Agent>, out: &Path) -> ShardReport {
     let folder = ShardFolder::create(out).unwrap();
     let mut recorder = Recorder::create(&folder, spec.task).unwrap();
-    let settings = PerturbationSettings::default();
+    let settings = (*spec.perturbations).clone();
     let plant = Plant::mismatched(&settings, spec.mismatch_seed);
     let mut outcomes = Vec::new();
     for episode in spec.episodes.clone() {
@@ -220,6 +221,14 @@ pub struct Evaluation {
 
 impl Evaluation {
     pub fn play(agent: Option<Agent>, shards: &[(Task, Range<u32>)]) -> Self {
+        Self::play_by(Variation::default(), agent, shards)
+    }
+
+    pub fn play_by(
+        variation: Variation,
+        agent: Option<Agent>,
+        shards: &[(Task, Range<u32>)],
+    ) -> Self {
         let dir = tempfile::tempdir().unwrap();
         let spec = spec(Task::Hit, 0..1);
         let mut evaluation = Self {
@@ -231,6 +240,7 @@ impl Evaluation {
                 mismatch_seed: spec.mismatch_seed,
                 agent: "test".into(),
                 ruleset: Ruleset::CURRENT,
+                variation,
             },
             dir,
         };
@@ -239,7 +249,11 @@ impl Evaluation {
                 .dir
                 .path()
                 .join(format!("{task}-{}", range.start));
-            let report = play(&self::spec(*task, range.clone()), agent, &out);
+            let spec = ShardSpec {
+                perturbations: evaluation.meta.variation.perturbations.clone(),
+                ..self::spec(*task, range.clone())
+            };
+            let report = play(&spec, agent, &out);
             evaluation.reports.push(report);
             evaluation.shards.push(out);
         }

@@ -2,11 +2,11 @@
 
 use crate::{
     app::App,
-    auth::PerhapsOrganiser,
     extract::{PathParam, QueryParams},
     problem::Problem,
     requests::BoardQuery,
-    views::board::BoardView,
+    viewer::Viewer,
+    views::{board::BoardView, sight::Sight},
 };
 use axum::{Json, extract::State};
 use faceoff_types::Task;
@@ -21,11 +21,12 @@ use faceoff_types::Task;
     )
 )]
 pub(crate) async fn board(
+    viewer: Viewer,
     State(app): State<App>,
-    caller: PerhapsOrganiser,
     QueryParams(query): QueryParams<BoardQuery>,
 ) -> Result<Json<BoardView>, Problem> {
-    BoardView::asked(&app, caller, query, None).await.map(Json)
+    let sight = Sight::of(&app, viewer).await?;
+    BoardView::asked(&app, &sight, query, None).await.map(Json)
 }
 
 /// The board of one task, ranked by its success rate and its penalty points.
@@ -38,12 +39,13 @@ pub(crate) async fn board(
     )
 )]
 pub(crate) async fn task_board(
+    viewer: Viewer,
     State(app): State<App>,
     PathParam(task): PathParam<Task>,
-    caller: PerhapsOrganiser,
     QueryParams(query): QueryParams<BoardQuery>,
 ) -> Result<Json<BoardView>, Problem> {
-    BoardView::asked(&app, caller, query, Some(task))
+    let sight = Sight::of(&app, viewer).await?;
+    BoardView::asked(&app, &sight, query, Some(task))
         .await
         .map(Json)
 }

@@ -1,6 +1,12 @@
 //! Two evaluations on the same episodes, compared.
 
-use crate::{app::App, extract::PathParams, problem::Problem, views::comparison::ComparisonView};
+use crate::{
+    app::App,
+    extract::PathParams,
+    problem::Problem,
+    viewer::Viewer,
+    views::{comparison::ComparisonView, sight::Sight},
+};
 use axum::{Json, extract::State};
 use faceoff_types::EvaluationId;
 
@@ -12,12 +18,14 @@ use faceoff_types::EvaluationId;
     responses(
         (status = 200, body = ComparisonView),
         (status = 404),
-        (status = 409, description = "not the same episodes (“field” says what differs), not finished, or of a day that is not released"),
+        (status = 409, description = "not the same episodes (“field” says what differs), not finished, of a blind stage, or of a day that is not released"),
     )
 )]
 pub(crate) async fn compare(
+    viewer: Viewer,
     State(app): State<App>,
     PathParams(ids): PathParams<EvaluationId, 2>,
 ) -> Result<Json<ComparisonView>, Problem> {
-    ComparisonView::of(&app, ids).await.map(Json)
+    let sight = Sight::of(&app, viewer).await?;
+    ComparisonView::of(&app, &sight, ids).await.map(Json)
 }

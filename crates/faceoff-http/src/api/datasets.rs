@@ -2,11 +2,12 @@
 
 use crate::{
     app::App,
-    auth::Caller,
+    auth::TeamCaller,
     extract::PathParam,
     problem::{Problem, ProblemKind},
     release::check_released,
-    views::violations::ViolationsView,
+    viewer::Viewer,
+    views::{evaluation::EvaluationView, sight::Sight, violations::ViolationsView},
 };
 use axum::{
     Json,
@@ -19,25 +20,25 @@ use faceoff_store::{Evaluation, EvaluationState};
 use faceoff_types::EvaluationId;
 use jiff::civil::Date;
 
-/// The recorded dataset, a zip archive; for its team and the organiser.
+/// The recorded dataset, a zip archive; for its team and the organiser, and once it is public for everybody.
 ///
 /// It carries the day's seed. So it comes out when the day is released, with all others of the day.
 #[utoipa::path(
     get, path = "/evaluations/{id}/dataset", tag = "team",
-    security(("team" = []), ("organiser" = [])),
+    security((), ("team" = []), ("organiser" = [])),
     params(("id" = EvaluationId, Path)),
     responses(
         (status = 200, body = Vec<u8>, content_type = "application/zip"),
         (status = 404),
-        (status = 409, description = "not finished yet, or failed, or its day is not released"),
+        (status = 409, description = "not finished yet, or failed, its day is not released, or its stage is blind"),
     )
 )]
 pub(crate) async fn dataset(
-    caller: Caller,
+    viewer: Viewer,
     State(app): State<App>,
     PathParam(id): PathParam<EvaluationId>,
 ) -> Result<Response, Problem> {
-    let (evaluation, dataset) = released(caller, &app, id).await?;
+    let (evaluation, dataset) = released(viewer, &app, id).await?;
     // A dataset that a finished evaluation names must be there: without it, we lost it.
     let (bytes, stream) = app
         .store
@@ -61,35 +62,74 @@ pub(crate) async fn dataset(
 }
 
 /// Where each constraint was broken and which answers were slow, by episode: `violations.json` of the dataset,
-/// for its team and the organiser, once the day is released. A slow answer tells what it took, what of it the
+/// for those who get the dataset. A slow answer tells what it took, what of it the
 /// host took, and the agent's CPU time meanwhile.
 #[utoipa::path(
     get, path = "/evaluations/{id}/violations", tag = "team",
-    security(("team" = []), ("organiser" = [])),
+    security((), ("team" = []), ("organiser" = [])),
     params(("id" = EvaluationId, Path)),
     responses(
         (status = 200, body = ViolationsView),
         (status = 404),
-        (status = 409, description = "not finished yet, or failed, or its day is not released"),
+        (status = 409, description = "not finished yet, or failed, its day is not released, or its stage is blind"),
     )
 )]
 pub(crate) async fn violations(
-    caller: Caller,
+    viewer: Viewer,
     State(app): State<App>,
     PathParam(id): PathParam<EvaluationId>,
 ) -> Result<Json<ViolationsView>, Problem> {
-    let (_, dataset) = released(caller, &app, id).await?;
+    let (_, dataset) = released(viewer, &app, id).await?;
     ViolationsView::read(&app, &dataset).await.map(Json)
+}
+
+/// Makes a finished evaluation of the team's public, with its dataset, before its stage does: everybody sees it from
+/// then on, without a token, and that stays so.
+#[utoipa::path(
+    post, path = "/evaluations/{id}/publish", tag = "team", security(("team" = [])),
+    params(("id" = EvaluationId, Path)),
+    responses(
+        (status = 200, body = EvaluationView),
+        (status = 404),
+        (status = 409, description = "not finished, its day is not released, or its stage is blind"),
+    )
+)]
+pub(crate) async fn publish_evaluation(
+    caller: TeamCaller,
+    State(app): State<App>,
+    PathParam(id): PathParam<EvaluationId>,
+) -> Result<Json<EvaluationView>, Problem> {
+    let team = &caller.team;
+    let sight = Sight::of(&app, Viewer::Team(team.id)).await?;
+    let evaluation = sight.readable(app.store.evaluation(id).await)?;
+    if evaluation.team != team.id {
+        return Err(Problem::new(
+            ProblemKind::Forbidden,
+            "the evaluation is another team's, and public already",
+        ));
+    }
+    sight.check_shown(evaluation.of.stage)?;
+    if let EvaluationState::Finished { .. } = &evaluation.state {
+        check_released(&app, &evaluation).await?;
+    }
+    let now = app.config.clock.now();
+    let published = app
+        .store
+        .publish_evaluation(caller.actor(), id, now)
+        .await?;
+    tracing::info!(evaluation = %id, team = %team.name, "evaluation published by its team");
+    EvaluationView::of(&app, &sight, published).await.map(Json)
 }
 
 /// A finished evaluation whose day is released, and its dataset's name among the artifacts.
 async fn released(
-    caller: Caller,
+    viewer: Viewer,
     app: &App,
     id: EvaluationId,
 ) -> Result<(Evaluation, String), Problem> {
-    let found = app.store.evaluation(id).await;
-    let evaluation = caller.visible("evaluation", found, |evaluation| evaluation.team)?;
+    let sight = Sight::of(app, viewer).await?;
+    let evaluation = sight.readable(app.store.evaluation(id).await)?;
+    sight.check_shown(evaluation.of.stage)?;
     let why_not = match &evaluation.state {
         EvaluationState::Finished { dataset, .. } => {
             check_released(app, &evaluation).await?;

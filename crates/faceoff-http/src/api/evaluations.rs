@@ -8,7 +8,8 @@ use crate::{
     paths,
     problem::Problem,
     requests::Cancellation,
-    views::{evaluation::EvaluationView, stage},
+    viewer::Viewer,
+    views::{evaluation::EvaluationView, sight::Sight, stage},
 };
 use axum::{
     Json,
@@ -39,16 +40,17 @@ pub(crate) async fn list_evaluations(
     State(app): State<App>,
     QueryParams(query): QueryParams<DayQuery>,
 ) -> Result<Json<Vec<EvaluationView>>, Problem> {
+    let sight = Sight::of(&app, Viewer::of(&caller)).await?;
     let mut evaluations = match caller.team() {
         None => {
             let day = match query.day {
                 Some(day) => day,
                 None => stage::current(&app).await?.day(app.config.clock.now()).date,
             };
-            EvaluationView::all_on(&app, day).await?
+            EvaluationView::all_on(&app, &sight, day).await?
         }
         Some(team) => {
-            let mut own = EvaluationView::of_team(&app, team.id).await?;
+            let mut own = EvaluationView::of_team(&app, &sight, team.id).await?;
             own.retain(|evaluation| query.day.is_none_or(|day| evaluation.day == day));
             own
         }
@@ -58,20 +60,20 @@ pub(crate) async fn list_evaluations(
 }
 
 /// One evaluation: state, progress, score and points; once its day is released also the whole result, or the
-/// faults with the log.
+/// faults with the log. Once it is public, everybody sees it without a token.
 #[utoipa::path(
-    get, path = "/evaluations/{id}", tag = "team", security(("team" = []), ("organiser" = [])),
+    get, path = "/evaluations/{id}", tag = "team", security((), ("team" = []), ("organiser" = [])),
     params(("id" = EvaluationId, Path)),
     responses((status = 200, body = EvaluationView), (status = 404))
 )]
 pub(crate) async fn evaluation(
-    caller: Caller,
+    viewer: Viewer,
     State(app): State<App>,
     PathParam(id): PathParam<EvaluationId>,
 ) -> Result<Json<EvaluationView>, Problem> {
-    let found = app.store.evaluation(id).await;
-    let evaluation = caller.visible("evaluation", found, |evaluation| evaluation.team)?;
-    EvaluationView::of(&app, evaluation).await.map(Json)
+    let sight = Sight::of(&app, viewer).await?;
+    let evaluation = sight.readable(app.store.evaluation(id).await)?;
+    EvaluationView::of(&app, &sight, evaluation).await.map(Json)
 }
 
 /// Stops an evaluation that is not over. It can be played again (`rerun`). If it was the last of its day,
@@ -97,7 +99,8 @@ pub(crate) async fn cancel_evaluation(
         .cancel_evaluation(organiser.actor(), id, reason, now)
         .await?;
     tracing::info!(evaluation = %id, reason, "evaluation cancelled");
-    EvaluationView::find(&app, id).await.map(Json)
+    let sight = Sight::of_organiser(&app).await?;
+    EvaluationView::find(&app, &sight, id).await.map(Json)
 }
 
 /// Plays an evaluation again that was cancelled or voided, or failed by our fault: the submission that was active at
@@ -108,7 +111,7 @@ pub(crate) async fn cancel_evaluation(
     responses(
         (status = 201, body = EvaluationView, description = "the evaluation that plays it again"),
         (status = 404),
-        (status = 409, description = "it ended otherwise, the team has another evaluation of the day that counts, or the season is closed"),
+        (status = 409, description = "it ended otherwise, the team has another evaluation of the day that counts, the stage is signed off, or the season is closed"),
     )
 )]
 pub(crate) async fn rerun_evaluation(
@@ -122,7 +125,8 @@ pub(crate) async fn rerun_evaluation(
         .rerun_evaluation(organiser.actor(), id, now)
         .await?;
     tracing::info!(evaluation = %id, rerun = %rerun.id, "an evaluation is played again");
-    let view = EvaluationView::of(&app, rerun).await?;
+    let sight = Sight::of_organiser(&app).await?;
+    let view = EvaluationView::of(&app, &sight, rerun).await?;
     let location = [(header::LOCATION, paths::evaluation(view.id))];
     Ok((StatusCode::CREATED, AppendHeaders(location), Json(view)))
 }

@@ -23,6 +23,7 @@ mod registrations;
 mod rulings;
 mod season;
 mod sessions;
+mod sign_off;
 mod stages;
 mod submissions;
 mod teams;
@@ -85,6 +86,8 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(stages::list_stages, stages::create_stage))
         .routes(routes!(stages::stage, stages::change_stage))
         .routes(routes!(capacity::capacity))
+        .routes(routes!(sign_off::start_final_day))
+        .routes(routes!(sign_off::finalise_stage))
         .routes(routes!(days::start_day))
         .routes(routes!(turns::start_missed_day))
         .routes(routes!(turns::extra_turn))
@@ -118,6 +121,7 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(rulings::reinstate_team))
         .routes(routes!(datasets::dataset))
         .routes(routes!(datasets::violations))
+        .routes(routes!(datasets::publish_evaluation))
         .routes(routes!(comparisons::compare))
         .layer(middleware::from_fn_with_state(patience, layers::time_out))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES));

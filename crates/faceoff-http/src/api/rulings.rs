@@ -8,7 +8,7 @@ use crate::{
     extract::{Json as Body, PathParam, PathParams},
     problem::Problem,
     requests::{Decision, Reason},
-    views::{day::DayView, evaluation::EvaluationView, team::TeamView},
+    views::{day::DayView, evaluation::EvaluationView, sight::Sight, team::TeamView},
 };
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_store::EvaluationState;
@@ -36,7 +36,7 @@ pub(super) fn checked_reason(reason: &str) -> Result<&str, Problem> {
     responses(
         (status = 200, body = EvaluationView),
         (status = 404),
-        (status = 409, description = "not confirmed with the team's name (nothing is done), under way, or it does not count"),
+        (status = 409, description = "not confirmed with the team's name (nothing is done), under way, it does not count, or its stage is signed off"),
         (status = 422),
     )
 )]
@@ -47,7 +47,8 @@ pub(crate) async fn void_evaluation(
     Body(decision): Body<Decision>,
 ) -> Result<Json<EvaluationView>, Problem> {
     let reason = checked_reason(&decision.reason)?;
-    let view = EvaluationView::find(&app, id).await?;
+    let sight = Sight::of_organiser(&app).await?;
+    let view = EvaluationView::find(&app, &sight, id).await?;
     let what = format!(
         "the evaluation of {} by {} would leave the boards for good, with the reason {reason:?} for everybody to \
          read; `rerun` can play it again",
@@ -60,7 +61,7 @@ pub(crate) async fn void_evaluation(
         .void_evaluation(organiser.actor(), id, reason, now)
         .await?;
     tracing::info!(evaluation = %id, reason, "evaluation voided");
-    EvaluationView::of(&app, voided).await.map(Json)
+    EvaluationView::of(&app, &sight, voided).await.map(Json)
 }
 
 /// Voids a whole day: what has ended leaves the boards, what is under way is cancelled, and the day is released.
@@ -70,7 +71,7 @@ pub(crate) async fn void_evaluation(
     responses(
         (status = 200, body = DayView),
         (status = 404),
-        (status = 409, description = "not confirmed with the date (nothing is done), or nothing of the day counts"),
+        (status = 409, description = "not confirmed with the date (nothing is done), nothing of the day counts, or its stage is signed off"),
         (status = 422),
     )
 )]

@@ -6,14 +6,18 @@ use crate::{
     extract::Json as Body,
     problem::Problem,
     requests::{CloseSeason, SeasonChange},
+    viewer::Viewer,
     views::season::{SeasonHead, SeasonView},
 };
 use axum::{Json, extract::State};
 
 /// The season.
 #[utoipa::path(get, path = "/season", tag = "public", responses((status = 200, body = SeasonView)))]
-pub(crate) async fn season(State(app): State<App>) -> Result<Json<SeasonView>, Problem> {
-    SeasonView::now(&app).await.map(Json)
+pub(crate) async fn season(
+    viewer: Viewer,
+    State(app): State<App>,
+) -> Result<Json<SeasonView>, Problem> {
+    SeasonView::now(&app, viewer).await.map(Json)
 }
 
 /// Lets anybody register a team, or nobody; sets the divisions.
@@ -39,7 +43,7 @@ pub(crate) async fn change_season(
             now,
         )
         .await?;
-    SeasonView::now(&app).await.map(Json)
+    SeasonView::now(&app, Viewer::Organiser).await.map(Json)
 }
 
 /// Closes the season for good: its secret becomes public, and nothing more is uploaded or evaluated.
@@ -48,7 +52,7 @@ pub(crate) async fn change_season(
     request_body = CloseSeason,
     responses(
         (status = 200, body = SeasonView),
-        (status = 409, description = "evaluations are queued or running, or it is closed already"),
+        (status = 409, description = "evaluations are queued or running, a stage is blind, or it is closed already"),
         (status = 422, description = "not the season's name"),
     )
 )]
@@ -67,5 +71,5 @@ pub(crate) async fn close_season(
     let now = app.config.clock.now();
     app.store.close_season(organiser.actor(), now).await?;
     tracing::info!(season = name, "season closed; its secret is public");
-    SeasonView::now(&app).await.map(Json)
+    SeasonView::now(&app, Viewer::Organiser).await.map(Json)
 }

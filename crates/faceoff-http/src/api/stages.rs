@@ -10,7 +10,9 @@ use crate::{
 };
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_store::{Stage, StagePhase};
-use faceoff_types::{InvalidStageRules, Ruleset, StageId, StageName, StageRules, StageSettings};
+use faceoff_types::{
+    MismatchSettings, Ruleset, StageId, StageName, StageRules, StageSettings, Standings, Variation,
+};
 
 fn name(text: &str) -> Result<StageName, Problem> {
     text.parse()
@@ -19,16 +21,29 @@ fn name(text: &str) -> Result<StageName, Problem> {
 
 fn check(rules: &StageRules, settings: &StageSettings) -> Result<(), Problem> {
     let checked = rules.check().and_then(|()| settings.check());
-    checked.map_err(|error| {
-        let field = match error {
-            InvalidStageRules::Tasks => "tasks",
-            InvalidStageRules::Episodes(_) => "episodes_per_task",
-            InvalidStageRules::Shards(_) => "episodes_per_shard",
-            InvalidStageRules::Ablations(_) => "ablation_episodes",
-            InvalidStageRules::Deadline(_) => "day_deadline",
-        };
-        Problem::invalid(field, error)
-    })
+    checked.map_err(|error| Problem::invalid(error.field(), error))
+}
+
+/// Refuses magnitudes that no robot of the season meets.
+async fn check_robot(app: &App, rules: &StageRules) -> Result<(), Problem> {
+    let settings = rules.variation.perturbations.clone();
+    if settings.model_mismatch == MismatchSettings::default() {
+        return Ok(());
+    }
+    let seed = app.store.season().await?.secret.model_mismatch();
+    let [least, most] = settings.model_mismatch.static_error_m;
+    let has_robot = move || faceoff_dataset::has_robot(&settings, seed);
+    if tokio::task::spawn_blocking(has_robot)
+        .await
+        .map_err(Problem::internal)?
+    {
+        return Ok(());
+    }
+    let detail = format!(
+        "model_mismatch: of 300 robots drawn by these ranges of mass and gains none has its largest static error within \
+         {least} to {most} m (static_error_m); widen one of them"
+    );
+    Err(Problem::invalid("perturbations", detail))
 }
 
 /// All stages, the first to open first.
@@ -75,7 +90,17 @@ pub(crate) async fn create_stage(
             .episodes_per_task
             .unwrap_or(like.rules.rules.episodes_per_task),
         max_faults: new.max_faults.unwrap_or(like.rules.rules.max_faults),
+        variation: Variation {
+            weights: new.weights.unwrap_or(like.rules.rules.variation.weights),
+            tier_bounds: new
+                .tier_bounds
+                .unwrap_or(like.rules.rules.variation.tier_bounds),
+            perturbations: new
+                .perturbations
+                .unwrap_or(like.rules.rules.variation.perturbations),
+        },
     };
+    let default = StageSettings::default();
     let settings = StageSettings {
         schedule: new.schedule,
         ablation_episodes: new.ablation_episodes.unwrap_or(0),
@@ -83,8 +108,12 @@ pub(crate) async fn create_stage(
             .episodes_per_shard
             .unwrap_or(like.settings.episodes_per_shard),
         day_deadline: new.day_deadline.unwrap_or_default(),
+        blind: new.blind.unwrap_or(default.blind),
+        publishes: new.publishes.unwrap_or(default.publishes),
+        standings: new.standings.unwrap_or(default.standings),
     };
     check(&rules, &settings)?;
+    check_robot(&app, &rules).await?;
     let wanted = faceoff_store::NewStage {
         name: name(&new.name)?,
         opens_at: new.opens_at.unwrap_or(now),
@@ -102,14 +131,15 @@ pub(crate) async fn create_stage(
     Ok((StatusCode::CREATED, Json(view)))
 }
 
-/// Changes a stage. Other rules of one that is open are another revision, which begins an empty board.
+/// Changes a stage. Other rules of one that is open are another revision, which begins an empty board. `blind` false opens
+/// a blind stage.
 #[utoipa::path(
     patch, path = "/stages/{id}", tag = "organiser", security(("organiser" = [])),
     params(("id" = StageId, Path)), request_body = StageChange,
     responses(
         (status = 200, body = StageView),
         (status = 404),
-        (status = 409, description = "what is to be changed has begun or is over, the name is taken, other rules of an open stage are not confirmed, or the season is closed"),
+        (status = 409, description = "what is to be changed has begun or is over, the name is taken, other rules or standings of an open stage are not confirmed, it is signed off, or the season is closed"),
         (status = 422),
     )
 )]
@@ -125,7 +155,10 @@ pub(crate) async fn change_stage(
     let other_rules = change.profile.is_some()
         || change.tasks.is_some()
         || change.episodes_per_task.is_some()
-        || change.max_faults.is_some();
+        || change.max_faults.is_some()
+        || change.weights.is_some()
+        || change.tier_bounds.is_some()
+        || change.perturbations.is_some();
     let rules = StageRules {
         // An upgrade of the program alone changes nothing of a stage.
         ruleset: if other_rules {
@@ -137,6 +170,13 @@ pub(crate) async fn change_stage(
         tasks: change.tasks.unwrap_or_else(|| is.tasks.clone()),
         episodes_per_task: change.episodes_per_task.unwrap_or(is.episodes_per_task),
         max_faults: change.max_faults.unwrap_or(is.max_faults),
+        variation: Variation {
+            weights: change.weights.unwrap_or(is.variation.weights),
+            tier_bounds: change.tier_bounds.unwrap_or(is.variation.tier_bounds),
+            perturbations: change
+                .perturbations
+                .unwrap_or_else(|| is.variation.perturbations.clone()),
+        },
     };
     let settings = StageSettings {
         schedule: change
@@ -149,10 +189,20 @@ pub(crate) async fn change_stage(
             .episodes_per_shard
             .unwrap_or(stage.settings.episodes_per_shard),
         day_deadline: change.day_deadline.unwrap_or(stage.settings.day_deadline),
+        blind: change.blind.unwrap_or(stage.settings.blind),
+        publishes: change.publishes.unwrap_or(stage.settings.publishes),
+        standings: change.standings.unwrap_or(stage.settings.standings),
     };
     check(&rules, &settings)?;
-    if rules != *is && stage.phase(now) == StagePhase::Open {
-        check_confirmed(&stage, change.confirm.as_deref())?;
+    if rules.variation.perturbations != is.variation.perturbations {
+        check_robot(&app, &rules).await?;
+    }
+    if stage.phase(now) == StagePhase::Open {
+        let other_rules = (rules != *is).then(|| begins_anew(&stage));
+        let other_order = (settings.standings != stage.settings.standings)
+            .then(|| ordered_anew(&stage, settings.standings));
+        let told: Vec<String> = other_rules.into_iter().chain(other_order).collect();
+        check_confirmed(&stage, &told, change.confirm.as_deref())?;
     }
     let wanted = faceoff_store::StageChange {
         name: change.name.as_deref().map(name).transpose()?,
@@ -170,19 +220,31 @@ pub(crate) async fn change_stage(
     StageView::of(&app, changed).await.map(Json)
 }
 
-fn check_confirmed(stage: &Stage, confirm: Option<&str>) -> Result<(), Problem> {
-    if confirm == Some(stage.name.as_str()) {
+fn begins_anew(stage: &Stage) -> String {
+    let number = stage.rules.number;
+    format!(
+        "other rules begin revision {} with an empty board, what was played by revision {number} stays on its own, and \
+         neither can be undone",
+        number + 1
+    )
+}
+
+fn ordered_anew(stage: &Stage, standings: Standings) -> String {
+    format!(
+        "the rows of its boards would be made by {standings} in place of {}, at once, of all that was played",
+        stage.settings.standings
+    )
+}
+
+/// Refuses what would change an open stage's boards unless the stage is named.
+fn check_confirmed(stage: &Stage, told: &[String], confirm: Option<&str>) -> Result<(), Problem> {
+    let name = stage.name.as_str();
+    if told.is_empty() || confirm == Some(name) {
         return Ok(());
     }
-    let (name, number) = (stage.name.as_str(), stage.rules.number);
-    Err(Problem::new(
-        ProblemKind::NotConfirmed,
-        format!(
-            "the stage {name:?} is open: other rules begin revision {} with an empty board, what was played by \
-             revision {number} stays on its own, and neither can be undone. To do it, send “confirm” with the \
-             stage's name",
-            number + 1
-        ),
-    )
-    .with("confirm", name))
+    let detail = format!(
+        "the stage {name:?} is open: {}. To do it, send “confirm” with the stage's name",
+        told.join("; ")
+    );
+    Err(Problem::new(ProblemKind::NotConfirmed, detail).with("confirm", name))
 }

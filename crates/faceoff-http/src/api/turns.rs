@@ -8,7 +8,7 @@ use crate::{
     paths,
     problem::Problem,
     requests::{Decision, ExtraTurn, MissedDay},
-    views::{day::DayView, evaluation::EvaluationView},
+    views::{day::DayView, evaluation::EvaluationView, sight::Sight},
 };
 use axum::{
     Json,
@@ -122,7 +122,7 @@ pub(crate) async fn extra_turn(
         )
         .await?;
     tracing::info!(team = %team.name, day = %of.date, evaluation = %turn.id, reason, "an extra turn was given");
-    let view = EvaluationView::of(&app, turn).await?;
+    let view = EvaluationView::of(&app, &Sight::of_organiser(&app).await?, turn).await?;
     let location = [(header::LOCATION, paths::evaluation(view.id))];
     Ok((StatusCode::CREATED, AppendHeaders(location), Json(view)))
 }

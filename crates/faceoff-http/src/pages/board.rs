@@ -3,18 +3,20 @@
 use super::{
     figures,
     frame::{Frame, PageProblem, render},
+    standing,
 };
 use crate::{
     app::App,
-    auth::PerhapsOrganiser,
     extract::{PathParam, QueryParams},
     problem::Problem,
     requests::BoardQuery,
+    viewer::Viewer,
     views::{
         board::{BoardRow, BoardView},
         evaluation::{EvaluationStatus, EvaluationView, Progress},
         ruling::RulingView,
         season::SeasonHead,
+        sight::Sight,
         stage::{PhaseView, StageView},
         task::TaskView,
         team::TeamView,
@@ -22,7 +24,7 @@ use crate::{
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
-use faceoff_types::{EvaluationId, StageDay, Task, Tier, ViolationCounts};
+use faceoff_types::{EvaluationId, StageDay, Task, TaskWeights, Tier, TierBounds, ViolationCounts};
 use figures::Rate;
 use jiff::{Timestamp, civil};
 
@@ -39,6 +41,8 @@ struct Who {
     day: civil::Date,
     /// Why it is a turn beside the day's own.
     extra_turn: Option<String>,
+    /// How many days the row is a mean of, if of several.
+    days: Option<usize>,
     /// How it was evaluated, where the rows of the board differ in that.
     setting: Option<String>,
 }
@@ -53,10 +57,16 @@ fn setting(row: &BoardRow) -> String {
     )
 }
 
-/// Of the task with the most.
+/// Of the task with the most, on a day.
 fn episodes(row: &BoardRow) -> u32 {
     let episodes = row.tasks.values().map(|task| task.episodes);
-    episodes.max().unwrap_or(0)
+    of_a_day(row, episodes.max().unwrap_or(0))
+}
+
+/// Episodes of a day, of those of all that the row is made of.
+fn of_a_day(row: &BoardRow, episodes: u32) -> u32 {
+    let days = u32::try_from(row.evaluations.len()).unwrap_or(u32::MAX);
+    episodes / days.max(1)
 }
 
 /// The setting of the whole board; `None` where its rows differ.
@@ -72,12 +82,15 @@ impl Who {
         Self {
             rank: row.rank,
             rank_group: row.rank_group,
-            tier_change: figures::chance(row.tier_change_probability),
+            tier_change: row
+                .tier_change_probability
+                .map_or_else(|| "not computed of means".to_owned(), figures::chance),
             team: row.team.to_string(),
             agent: row.agent.clone(),
             evaluation: row.evaluation,
             day: row.day,
             extra_turn: row.extra_turn.clone(),
+            days: (row.evaluations.len() > 1).then_some(row.evaluations.len()),
             setting: common_setting.is_none().then(|| setting(row)),
         }
     }
@@ -88,7 +101,7 @@ struct TierRows<Row> {
     name: &'static str,
     title: &'static str,
     sign: &'static str,
-    bounds: &'static str,
+    bounds: String,
     rows: Vec<Row>,
 }
 
@@ -99,7 +112,7 @@ fn by_tier<Row>(board: &BoardView, row: impl Fn(&BoardRow) -> Row) -> Vec<TierRo
             name: tier.as_str(),
             title: tier.title(),
             sign: figures::tier_sign(tier),
-            bounds: figures::tier_bounds(tier),
+            bounds: figures::tier_bounds(tier, &board.tier_bounds),
             rows: Vec::new(),
         })
         .collect();
@@ -156,6 +169,21 @@ struct Heading {
     paused: Option<RulingView>,
     /// The organiser has frozen the board.
     frozen: Option<RulingView>,
+    /// What its rows are, for the table's caption.
+    rows: String,
+    /// What the tasks weigh, and the bounds of the tiers.
+    weights: TaskWeights,
+    tier_bounds: TierBounds,
+    /// The perturbations have magnitudes of their own.
+    own_magnitudes: bool,
+    /// What decides in the end, if that is something else.
+    still_to_come: Option<&'static str>,
+    /// Who sees it, if not everybody.
+    blind: Option<&'static str>,
+    /// Is it hidden from the viewer?
+    is_hidden: bool,
+    /// May it change?
+    result: String,
 }
 
 struct OtherBoard {
@@ -168,8 +196,10 @@ impl Heading {
     async fn of(
         app: &App,
         board: &BoardView,
+        sight: &Sight,
         paused: Option<RulingView>,
     ) -> Result<Self, PageProblem> {
+        let is_hidden = sight.is_hidden(board.stage);
         let stages = StageView::all(app).await?;
         let mut others = Vec::new();
         let mut heading = None;
@@ -204,6 +234,14 @@ impl Heading {
                     others: Vec::new(),
                     paused: None,
                     frozen: board.frozen.clone(),
+                    rows: standing::rows(board),
+                    weights: board.weights,
+                    tier_bounds: board.tier_bounds,
+                    own_magnitudes: board.perturbations.is_some(),
+                    still_to_come: standing::still_to_come(board),
+                    blind: standing::blind(board, is_hidden),
+                    is_hidden,
+                    result: standing::result(board),
                 });
             }
         }
@@ -248,35 +286,42 @@ struct OverallPage {
 
 /// The overall board.
 pub(super) async fn overall(
+    viewer: Result<Viewer, Problem>,
     State(app): State<App>,
-    caller: PerhapsOrganiser,
     query: Result<QueryParams<BoardQuery>, Problem>,
 ) -> Result<Response, PageProblem> {
     let QueryParams(query) = query?;
+    let sight = Sight::of(&app, viewer?).await?;
     let season = SeasonHead::now(&app).await?;
-    let board = BoardView::asked(&app, caller, query, None).await?;
+    let board = BoardView::asked(&app, &sight, query, None).await?;
     let today = app.store.stage(board.stage).await.map_err(Problem::from)?;
     let today = today.day(app.config.clock.now());
     let setting = common_setting(&board.rows);
     let page = OverallPage {
         frame: Frame::of(&app, season.name, "/"),
         today: today.date,
-        heading: Heading::of(&app, &board, season.paused).await?,
+        heading: Heading::of(&app, &board, &sight, season.paused).await?,
         commitment: season.commitment,
         tiers: by_tier(&board, |row| OverallRow::of(row, setting.as_ref())),
         setting,
-        under_way: under_way(&app, today).await?,
+        under_way: under_way(&app, &sight, today).await?,
         disqualified: board.disqualified,
     };
     render(&page)
 }
 
-async fn under_way(app: &App, today: StageDay) -> Result<Vec<UnderWay>, PageProblem> {
-    let evaluations = EvaluationView::current(app, today).await?;
+async fn under_way(
+    app: &App,
+    sight: &Sight,
+    today: StageDay,
+) -> Result<Vec<UnderWay>, PageProblem> {
+    let evaluations = EvaluationView::current(app, sight, today).await?;
     let under_way = evaluations.into_iter().filter_map(|evaluation| {
         let state = match evaluation.status {
             _ if evaluation.voided.is_some() => "Voided by the organiser",
             EvaluationStatus::Finished { .. } => return None,
+            // How it went is not told.
+            EvaluationStatus::AgentFailed { .. } if evaluation.blind => return None,
             EvaluationStatus::Queued => "Queued",
             EvaluationStatus::Running => "Running",
             EvaluationStatus::Finalising => "Computing the score",
@@ -332,7 +377,10 @@ impl TaskRow {
             who: Who::of(row, common_setting),
             rate: Rate::of(result),
             penalty_points: figures::one(result.penalty_points),
-            per_episode: figures::per_episode(result.penalty_points, result.episodes),
+            per_episode: figures::per_episode(
+                result.penalty_points,
+                of_a_day(row, result.episodes),
+            ),
             details: TaskDetails::of(result),
         }
     }
@@ -351,12 +399,13 @@ struct TaskPage {
 
 /// The board of one task.
 pub(super) async fn by_task(
+    viewer: Result<Viewer, Problem>,
     State(app): State<App>,
     task: Result<PathParam<Task>, Problem>,
-    caller: PerhapsOrganiser,
     query: Result<QueryParams<BoardQuery>, Problem>,
 ) -> Result<Response, PageProblem> {
     let (PathParam(task), QueryParams(query)) = (task?, query?);
+    let sight = Sight::of(&app, viewer?).await?;
     let season = SeasonHead::now(&app).await?;
     let (title, aim) = match task {
         Task::Hit => (
@@ -372,7 +421,7 @@ pub(super) async fn by_task(
             "Bring a puck from the border to a good hitting position.",
         ),
     };
-    let mut board = BoardView::asked(&app, caller, query, Some(task)).await?;
+    let mut board = BoardView::asked(&app, &sight, query, Some(task)).await?;
     // The board leaves out teams without the task; a row without one could show nothing.
     board.rows.retain(|row| row.tasks.contains_key(&task));
     let setting = common_setting(&board.rows);
@@ -382,7 +431,7 @@ pub(super) async fn by_task(
     let frame = Frame::of(&app, season.name, format!("/tasks/{task}"));
     render(&TaskPage {
         frame,
-        heading: Heading::of(&app, &board, season.paused).await?,
+        heading: Heading::of(&app, &board, &sight, season.paused).await?,
         title,
         aim,
         setting,

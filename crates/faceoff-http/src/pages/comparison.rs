@@ -8,7 +8,8 @@ use crate::{
     app::App,
     extract::PathParams,
     problem::Problem,
-    views::{comparison::ComparisonView, season::SeasonHead},
+    viewer::Viewer,
+    views::{comparison::ComparisonView, season::SeasonHead, sight::Sight},
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
@@ -65,11 +66,13 @@ struct Page {
 
 /// The comparison of two evaluations.
 pub(super) async fn page(
+    viewer: Result<Viewer, Problem>,
     State(app): State<App>,
     ids: Result<PathParams<EvaluationId, 2>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PathParams(ids) = ids?;
-    let view = ComparisonView::of(&app, ids).await?;
+    let sight = Sight::of(&app, viewer?).await?;
+    let view = ComparisonView::of(&app, &sight, ids).await?;
     let season = SeasonHead::now(&app).await?;
     let names = [view.a.team.as_str(), view.b.team.as_str()];
     let rows = view

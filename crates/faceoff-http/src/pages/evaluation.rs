@@ -10,12 +10,14 @@ use crate::{
     extract::PathParam,
     freeze,
     problem::Problem,
+    viewer::Viewer,
     views::{
         ablation,
         evaluation::{EvaluationStatus, EvaluationView, Progress, ResultView},
         queue::QueueView,
         ruling::RulingView,
         season::SeasonHead,
+        sight::Sight,
         submission::SubmissionView,
         task::TaskView,
         violations::ViolationsView,
@@ -101,7 +103,7 @@ struct Finished {
     tier_name: &'static str,
     tier_title: &'static str,
     tier_sign: &'static str,
-    tier_bounds: &'static str,
+    tier_bounds: String,
     tier_change: String,
     resamples: u32,
     ruleset: String,
@@ -270,6 +272,8 @@ struct Page {
     ablation: Option<String>,
     /// Said when there is no result.
     state: String,
+    /// Is its dataset there for everybody?
+    public: bool,
     progress: Option<Progress>,
     /// Where it stands in the queue, in words.
     place: Option<String>,
@@ -291,11 +295,13 @@ fn place(queue: &QueueView) -> String {
 
 /// One evaluation.
 pub(super) async fn page(
+    viewer: Result<Viewer, Problem>,
     State(app): State<App>,
     id: Result<PathParam<EvaluationId>, Problem>,
 ) -> Result<Response, PageProblem> {
     let PathParam(id) = id?;
-    let view = EvaluationView::find(&app, id).await?;
+    let sight = Sight::of(&app, viewer?).await?;
+    let view = EvaluationView::find(&app, &sight, id).await?;
     let submission = SubmissionView::find(&app, view.submission).await?;
     let ablation = ablation::exists(&app, submission.id).await?;
     let season = SeasonHead::now(&app).await?;
@@ -304,13 +310,13 @@ pub(super) async fn page(
         _ if frozen.is_some() => None,
         EvaluationStatus::Finished {
             finished_at,
-            result,
+            result: Some(result),
             dataset_blake3,
             ..
         } => {
             let summary = view.summary(&app).await?;
             let others = match view.released_at {
-                Some(_) => others(&app, &view, result.seed).await?,
+                Some(_) => others(&app, &sight, &view, result.seed).await?,
                 None => Vec::new(),
             };
             Some(Finished {
@@ -339,8 +345,9 @@ pub(super) async fn page(
                 frozen.at.strftime("%Y-%m-%d %H:%M UTC"),
                 frozen.reason
             ),
-            None => in_words(&view.status).to_owned(),
+            None => in_words(&view).to_owned(),
         },
+        public: view.public,
         progress: (!view.status.is_final()).then_some(view.progress),
         place: view.queue.as_ref().map(place),
         next: view.next.clone(),
@@ -349,8 +356,13 @@ pub(super) async fn page(
 }
 
 /// What has become of an evaluation without a result.
-const fn in_words(status: &EvaluationStatus) -> &'static str {
-    match status {
+const fn in_words(view: &EvaluationView) -> &'static str {
+    const HIDDEN: &str = "It is over. Its stage is blind: how it went is hidden from everybody until the organiser opens \
+                          the stage, and nobody knows when that is.";
+    match &view.status {
+        EvaluationStatus::Finished { .. } | EvaluationStatus::AgentFailed { .. } if view.blind => {
+            HIDDEN
+        }
         EvaluationStatus::Queued => "It waits for a worker.",
         EvaluationStatus::Running => "Episodes are being played.",
         EvaluationStatus::Finalising => "All episodes are played; the score is being computed.",
@@ -374,6 +386,7 @@ const fn in_words(status: &EvaluationStatus) -> &'static str {
 /// The finished evaluations that can be compared with this one, in the order of their scores.
 async fn others(
     app: &App,
+    sight: &Sight,
     of: &EvaluationView,
     seed: Option<Seed>,
 ) -> Result<Vec<Other>, PageProblem> {
@@ -388,14 +401,17 @@ async fn others(
         stage: of.stage,
         date: of.day,
     };
-    let same_day = EvaluationView::of_day(app, day).await?;
+    let same_day = EvaluationView::of_day(app, sight, day).await?;
     let mut others = Vec::new();
     for view in same_day.into_iter().filter(same_episodes) {
         if freeze::hides_evaluation(app, &view).await?.is_some() {
             continue;
         }
         // An extra turn may have had episodes of its own.
-        if let EvaluationStatus::Finished { result, .. } = view.status
+        if let EvaluationStatus::Finished {
+            result: Some(result),
+            ..
+        } = view.status
             && result.seed == seed
         {
             others.push((result.score, view.team_name, view.id));
@@ -420,7 +436,7 @@ impl Finished {
             tier_name: result.tier.as_str(),
             tier_title: result.tier.title(),
             tier_sign: figures::tier_sign(result.tier),
-            tier_bounds: figures::tier_bounds(result.tier),
+            tier_bounds: figures::tier_bounds(result.tier, &result.variation.tier_bounds),
             tier_change: figures::chance(summary.tier_change_of(None)),
             resamples: TIER_CHANGE_RESAMPLES,
             ruleset: result.ruleset.clone(),

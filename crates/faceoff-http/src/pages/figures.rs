@@ -2,7 +2,7 @@
 
 use crate::views::task::TaskView;
 use faceoff_scoring::TIER_CHANGE_RESAMPLES;
-use faceoff_types::Tier;
+use faceoff_types::{Tier, TierBounds};
 
 /// A success rate with its interval.
 #[derive(Debug, Clone, PartialEq)]
@@ -107,11 +107,14 @@ pub(super) const fn tier_sign(tier: Tier) -> &'static str {
 }
 
 /// What a tier means, as the legend and the tables' group heads say it.
-pub(super) const fn tier_bounds(tier: Tier) -> &'static str {
+pub(super) fn tier_bounds(tier: Tier, bounds: &TierBounds) -> String {
+    let (deployable, improvable) = (bounds.deployable(), bounds.improvable());
     match tier {
-        Tier::Deployable => "at most 0.5 penalty points per episode",
-        Tier::Improvable => "more than 0.5, at most 1.5 penalty points per episode",
-        Tier::NonDeployable => "more than 1.5 penalty points per episode",
+        Tier::Deployable => format!("at most {deployable} penalty points per episode"),
+        Tier::Improvable => {
+            format!("more than {deployable}, at most {improvable} penalty points per episode")
+        }
+        Tier::NonDeployable => format!("more than {improvable} penalty points per episode"),
     }
 }
 
@@ -124,10 +127,11 @@ mod tests {
     fn the_tiers_bounds_are_the_scorings() {
         let deployable = DEPLOYABLE_POINTS_PER_EPISODE.to_string();
         let improvable = IMPROVABLE_POINTS_PER_EPISODE.to_string();
-        assert!(tier_bounds(Tier::Deployable).contains(&deployable));
-        assert!(tier_bounds(Tier::Improvable).contains(&deployable));
-        assert!(tier_bounds(Tier::Improvable).contains(&improvable));
-        assert!(tier_bounds(Tier::NonDeployable).contains(&improvable));
+        let told = |tier| tier_bounds(tier, &TierBounds::default());
+        assert!(told(Tier::Deployable).contains(&deployable));
+        assert!(told(Tier::Improvable).contains(&deployable));
+        assert!(told(Tier::Improvable).contains(&improvable));
+        assert!(told(Tier::NonDeployable).contains(&improvable));
     }
 
     #[test]

@@ -17,6 +17,7 @@ mod problems;
 mod register;
 mod season;
 mod sign_in;
+mod standing;
 mod unknown;
 
 pub(crate) use unknown::{unknown_method, unknown_path};

@@ -4,6 +4,8 @@
 use super::frame::{Frame, PageProblem, render};
 use crate::{
     app::App,
+    problem::Problem,
+    viewer::Viewer,
     views::{season::SeasonView, stage::StageView},
 };
 use askama::Template;
@@ -47,8 +49,11 @@ impl Page {
     }
 }
 
-pub(super) async fn page(State(app): State<App>) -> Result<Response, PageProblem> {
-    let season = SeasonView::now(&app).await?;
+pub(super) async fn page(
+    viewer: Result<Viewer, Problem>,
+    State(app): State<App>,
+) -> Result<Response, PageProblem> {
+    let season = SeasonView::now(&app, viewer?).await?;
     let instant = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M:%S UTC").to_string();
     render(&Page {
         frame: Frame::of(&app, season.name.clone(), "/season"),

@@ -84,6 +84,9 @@ kinds! {
     NotYet "not-yet" CONFLICT
         "Not yet"
         "Datasets and comparisons tell of the day's episodes. They come out for everybody at once, when the last evaluation of the day has ended."
+    Blind "blind" CONFLICT
+        "The stage is blind"
+        "Scores, points, tiers, boards, comparisons and datasets of a blind stage are hidden from everybody until the organiser opens it. Its evaluations tell their state and progress."
     SeasonClosed "season-closed" CONFLICT
         "The season is over"
         "The season's secret is published, so nothing more is uploaded or evaluated. Results and datasets stay."

@@ -137,15 +137,6 @@ pub struct TeamChange {
     pub division: Option<Option<DivisionName>>,
 }
 
-/// What needs a name to be done.
-#[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Confirmation {
-    /// The name of what it is about. Without it nothing is done, and the answer says what would be.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub confirm: Option<String>,
-}
-
 /// What of the season is to be another; what is left out stays as it is.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]

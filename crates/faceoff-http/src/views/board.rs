@@ -1,25 +1,33 @@
 //! Who stands where, and how sure that is.
 
-use super::{ruling::RulingView, stage, task::TaskView, team::TeamView};
+use super::{
+    finalised::FinalisedView,
+    ruling::RulingView,
+    sight::Sight,
+    stage,
+    standings::{self, Standing},
+    task::TaskView,
+    team::TeamView,
+};
 use crate::{
-    app::AppState, auth::PerhapsOrganiser, problem::Problem, requests::BoardQuery,
-    summaries::RunSummaries, views::shown,
+    app::AppState, problem::Problem, requests::BoardQuery, summaries::RunSummaries, views::shown,
 };
 use faceoff_scoring::{
-    BoardEntry, Played, RankedEntry, SIGNIFICANCE, TIER_CHANGE_RESAMPLES, overall_board,
-    rank_groups, task_board,
+    EpisodeSummary, Played, RankedEntry, SIGNIFICANCE, TIER_CHANGE_RESAMPLES, joined_summary,
+    rank_groups,
 };
 use faceoff_store::{BoardRecord, BoardScope, Stage};
 use faceoff_types::{
-    EvaluationId, Profile, Seed, StageId, StageName, Task, TeamId, TeamName, Tier,
+    EvaluationId, PerturbationSettings, Profile, Seed, StageId, StageName, Standings, Task,
+    TaskWeights, TeamId, TeamName, Tier, TierBounds,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 use utoipa::ToSchema;
 
-/// A board: each team's newest evaluation of a stage that is finished under one revision of its rules, in board
-/// order.
+/// A board: of each team what the stage's standings say, of its evaluations that are finished under one revision of
+/// the stage's rules, in board order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct BoardView {
     /// Whose it is.
@@ -33,6 +41,23 @@ pub struct BoardView {
     /// The simulator and the scoring that the scores refer to.
     #[schema(example = "airhockey-2023.2")]
     pub ruleset: String,
+    /// What each task's success rate weighs in the overall score.
+    pub weights: TaskWeights,
+    /// Penalty points per episode up to which an agent is in a tier.
+    pub tier_bounds: TierBounds,
+    /// Magnitudes of the perturbations that the profile switches on; absent where they are the ruleset's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub perturbations: Option<Box<PerturbationSettings>>,
+    /// What rows are made of in the end.
+    pub standings: Standings,
+    /// What they are made of at the moment: before a final day, of the newest evaluations, which do not count then.
+    pub rows_by: Standings,
+    /// The stage is blind: without the organiser's token there are no rows until the organiser opens it.
+    pub blind: bool,
+    /// The result may still change: it is not signed off.
+    pub provisional: bool,
+    /// It is signed off, if it is.
+    pub finalised: Option<FinalisedView>,
     /// The task, or null for the overall board.
     pub task: Option<Task>,
     /// The level at which teams are told apart: rows of one rank group stand in the same tier and
@@ -61,16 +86,19 @@ pub struct BoardRow {
     pub rank_group: u32,
     /// The overall one, or the task's.
     pub tier: Tier,
-    /// Probability that other episodes of the same kind would give another tier.
-    pub tier_change_probability: f64,
+    /// Probability that other episodes of the same kind would give another tier; null where the row is a mean of
+    /// several days, of which it is not computed.
+    pub tier_change_probability: Option<f64>,
     /// The team's name.
     pub team: TeamName,
     /// Stays when names change.
     pub team_id: TeamId,
     /// The agent's own name.
     pub agent: Option<String>,
-    /// The newest that the team finished.
+    /// What the row shows; of a mean, the newest of its evaluations.
     pub evaluation: EvaluationId,
+    /// All that the row is made of, the earlier day first: one, unless it is a mean.
+    pub evaluations: Vec<EvaluationId>,
     /// The date, in the stage's zone, whose episodes it played.
     pub day: Date,
     /// It is a turn beside the day's own, and why; absent otherwise. Given after the day's release it played other
@@ -85,13 +113,15 @@ pub struct BoardRow {
     pub profile: Profile,
     /// Overall score in percent.
     pub score: f64,
-    /// Overall penalty points: the maximum over the tasks.
+    /// Overall penalty points: the maximum over the tasks. Of a mean: of a day.
     pub penalty_points: f64,
-    /// When the day's last evaluation had ended, and all of the day came out; null until then.
+    /// When the day's last evaluation had ended, and all of the day came out; null until then. Of a mean: null until
+    /// that is so of all its days.
     pub released_at: Option<Timestamp>,
-    /// The seed of the day's evaluations; null until the day is released.
+    /// The seed of the day's evaluations; null until the day is released, and where the row is a mean of several days.
     pub seed: Option<Seed>,
-    /// Results by task: hit, defend, prepare.
+    /// Results by task: hit, defend, prepare. Of a mean, episodes, successes, violations and steps are sums over the
+    /// days, rates and points are means of a day, and of the computation times `p99` and `max` are the worst day's.
     pub tasks: BTreeMap<Task, TaskView>,
 }
 
@@ -100,12 +130,12 @@ impl BoardView {
     /// organiser's alone.
     pub(crate) async fn asked(
         app: &AppState,
-        caller: PerhapsOrganiser,
+        sight: &Sight,
         query: BoardQuery,
         task: Option<Task>,
     ) -> Result<Self, Problem> {
         if query.live {
-            caller.0?;
+            sight.check_organiser("the board beyond the freeze")?;
         }
         let stage = match query.stage {
             Some(id) => app.store.stage(id).await?,
@@ -123,103 +153,150 @@ impl BoardView {
             Some(number) => number,
             None => app.store.board_revision_until(&stage, scope.until).await?,
         };
-        let records = app.store.board_within(stage.id, revision, &scope).await?;
-        let board = Self::of(app, &stage, revision, task, records).await?;
+        let board = Self::of(app, sight, &stage, revision, task, (&scope, Vec::new())).await?;
         Ok(Self {
             frozen: frozen.map(RulingView::from),
             ..board
         })
     }
 
-    /// These records of a stage by one revision of its rules, ranked by all tasks or by one. A constant number of
+    /// The board of a stage by one revision of its rules within a scope, with results that are taken as if they counted
+    /// beside it, ranked by all tasks or by one. A constant number of
     /// reads, however many teams there are.
     pub(crate) async fn of(
         app: &AppState,
+        sight: &Sight,
         stage: &Stage,
         number: u32,
         task: Option<Task>,
-        records: Vec<BoardRecord>,
+        (scope, beside): (&BoardScope, Vec<BoardRecord>),
     ) -> Result<Self, Problem> {
         let mut revisions = app.store.stage_revisions(stage.id).await?.into_iter();
         let Some(revision) = revisions.find(|revision| revision.number == number) else {
             return Err(Problem::not_found("revision of the stage's rules"));
         };
         let mut disqualified = TeamView::all(app).await?;
-        disqualified.retain(|team| team.disqualified.is_some());
-        let runs: Vec<_> = records.iter().map(|record| record.run).collect();
-        let summaries = app.summaries.of(&runs).await?;
-        let mismatch_seed = app.store.season().await?.secret.model_mismatch();
-
-        let entries = records.into_iter().map(|record| BoardEntry {
-            result: record.result.clone(),
-            submitted_at_ms: record.submitted_at.as_millisecond(),
-            key: record,
-        });
-        let ranked = match task {
-            None => overall_board(entries.collect()),
-            Some(task) => task_board(task, entries.collect()),
+        match &stage.finalised {
+            None => disqualified.retain(|team| team.disqualified.is_some()),
+            Some(finalised) => disqualified.retain(|team| finalised.without.contains(&team.id)),
+        }
+        let variation = revision.rules.variation;
+        let rows_by = standings::at_the_moment(app, stage).await?;
+        let rows = if sight.is_hidden(stage.id) {
+            Vec::new()
+        } else {
+            ranked_rows(app, stage, number, (scope, beside), rows_by, task).await?
         };
-        let groups = rank_groups(&ranked, |leader, row| {
-            let leader = played(leader, &summaries, mismatch_seed)?;
-            Ok::<_, Problem>(leader.told_apart(&played(row, &summaries, mismatch_seed)?, task))
-        })?;
-        let rows = ranked.into_iter().zip(groups).map(|(ranked, rank_group)| {
-            let summary = played(&ranked.entry.key, &summaries, mismatch_seed)?.summary;
-            let tier_change_probability = summary.tier_change_of(task);
-            Ok(row(ranked, rank_group, tier_change_probability))
-        });
         Ok(Self {
             stage: stage.id,
             stage_name: stage.name.clone(),
             revision: number,
             since: revision.since,
             ruleset: revision.rules.ruleset.to_string(),
+            weights: variation.weights,
+            tier_bounds: variation.tier_bounds,
+            perturbations: (*variation.perturbations != PerturbationSettings::default())
+                .then_some(variation.perturbations),
+            standings: stage.settings.standings,
+            rows_by,
+            blind: stage.settings.blind,
+            provisional: stage.finalised.is_none(),
+            finalised: stage.finalised.clone().map(FinalisedView::from),
             task,
             significance: SIGNIFICANCE,
             tier_change_resamples: TIER_CHANGE_RESAMPLES,
             frozen: None,
             disqualified,
-            rows: rows.collect::<Result<_, Problem>>()?,
+            rows,
         })
     }
 }
 
-/// A board's record as comparisons need it.
-fn played<'a>(
-    record: &'a BoardRecord,
-    summaries: &'a RunSummaries,
-    mismatch_seed: Seed,
-) -> Result<Played<'a>, Problem> {
-    let run = record.run;
-    let summary = summaries
-        .get(&run)
-        .ok_or_else(|| Problem::internal(format_args!("run {run} has no summary")))?;
-    Ok(Played {
-        ruleset: &record.result.ruleset,
-        profile: record.result.profile,
-        seed: record.result.seed,
-        mismatch_seed,
-        summary,
-    })
+/// The rows of a board in their order, with what tells them apart.
+async fn ranked_rows(
+    app: &AppState,
+    stage: &Stage,
+    revision: u32,
+    results: (&BoardScope, Vec<BoardRecord>),
+    rows_by: Standings,
+    task: Option<Task>,
+) -> Result<Vec<BoardRow>, Problem> {
+    let rows = standings::rows(app, stage, revision, results, rows_by, task).await?;
+    let runs: Vec<_> = rows.iter().flat_map(|row| row.runs.clone()).collect();
+    let summaries = app.summaries.of(&runs).await?;
+    let mismatch_seed = app.store.season().await?.secret.model_mismatch();
+    let rows: Vec<Row> = rows
+        .into_iter()
+        .map(|standing| Row::of(standing, &summaries))
+        .collect::<Result<_, _>>()?;
+    let ranked = standings::ranked(rows, task, |row| &row.standing.record);
+    let groups = rank_groups(&ranked, |leader, row| {
+        let [leader, row] = [leader, row].map(|row| row.played(mismatch_seed));
+        Ok::<_, Problem>(leader.told_apart(&row, task))
+    })?;
+    let rows = ranked.into_iter().zip(groups);
+    Ok(rows
+        .map(|(ranked, rank_group)| row(ranked, rank_group, task))
+        .collect())
 }
 
-fn row(
-    ranked: RankedEntry<BoardRecord>,
-    rank_group: u32,
-    tier_change_probability: f64,
-) -> BoardRow {
+/// A row with its episodes.
+struct Row {
+    standing: Standing,
+    summary: Arc<EpisodeSummary>,
+}
+
+impl Row {
+    fn of(standing: Standing, summaries: &RunSummaries) -> Result<Self, Problem> {
+        let days = standing.runs.iter().map(|run| {
+            let summary = summaries.get(run);
+            summary.ok_or_else(|| Problem::internal(format_args!("run {run} has no summary")))
+        });
+        let days: Vec<&Arc<EpisodeSummary>> = days.collect::<Result<_, _>>()?;
+        let summary = match days[..] {
+            [one] => Arc::clone(one),
+            _ => {
+                let days: Vec<&EpisodeSummary> = days.iter().map(|day| &***day).collect();
+                Arc::new(joined_summary(&days))
+            }
+        };
+        Ok(Self { standing, summary })
+    }
+
+    /// As comparisons need it.
+    fn played(&self, mismatch_seed: Seed) -> Played<'_> {
+        let result = &self.standing.record.result;
+        Played {
+            ruleset: &result.ruleset,
+            profile: result.profile,
+            variation: &result.variation,
+            seed: result.seed,
+            mismatch_seed,
+            summary: &self.summary,
+        }
+    }
+}
+
+fn row(ranked: RankedEntry<Row>, rank_group: u32, task: Option<Task>) -> BoardRow {
     let RankedEntry { rank, tier, entry } = ranked;
-    let (record, result) = (entry.key, entry.result);
+    let (row, result) = (entry.key, entry.result);
+    let Standing {
+        record,
+        evaluations,
+        ..
+    } = row.standing;
     let released = record.released_at.is_some();
+    let is_mean = evaluations.len() > 1;
     BoardRow {
         rank,
         rank_group,
         tier,
-        tier_change_probability,
+        tier_change_probability: (!is_mean).then(|| row.summary.tier_change_of(task)),
         team: record.team.name,
         team_id: record.team.id,
         agent: record.agent_name.map(shown),
         evaluation: record.evaluation,
+        evaluations,
         day: record.day,
         extra_turn: record.extra_for,
         finished_at: record.finished_at,
@@ -228,7 +305,7 @@ fn row(
         score: result.score,
         penalty_points: result.penalty_points,
         released_at: record.released_at,
-        seed: released.then_some(result.seed),
+        seed: (released && !is_mean).then_some(result.seed),
         tasks: result
             .tasks
             .iter()

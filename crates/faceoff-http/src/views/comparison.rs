@@ -1,5 +1,6 @@
 //! Whether one of two agents is better, by the episodes that both played.
 
+use super::sight::Sight;
 use crate::{
     app::AppState,
     freeze,
@@ -50,7 +51,7 @@ struct Side {
 }
 
 impl Side {
-    async fn load(app: &AppState, id: EvaluationId) -> Result<Self, Problem> {
+    async fn load(app: &AppState, sight: &Sight, id: EvaluationId) -> Result<Self, Problem> {
         let evaluation = app
             .store
             .evaluation(id)
@@ -62,6 +63,7 @@ impl Side {
                 ),
                 error => error.into(),
             })?;
+        sight.check_shown(evaluation.of.stage)?;
         let EvaluationState::Finished { result, .. } = &evaluation.state else {
             return Err(Problem::new(
                 ProblemKind::Conflict,
@@ -83,6 +85,7 @@ impl Side {
         Played {
             ruleset: &self.result.ruleset,
             profile: self.result.profile,
+            variation: &self.result.variation,
             seed: self.result.seed,
             mismatch_seed,
             summary: &self.summary,
@@ -120,9 +123,17 @@ impl ComparisonView {
     /// Compares two finished evaluations.
     ///
     /// # Errors
-    /// `NotFound`, `Conflict` while one has no result, `NotYet` before their day is released, `NotPaired` when they did not play the same episodes.
-    pub(crate) async fn of(app: &AppState, [a, b]: [EvaluationId; 2]) -> Result<Self, Problem> {
-        let (a, b) = (Side::load(app, a).await?, Side::load(app, b).await?);
+    /// `NotFound`, `Conflict` while one has no result, `Blind` and `NotYet` before their stage is opened and their day released,
+    /// `NotPaired` when they did not play the same episodes.
+    pub(crate) async fn of(
+        app: &AppState,
+        sight: &Sight,
+        [a, b]: [EvaluationId; 2],
+    ) -> Result<Self, Problem> {
+        let (a, b) = (
+            Side::load(app, sight, a).await?,
+            Side::load(app, sight, b).await?,
+        );
         let not_paired = |field: &str, detail: String| {
             Problem::new(
                 ProblemKind::NotPaired,

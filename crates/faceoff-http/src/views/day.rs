@@ -1,6 +1,6 @@
 //! The day's cut: what it brought about, and when the next one is.
 
-use super::{evaluation::EvaluationView, team::TeamView};
+use super::{evaluation::EvaluationView, sight::Sight, team::TeamView};
 use crate::{app::AppState, problem::Problem};
 use faceoff_store::Stage;
 use faceoff_types::{StageDay, StageId, StageName, TeamId, Zone};
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use std::{collections::BTreeSet, fmt};
 use utoipa::ToSchema;
 
-/// What starting the day did.
+/// What starting the day did, as the organiser sees it.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
 pub struct DayView {
     /// Whose day.
@@ -24,7 +24,8 @@ pub struct DayView {
 
 impl DayView {
     pub(crate) async fn of(app: &AppState, of: StageDay) -> Result<Self, Problem> {
-        let mut created = EvaluationView::of_day(app, of).await?;
+        let sight = Sight::of_organiser(app).await?;
+        let mut created = EvaluationView::of_day(app, &sight, of).await?;
         EvaluationView::place(app, &mut created).await?;
         let evaluated: BTreeSet<TeamId> = created.iter().map(|created| created.team).collect();
         let mut without_submission = TeamView::all(app).await?;

@@ -3,6 +3,7 @@
 use super::{
     queue::{self, QueueView},
     ruling::RulingView,
+    sight::Sight,
 };
 use crate::{app::AppState, paths, problem::Problem, views::shown};
 use faceoff_scoring::EpisodeSummary;
@@ -49,6 +50,11 @@ pub struct EvaluationView {
     /// It does not count, if it was voided; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub voided: Option<RulingView>,
+    /// Its stage is blind: its result is hidden until the organiser opens that; absent otherwise.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub blind: bool,
+    /// Everybody sees it and its dataset, without a token.
+    pub public: bool,
     /// The perturbations.
     pub profile: Profile,
     /// In the order of play.
@@ -79,18 +85,28 @@ pub struct Progress {
 }
 
 impl EvaluationView {
-    pub(crate) async fn find(app: &AppState, id: EvaluationId) -> Result<Self, Problem> {
-        Self::of(app, app.store.evaluation(id).await?).await
+    pub(crate) async fn find(
+        app: &AppState,
+        sight: &Sight,
+        id: EvaluationId,
+    ) -> Result<Self, Problem> {
+        Self::of(app, sight, app.store.evaluation(id).await?).await
     }
 
-    /// With its place in the queue while it is under way; with faults and log, if it failed by them and its day is
-    /// released.
-    pub(crate) async fn of(app: &AppState, evaluation: Evaluation) -> Result<Self, Problem> {
+    /// With its place in the queue while it is under way; with faults and log, if it failed by them, its day is
+    /// released, and the viewer may see them.
+    pub(crate) async fn of(
+        app: &AppState,
+        sight: &Sight,
+        evaluation: Evaluation,
+    ) -> Result<Self, Problem> {
         let team = app.store.team(evaluation.team).await?;
         let run = evaluation.run;
-        let mut view = Self::new(evaluation, team.name);
+        let tells_faults = sight.is_own(&evaluation) && !sight.is_hidden(evaluation.of.stage);
+        let mut view = Self::new(sight, evaluation, team.name);
         if let EvaluationStatus::AgentFailed { faults, log, .. } = &mut view.status
             && view.released_at.is_some()
+            && tells_faults
         {
             let of_run = app.store.run_faults(run).await?;
             *faults = Some(of_run.faults.into_iter().map(FaultView::from).collect());
@@ -114,17 +130,29 @@ impl EvaluationView {
 
     /// All evaluations of a date, of all stages, in the order in which they were queued; without faults and
     /// logs, which are long, as in all lists.
-    pub(crate) async fn all_on(app: &AppState, date: Date) -> Result<Vec<Self>, Problem> {
-        Self::all(app, app.store.evaluations_on(date).await?).await
+    pub(crate) async fn all_on(
+        app: &AppState,
+        sight: &Sight,
+        date: Date,
+    ) -> Result<Vec<Self>, Problem> {
+        Self::all(app, sight, app.store.evaluations_on(date).await?).await
     }
 
     /// Those of a stage's day.
-    pub(crate) async fn of_day(app: &AppState, of: StageDay) -> Result<Vec<Self>, Problem> {
-        Self::all(app, app.store.evaluations_of_day(of).await?).await
+    pub(crate) async fn of_day(
+        app: &AppState,
+        sight: &Sight,
+        of: StageDay,
+    ) -> Result<Vec<Self>, Problem> {
+        Self::all(app, sight, app.store.evaluations_of_day(of).await?).await
     }
 
     /// Those of `today`, after what began the day before and is still going.
-    pub(crate) async fn current(app: &AppState, today: StageDay) -> Result<Vec<Self>, Problem> {
+    pub(crate) async fn current(
+        app: &AppState,
+        sight: &Sight,
+        today: StageDay,
+    ) -> Result<Vec<Self>, Problem> {
         let mut evaluations = match today.date.yesterday() {
             Ok(date) => {
                 let yesterday = StageDay { date, ..today };
@@ -134,22 +162,30 @@ impl EvaluationView {
         };
         evaluations.retain(|evaluation| !evaluation.state.is_over());
         evaluations.extend(app.store.evaluations_of_day(today).await?);
-        Self::all(app, evaluations).await
+        Self::all(app, sight, evaluations).await
     }
 
     /// Of a team, newest first.
-    pub(crate) async fn of_team(app: &AppState, team: TeamId) -> Result<Vec<Self>, Problem> {
-        Self::all(app, app.store.evaluations_of(team).await?).await
+    pub(crate) async fn of_team(
+        app: &AppState,
+        sight: &Sight,
+        team: TeamId,
+    ) -> Result<Vec<Self>, Problem> {
+        Self::all(app, sight, app.store.evaluations_of(team).await?).await
     }
 
-    async fn all(app: &AppState, evaluations: Vec<Evaluation>) -> Result<Vec<Self>, Problem> {
+    async fn all(
+        app: &AppState,
+        sight: &Sight,
+        evaluations: Vec<Evaluation>,
+    ) -> Result<Vec<Self>, Problem> {
         let teams = app.store.teams().await?;
         let names: BTreeMap<TeamId, TeamName> =
             teams.into_iter().map(|team| (team.id, team.name)).collect();
         evaluations
             .into_iter()
             .map(|evaluation| match names.get(&evaluation.team) {
-                Some(name) => Ok(Self::new(evaluation, name.clone())),
+                Some(name) => Ok(Self::new(sight, evaluation, name.clone())),
                 None => Err(Problem::internal(format_args!(
                     "evaluation {} has no team",
                     evaluation.id
@@ -158,8 +194,12 @@ impl EvaluationView {
             .collect()
     }
 
-    fn new(evaluation: Evaluation, team_name: TeamName) -> Self {
+    fn new(sight: &Sight, evaluation: Evaluation, team_name: TeamName) -> Self {
         let released = evaluation.released_at.is_some();
+        let (hidden, public) = (
+            sight.is_hidden(evaluation.of.stage),
+            sight.is_public(&evaluation),
+        );
         let episodes_total = evaluation.plan.episodes_total();
         let episodes_done = match &evaluation.state {
             EvaluationState::Running { episodes_done, .. } => *episodes_done,
@@ -181,9 +221,9 @@ impl EvaluationView {
                 ..
             } => EvaluationStatus::Finished {
                 finished_at,
-                result: Box::new(ResultView::new(*result, released)),
-                dataset: format!("{}/dataset", paths::evaluation(evaluation.id)),
-                dataset_blake3,
+                result: (!hidden).then(|| Box::new(ResultView::new(*result, released))),
+                dataset: (!hidden).then(|| format!("{}/dataset", paths::evaluation(evaluation.id))),
+                dataset_blake3: dataset_blake3.filter(|_| !hidden),
             },
             EvaluationState::AgentFailed { finished_at } => EvaluationStatus::AgentFailed {
                 finished_at,
@@ -226,6 +266,8 @@ impl EvaluationView {
             rerun_of: evaluation.rerun_of,
             extra_turn: evaluation.extra_for,
             voided: evaluation.voided.map(RulingView::from),
+            blind: hidden,
+            public,
             profile: evaluation.plan.profile,
             tasks: evaluation.plan.tasks,
             episodes_per_task: evaluation.plan.episodes_per_task,

@@ -1,7 +1,9 @@
 //! What has become of an evaluation, and what happens to it next.
 
 use super::{shown, task::TaskView};
-use faceoff_types::{AgentFault, EvaluationResult, Profile, Seed, SlotTiming, Task, Tier};
+use faceoff_types::{
+    AgentFault, EvaluationResult, Profile, Seed, SlotTiming, Task, Tier, Variation,
+};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -21,11 +23,14 @@ pub enum EvaluationStatus {
     Finished {
         /// When the score was published.
         finished_at: Timestamp,
-        /// The score.
-        result: Box<ResultView>,
-        /// Path of the recorded dataset on this server.
-        dataset: String,
-        /// BLAKE3 of its archive, 64 hexadecimal digits; absent for datasets of older versions.
+        /// The score; absent while the stage is blind.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        result: Option<Box<ResultView>>,
+        /// Path of the recorded dataset on this server; absent while the stage is blind.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        dataset: Option<String>,
+        /// BLAKE3 of its archive, 64 hexadecimal digits; absent for datasets of older versions, and while the stage is
+        /// blind.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         dataset_blake3: Option<String>,
     },
@@ -133,6 +138,9 @@ pub struct ResultView {
     pub ruleset: String,
     /// The perturbations.
     pub profile: Profile,
+    /// What it was played and scored by otherwise than the ruleset has it.
+    #[serde(flatten)]
+    pub variation: Variation,
     /// The seed of the day's evaluations, 64 hexadecimal digits; null until the day is released.
     pub seed: Option<Seed>,
     /// By task: hit, defend, prepare.
@@ -155,6 +163,7 @@ impl ResultView {
         Self {
             ruleset: result.ruleset,
             profile: result.profile,
+            variation: result.variation,
             seed: released.then_some(result.seed),
             tasks: tasks
                 .map(|(task, result)| (*task, TaskView::new(result, released)))
@@ -204,17 +213,18 @@ mod tests {
         let reason = || "a reason".to_owned();
         let finished = EvaluationStatus::Finished {
             finished_at: at,
-            result: Box::new(ResultView {
+            result: Some(Box::new(ResultView {
                 ruleset: String::new(),
                 profile: Profile::Evaluation,
+                variation: Variation::default(),
                 seed: None,
                 tasks: Default::default(),
                 score: 0.0,
                 penalty_points: 0.0,
                 tier: Tier::Deployable,
                 timing: None,
-            }),
-            dataset: String::new(),
+            })),
+            dataset: Some(String::new()),
             dataset_blake3: None,
         };
         let agent_failed = EvaluationStatus::AgentFailed {

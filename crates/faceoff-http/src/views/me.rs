@@ -4,11 +4,12 @@ use super::{
     day::NextCut,
     evaluation::EvaluationView,
     queue::QueueView,
+    sight::Sight,
     stage,
     submission::{SubmissionStatus, SubmissionView},
     team::TeamView,
 };
-use crate::{app::AppState, problem::Problem};
+use crate::{app::AppState, problem::Problem, viewer::Viewer};
 use faceoff_store::{Evaluation, EvaluationState, Team};
 use faceoff_types::{EvaluationId, StageId, SubmissionId};
 use jiff::civil::Date;
@@ -63,6 +64,7 @@ pub struct ValidatingView {
 
 impl MeView {
     pub(crate) async fn of(app: &AppState, team: Team) -> Result<Self, Problem> {
+        let sight = Sight::of(app, Viewer::Team(team.id)).await?;
         let today = stage::current(app).await?.day(app.config.clock.now());
         let counts = |evaluation: &Evaluation| {
             let stopped = matches!(
@@ -79,7 +81,7 @@ impl MeView {
             .find(|evaluation| evaluation.of == today && counts(evaluation))
             .cloned();
         let evaluation = match evaluation {
-            Some(evaluation) => Some(EvaluationView::of(app, evaluation).await?),
+            Some(evaluation) => Some(EvaluationView::of(app, &sight, evaluation).await?),
             None => None,
         };
         let submissions = SubmissionView::of_team(app, team.id).await?;

@@ -1,8 +1,8 @@
 //! What can be known of a resource, and how it is made from the store and the scoring: one file per
 //! resource. API and pages show these very types, and the command line's client reads them.
 //!
-//! Nothing here is decided by who asks: what may be told of a day's episodes follows from its release, the
-//! same for everybody; whether a caller may see a thing at all is the API's to check.
+//! What may be told of a day's episodes follows from its release, the same for everybody. Who asks decides in one
+//! file alone, `sight.rs`: of blind stages, whose scores the organiser sees, and of evaluations that are not public.
 
 pub mod ablation;
 pub mod announcement;
@@ -13,6 +13,7 @@ pub mod day;
 pub mod evaluation;
 mod evaluation_status;
 pub mod event;
+pub mod finalised;
 pub mod invitation;
 pub mod me;
 pub mod person;
@@ -20,7 +21,9 @@ pub mod proposal;
 pub mod queue;
 pub mod ruling;
 pub mod season;
+pub(crate) mod sight;
 pub mod stage;
+mod standings;
 pub mod submission;
 pub mod task;
 pub mod team;

@@ -4,6 +4,7 @@ use super::{
     board::BoardView,
     evaluation::{FaultView, Progress, ResultView},
     shown,
+    sight::Sight,
 };
 use crate::{app::AppState, problem::Problem};
 use faceoff_store::{
@@ -14,7 +15,7 @@ use faceoff_types::{
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use utoipa::ToSchema;
 
 /// Evaluations of a stage that do not count: a trial, or a re-evaluation until it is applied. The organiser alone sees
@@ -273,6 +274,7 @@ async fn record(
 impl OutcomeView {
     async fn of(app: &AppState, proposal: &Proposal, drafts: &[Draft]) -> Result<Self, Problem> {
         let stage = app.store.stage(proposal.stage).await?;
+        let sight = Sight::of_organiser(app).await?;
         let mut played = Vec::new();
         for draft in drafts {
             played.extend(record(app, &stage, proposal, draft).await?);
@@ -280,7 +282,13 @@ impl OutcomeView {
         let revision = proposal.revision;
         let old_revision = match proposal.kind {
             ProposalKind::Trial => {
-                let new_board = BoardView::of(app, &stage, revision, None, played).await?;
+                // Nothing that counts.
+                let nothing = BoardScope {
+                    until: Some(Timestamp::MIN),
+                    without: Vec::new(),
+                };
+                let tried = (&nothing, played);
+                let new_board = BoardView::of(app, &sight, &stage, revision, None, tried).await?;
                 return Ok(Self {
                     changes: Vec::new(),
                     old_board: None,
@@ -290,8 +298,8 @@ impl OutcomeView {
             ProposalKind::Rules(_) => app.store.board_revision(&stage).await?,
             ProposalKind::Evaluation(_) | ProposalKind::Day(_) => revision,
         };
-        let old = app.store.board(stage.id, old_revision).await?;
-        let old_board = BoardView::of(app, &stage, old_revision, None, old).await?;
+        let now = (&BoardScope::default(), Vec::new());
+        let old_board = BoardView::of(app, &sight, &stage, old_revision, None, now).await?;
         // What we broke replaces nothing.
         let replaces = |draft: &Draft| match draft.state {
             EvaluationState::Finished { .. } | EvaluationState::AgentFailed { .. } => {
@@ -303,19 +311,8 @@ impl OutcomeView {
             until: None,
             without: drafts.iter().filter_map(replaces).collect(),
         };
-        let counting = app.store.board_within(stage.id, revision, &scope).await?;
-        let mut rows: BTreeMap<TeamId, BoardRecord> =
-            counting.into_iter().map(|row| (row.team.id, row)).collect();
-        for row in played {
-            let newer = rows
-                .get(&row.team.id)
-                .is_some_and(|other| other.day > row.day);
-            if !newer {
-                rows.insert(row.team.id, row);
-            }
-        }
-        let rows = rows.into_values().collect();
-        let new_board = BoardView::of(app, &stage, revision, None, rows).await?;
+        let then = (&scope, played);
+        let new_board = BoardView::of(app, &sight, &stage, revision, None, then).await?;
         Ok(Self {
             changes: changes(&old_board, &new_board),
             old_board: Some(old_board),

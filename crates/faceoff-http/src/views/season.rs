@@ -3,9 +3,10 @@
 use super::{
     day::NextCut,
     ruling::RulingView,
+    sight::Sight,
     stage::{self, StageView},
 };
-use crate::{app::AppState, problem::Problem};
+use crate::{app::AppState, problem::Problem, viewer::Viewer};
 use faceoff_types::{DivisionName, RULESET, Seed, StageDay, StageId};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
@@ -71,13 +72,14 @@ pub struct SeasonDay {
     pub missed: Option<String>,
     /// Its finished evaluations.
     pub finished: u32,
-    /// The seed of its evaluations; null until it is released.
+    /// The seed of its evaluations; null until it is released, and while its stage is blind: scores follow from it.
     pub seed: Option<Seed>,
 }
 
 impl SeasonView {
-    pub(crate) async fn now(app: &AppState) -> Result<Self, Problem> {
+    pub(crate) async fn now(app: &AppState, viewer: Viewer) -> Result<Self, Problem> {
         let season = app.store.season().await?;
+        let sight = Sight::of(app, viewer).await?;
         let days = app.store.days().await?;
         let missed: HashMap<StageDay, String> =
             app.store.missed_days().await?.into_iter().collect();
@@ -110,7 +112,10 @@ impl SeasonView {
                     released_at: day.released_at,
                     missed: missed.get(&day.of).cloned(),
                     finished,
-                    seed: day.released_at.and_then(|_| seed(day.of)),
+                    seed: day
+                        .released_at
+                        .filter(|_| !sight.is_hidden(day.of.stage))
+                        .and_then(|_| seed(day.of)),
                 })
                 .collect(),
             name: season.name,

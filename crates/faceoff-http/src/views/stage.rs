@@ -1,6 +1,6 @@
 //! A stage: when it is open, by which rules it is played, and when its next day starts.
 
-use super::{day::NextCut, ruling::RulingView};
+use super::{day::NextCut, finalised::FinalisedView, ruling::RulingView};
 use crate::{app::AppState, problem::Problem};
 use faceoff_store::{Revision, Stage, StagePhase};
 use faceoff_types::{StageId, StageName, StageRules, StageSettings, Zone};
@@ -33,6 +33,8 @@ pub struct StageView {
     pub names_seeds: bool,
     /// Does it take rules and settings from the server's configuration, at each start?
     pub configured: bool,
+    /// Its result is signed off, if it is: nothing of it changes any more. Null: its result is provisional.
+    pub finalised: Option<FinalisedView>,
     /// What no score depends on.
     #[serde(flatten)]
     pub settings: StageSettings,
@@ -118,6 +120,7 @@ impl StageView {
             zone: stage.zone,
             names_seeds: stage.names_seeds,
             configured: stage.configured,
+            finalised: stage.finalised.map(FinalisedView::from),
             settings: stage.settings,
             rules: stage.rules.into(),
             revisions: revisions.into_iter().map(RevisionView::from).collect(),

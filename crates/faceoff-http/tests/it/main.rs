@@ -6,6 +6,7 @@
 
 mod ablations;
 mod acts;
+mod blind;
 mod board;
 mod board_load;
 mod capacity;
@@ -17,14 +18,18 @@ mod openapi;
 mod people;
 mod problems;
 mod proposals;
+mod publication;
 mod roles;
 mod room;
 mod rulings;
 mod season;
 mod seeds;
 mod sign_in;
+mod sign_off;
 mod site;
 mod stages;
+mod standings;
 mod submissions;
 mod teams;
 mod uploads;
+mod variation;

@@ -355,13 +355,18 @@ impl Site {
                             .collect();
                         (
                             task,
-                            faceoff_scoring::score_task(&of_task, &Default::default()),
+                            faceoff_scoring::score_task(
+                                &of_task,
+                                &Default::default(),
+                                &run.plan.variation.tier_bounds,
+                            ),
                         )
                     });
                     let result = faceoff_scoring::score_evaluation(
                         run.ruleset,
                         run.plan.profile,
                         seeds.episodes,
+                        &run.plan.variation,
                         tasks.into(),
                     );
                     self.publish(&claim, evaluation, &result).await;
@@ -443,6 +448,7 @@ fn plan() -> RunPlan {
         episodes_per_task: 4,
         episodes_per_shard: 4,
         max_faults: 1,
+        variation: Default::default(),
     }
 }
 
@@ -459,6 +465,7 @@ async fn stage_by(
         tasks: plan.tasks.clone(),
         episodes_per_task: plan.episodes_per_task,
         max_faults: plan.max_faults,
+        variation: Default::default(),
     };
     let settings = StageSettings {
         schedule,
@@ -590,5 +597,6 @@ pub fn result(rates: [f64; 3], penalty_points: f64) -> EvaluationResult {
             host_noise_reruns: 2,
             platform_retries: 1,
         }),
+        variation: Default::default(),
     }
 }

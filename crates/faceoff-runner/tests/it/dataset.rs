@@ -100,6 +100,7 @@ fn meta() -> EvaluationMeta {
         mismatch_seed: spec.mismatch_seed,
         agent: "test".into(),
         ruleset: Ruleset::CURRENT,
+        variation: Default::default(),
     }
 }
 

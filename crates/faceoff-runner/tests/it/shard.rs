@@ -39,6 +39,7 @@ pub fn spec(task: Task, episodes: Range<u32>) -> ShardSpec {
         seed,
         mismatch_seed: seed.model_mismatch(),
         max_faults: 2,
+        perturbations: Default::default(),
     }
 }
 

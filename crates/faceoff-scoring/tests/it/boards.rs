@@ -13,6 +13,7 @@ fn entry<K>(key: K, successes: u32, penalty_points: f64, submitted_at_ms: i64) -
         Ruleset::CURRENT,
         Profile::Evaluation,
         Seed::from_number(0),
+        &Default::default(),
         tasks,
     );
     BoardEntry {

@@ -3,9 +3,11 @@ use faceoff_scoring::{
     EpisodeSummary, NotPaired, PairedTally, PairingError, Played, StepTimes, overall_p_value,
     overall_score, score_task,
 };
-use faceoff_types::{EpisodeOutcome, Profile, RULESET, Seed, Task, Violations};
+use faceoff_types::{
+    EpisodeOutcome, Profile, RULESET, Seed, Task, TierBounds, Variation, Violations,
+};
 use proptest::prelude::*;
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::LazyLock};
 
 /// `solved` decides by task and episode.
 fn outcomes(episodes: u32, solved: impl Fn(Task, u32) -> bool) -> Vec<EpisodeOutcome> {
@@ -22,17 +24,104 @@ fn outcomes(episodes: u32, solved: impl Fn(Task, u32) -> bool) -> Vec<EpisodeOut
 }
 
 fn summary(outcomes: &[EpisodeOutcome]) -> EpisodeSummary {
-    EpisodeSummary::of(outcomes).unwrap()
+    EpisodeSummary::of(outcomes, &Default::default()).unwrap()
 }
 
 fn played(summary: &EpisodeSummary) -> Played<'_> {
     Played {
         ruleset: RULESET,
         profile: Profile::Evaluation,
+        variation: &RULESETS,
         seed: Seed::from_number(1),
         mismatch_seed: Seed::from_number(2),
         summary,
     }
+}
+
+/// Nothing but what the ruleset has.
+static RULESETS: LazyLock<Variation> = LazyLock::new(Variation::default);
+
+#[test]
+fn other_weights_and_bounds_count_and_are_not_compared_with_the_rulesets() {
+    let a = summary(&outcomes(100, |task, e| match task {
+        Task::Hit => e < 80,
+        _ => e < 50,
+    }));
+    let b = summary(&outcomes(100, |task, e| match task {
+        Task::Prepare => e < 99,
+        _ => e < 50,
+    }));
+    let by = |weights: &str| Variation {
+        weights: weights.parse().unwrap(),
+        ..Variation::default()
+    };
+    let score = |variation: &Variation| {
+        let of = |summary| Played {
+            variation,
+            ..played(summary)
+        };
+        let compared = of(&a).compare(&of(&b)).unwrap();
+        (
+            compared.overall.score_a,
+            compared.overall.score_b,
+            compared.overall.told_apart,
+        )
+    };
+    assert_eq!(score(&by("1,0,0")), (80.0, 50.0, true));
+    assert_eq!(score(&by("0,0,1")), (50.0, 99.0, true));
+    assert_eq!(score(&by("0,1,0")), (50.0, 50.0, false));
+    // A task that weighs nothing has its own board all the same.
+    let nothing = by("0,1,0");
+    let of = |summary| Played {
+        variation: &nothing,
+        ..played(summary)
+    };
+    assert!(of(&a).told_apart(&of(&b), Some(Task::Hit)));
+    assert!(!of(&a).told_apart(&of(&b), None));
+
+    let mut calm = Variation::default();
+    calm.perturbations.tracking_loss.probability = 0.0;
+    let bounds = Variation {
+        tier_bounds: "0.1,0.2".parse().unwrap(),
+        ..Variation::default()
+    };
+    for (other, field) in [
+        (by("1,0,0"), "weights"),
+        (bounds, "tier_bounds"),
+        (calm, "perturbations"),
+    ] {
+        let theirs = Played {
+            variation: &other,
+            ..played(&a)
+        };
+        let refused = played(&a).compare(&theirs).unwrap_err();
+        assert_eq!(refused, NotPaired::Variation(field));
+        assert_eq!(refused.field(), field);
+        assert!(played(&a).told_apart(&theirs, None));
+    }
+}
+
+#[test]
+fn how_sure_a_tier_is_depends_on_its_bounds() {
+    let all = outcomes(100, |_, _| true);
+    let costly: Vec<_> = all
+        .into_iter()
+        .map(|outcome| EpisodeOutcome {
+            violations: Violations {
+                joint_vel: outcome.episode < 10,
+                ..Violations::default()
+            },
+            ..outcome
+        })
+        .collect();
+    let sure = EpisodeSummary::of(&costly, &TierBounds::default()).unwrap();
+    assert_eq!(sure.tier_change, 0.0, "10 points of 50");
+    let tight = EpisodeSummary::of(&costly, &"0.1,0.5".parse().unwrap()).unwrap();
+    assert!(
+        tight.tier_change > 0.5,
+        "10 points of 10, three times: {}",
+        tight.tier_change
+    );
 }
 
 #[test]
@@ -156,15 +245,15 @@ fn without_pairs_the_rates_themselves_must_differ() {
 fn a_summary_needs_every_episode_once() {
     let mut outcomes = outcomes(3, |_, _| true);
     outcomes.reverse();
-    EpisodeSummary::of(&outcomes).unwrap();
+    EpisodeSummary::of(&outcomes, &Default::default()).unwrap();
     let first = outcomes.remove(2); // prepare 0
     assert_eq!(
-        EpisodeSummary::of(&outcomes),
+        EpisodeSummary::of(&outcomes, &Default::default()),
         Err(PairingError::Missing(Task::Prepare, 0))
     );
     outcomes.extend([first.clone(), first]);
     assert_eq!(
-        EpisodeSummary::of(&outcomes),
+        EpisodeSummary::of(&outcomes, &Default::default()),
         Err(PairingError::Repeated(Task::Prepare, 0))
     );
     assert_eq!(summary(&[]).tier_change, 0.0);
@@ -224,10 +313,10 @@ proptest! {
             prop_assert!(-1.0 <= low && low <= got.difference + 1e-12);
             prop_assert!(got.difference <= high + 1e-12 && high <= 1.0);
         }
-        prop_assert_eq!(comparison.overall.p_value, overall_p_value(&tallies));
-        let score = |all: &[EpisodeOutcome]| overall_score(Task::ALL.map(|task| {
+        prop_assert_eq!(comparison.overall.p_value, overall_p_value(&Default::default(), &tallies));
+        let score = |all: &[EpisodeOutcome]| overall_score(&Default::default(), Task::ALL.map(|task| {
             let of_task: Vec<_> = all.iter().filter(|o| o.task == task).cloned().collect();
-            (task, score_task(&of_task, &StepTimes::default()).success_rate)
+            (task, score_task(&of_task, &StepTimes::default(), &Default::default()).success_rate)
         }));
         prop_assert_eq!(comparison.overall.score_a, score(&of_a));
         prop_assert_eq!(comparison.overall.score_b, score(&of_b));

@@ -51,7 +51,7 @@ fn an_agent_fault_is_a_failure_with_the_full_computation_time_points() {
         5.0,
         "2 points once, not per cause"
     );
-    let result = score_task(&[faulty], &StepTimes::default());
+    let result = score_task(&[faulty], &StepTimes::default(), &Default::default());
     assert_eq!(
         (result.successes, result.violations.computation_time),
         (0, 1)
@@ -77,7 +77,7 @@ fn a_task_adds_up_its_episodes_in_any_order() {
     for time_s in [0.1, 0.2, 0.3] {
         times.add(time_s);
     }
-    let result = score_task(&outcomes, &times);
+    let result = score_task(&outcomes, &times, &Default::default());
     assert_eq!(
         (result.episodes, result.successes, result.success_rate),
         (50, 20, 0.4)
@@ -96,7 +96,7 @@ fn a_task_adds_up_its_episodes_in_any_order() {
     assert_eq!(result.steps, 20 * 100 + 30 * 500);
 
     outcomes.reverse();
-    assert_eq!(score_task(&outcomes, &times), result);
+    assert_eq!(score_task(&outcomes, &times, &Default::default()), result);
 }
 
 #[test]
@@ -107,7 +107,13 @@ fn an_evaluation_takes_the_worst_task_for_safety_and_weighs_the_rates() {
         (Task::Defend, task_result(50, 40, 60.0)),
         (Task::Prepare, task_result(50, 5, 0.0)),
     ]);
-    let result = score_evaluation(Ruleset::CURRENT, Profile::Evaluation, seed, tasks.clone());
+    let result = score_evaluation(
+        Ruleset::CURRENT,
+        Profile::Evaluation,
+        seed,
+        &Default::default(),
+        tasks.clone(),
+    );
     assert_eq!((result.score, result.penalty_points), (54.0, 60.0));
     assert_eq!(result.tier, Tier::Improvable);
     assert_eq!(
@@ -118,9 +124,21 @@ fn an_evaluation_takes_the_worst_task_for_safety_and_weighs_the_rates() {
 
     let mut hit_alone = tasks;
     hit_alone.retain(|task, _| *task == Task::Hit);
-    let result = score_evaluation(Ruleset::CURRENT, Profile::Ideal, seed, hit_alone);
+    let result = score_evaluation(
+        Ruleset::CURRENT,
+        Profile::Ideal,
+        seed,
+        &Default::default(),
+        hit_alone,
+    );
     assert_eq!((result.score, result.tier), (20.0, Tier::Deployable));
-    let nothing = score_evaluation(Ruleset::CURRENT, Profile::Ideal, seed, BTreeMap::new());
+    let nothing = score_evaluation(
+        Ruleset::CURRENT,
+        Profile::Ideal,
+        seed,
+        &Default::default(),
+        BTreeMap::new(),
+    );
     assert_eq!((nothing.score, nothing.penalty_points), (0.0, 0.0));
 }
 
@@ -131,6 +149,7 @@ fn results_survive_their_file() {
         Ruleset::CURRENT,
         Profile::Evaluation,
         Seed::from_number(1),
+        &Default::default(),
         tasks,
     );
     let json = serde_json::to_string(&result).unwrap();

@@ -16,7 +16,7 @@ fn outcomes(successes: &[bool]) -> Vec<EpisodeOutcome> {
 
 fn tally(a: &[EpisodeOutcome], b: &[EpisodeOutcome]) -> Result<PairedTally, PairingError> {
     let solved = |outcomes: &[EpisodeOutcome]| -> Result<Successes, PairingError> {
-        let mut summary = EpisodeSummary::of(outcomes)?;
+        let mut summary = EpisodeSummary::of(outcomes, &Default::default())?;
         let hit = summary.tasks.remove(&Task::Hit);
         Ok(hit.map_or_else(|| [].into_iter().collect(), |hit| hit.successes))
     };
@@ -78,9 +78,9 @@ proptest! {
                 })
                 .collect()
         };
-        let p = overall_p_value(&tally(false));
+        let p = overall_p_value(&Default::default(), &tally(false));
         prop_assert!(0.0 < p && p <= 1.0, "{}", p);
-        prop_assert_eq!(p, overall_p_value(&tally(true)));
+        prop_assert_eq!(p, overall_p_value(&Default::default(), &tally(true)));
     }
 
     #[test]

@@ -137,6 +137,7 @@ fn boards_of_evaluations_give_the_same_tables() {
                     Ruleset::CURRENT,
                     Profile::Evaluation,
                     Seed::from_number(0),
+                    &Default::default(),
                     tasks.into_iter().collect(),
                 ),
                 submitted_at_ms,

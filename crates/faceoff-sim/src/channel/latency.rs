@@ -1,8 +1,8 @@
 //! Late observations and late actions (RULES, factor `delay`).
 
 use super::command::Command;
-use crate::{perturbation::settings::DelaySettings, stream::Stream, world::World};
-use faceoff_types::Interpolation;
+use crate::{stream::Stream, world::World};
+use faceoff_types::{DelaySettings, Interpolation};
 
 /// Numbers of an observation that describe the puck, the part that arrives late.
 const PUCK_LEN: usize = 6;

@@ -5,13 +5,9 @@ mod command;
 mod latency;
 pub mod observation;
 
-use crate::{
-    perturbation::{noise::ObservationNoise, settings::PerturbationSettings},
-    stream::Stream,
-    world::World,
-};
+use crate::{perturbation::noise::ObservationNoise, stream::Stream, world::World};
 pub use command::Command;
-use faceoff_types::{Factor, Factors, Interpolation, Seed};
+use faceoff_types::{Factor, Factors, Interpolation, PerturbationSettings, Seed};
 use latency::Latency;
 use observation::{OBSERVATION_WITH_OPPONENT_LEN, observe, wrap};
 

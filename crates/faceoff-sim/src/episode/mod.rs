@@ -10,13 +10,15 @@ pub use task::EPISODE_STEPS;
 use crate::{
     channel::{AgentChannel, Command, observation},
     model::JOINTS,
-    perturbation::{settings::PerturbationSettings, table_factors::TableFactors},
+    perturbation::table_factors::TableFactors,
     robot::plant::Plant,
     stream::Stream,
     world::{Bounds, Divergence, World},
 };
 use constraints::ConstraintValues;
-use faceoff_types::{EpisodeEnd, Factors, Interpolation, Seed, Task, Violations};
+use faceoff_types::{
+    EpisodeEnd, Factors, Interpolation, PerturbationSettings, Seed, Task, Violations,
+};
 use opponent::Opponent;
 
 /// One qualifying episode. Deterministic: no clock, no I/O. Clone saves and restores it exactly.

@@ -5,12 +5,14 @@ pub mod referee;
 use crate::{
     channel::{AgentChannel, Command, observation::OBSERVATION_WITH_OPPONENT_LEN},
     episode::{constraints::ConstraintValues, task::PLAYABLE_Y_M},
-    perturbation::{settings::PerturbationSettings, table_factors::TableFactors},
+    perturbation::table_factors::TableFactors,
     robot::plant::Plant,
     stream::Stream,
     world::{Bounds, Divergence, World},
 };
-use faceoff_types::{Factors, Interpolation, Ruleset, Seed, Violations, WINDOW_STEPS};
+use faceoff_types::{
+    Factors, Interpolation, PerturbationSettings, Ruleset, Seed, Violations, WINDOW_STEPS,
+};
 use referee::{GAME_RULES, RallyEnd, Referee};
 
 /// What a game is played with.

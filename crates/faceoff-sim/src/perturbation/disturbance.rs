@@ -1,7 +1,7 @@
 //! Air flow that pushes a moving puck.
 
-use super::settings::DisturbanceSettings;
 use crate::{model::SUBSTEP_S, stream::Stream, table::puck::Puck};
+use faceoff_types::DisturbanceSettings;
 
 /// A force on the puck of its speed times an Ornstein–Uhlenbeck process per axis.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,5 @@
 //! The season's plant.
 
-use super::settings::{MismatchSettings, PerturbationSettings};
 use crate::{
     dynamics::arm::{Bodies, Kinematics, controller_torques, plant_bias},
     model::{DOFS, EE_DESIRED_HEIGHT_M, INITIAL_Q, JOINTS, LINKS},
@@ -11,7 +10,7 @@ use crate::{
     },
     stream::Stream,
 };
-use faceoff_types::{Factor, Factors, Seed};
+use faceoff_types::{Factor, Factors, MismatchSettings, PerturbationSettings, Seed};
 
 /// Where the static error is looked at: end-effector positions over the table, m, base frame.
 const WORKSPACE_X_M: [f64; 4] = [0.65, 0.85, 1.05, 1.2];
@@ -20,6 +19,9 @@ const WORKSPACE_Y_M: [f64; 5] = [-0.4, -0.2, 0.0, 0.2, 0.4];
 /// Draws before the last one is taken as it is. About one draw in three is accepted with the
 /// ruleset's settings, so that only settings that cannot be met come this far.
 const DRAWS: usize = 10_000;
+
+/// What one must expect to be enough of magnitudes that can be met at all.
+const EXPECTED_DRAWS: usize = 300;
 
 /// Rounds of the fixed-point iteration for the sag; each gains two to three digits.
 const SAG_ROUNDS: usize = 12;
@@ -40,18 +42,14 @@ impl Plant {
     /// is the season's mismatch seed.
     #[must_use]
     pub fn mismatched(settings: &PerturbationSettings, seed: Seed) -> Self {
-        let settings = &settings.model_mismatch;
-        let mut stream = Stream::new(&seed, "plant");
-        let workspace = workspace();
-        let mut plant = draw(settings, &mut stream);
-        for _ in 1..DRAWS {
-            let error = largest_static_error(&plant, &workspace);
-            if (settings.static_error_m[0]..=settings.static_error_m[1]).contains(&error) {
-                break;
-            }
-            plant = draw(settings, &mut stream);
-        }
-        plant
+        drawn(&settings.model_mismatch, seed, DRAWS).0
+    }
+
+    /// Is a plant found within these settings' range before the draws become many? Magnitudes that are not met by any
+    /// would be played outside of it, after seconds of draws.
+    #[must_use]
+    pub fn can_be_drawn(settings: &PerturbationSettings, seed: Seed) -> bool {
+        drawn(&settings.model_mismatch, seed, EXPECTED_DRAWS).1
     }
 
     /// The largest distance, m, between commanded and reached end-effector position over the
@@ -60,6 +58,23 @@ impl Plant {
     pub fn largest_static_error(&self) -> f64 {
         largest_static_error(self, &workspace())
     }
+}
+
+/// The first plant of at most so many whose static error is in range, or else the last one; and whether it is.
+fn drawn(settings: &MismatchSettings, seed: Seed, draws: usize) -> (Plant, bool) {
+    let [least, most] = settings.static_error_m;
+    let workspace = workspace();
+    let is_met = |plant: &Plant| (least..=most).contains(&largest_static_error(plant, &workspace));
+    let mut stream = Stream::new(&seed, "plant");
+    let mut plant = draw(settings, &mut stream);
+    for _ in 1..draws {
+        if is_met(&plant) {
+            return (plant, true);
+        }
+        plant = draw(settings, &mut stream);
+    }
+    let met = is_met(&plant);
+    (plant, met)
 }
 
 fn draw(settings: &MismatchSettings, stream: &mut Stream) -> Plant {

@@ -4,6 +4,5 @@ pub mod disturbance;
 mod mismatch;
 pub mod noise;
 pub mod rehearsal_table;
-pub mod settings;
 pub mod table_factors;
 pub mod tracking_loss;

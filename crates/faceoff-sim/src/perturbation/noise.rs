@@ -1,7 +1,7 @@
 //! Gaussian noise on what the agent observes.
 
-use super::settings::NoiseSettings;
 use crate::{model::JOINTS, stream::Stream};
+use faceoff_types::NoiseSettings;
 
 /// Draws the noise of one observation after the other.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,8 +1,8 @@
 //! A table as in the laboratory: not quite level, its air cushion not quite as designed (RULES, factor
 //! `delay`).
 
-use super::settings::DelaySettings;
 use crate::stream::Stream;
+use faceoff_types::DelaySettings;
 
 /// Drawn once per episode.
 #[derive(Debug, Clone, Copy, PartialEq)]

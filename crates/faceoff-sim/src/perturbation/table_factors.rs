@@ -1,15 +1,14 @@
 //! The factors that act on the table and on how the puck is tracked: the same for all robots on it.
 
 use super::{
-    disturbance::Disturbance, rehearsal_table::RehearsalTable, settings::PerturbationSettings,
-    tracking_loss::TrackingLoss,
+    disturbance::Disturbance, rehearsal_table::RehearsalTable, tracking_loss::TrackingLoss,
 };
 use crate::{
     stream::Stream,
     table::{geometry::PUCK, puck::Puck},
     world::World,
 };
-use faceoff_types::{Factor, Factors, Seed};
+use faceoff_types::{Factor, Factors, PerturbationSettings, Seed};
 
 /// The draws of one episode or rally.
 #[derive(Debug, Clone)]

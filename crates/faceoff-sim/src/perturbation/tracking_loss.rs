@@ -1,7 +1,7 @@
 //! Losing sight of the puck.
 
-use super::settings::TrackingLossSettings;
 use crate::stream::Stream;
+use faceoff_types::TrackingLossSettings;
 
 /// Decides at which control steps the puck is not seen.
 #[derive(Debug, Clone, PartialEq)]

@@ -12,7 +12,7 @@ use crate::{
         drafts::{self, Draft},
         entries::{self, Entry},
         evaluations::{self, EvaluationState, Failure},
-        finalisations, freezes,
+        finalisations, finalised, freezes,
         plan::RunPlan,
         proposals::{self, Proposal, ProposalKind, Settled},
         runs as run_rows,
@@ -201,6 +201,7 @@ impl Store {
                 Reevaluation::Evaluation(id) => entries::find(tx, id).await?.of,
                 Reevaluation::Day(of) | Reevaluation::Rules(of) => of,
             };
+            finalised::check_not(tx, of.stage).await?;
             let stage = stages::find(tx, of.stage).await?;
             if days::find(tx, of).await?.released_at.is_none() {
                 return conflict(format!(
@@ -265,6 +266,7 @@ impl Store {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
             let proposal = check_unsettled(tx, id).await?;
+            finalised::check_not(tx, proposal.stage).await?;
             let Some(date) = proposal.kind.day() else {
                 return conflict("a trial has nothing to apply: it was on episodes of its own; it can be dropped");
             };

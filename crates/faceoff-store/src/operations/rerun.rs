@@ -11,7 +11,7 @@ use crate::{
         days,
         entries::{self, Entry},
         evaluations::{self, Evaluation, EvaluationState},
-        runs, season, teams,
+        finalised, runs, season, teams,
     },
     write::Tx,
 };
@@ -60,8 +60,8 @@ pub(crate) async fn after_our_fault(tx: &mut Tx, id: EvaluationId) -> Result<()>
 impl Store {
     /// Plays an evaluation again that was cancelled or voided, not played in time, or that we broke: what was active at the cut, on the
     /// same episodes, whether the day is released or not. [`StoreError::Conflict`] if it ended otherwise,
-    /// or the team has another one of the day that counts; [`StoreError::Disqualified`] if it is; [`StoreError::SeasonClosed`] once the season
-    /// is over.
+    /// the team has another one of the day that counts, or the stage is signed off; [`StoreError::Disqualified`] if
+    /// it is; [`StoreError::SeasonClosed`] once the season is over.
     pub async fn rerun_evaluation(
         &self,
         actor: Actor,
@@ -85,6 +85,7 @@ impl Store {
                 ));
             }
             let broken = entries::find(tx, id).await?;
+            finalised::check_not(tx, broken.of.stage).await?;
             teams::check_may_play(tx, broken.team).await?;
             let id = again(tx, broken, 0).await?;
             reads::evaluations::find(tx, id).await

@@ -9,6 +9,7 @@ use crate::{
     tables::{
         days, entries,
         evaluations::{Evaluation, Failure},
+        finalised,
         rulings::Ruling,
         standings,
         teams::{self, Team},
@@ -31,7 +32,7 @@ pub(crate) async fn void(tx: &mut Tx, id: EvaluationId, reason: &str) -> Result<
 
 impl Store {
     /// Takes a result off the board, or a failure of the agent off its team's day: it stays to be read, counts no
-    /// more, and can be played again. [`StoreError::Conflict`] unless it has ended by the agent's doing and counts.
+    /// more, and can be played again. [`StoreError::Conflict`] unless it has ended by the agent's doing and counts, and once its stage is signed off.
     pub async fn void_evaluation(
         &self,
         actor: Actor,
@@ -41,6 +42,7 @@ impl Store {
     ) -> Result<Evaluation> {
         self.write(actor, now, async |tx| {
             let of = entries::find(tx, id).await?.of;
+            finalised::check_not(tx, of.stage).await?;
             let standings = standings::of_day(tx, of).await?;
             if !standings.iter().any(|standing| standing.id == id && standing.counts) {
                 return Err(StoreError::Conflict(
@@ -56,7 +58,8 @@ impl Store {
     }
 
     /// Voids all that has ended of a day and cancels the rest, so that it is released. The evaluations that counted.
-    /// [`StoreError::NotFound`] if the day has had no cut, [`StoreError::Conflict`] if nothing of it counts.
+    /// [`StoreError::NotFound`] if the day has had no cut, [`StoreError::Conflict`] if nothing of it counts, or its stage
+    /// is signed off.
     pub async fn void_day(
         &self,
         actor: Actor,
@@ -68,6 +71,7 @@ impl Store {
             if !days::exists(tx, of).await? {
                 return Err(StoreError::NotFound("day"));
             }
+            finalised::check_not(tx, of.stage).await?;
             let mut count = 0;
             for standing in standings::of_day(tx, of).await? {
                 if standing.is_open {

@@ -2,7 +2,7 @@ use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     store::Store,
-    tables::{drafts, evaluations, season},
+    tables::{drafts, evaluations, season, stages},
 };
 use jiff::Timestamp;
 
@@ -21,7 +21,7 @@ impl Store {
 
     /// Closes the season for good: nothing more is uploaded or evaluated, and its secret is public.
     /// [`StoreError::SeasonClosed`] if it is closed already, [`StoreError::Conflict`] while
-    /// evaluations are under way.
+    /// evaluations are under way or a stage is blind.
     pub async fn close_season(&self, actor: Actor, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
@@ -37,6 +37,14 @@ impl Store {
                 return Err(StoreError::Conflict(format!(
                     "{under_way} evaluations are queued or running, and closing the season publishes \
                      their seeds: wait until they are over, or cancel them"
+                )));
+            }
+            let mut stages = stages::all(tx).await?.into_iter();
+            if let Some(blind) = stages.find(|stage| stage.settings.blind) {
+                return Err(StoreError::Conflict(format!(
+                    "the stage {:?} is blind, and closing the season publishes the seeds that its scores follow \
+                     from: open it first",
+                    blind.name.as_str()
                 )));
             }
             season::close(tx, now).await?;

@@ -6,7 +6,7 @@ use crate::{
     operations::deadlines,
     store::Store,
     tables::{
-        days, season,
+        days, finalised, season,
         stages::{self, Revision, Stage, StagePhase},
     },
     write::Tx,
@@ -92,6 +92,21 @@ async fn create(tx: &mut Tx, stage: &Stage) -> Result<()> {
     Ok(())
 }
 
+/// Is that all that is to be another: that a blind stage is opened, and datasets published sooner?
+fn only_tells_more(stage: &Stage, changed: &Stage) -> bool {
+    let told = Stage {
+        settings: StageSettings {
+            blind: changed.settings.blind,
+            publishes: changed.settings.publishes,
+            ..stage.settings.clone()
+        },
+        ..stage.clone()
+    };
+    *changed == told
+        && changed.settings.blind <= stage.settings.blind
+        && changed.settings.publishes >= stage.settings.publishes
+}
+
 /// Who changes a stage.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum By {
@@ -110,9 +125,13 @@ async fn change(tx: &mut Tx, stage: &Stage, change: StageChange, by: By) -> Resu
         ..stage.clone()
     };
     let phase = stage.phase(now);
-    if phase == StagePhase::Closed {
+    let rules = change.rules.unwrap_or_else(|| stage.rules.rules.clone());
+    finalised::check_not(tx, stage.id).await?;
+    let tells_more = rules == stage.rules.rules && only_tells_more(stage, &changed);
+    if phase == StagePhase::Closed && !tells_more {
         return conflict(format!(
-            "the stage {:?} closed at {}, and what has closed stays as it was; make another stage",
+            "the stage {:?} closed at {}, and what has closed stays as it was, but for what of it is told: a blind one can be opened, and \
+             its datasets published sooner. Make another stage",
             stage.name.as_str(),
             stage.closes_at.unwrap_or(now)
         ));
@@ -138,7 +157,16 @@ async fn change(tx: &mut Tx, stage: &Stage, change: StageChange, by: By) -> Resu
             stage.zone
         ));
     }
-    let rules = change.rules.unwrap_or_else(|| stage.rules.rules.clone());
+    if changed.settings.blind && !stage.settings.blind {
+        let scored = finalised::count_scored(tx, stage.id).await?;
+        if scored > 0 {
+            return conflict(format!(
+                "blind: {scored} evaluations of the stage {:?} have a score that everybody could read; a stage is \
+                 made blind before that",
+                stage.name.as_str()
+            ));
+        }
+    }
     check_rules(&rules, &changed.settings)?;
     // What a person has changed is not changed back by the next start.
     let told = (&rules, &changed.settings, &changed.zone);
@@ -208,6 +236,7 @@ impl Store {
                 },
                 names_seeds: true,
                 configured: false,
+                finalised: None,
             };
             create(tx, &stage).await?;
             stages::find(tx, stage.id).await
@@ -265,6 +294,7 @@ impl Store {
                     },
                     names_seeds: true,
                     configured: true,
+                    finalised: None,
                 };
                 return create(tx, &first).await;
             };

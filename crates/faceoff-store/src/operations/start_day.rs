@@ -35,7 +35,7 @@ pub(crate) fn check_open(stage: &Stage, now: Timestamp) -> Result<()> {
 }
 
 /// Of which date a cut is.
-enum CutOf<'a> {
+pub(crate) enum CutOf<'a> {
     Today,
     /// One that has passed without, and why it is made up for.
     Missed {
@@ -83,10 +83,18 @@ async fn insert(tx: &mut Tx, stage: &Stage, of: CutOf<'_>) -> Result<StageDay> {
 async fn cut(tx: &mut Tx, stage: StageId, of: CutOf<'_>) -> Result<(StageDay, Vec<Evaluation>)> {
     season::check_open(tx).await?;
     let stage = stages::find(tx, stage).await?;
-    let now = tx.now;
-    check_open(&stage, now)?;
+    check_open(&stage, tx.now)?;
+    begin(tx, &stage, of).await
+}
+
+/// A stage's cut, whether it is open or not.
+pub(crate) async fn begin(
+    tx: &mut Tx,
+    stage: &Stage,
+    of: CutOf<'_>,
+) -> Result<(StageDay, Vec<Evaluation>)> {
     stage.plan().check()?;
-    let of = insert(tx, &stage, of).await?;
+    let of = insert(tx, stage, of).await?;
     let turn = Turn {
         of,
         revision: stage.rules.number,
@@ -112,12 +120,16 @@ async fn cut(tx: &mut Tx, stage: StageId, of: CutOf<'_>) -> Result<(StageDay, Ve
 
 fn unless_empty(started: Vec<Evaluation>) -> Result<Vec<Evaluation>> {
     if started.is_empty() {
-        return Err(StoreError::Conflict(
-            "no team has a valid submission, so nothing was started, and the day still has its cut"
-                .into(),
-        ));
+        return Err(nobody_plays());
     }
     Ok(started)
+}
+
+pub(crate) fn nobody_plays() -> StoreError {
+    StoreError::Conflict(
+        "no team has a valid submission, so nothing was started, and the day still has its cut"
+            .into(),
+    )
 }
 
 impl Store {

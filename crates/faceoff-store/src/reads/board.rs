@@ -80,7 +80,8 @@ impl Store {
     }
 
     /// What the board of a stage is made of, by one revision of its rules: each team's newest evaluation that is
-    /// finished under it and was not voided, of teams that are not disqualified, in the teams' order of names, but for what `scope` leaves out. Ranks and tiers are the scoring's.
+    /// finished under it and was not voided, of teams that are not disqualified (once the stage is signed off: were not
+    /// then), in the teams' order of names, but for what `scope` leaves out. Ranks and tiers are the scoring's.
     pub async fn board_within(
         &self,
         stage: StageId,
@@ -109,7 +110,9 @@ impl Store {
                                                 ORDER BY n.day DESC LIMIT 1)
                JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
                JOIN submissions s ON s.id = e.submission_id
-               WHERE t.disqualified_at IS NULL
+               JOIN stages g ON g.id = e.stage_id
+               WHERE CASE WHEN g.finalised_at IS NULL THEN t.disqualified_at IS NULL
+                          ELSE t.id NOT IN (SELECT value FROM json_each(g.finalised_without)) END
                ORDER BY t.name"#,
             stage,
             revision,

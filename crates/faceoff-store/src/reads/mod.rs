@@ -11,6 +11,7 @@ pub(crate) mod proposals;
 pub(crate) mod runs;
 mod season;
 mod stages;
+pub(crate) mod standings;
 mod submissions;
 mod summaries;
 mod teams;

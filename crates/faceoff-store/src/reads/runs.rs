@@ -1,9 +1,12 @@
 use crate::{
     error::Result,
     store::Store,
-    tables::shards::{self, Shard},
+    tables::{
+        runs as run_rows,
+        shards::{self, Shard},
+    },
 };
-use faceoff_types::{AgentFault, EpisodeOutcome, RunId};
+use faceoff_types::{AgentFault, EpisodeOutcome, RunId, Variation};
 
 /// How much of its agent's standard error is shown of a failed run, bytes; the protocol's bound for
 /// one shard.
@@ -22,6 +25,12 @@ impl Store {
     /// The shards of a run in (task, first episode) order, with recording keys.
     pub async fn shards(&self, run: RunId) -> Result<Vec<Shard>> {
         shards::of_run(&mut *self.database.read.acquire().await?, run).await
+    }
+
+    /// What a run is played and scored by otherwise than its ruleset has it.
+    pub async fn run_variation(&self, run: RunId) -> Result<Variation> {
+        let found = run_rows::find(&mut *self.database.read.acquire().await?, run).await?;
+        Ok(found.plan.variation)
     }
 
     /// The outcomes of a run's committed shards in (task, episode) order: all that scoring needs,

@@ -5,6 +5,7 @@ use crate::{
 };
 use faceoff_types::{
     EvaluationId, EvaluationResult, Profile, RunId, StageDay, StageId, SubmissionId, Task, TeamId,
+    Variation,
 };
 use jiff::{Timestamp, civil::Date};
 use sqlx::{SqliteConnection, types::Text};
@@ -38,6 +39,8 @@ pub struct Evaluation {
     pub extra_for: Option<String>,
     /// It does not count, if it was.
     pub voided: Option<Ruling>,
+    /// When its team made its dataset public, if it did.
+    pub published_at: Option<Timestamp>,
     /// How far it is.
     pub state: EvaluationState,
 }
@@ -121,6 +124,7 @@ pub(crate) struct EvaluationRow {
     episodes_per_task: u32,
     episodes_per_shard: u32,
     max_faults: u32,
+    variation: Option<Json<Variation>>,
     run_state: RunState,
     created_at: Instant,
     state: String,
@@ -133,6 +137,7 @@ pub(crate) struct EvaluationRow {
     extra_for: Option<String>,
     voided_at: Option<Instant>,
     voided_for: Option<String>,
+    published_at: Option<Instant>,
 }
 
 impl EvaluationRow {
@@ -151,6 +156,10 @@ impl EvaluationRow {
             episodes_per_task: self.episodes_per_task,
             episodes_per_shard: self.episodes_per_shard,
             max_faults: self.max_faults,
+            variation: self
+                .variation
+                .map(|variation| variation.0)
+                .unwrap_or_default(),
         };
         let finished_at = || {
             self.finished_at
@@ -216,6 +225,7 @@ impl EvaluationRow {
             created_at: self.created_at.0,
             extra_for: self.extra_for,
             voided: Ruling::of(self.voided_at, self.voided_for),
+            published_at: self.published_at.map(|at| at.0),
             state,
         })
     }
@@ -235,11 +245,13 @@ macro_rules! select_evaluations {
                       r.tasks AS "tasks: Json<Vec<Task>>",
                       r.episodes_per_task AS "episodes_per_task: u32",
                       r.episodes_per_shard AS "episodes_per_shard: u32",
-                      r.max_faults AS "max_faults: u32", r.state AS "run_state: RunState",
+                      r.max_faults AS "max_faults: u32",
+                      r.variation AS "variation: Json<Variation>", r.state AS "run_state: RunState",
                       e.created_at AS "created_at: Instant", e.state,
                       e.finished_at AS "finished_at: Instant",
                       e.result AS "result: Json<EvaluationResult>", e.dataset, e.dataset_blake3,
-                      e.reason, e.unplayed AS "unplayed: bool", e.extra_for, e.voided_at AS "voided_at: Instant", e.voided_for
+                      e.reason, e.unplayed AS "unplayed: bool", e.extra_for, e.voided_at AS "voided_at: Instant", e.voided_for,
+                      e.published_at AS "published_at: Instant"
                FROM evaluations e JOIN runs r ON r.id = e.run_id 
                LEFT JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day "# + $tail
             $(, $argument)*

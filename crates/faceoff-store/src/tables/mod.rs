@@ -13,6 +13,7 @@ pub(crate) mod episode_summaries;
 pub(crate) mod evaluations;
 pub(crate) mod events;
 pub(crate) mod finalisations;
+pub(crate) mod finalised;
 pub(crate) mod freezes;
 pub(crate) mod invitations;
 pub(crate) mod measured;

@@ -1,5 +1,5 @@
 use crate::error::{Result, StoreError};
-use faceoff_types::{Profile, Task};
+use faceoff_types::{Profile, Task, Variation};
 
 /// What a run plays.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,6 +14,8 @@ pub struct RunPlan {
     pub episodes_per_shard: u32,
     /// More agent faults than this, summed over the run, end it without a score.
     pub max_faults: u32,
+    /// What is played and scored by otherwise than the ruleset has it.
+    pub variation: Variation,
 }
 
 impl RunPlan {
@@ -30,7 +32,8 @@ impl RunPlan {
                 "a plan plays at least one episode".into(),
             ));
         }
-        Ok(())
+        let magnitudes = self.variation.perturbations.check();
+        magnitudes.map_err(|error| StoreError::Conflict(format!("perturbations.{error}")))
     }
 
     /// Episodes over all tasks.

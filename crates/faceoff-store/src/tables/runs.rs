@@ -3,7 +3,7 @@ use crate::{
     error::{Result, StoreError},
     tables::plan::RunPlan,
 };
-use faceoff_types::{Profile, Ruleset, RunId, SeedLabel, SubmissionId, Task};
+use faceoff_types::{Profile, Ruleset, RunId, SeedLabel, SubmissionId, Task, Variation};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
@@ -44,10 +44,11 @@ pub(crate) async fn insert(
     let (id, plan) = (Text(run.id), &run.plan);
     let (profile, seed, tasks) = (Text(plan.profile), Text(run.seed), Json(&plan.tasks));
     let ruleset = Text(run.ruleset);
+    let variation = (!plan.variation.is_none()).then_some(Json(&plan.variation));
     sqlx::query!(
         "INSERT INTO runs (id, profile, seed, tasks, episodes_per_task, episodes_per_shard, max_faults,
-                           keeps_recordings, ruleset, state)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, 'queued')",
+                           keeps_recordings, ruleset, variation, state)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 'queued')",
         id,
         profile,
         seed,
@@ -57,6 +58,7 @@ pub(crate) async fn insert(
         plan.max_faults,
         run.keeps_recordings,
         ruleset,
+        variation,
     )
     .execute(&mut *connection)
     .await?;
@@ -80,7 +82,8 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: RunId) -> Result
         r#"SELECT profile AS "profile: Text<Profile>", seed AS "seed: Text<SeedLabel>",
                   tasks AS "tasks: Json<Vec<Task>>", episodes_per_task AS "episodes_per_task: u32",
                   episodes_per_shard AS "episodes_per_shard: u32", max_faults AS "max_faults: u32",
-                  keeps_recordings AS "keeps_recordings: bool", ruleset AS "ruleset: Text<Ruleset>"
+                  keeps_recordings AS "keeps_recordings: bool", ruleset AS "ruleset: Text<Ruleset>",
+                  variation AS "variation: Json<Variation>"
            FROM runs WHERE id = ?"#,
         id_text,
     )
@@ -96,6 +99,10 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: RunId) -> Result
             episodes_per_task: row.episodes_per_task,
             episodes_per_shard: row.episodes_per_shard,
             max_faults: row.max_faults,
+            variation: row
+                .variation
+                .map(|variation| variation.0)
+                .unwrap_or_default(),
         },
         seed: row.seed.0,
         keeps_recordings: row.keeps_recordings,

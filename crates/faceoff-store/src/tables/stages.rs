@@ -1,10 +1,11 @@
 use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
-    tables::plan::RunPlan,
+    event::Actor,
+    tables::{finalised::Finalised, plan::RunPlan},
 };
 use faceoff_types::{
-    DayDeadline, SeedLabel, StageDay, StageId, StageName, StageRules, StageSettings, Zone,
+    DayDeadline, SeedLabel, StageDay, StageId, StageName, StageRules, StageSettings, TeamId, Zone,
 };
 use jiff::{SignedDuration, Timestamp, civil::Date};
 use sqlx::{SqliteConnection, types::Text};
@@ -30,6 +31,8 @@ pub struct Stage {
     pub names_seeds: bool,
     /// Does it take rules and settings from the server's configuration?
     pub configured: bool,
+    /// The organiser has signed its result off, if so: nothing of it changes any more.
+    pub finalised: Option<Finalised>,
 }
 
 /// Rules from one time on.
@@ -130,6 +133,7 @@ impl Stage {
             episodes_per_task: rules.episodes_per_task,
             episodes_per_shard: self.settings.episodes_per_shard,
             max_faults: rules.max_faults,
+            variation: rules.variation.clone(),
         }
     }
 
@@ -156,6 +160,9 @@ struct Row {
     settings: Json<StageSettings>,
     names_seeds: bool,
     configured: bool,
+    finalised_at: Option<Instant>,
+    finalised_by: Option<Text<Actor>>,
+    finalised_without: Option<Json<Vec<TeamId>>>,
     revision: u32,
     since: Instant,
     rules: Json<StageRules>,
@@ -177,6 +184,7 @@ impl From<Row> for Stage {
             },
             names_seeds: row.names_seeds,
             configured: row.configured,
+            finalised: Finalised::of(row.finalised_at, row.finalised_by, row.finalised_without),
         }
     }
 }
@@ -188,7 +196,9 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Stage>>
         r#"SELECT s.id AS "id: Text<StageId>", s.name AS "name: Text<StageName>", s.opens_at AS "opens_at: Instant",
                   s.closes_at AS "closes_at: Instant", s.zone AS "zone: Text<Zone>",
                   s.settings AS "settings: Json<StageSettings>", s.names_seeds AS "names_seeds: bool",
-                  s.configured AS "configured: bool", r.revision AS "revision: u32", r.since AS "since: Instant",
+                  s.configured AS "configured: bool", s.finalised_at AS "finalised_at: Instant",
+                  s.finalised_by AS "finalised_by: Text<Actor>",
+                  s.finalised_without AS "finalised_without: Json<Vec<TeamId>>", r.revision AS "revision: u32", r.since AS "since: Instant",
                   r.rules AS "rules: Json<StageRules>"
            FROM stages s JOIN stage_revisions r ON r.stage_id = s.id
            WHERE r.revision = (SELECT MAX(n.revision) FROM stage_revisions n WHERE n.stage_id = s.id)
@@ -363,10 +373,12 @@ mod tests {
                     tasks: Task::ALL.to_vec(),
                     episodes_per_task: 1,
                     max_faults: 1,
+                    variation: Default::default(),
                 },
             },
             names_seeds: true,
             configured: false,
+            finalised: None,
         }
     }
 

@@ -2,6 +2,7 @@
 
 use crate::{column::Instant, error::Result, tables::rulings::Ruling};
 use faceoff_types::{EvaluationId, RunId, StageDay, TeamId};
+use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
 /// How an evaluation stands to a ruling.
@@ -132,6 +133,23 @@ pub(crate) async fn set_voided(
         at,
         ruling.reason,
         id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// From now on its dataset is for everybody.
+pub(crate) async fn set_published(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+    now: Timestamp,
+) -> Result<()> {
+    let (id, now) = (Text(id), Instant(now));
+    sqlx::query!(
+        "UPDATE evaluations SET published_at = ? WHERE id = ?",
+        now,
+        id
     )
     .execute(connection)
     .await?;

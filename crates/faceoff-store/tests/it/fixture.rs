@@ -261,6 +261,7 @@ pub fn rules_of(plan: &RunPlan) -> (StageRules, StageSettings) {
         tasks: plan.tasks.clone(),
         episodes_per_task: plan.episodes_per_task,
         max_faults: plan.max_faults,
+        variation: Default::default(),
     };
     let settings = StageSettings {
         episodes_per_shard: plan.episodes_per_shard,
@@ -304,6 +305,7 @@ pub fn plan() -> RunPlan {
         episodes_per_task: 4,
         episodes_per_shard: 2,
         max_faults: 3,
+        variation: Default::default(),
     }
 }
 
@@ -370,6 +372,7 @@ pub fn result(score: f64) -> EvaluationResult {
         penalty_points: 0.1 + 0.2,
         tier: Tier::Improvable,
         timing: None,
+        variation: Default::default(),
     }
 }
 

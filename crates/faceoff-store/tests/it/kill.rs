@@ -44,6 +44,7 @@ async fn child() {
     };
     let run = uuid::Uuid::now_v7();
     for round in 0.. {
+        sign_off(&store, &format!("s {} {round}", run.simple()), now, &tell).await;
         let mut token_hash = [0; 32];
         token_hash[..16].copy_from_slice(uuid::Uuid::now_v7().as_bytes());
         let name: TeamName = format!("t {} {round}", run.simple()).parse().unwrap();
@@ -242,6 +243,26 @@ async fn open_proposals(store: &Store) -> Vec<(ProposalId, Vec<Draft>)> {
     open
 }
 
+/// A stage of an hour, without a day, from its making to the signature under it.
+async fn sign_off(store: &Store, name: &str, now: jiff::Timestamp, tell: &impl Fn(String)) {
+    let (rules, settings) = rules_of(&small());
+    let hour = jiff::SignedDuration::from_hours(1);
+    let new = NewStage {
+        name: name.parse().unwrap(),
+        opens_at: now,
+        closes_at: Some(now + hour),
+        zone: Zone::UTC,
+        rules,
+        settings,
+    };
+    let made = store
+        .create_stage(Actor::Organiser, new, now)
+        .await
+        .unwrap();
+    let signed = store.finalise_stage(Actor::Organiser, made.id, now + hour);
+    tell(format!("finalised {}", signed.await.unwrap().id));
+}
+
 #[tokio::test]
 async fn survives_kill_9() {
     survive(&[1, 3, 5, 8, 2, 13, 4, 21, 7, 17, 6, 30]).await;
@@ -282,6 +303,7 @@ async fn survive(lives: &[usize]) -> HashSet<String> {
                         "shard",
                         "finished",
                         "disqualified",
+                        "finalised",
                         "voided",
                         "joined",
                         "left",
@@ -323,6 +345,7 @@ async fn stored(folder: &Path) -> HashSet<String> {
          UNION SELECT 'proposal ' || id FROM proposals
          UNION SELECT outcome || ' ' || id FROM proposals WHERE outcome IS NOT NULL
          UNION SELECT 'finished ' || id FROM drafts WHERE state = 'finished'
+         UNION SELECT 'finalised ' || id FROM stages WHERE finalised_at IS NOT NULL
          UNION SELECT 'voided ' || id FROM evaluations WHERE voided_at IS NOT NULL
          UNION SELECT 'joined ' || id FROM people
          UNION SELECT 'left ' || id FROM people WHERE left_at IS NOT NULL
@@ -415,6 +438,9 @@ async fn check_consistency(folder: &Path, store: &Store) {
                - (SELECT COUNT(*) FROM events WHERE kind IN ('extra_turn_given', 'missed_day_started', 'proposal_made',
                                                              'proposal_applied', 'proposal_dropped', 'boards_frozen'))
                + (SELECT COUNT(*) FROM events WHERE kind = 'boards_unfrozen')"),
+        ("a signature without its event",
+         "SELECT (SELECT COUNT(*) FROM stages WHERE finalised_at IS NOT NULL)
+               - (SELECT COUNT(*) FROM events WHERE kind = 'stage_finalised')"),
         ("a change without its event",
          "SELECT (SELECT COUNT(*) FROM submissions) + (SELECT COUNT(*) FROM evaluations)
                + (SELECT COUNT(*) FROM shards WHERE committed_at IS NOT NULL)

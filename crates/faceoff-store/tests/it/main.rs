@@ -29,6 +29,7 @@ mod retries;
 mod rulesets;
 mod rulings;
 mod shares;
+mod sign_off;
 mod stages;
 mod teams;
 mod tokens;

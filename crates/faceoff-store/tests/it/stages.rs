@@ -232,6 +232,7 @@ async fn settings_are_no_rules() {
         ablation_episodes: 3,
         day_deadline: DayDeadline::Hours(30),
         episodes_per_shard: 7,
+        ..StageSettings::default()
     };
     let others = StageChange {
         settings: Some(settings.clone()),

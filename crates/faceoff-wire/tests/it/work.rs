@@ -55,6 +55,7 @@ fn shard(recording: Option<&str>) -> Assignment {
             seed: Seed::from_number(4),
             mismatch_seed: Seed::from_number(5),
             max_faults: 6,
+            perturbations: Default::default(),
         },
         recording: recording.map(str::to_owned),
     }
@@ -70,6 +71,7 @@ fn every_order_round_trips() {
             mismatch_seed: Seed::from_number(8),
             agent: "striker".into(),
             ruleset: Ruleset::CURRENT,
+            variation: Default::default(),
         },
         recordings: vec!["recordings/a".into(), "recordings/b".into()],
         dataset: "datasets/c.zip".into(),
@@ -117,6 +119,7 @@ fn every_report_round_trips() {
         penalty_points: 327.5,
         tier: Tier::Deployable,
         timing: Some(SlotTiming::default()),
+        variation: Default::default(),
     };
     let reports = [
         WorkReport::Smoke(SmokeOutcome::Valid {
@@ -155,4 +158,35 @@ fn a_log_line_names_the_work() {
         "defend episodes 100 to 4294967294 of 00000000-0000-0000-0000-000000000003, profile \
          tracking_loss"
     );
+}
+
+#[test]
+fn orders_of_before_there_were_variations_are_read_and_written_as_they_were() {
+    let Assignment::Play { spec, .. } = shard(None) else {
+        unreachable!();
+    };
+    let text = serde_json::to_string(&spec).expect("it is JSON");
+    assert!(!text.contains("perturbations"), "{text}");
+    let read: ShardSpec = serde_json::from_str(&text).expect("it comes back");
+    assert_eq!(*read.perturbations, PerturbationSettings::default());
+    let mut wild = spec;
+    wild.perturbations.disturbance.sigma_n_per_m_s = 1.0 / 3.0;
+    travels(&wild);
+
+    let meta = EvaluationMeta {
+        profile: Profile::Evaluation,
+        seed: Seed::from_number(1),
+        mismatch_seed: Seed::from_number(2),
+        agent: "a".into(),
+        ruleset: Ruleset::CURRENT,
+        variation: Variation::default(),
+    };
+    let text = serde_json::to_string(&meta).expect("it is JSON");
+    for key in ["weights", "tier_bounds", "perturbations", "variation"] {
+        assert!(!text.contains(key), "{text}");
+    }
+    let mut wild = meta;
+    wild.variation.weights = "0.1,0.2,0.7".parse().expect("they sum to 1");
+    wild.variation.perturbations.tracking_loss.steps = [1, 2];
+    travels(&wild);
 }

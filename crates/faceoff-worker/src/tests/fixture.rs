@@ -181,6 +181,7 @@ pub(super) fn result(meta: &EvaluationMeta) -> EvaluationResult {
         penalty_points: 0.0,
         tier: Tier::Deployable,
         timing: None,
+        variation: Default::default(),
     }
 }
 
@@ -292,6 +293,7 @@ impl Server {
             episodes_per_task: 4,
             episodes_per_shard: 2,
             max_faults: 10,
+            variation: Default::default(),
         };
         let stage = stage_by(&self.store, &plan, None, self.now()).await;
         let started = self
@@ -419,6 +421,7 @@ pub(super) async fn stage_by(
         tasks: plan.tasks.clone(),
         episodes_per_task: plan.episodes_per_task,
         max_faults: plan.max_faults,
+        variation: Default::default(),
     };
     let settings = StageSettings {
         schedule,

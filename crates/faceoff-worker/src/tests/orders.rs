@@ -71,6 +71,7 @@ async fn no_order_tells_the_seasons_secret() {
         episodes_per_task: 3,
         episodes_per_shard: 3,
         max_faults: 0,
+        variation: Default::default(),
     };
     server
         .store
@@ -95,6 +96,57 @@ async fn no_order_tells_the_seasons_secret() {
         assert_eq!(commit(&server, &order, report).await, Holding::Held);
     }
     assert_eq!((smoke, recorded, unrecorded, finalised), (1, 6, 18, 1));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_stages_weights_bounds_and_magnitudes_go_with_its_orders_and_its_ablations() {
+    let server = Server::new().await;
+    let id = server.evaluation().await;
+    // Of the old rules is what was cut by them.
+    let stage = server.store.stages().await.unwrap()[0].clone();
+    let mut rules = stage.rules.rules.clone();
+    rules.variation.weights = "1,0,0".parse().unwrap();
+    rules.variation.perturbations.tracking_loss.probability = 0.25;
+    let wild = rules.variation.clone();
+    let change = StageChange {
+        rules: Some(rules),
+        ..StageChange::default()
+    };
+    let changed = server
+        .store
+        .change_stage(Actor::Organiser, stage.id, change, server.now());
+    let plan = changed.await.unwrap().plan();
+    assert_eq!(plan.variation, wild);
+    let order = next(&server).await.unwrap();
+    let Assignment::Play { spec, .. } = &order.assignment else {
+        panic!("expected a shard");
+    };
+    assert_eq!(*spec.perturbations, Default::default());
+    let submission = server.store.evaluation(id).await.unwrap().submission;
+    let ordered = server
+        .store
+        .create_ablation(Actor::Organiser, submission, &plan, server.now());
+    ordered.await.unwrap();
+    let report_of = report(&server, &order).await;
+    assert_eq!(commit(&server, &order, report_of).await, Holding::Held);
+    let mut wildly_played = 0;
+    while let Some(order) = next(&server).await {
+        match &order.assignment {
+            Assignment::Play {
+                spec,
+                recording: None,
+                ..
+            } => {
+                assert_eq!(spec.perturbations, wild.perturbations);
+                wildly_played += 1;
+            }
+            Assignment::Finalise { meta, .. } => assert!(meta.variation.is_none()),
+            _ => {}
+        }
+        let report = report(&server, &order).await;
+        assert_eq!(commit(&server, &order, report).await, Holding::Held);
+    }
+    assert!(wildly_played > 0);
 }
 
 /// Plays all shards of an evaluation and returns the order to finalise it.

@@ -8,7 +8,7 @@ use faceoff_http::{
 };
 use faceoff_store::{Claimed, Store, Work};
 use faceoff_types::{
-    Clock, DayDeadline, Profile, Ruleset, SmokeOutcome, StageRules, StageSettings, Task,
+    Clock, DayDeadline, Profile, Ruleset, SmokeOutcome, StageRules, StageSettings, Standings, Task,
     TimeLimits, Zone,
 };
 use jiff::Timestamp;
@@ -42,6 +42,7 @@ async fn site(max_bundle_bytes: u64) -> Site {
         tasks: vec![Task::Hit],
         episodes_per_task: 1,
         max_faults: 0,
+        variation: Default::default(),
     };
     store
         .configure_stage(rules, StageSettings::default(), Zone::UTC, now())
@@ -230,10 +231,16 @@ async fn a_stage_is_changed_by_what_is_said_and_by_nothing_else() {
         tasks: None,
         episodes_per_task: None,
         max_faults: None,
+        weights: Some("0.5,0.5,0".parse().unwrap()),
+        tier_bounds: None,
+        perturbations: None,
         schedule: Some(faceoff_types::Schedule::cron("0 6 * * 1-5").unwrap()),
         ablation_episodes: None,
         day_deadline: Some(DayDeadline::Hours(30)),
         episodes_per_shard: None,
+        blind: Some(true),
+        publishes: None,
+        standings: Some(Standings::MeanOfLast(3)),
     };
     let made = site.organiser.create_stage(&new).await.unwrap();
     assert_eq!(made.settings.schedule, new.schedule);

@@ -125,8 +125,8 @@ fn open(path: &str) -> anyhow::Result<Evaluation> {
         let episodes = dataset.episodes()?.into_iter();
         let outcomes: Vec<EpisodeOutcome> = episodes.map(|record| record.outcome).collect();
         Ok(Evaluation {
+            summary: EpisodeSummary::of(&outcomes, &dataset.manifest().variation.tier_bounds)?,
             manifest: dataset.manifest().clone(),
-            summary: EpisodeSummary::of(&outcomes)?,
         })
     };
     read().with_context(|| format!("reading the evaluation {path}"))
@@ -136,6 +136,7 @@ fn played(Evaluation { manifest, summary }: &Evaluation) -> Played<'_> {
     Played {
         ruleset: &manifest.ruleset,
         profile: manifest.profile,
+        variation: &manifest.variation,
         seed: manifest.seed,
         mismatch_seed: manifest.mismatch_seed,
         summary,

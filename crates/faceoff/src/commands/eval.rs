@@ -63,7 +63,8 @@ pub struct EvalCommand {
     /// Run your own agent without isolation, with your own environment
     #[arg(long)]
     no_sandbox: bool,
-    /// Limits, runtimes and given-up layers as a server's configuration states them
+    /// Limits, runtimes and given-up layers, and of [evaluation] weights, tier bounds, magnitudes of perturbations and
+    /// faults, as a server's configuration states them
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
 }
@@ -95,14 +96,19 @@ impl EvalCommand {
         let bundle = self.open(scratch.path(), &config.bundle)?;
         let envs = self.environments(&config, &bundle.manifest.runtime)?;
 
+        let mismatch_seed = self
+            .mismatch_seed
+            .unwrap_or_else(|| self.seed.model_mismatch());
+        config
+            .check_robot(mismatch_seed)
+            .context("the configuration")?;
         let setup = EvalSetup {
             tasks: self.tasks,
             episodes: self.episodes,
             seed: self.seed,
-            mismatch_seed: self
-                .mismatch_seed
-                .unwrap_or_else(|| self.seed.model_mismatch()),
+            mismatch_seed,
             max_faults: config.evaluation.max_faults,
+            variation: config.rules().variation,
             scratch: scratch.path().to_owned(),
             bundle,
             envs,

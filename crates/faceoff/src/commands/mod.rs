@@ -11,6 +11,7 @@ pub mod init;
 pub mod join;
 mod output;
 mod people;
+pub mod publish;
 pub mod score;
 pub mod serve;
 pub mod sim;

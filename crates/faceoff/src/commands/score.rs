@@ -7,6 +7,7 @@ use faceoff_scoring::{
     QualifyingSheet,
     tournament::{PlayedGame, score_tournament},
 };
+use faceoff_types::{TaskWeights, TierBounds};
 use serde::de::DeserializeOwned;
 use std::io::{IsTerminal as _, Read, Write};
 
@@ -27,7 +28,14 @@ enum Stage {
     /// Input: {"TEAM": {"hit": {"success_rate": 0.549, "penalty_points": 327.5}, "defend": {…},
     /// "prepare": {…}}, …}. Rates are fractions. "episodes" beside them is 1000 unless given; the tasks
     /// of a results.json may stand there as they are. Teams that are level keep the order of the file.
-    Qualifying,
+    Qualifying {
+        /// What hit, defend and prepare weigh [default: 0.4,0.4,0.2]
+        #[arg(long, value_name = "WEIGHTS")]
+        weights: Option<TaskWeights>,
+        /// Penalty points per episode up to which a team is deployable, and improvable [default: 0.5,1.5]
+        #[arg(long, value_name = "BOUNDS")]
+        tier_bounds: Option<TierBounds>,
+    },
     /// Read games.json from standard input and print winners and standings as one JSON object
     ///
     /// Input: [{"round": 1, "home": "A", "away": "B", "goals": [10, 0], "fouls": [0, 0],
@@ -61,14 +69,14 @@ impl ScoreCommand {
 impl Stage {
     const fn name(self) -> &'static str {
         match self {
-            Self::Qualifying => "qualifying",
+            Self::Qualifying { .. } => "qualifying",
             Self::Tournament => "tournament",
         }
     }
 
     const fn file(self) -> &'static str {
         match self {
-            Self::Qualifying => "tasks.json",
+            Self::Qualifying { .. } => "tasks.json",
             Self::Tournament => "games.json",
         }
     }
@@ -81,9 +89,15 @@ impl Stage {
     ) -> anyhow::Result<()> {
         let input = read_all(input, self.file())?;
         match self {
-            Self::Qualifying => {
+            Self::Qualifying {
+                weights,
+                tier_bounds,
+            } => {
                 let sheet: QualifyingSheet = parse(&input, self.file())?;
-                for row in sheet.board() {
+                for row in sheet.board_by(
+                    &weights.unwrap_or_default(),
+                    &tier_bounds.unwrap_or_default(),
+                ) {
                     write_line(out, &row)?;
                 }
             }
@@ -144,6 +158,11 @@ mod tests {
     use super::*;
     use serde_json::{Value, json};
 
+    const QUALIFYING: Stage = Stage::Qualifying {
+        weights: None,
+        tier_bounds: None,
+    };
+
     fn score(stage: Stage, input: &str) -> (anyhow::Result<()>, Vec<Value>, String) {
         let (mut out, mut warnings) = (Vec::new(), Vec::new());
         let outcome = stage.score(input.as_bytes(), &mut out, &mut warnings);
@@ -170,7 +189,7 @@ mod tests {
     #[test]
     fn the_board_is_one_object_per_row_in_board_order() {
         let input = json!({"A": tasks(0.9, 501.0), "B": tasks(0.1, 0.0), "C": tasks(0.2, 10.0)});
-        let (outcome, rows, _) = score(Stage::Qualifying, &input.to_string());
+        let (outcome, rows, _) = score(QUALIFYING, &input.to_string());
         outcome.unwrap();
         let brief: Vec<_> = rows
             .iter()
@@ -196,6 +215,25 @@ mod tests {
     }
 
     #[test]
+    fn weights_and_bounds_may_be_others() {
+        let input = json!({"A": tasks(0.9, 501.0), "B": tasks(0.1, 0.0)}).to_string();
+        let stage = Stage::Qualifying {
+            weights: Some("1,0,0".parse().unwrap()),
+            tier_bounds: Some("0.6,0.7".parse().unwrap()),
+        };
+        let (outcome, rows, _) = score(stage, &input);
+        outcome.unwrap();
+        let brief: Vec<_> = rows
+            .iter()
+            .map(|row| json!([row["team"], row["tier"], row["score"]]))
+            .collect();
+        assert_eq!(
+            Value::from(brief),
+            json!([["A", "deployable", 90.0], ["B", "deployable", 10.0]])
+        );
+    }
+
+    #[test]
     fn the_tournament_is_one_object_with_games_and_standings() {
         let game = json!({"round": 1, "home": "A", "away": "B", "goals": [1, 4], "fouls": [0, 9],
             "penalty_points": [136.0, 12]});
@@ -215,7 +253,7 @@ mod tests {
     #[test]
     fn errors_name_the_file_the_place_and_what_came() {
         let wrong = json!({"Alpha": tasks(54.9, 0.0)}).to_string();
-        let got = error(Stage::Qualifying, &wrong);
+        let got = error(QUALIFYING, &wrong);
         assert!(
             got.starts_with("tasks.json: Alpha.hit: success_rate: expected"),
             "{got}"
@@ -223,7 +261,7 @@ mod tests {
         assert!(got.contains("got 54.9"), "{got}");
         for (stage, input, expected) in [
             (
-                Stage::Qualifying,
+                QUALIFYING,
                 "",
                 "tasks.json: expected JSON on standard input, got nothing",
             ),
@@ -233,11 +271,11 @@ mod tests {
                 "games.json: expected JSON on standard input, got nothing",
             ),
             (
-                Stage::Qualifying,
+                QUALIFYING,
                 "{} {}",
                 "tasks.json: after the end of the data: trailing",
             ),
-            (Stage::Qualifying, "{\"A\"", "tasks.json: "),
+            (QUALIFYING, "{\"A\"", "tasks.json: "),
             (
                 Stage::Tournament,
                 "{}",
@@ -259,20 +297,20 @@ mod tests {
     }
 
     fn score_bytes(input: &[u8]) -> String {
-        let outcome = Stage::Qualifying.score(input, &mut Vec::new(), &mut Vec::new());
+        let outcome = QUALIFYING.score(input, &mut Vec::new(), &mut Vec::new());
         format!("{:#}", outcome.unwrap_err())
     }
 
     #[test]
     fn an_input_without_end_is_refused() {
         let endless = std::io::repeat(b' ');
-        let outcome = Stage::Qualifying.score(endless, &mut Vec::new(), &mut Vec::new());
+        let outcome = QUALIFYING.score(endless, &mut Vec::new(), &mut Vec::new());
         assert!(format!("{:#}", outcome.unwrap_err()).contains("at most 67108864 bytes"));
     }
 
     #[test]
     fn nothing_to_score_is_an_empty_board() {
-        let (outcome, rows, _) = score(Stage::Qualifying, "{}");
+        let (outcome, rows, _) = score(QUALIFYING, "{}");
         outcome.unwrap();
         assert_eq!(rows, Vec::<Value>::new());
         let (outcome, rows, _) = score(Stage::Tournament, "[]");

@@ -173,6 +173,10 @@ async fn serve(
         .local_addr()
         .context("asking for the address that was bound")?;
     let clock = Clock::new(Timestamp::now);
+    let season = store.season().await.context("reading the season")?;
+    config
+        .check_robot(season.secret.model_mismatch())
+        .context("the configuration")?;
     store
         .configure_stage(
             config.rules(),

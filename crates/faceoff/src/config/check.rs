@@ -2,7 +2,10 @@
 
 use super::Config;
 use anyhow::{Context as _, bail, ensure};
-use faceoff_types::{DayDeadline, LONGEST_DEADLINE_H, MAX_EPISODES_PER_TASK};
+use faceoff_dataset::has_robot;
+use faceoff_types::{
+    DayDeadline, LONGEST_DEADLINE_H, MAX_EPISODES_PER_TASK, MismatchSettings, Seed,
+};
 use std::collections::BTreeSet;
 
 /// Slots per CPU beyond which none would get on.
@@ -27,6 +30,19 @@ impl Config {
         {
             bail!("workers.agent_cpus: expected CPUs of {cpus:?}, got {cpu}");
         }
+        Ok(())
+    }
+
+    /// Magnitudes that no robot with this seed of its mismatch meets.
+    pub fn check_robot(&self, mismatch_seed: Seed) -> anyhow::Result<()> {
+        let settings = self.rules().variation.perturbations;
+        let [least, most] = settings.model_mismatch.static_error_m;
+        ensure!(
+            settings.model_mismatch == MismatchSettings::default()
+                || has_robot(&settings, mismatch_seed),
+            "evaluation.perturbations: of 300 robots drawn by these ranges of mass and gains none has its largest static \
+             error within {least} to {most} m (model_mismatch.static_error_m); widen one of them"
+        );
         Ok(())
     }
 
@@ -74,6 +90,13 @@ impl Config {
             !evaluation.tasks.is_empty(),
             "evaluation.tasks: expected at least one task"
         );
+        self.rules()
+            .variation
+            .perturbations
+            .check()
+            .context("evaluation.perturbations")?;
+        let settings = self.settings().context("evaluation.cron")?;
+        settings.check().context("evaluation")?;
         let mut seen = BTreeSet::new();
         if let Some(twice) = evaluation.tasks.iter().find(|task| !seen.insert(**task)) {
             bail!("evaluation.tasks: {twice} is listed twice");

@@ -28,6 +28,11 @@ fn every_section_is_read() {
         episodes_per_task = 7
         at = "00:30"
         ablation_episodes = 50
+        weights = { hit = 1, defend = 0, prepare = 0 }
+        tier_bounds = { deployable = 0.25, improvable = 2 }
+        perturbations = { tracking_loss = { probability = 0.05 } }
+        publishes = "never"
+        standings = { mean_of_last = 5 }
         [workers]
         slots = 3
         agent_cpus = [1]
@@ -55,6 +60,14 @@ fn every_section_is_read() {
     assert_eq!(config.rules().episodes_per_task, 7);
     assert_eq!(config.evaluation.at, Some(jiff::civil::time(0, 30, 0, 0)));
     assert_eq!(config.evaluation.ablation_episodes, 50);
+    let variation = config.rules().variation;
+    assert_eq!(variation.weights.to_string(), "1,0,0");
+    assert_eq!(variation.tier_bounds.to_string(), "0.25,2");
+    assert_eq!(variation.perturbations.tracking_loss.probability, 0.05);
+    assert_eq!(variation.perturbations.tracking_loss.steps, [5, 20]);
+    let settings = config.settings().unwrap();
+    assert_eq!(settings.publishes, Publishes::Never);
+    assert_eq!(settings.standings, Standings::MeanOfLast(5));
     assert_eq!(config.slots(), 3);
     assert_eq!(config.limits.pids, 9);
     assert_eq!(config.limits.open_files, Limits::default().open_files);
@@ -85,6 +98,21 @@ fn an_error_names_the_field() {
     assert!(
         error("[evaluation]\nablation_episodes = 1000000").contains("evaluation.ablation_episodes")
     );
+    let wrong = error("[evaluation]\nweights = { hit = 0.5, defend = 0.5, prepare = 0.5 }");
+    assert!(wrong.contains("sum to 1"), "{wrong}");
+    let wrong = error("[evaluation]\ntier_bounds = { deployable = 2, improvable = 1 }");
+    assert!(wrong.contains("0 < deployable < improvable"), "{wrong}");
+    let wrong = error("[evaluation]\nperturbations = { delay = { tilt_m_s2 = -1 } }");
+    assert!(
+        wrong.contains("evaluation.perturbations: delay.tilt_m_s2"),
+        "{wrong}"
+    );
+    assert!(error("[evaluation]\nperturbations = { noise = {} }").contains("noise"));
+    assert!(
+        error("[evaluation]\nstandings = { mean_of_last = 0 }")
+            .contains("standings: a mean is of 1")
+    );
+    assert!(error("[evaluation]\npublishes = \"soon\"").contains("soon"));
     assert!(error("[workers]\nslots = 0").contains("workers.slots"));
     assert!(error("[workers]\nlease_s = 1").contains("workers.lease_s"));
     assert!(error("[time]\nstep_s = -1.0").contains("time.step_s"));
@@ -116,6 +144,7 @@ fn init_writes_every_value_with_what_it_means() {
         ("season", "name"),
         ("evaluation", "at"),
         ("evaluation", "cron"),
+        ("evaluation", "perturbations"),
         ("workers", "slots"),
         ("workers", "scratch_dir"),
     ] {

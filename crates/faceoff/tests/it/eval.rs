@@ -212,3 +212,61 @@ fn an_ablation_plays_the_same_episodes_in_every_profile_and_compares_them() {
     assert!(eval(&hold(), &alone, &args).status.success());
     assert_eq!(result(&alone), result(&out.join("tracking_loss")));
 }
+
+#[test]
+fn a_servers_rules_count_here_too_and_the_dataset_verifies_by_them() {
+    let dir = tempfile::tempdir().unwrap();
+    let config = dir.path().join("rules.toml");
+    let patient = fs::read_to_string(PATIENT).unwrap();
+    let rules = "[evaluation]\nweights = { hit = 1, defend = 0, prepare = 0 }\n\
+                 tier_bounds = { deployable = 20, improvable = 30 }\n\
+                 perturbations = { observation_noise = { puck_position_m = 0.05 } }\n";
+    fs::write(&config, format!("{patient}\n{rules}")).unwrap();
+    let run = |out: &Path| {
+        Command::new(env!("CARGO_BIN_EXE_faceoff"))
+            .arg("eval")
+            .arg(hold())
+            .args([
+                "--task",
+                "hit",
+                "--episodes",
+                "2",
+                "--seed",
+                "5",
+                "--no-sandbox",
+                "--config",
+            ])
+            .arg(&config)
+            .arg("--out")
+            .arg(out)
+            .output()
+            .unwrap()
+    };
+    let out = dir.path().join("out");
+    let output = run(&out);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let result: serde_json::Value =
+        serde_json::from_slice(&fs::read(out.join("results.json")).unwrap()).unwrap();
+    assert_eq!(result["weights"]["hit"], 1.0);
+    assert_eq!(result["tier"], "deployable");
+    assert_eq!(
+        result["perturbations"]["observation_noise"]["puck_position_m"],
+        0.05
+    );
+    let verified = Command::new(env!("CARGO_BIN_EXE_faceoff"))
+        .arg("verify")
+        .arg(out.join("dataset.zip"))
+        .output()
+        .unwrap();
+    assert!(verified.status.success(), "{}", text(&verified.stderr));
+
+    let nowhere =
+        "[evaluation]\nperturbations = { model_mismatch = { static_error_m = [0.9, 1.0] } }\n";
+    fs::write(&config, format!("{patient}\n{nowhere}")).unwrap();
+    let output = run(&out);
+    let error = text(&output.stderr);
+    assert!(
+        !output.status.success() && error.contains("static_error_m"),
+        "{error}"
+    );
+}

@@ -49,11 +49,18 @@ fn recorded(dir: &Path) {
         seed,
         mismatch_seed: seed.model_mismatch(),
         max_faults: 9,
+        perturbations: Default::default(),
     };
     let shard = dir.join("shard");
     let folder = ShardFolder::create(&shard).unwrap();
     let mut recorder = Recorder::create(&folder, spec.task).unwrap();
-    let arena = Arena::by(spec.ruleset, spec.profile, spec.seed, spec.mismatch_seed);
+    let arena = Arena::by(
+        spec.ruleset,
+        spec.profile,
+        &spec.perturbations,
+        spec.seed,
+        spec.mismatch_seed,
+    );
     let mut outcomes = Vec::new();
     for episode in spec.episodes.clone() {
         let interpolation = Some(Interpolation::Linear);
@@ -92,6 +99,7 @@ fn recorded(dir: &Path) {
         mismatch_seed: spec.mismatch_seed,
         agent: "test".into(),
         ruleset: spec.ruleset,
+        variation: Default::default(),
     };
     assemble(&meta, &[shard], &dir.join("dataset.zip")).unwrap();
 }

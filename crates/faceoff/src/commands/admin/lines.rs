@@ -21,7 +21,11 @@ pub(super) fn line(evaluation: &EvaluationView) -> String {
             )
         }
         EvaluationStatus::Finalising => "computing the score".to_owned(),
-        EvaluationStatus::Finished { result, .. } => format!(
+        EvaluationStatus::Finished { result: None, .. } => "finished".to_owned(),
+        EvaluationStatus::Finished {
+            result: Some(result),
+            ..
+        } => format!(
             "finished: score {:.1}, {:.1} penalty points, {}",
             result.score,
             result.penalty_points,

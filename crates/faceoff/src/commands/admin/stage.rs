@@ -10,11 +10,15 @@ use faceoff_http::{
     requests::{NewStage, StageChange},
     views::stage::{PhaseView, StageView},
 };
-use faceoff_types::{DayDeadline, Profile, Schedule, StageId, Task, Zone};
+use faceoff_types::{
+    DayDeadline, PerturbationSettings, Profile, Publishes, Schedule, StageId, Standings, Task,
+    TaskWeights, TierBounds, Zone,
+};
 use jiff::{
     Timestamp, Zoned,
     civil::{Date, DateTime, Time},
 };
+use std::path::PathBuf;
 
 #[derive(Debug, Subcommand)]
 pub(super) enum StageAction {
@@ -47,7 +51,20 @@ pub(super) enum StageAction {
         /// The organiser starts the days
         #[arg(long, conflicts_with_all = ["daily", "cron"])]
         no_schedule: bool,
-        /// The stage's name, if it is open and gets other rules: its board begins anew then
+        /// The stage's name, if it is open and gets other rules or standings: its board begins anew then
+        #[arg(long, value_name = "NAME")]
+        confirm: Option<String>,
+    },
+    /// Start a stage's final day, once, after its close: of a stage with --standings final
+    Final {
+        /// The stage's name or id
+        stage: String,
+    },
+    /// Sign a closed stage's result off: nothing of it changes any more; without --confirm, say what that would do
+    Finalise {
+        /// The stage's name or id
+        stage: String,
+        /// The stage's name
         #[arg(long, value_name = "NAME")]
         confirm: Option<String>,
     },
@@ -76,6 +93,15 @@ pub(super) struct Wanted {
     /// More agent faults than this: no score
     #[arg(long)]
     max_faults: Option<u32>,
+    /// What hit, defend and prepare weigh in the score, e.g. 0.4,0.4,0.2
+    #[arg(long, value_name = "WEIGHTS")]
+    weights: Option<TaskWeights>,
+    /// Penalty points per episode up to which an agent is deployable, and improvable, e.g. 0.5,1.5
+    #[arg(long, value_name = "BOUNDS")]
+    tier_bounds: Option<TierBounds>,
+    /// A JSON file with magnitudes of the perturbations; what it leaves out is the ruleset's, so {} gives up all others
+    #[arg(long, value_name = "FILE")]
+    perturbations: Option<PathBuf>,
     /// Its days start every day at this time
     #[arg(long, value_name = "HH:MM", conflicts_with = "cron")]
     daily: Option<Time>,
@@ -94,9 +120,34 @@ pub(super) struct Wanted {
     /// Until when a day may be played: next-cut, never, or hours from its cut as 30h
     #[arg(long, value_name = "DEADLINE")]
     deadline: Option<DayDeadline>,
+    /// Hide its scores from everybody but the organiser; `false` opens it, for good once it has scores
+    #[arg(long, value_name = "true|false")]
+    blind: Option<bool>,
+    /// When its datasets are there for everybody: never, at_close or at_release
+    #[arg(long, value_name = "WHEN")]
+    publishes: Option<Publishes>,
+    /// What a team's row on its board is: latest, best, mean_of_last:N, or final
+    #[arg(long, value_name = "HOW")]
+    standings: Option<Standings>,
 }
 
 impl Wanted {
+    fn perturbations(&self) -> anyhow::Result<Option<Box<PerturbationSettings>>> {
+        let Some(path) = &self.perturbations else {
+            return Ok(None);
+        };
+        let read = || -> anyhow::Result<Box<PerturbationSettings>> {
+            let text = std::fs::read_to_string(path)?;
+            let mut json = serde_json::Deserializer::from_str(&text);
+            let settings: Box<PerturbationSettings> = serde_path_to_error::deserialize(&mut json)?;
+            json.end()?;
+            settings.check()?;
+            Ok(settings)
+        };
+        let settings = read().with_context(|| format!("--perturbations {}", path.display()))?;
+        Ok(Some(settings))
+    }
+
     fn schedule(&self) -> anyhow::Result<Option<Schedule>> {
         let schedule = match (self.daily, &self.cron) {
             (Some(at), _) => Schedule::daily(at),
@@ -176,6 +227,7 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
             };
             let new = NewStage {
                 name,
+                perturbations: wanted.perturbations()?,
                 opens_at: at(&wanted.opens)?,
                 closes_at: at(&wanted.closes)?,
                 schedule: wanted.schedule()?,
@@ -184,9 +236,14 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 tasks: wanted.tasks,
                 episodes_per_task: wanted.episodes,
                 max_faults: wanted.max_faults,
+                weights: wanted.weights,
+                tier_bounds: wanted.tier_bounds,
                 ablation_episodes: wanted.ablation_episodes,
                 episodes_per_shard: wanted.episodes_per_shard,
                 day_deadline: wanted.deadline,
+                blind: wanted.blind,
+                publishes: wanted.publishes,
+                standings: wanted.standings,
             };
             let made = client.create_stage(&new).await?;
             print(json, &made, || told(&made))
@@ -208,6 +265,7 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
             let schedule = wanted.schedule()?.map(Some).or(no_schedule.then_some(None));
             let change = StageChange {
                 name: rename,
+                perturbations: wanted.perturbations()?,
                 opens_at: at(&wanted.opens)?,
                 closes_at: at(&wanted.closes)?.map(Some).or(open_end.then_some(None)),
                 schedule,
@@ -216,13 +274,30 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 tasks: wanted.tasks,
                 episodes_per_task: wanted.episodes,
                 max_faults: wanted.max_faults,
+                weights: wanted.weights,
+                tier_bounds: wanted.tier_bounds,
                 ablation_episodes: wanted.ablation_episodes,
                 episodes_per_shard: wanted.episodes_per_shard,
                 day_deadline: wanted.deadline,
+                blind: wanted.blind,
+                publishes: wanted.publishes,
+                standings: wanted.standings,
                 confirm,
             };
             let changed = client.change_stage(stage.id, &change).await?;
             print(json, &changed, || told(&changed))
+        }
+        StageAction::Final { stage } => {
+            let stage = find(client, &stage).await?;
+            let day = client.start_final_day(stage.id).await?;
+            print(json, &day, || {
+                format!("{}: final day, {} started", day.day, day.created.len())
+            })
+        }
+        StageAction::Finalise { stage, confirm } => {
+            let stage = find(client, &stage).await?;
+            let done = client.finalise(stage.id, confirm).await?;
+            print(json, &done, || told(&done))
         }
     }
 }
@@ -252,9 +327,16 @@ fn told(stage: &StageView) -> String {
         Some(next) => next.to_string(),
         None => "none".to_owned(),
     };
+    let result = match &stage.finalised {
+        Some(done) => format!("signed off on {} by {}", there(done.at), done.by),
+        None => "provisional".to_owned(),
+    };
+    let settings = &stage.settings;
+    let blind = if settings.blind { ", blind" } else { "" };
     format!(
-        "{} ({phase})\n  id       {}\n  times    {} to {closes}, {}\n  next day {next}\n  deadline {}\n  rules    revision {} since {}: {}, {} \
-         episodes of each of {}, at most {} faults",
+        "{} ({phase}{blind})\n  id       {}\n  times    {} to {closes}, {}\n  next day {next}\n  deadline {}\n  rules    revision {} since {}: {}, {} \
+         episodes of each of {}, at most {} faults\n  score    weights {}, tiers up to {} \
+         points per episode, perturbations {}\n  board    by {}, {result}\n  datasets public {}",
         stage.name,
         stage.id,
         there(stage.opens_at),
@@ -266,6 +348,19 @@ fn told(stage: &StageView) -> String {
         rules.episodes_per_task,
         tasks.join(", "),
         rules.max_faults,
+        rules.variation.weights,
+        rules.variation.tier_bounds,
+        if *rules.variation.perturbations == PerturbationSettings::default() {
+            "as the ruleset has them"
+        } else {
+            "of its own"
+        },
+        settings.standings,
+        match settings.publishes {
+            Publishes::Never => "if their teams publish them",
+            Publishes::AtClose => "at the close",
+            Publishes::AtRelease => "when their day is released",
+        },
     )
 }
 

@@ -25,7 +25,7 @@ pub(super) fn run(setup: &EvalSetup, out: &Path) -> anyhow::Result<()> {
     for profile in Profile::ABLATION {
         let played = play(setup, profile, &out.join(profile.as_str()))
             .with_context(|| format!("profile {profile}"))?;
-        let summary = EpisodeSummary::of(&played.outcomes);
+        let summary = EpisodeSummary::of(&played.outcomes, &setup.variation.tier_bounds);
         runs.insert(profile, summary.context("comparing the profiles")?);
     }
     let tasks = faceoff_scoring::ablation(&runs).context("comparing the profiles")?;

@@ -7,7 +7,9 @@ use super::{
 use anyhow::{Context, bail};
 use faceoff_dataset::{ARCHIVE_FILE, Assembled, assemble};
 use faceoff_runner::{AgentEnvironment, bundle::Bundle};
-use faceoff_types::{AgentFault, EpisodeOutcome, EvaluationResult, Profile, Ruleset, Seed, Task};
+use faceoff_types::{
+    AgentFault, EpisodeOutcome, EvaluationResult, Profile, Ruleset, Seed, Task, Variation,
+};
 use faceoff_wire::work::{EvaluationMeta, ShardSpec};
 use std::{
     fs,
@@ -26,6 +28,8 @@ pub(super) struct EvalSetup {
     pub seed: Seed,
     pub mismatch_seed: Seed,
     pub max_faults: u32,
+    /// What is played and scored by otherwise than the ruleset has it.
+    pub variation: Variation,
     /// For recordings under way.
     pub scratch: PathBuf,
 }
@@ -69,6 +73,7 @@ pub(super) fn play(setup: &EvalSetup, profile: Profile, out: &Path) -> anyhow::R
         mismatch_seed: setup.mismatch_seed,
         agent: setup.bundle.manifest.name.clone(),
         ruleset: Ruleset::CURRENT,
+        variation: setup.variation.clone(),
     };
     let Assembled { result, archive } =
         assemble(&meta, &dirs, &out.join(ARCHIVE_FILE)).context("joining the recordings")?;
@@ -103,6 +108,7 @@ fn jobs(setup: &EvalSetup, profile: Profile) -> Vec<Job> {
                     seed: setup.seed,
                     mismatch_seed: setup.mismatch_seed,
                     max_faults: setup.max_faults,
+                    perturbations: setup.variation.perturbations.clone(),
                 },
             });
         }

@@ -1,0 +1,104 @@
+//! Evaluations by other weights, bounds and magnitudes than the ruleset's: recorded with the dataset, simulated and
+//! scored again by them.
+
+use crate::{
+    forgery::Forgery,
+    played::{Evaluation, json, moving},
+    verify::check,
+};
+use faceoff_dataset::{Dataset, has_robot, verify::VerifyError};
+use faceoff_types::{PerturbationSettings, Task, Variation};
+use faceoff_wire::dataset::DatasetManifest;
+use serde_json::{Value, json};
+
+const SHARDS: [(Task, std::ops::Range<u32>); 2] = [(Task::Hit, 0..2), (Task::Defend, 0..2)];
+
+/// Everything is another.
+fn wild() -> Variation {
+    serde_json::from_value(json!({
+        "weights": { "hit": 0.125, "defend": 0.875, "prepare": 0.0 },
+        "tier_bounds": { "deployable": 5.0, "improvable": 10.0 },
+        "perturbations": {
+            "model_mismatch": { "mass": [0.9, 1.1], "static_error_m": [0.002, 0.02] },
+            "observation_noise": { "puck_position_m": 0.01 },
+            "disturbance": { "sigma_n_per_m_s": 0.02 },
+            "tracking_loss": { "probability": 0.2, "steps": [2, 3] },
+        },
+    }))
+    .unwrap()
+}
+
+#[test]
+fn a_dataset_says_by_what_it_was_played_and_verifies_by_it() {
+    let played = Evaluation::play_by(wild(), Some(moving), &SHARDS).assembled();
+    let verified = check(&played.archive(), 2).unwrap();
+    assert_eq!(verified.result.variation, wild());
+    let dataset = Dataset::open(&played.archive()).unwrap();
+    assert_eq!(dataset.manifest().variation, wild());
+    for name in ["manifest.json", "results.json"] {
+        let file: Value = json(&played.folder().join(name));
+        assert_eq!(file["weights"]["defend"], 0.875, "{name}");
+        assert_eq!(
+            file["perturbations"]["tracking_loss"]["steps"],
+            json!([2, 3]),
+            "{name}"
+        );
+    }
+    let rate = |task| verified.result.tasks[&task].success_rate;
+    let score = 12.5 * rate(Task::Hit) + 87.5 * rate(Task::Defend);
+    assert!((verified.result.score - score).abs() < 1e-9);
+
+    // The same agent on the same seeds under the ruleset's magnitudes plays another evaluation, and says nothing of them.
+    let plain = Evaluation::play(Some(moving), &SHARDS).assembled();
+    assert_ne!(
+        std::fs::read(plain.folder().join("steps.parquet")).unwrap(),
+        std::fs::read(played.folder().join("steps.parquet")).unwrap()
+    );
+    let file: Value = json(&plain.folder().join("results.json"));
+    for key in ["weights", "tier_bounds", "perturbations"] {
+        assert_eq!(file.get(key), None);
+    }
+}
+
+#[test]
+fn other_magnitudes_than_those_that_were_played_are_found() {
+    let played = Evaluation::play_by(wild(), Some(moving), &SHARDS).assembled();
+    let forged = |change: &dyn Fn(&mut Variation)| {
+        let forgery = Forgery::of(&played.folder());
+        let path = forgery.path("manifest.json");
+        let mut manifest: DatasetManifest = json(&path);
+        change(&mut manifest.variation);
+        std::fs::write(&path, serde_json::to_vec(&manifest).unwrap()).unwrap();
+        check(forgery.reseal().dir.path(), 2)
+    };
+    let calmer = forged(&|variation| variation.perturbations.tracking_loss.probability = 0.03);
+    assert!(matches!(calmer, Err(VerifyError::Differs(_))), "{calmer:?}");
+    let weights = forged(&|variation| variation.weights = Default::default());
+    assert!(
+        matches!(weights, Err(VerifyError::Differs(_))),
+        "{weights:?}"
+    );
+    let nowhere = forged(&|variation| variation.perturbations.delay.tilt_m_s2 = 1e9).unwrap_err();
+    assert!(nowhere.to_string().contains("delay.tilt_m_s2"), "{nowhere}");
+}
+
+#[test]
+fn shards_of_other_magnitudes_are_not_joined() {
+    let mut played = Evaluation::play_by(wild(), Some(moving), &SHARDS);
+    played.meta.variation.perturbations = Box::default();
+    let refused = played.assemble("dataset.zip").unwrap_err().to_string();
+    assert!(refused.contains("other magnitudes"), "{refused}");
+}
+
+#[test]
+fn ranges_that_no_robot_meets_are_known_before_anything_is_played() {
+    let seed = faceoff_types::Seed::from_number(7).model_mismatch();
+    let mut settings = PerturbationSettings::default();
+    assert!(has_robot(&settings, seed));
+    assert!(has_robot(&wild().perturbations, seed));
+    settings.model_mismatch.static_error_m = [0.9, 1.0];
+    assert!(
+        !has_robot(&settings, seed),
+        "an arm that sags by its own length"
+    );
+}

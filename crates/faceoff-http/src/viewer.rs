@@ -1,0 +1,51 @@
+//! Who looks at what everybody may look at: nobody needs a token, and the organiser's shows more.
+
+use crate::{
+    app::App,
+    auth::{Anybody, Caller},
+    problem::{Problem, ProblemKind},
+};
+use axum::{extract::FromRequestParts, http::request::Parts};
+use faceoff_types::TeamId;
+
+/// A caller, with or without a token.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Viewer {
+    Organiser,
+    Team(TeamId),
+    Anybody,
+}
+
+impl Viewer {
+    pub(crate) fn of(caller: &Caller) -> Self {
+        match caller.team() {
+            None => Self::Organiser,
+            Some(team) => Self::Team(team.id),
+        }
+    }
+
+    /// Refuses everybody but organisers, of whom `what` is.
+    ///
+    /// # Errors
+    /// `Unauthenticated` or `Forbidden`.
+    pub(crate) fn check_organiser(self, what: &str) -> Result<(), Problem> {
+        let kind = match self {
+            Self::Organiser => return Ok(()),
+            Self::Team(_) => ProblemKind::Forbidden,
+            Self::Anybody => ProblemKind::Unauthenticated,
+        };
+        Err(Problem::new(
+            kind,
+            format!("{what} is for the organiser: it needs the organiser's token"),
+        ))
+    }
+}
+
+impl FromRequestParts<App> for Viewer {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
+        let Anybody(caller) = Anybody::from_request_parts(parts, app).await?;
+        Ok(caller.as_ref().map_or(Self::Anybody, Self::of))
+    }
+}

@@ -1,0 +1,134 @@
+//! What a viewer sees of stages: nobody but the organiser the scores of a blind one, and without a token what is
+//! published.
+
+use crate::{
+    app::AppState,
+    problem::{Problem, ProblemKind},
+    viewer::Viewer,
+};
+use faceoff_store::{Evaluation, Stage, StagePhase, StoreError};
+use faceoff_types::{Publishes, StageId};
+use std::collections::BTreeMap;
+
+/// The stages as they are now, seen by somebody.
+#[derive(Debug)]
+pub(crate) struct Sight {
+    viewer: Viewer,
+    stages: BTreeMap<StageId, Told>,
+}
+
+/// What a stage tells, whoever asks.
+#[derive(Debug)]
+struct Told {
+    name: String,
+    is_blind: bool,
+    publishes: Publishes,
+    has_closed: bool,
+}
+
+impl Sight {
+    pub(crate) async fn of(app: &AppState, viewer: Viewer) -> Result<Self, Problem> {
+        let now = app.config.clock.now();
+        let season_has_closed = app.store.season().await?.closed_at.is_some();
+        let told = |stage: Stage| {
+            let told = Told {
+                is_blind: stage.settings.blind,
+                publishes: stage.settings.publishes,
+                has_closed: season_has_closed || stage.phase(now) == StagePhase::Closed,
+                name: stage.name.to_string(),
+            };
+            (stage.id, told)
+        };
+        let stages = app.store.stages().await?;
+        Ok(Self {
+            viewer,
+            stages: stages.into_iter().map(told).collect(),
+        })
+    }
+
+    /// All of everything.
+    pub(crate) async fn of_organiser(app: &AppState) -> Result<Self, Problem> {
+        Self::of(app, Viewer::Organiser).await
+    }
+
+    /// Refuses everybody but organisers, of whom `what` is.
+    ///
+    /// # Errors
+    /// `Unauthenticated` or `Forbidden`.
+    pub(crate) fn check_organiser(&self, what: &str) -> Result<(), Problem> {
+        self.viewer.check_organiser(what)
+    }
+
+    /// Are a stage's scores hidden from the viewer?
+    pub(crate) fn is_hidden(&self, stage: StageId) -> bool {
+        let is_blind = self.stages.get(&stage).is_none_or(|told| told.is_blind);
+        is_blind && self.viewer != Viewer::Organiser
+    }
+
+    /// Refuses what tells of a stage's scores, if they are hidden from the viewer.
+    ///
+    /// # Errors
+    /// `Blind`.
+    pub(crate) fn check_shown(&self, stage: StageId) -> Result<(), Problem> {
+        if !self.is_hidden(stage) {
+            return Ok(());
+        }
+        let name = self
+            .stages
+            .get(&stage)
+            .map_or("", |told| told.name.as_str());
+        Err(Problem::new(
+            ProblemKind::Blind,
+            format!(
+                "the stage {name:?} is blind: its scores, datasets and comparisons are hidden from everybody until the \
+                 organiser opens it, and nobody knows when that is"
+            ),
+        ))
+    }
+
+    /// Does anybody see an evaluation, and its dataset if it has one, without a token?
+    pub(crate) fn is_public(&self, evaluation: &Evaluation) -> bool {
+        let Some(told) = self.stages.get(&evaluation.of.stage) else {
+            return false;
+        };
+        let by_stage = match told.publishes {
+            Publishes::Never => false,
+            Publishes::AtClose => told.has_closed,
+            Publishes::AtRelease => true,
+        };
+        !told.is_blind
+            && evaluation.released_at.is_some()
+            && (by_stage || evaluation.published_at.is_some())
+    }
+
+    /// Does the viewer see what is an evaluation's team's alone: faults and logs?
+    pub(crate) fn is_own(&self, evaluation: &Evaluation) -> bool {
+        match self.viewer {
+            Viewer::Organiser => true,
+            Viewer::Team(team) => team == evaluation.team,
+            Viewer::Anybody => false,
+        }
+    }
+
+    /// What was found, if the viewer may read it: another team's looks like none at all unless it is public.
+    ///
+    /// # Errors
+    /// `NotFound`; without a token `Unauthenticated`, whether there is one or not.
+    pub(crate) fn readable(
+        &self,
+        found: Result<Evaluation, StoreError>,
+    ) -> Result<Evaluation, Problem> {
+        match found {
+            Ok(found) if self.is_own(&found) || self.is_public(&found) => Ok(found),
+            Ok(_) | Err(StoreError::NotFound(_)) if self.viewer == Viewer::Anybody => {
+                Err(Problem::new(
+                    ProblemKind::Unauthenticated,
+                    "no token came, and there is no such evaluation that is public; send the header “Authorization: \
+                     Bearer TOKEN” with its team's token, or the organiser's",
+                ))
+            }
+            Ok(_) | Err(StoreError::NotFound(_)) => Err(Problem::not_found("evaluation")),
+            Err(error) => Err(error.into()),
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! What a board's rows are made of: of each team one evaluation, or the mean of several.
+
+use crate::{app::AppState, problem::Problem};
+use faceoff_scoring::{BoardEntry, RankedEntry, mean_result, overall_board, task_board};
+use faceoff_store::{BoardDays, BoardRecord, BoardScope, Stage};
+use faceoff_types::{EvaluationId, RunId, Standings, Task};
+
+/// What a row is made of.
+#[derive(Debug)]
+pub(super) struct Standing {
+    /// The newest of its evaluations; of a mean, with the mean as its result.
+    pub(super) record: BoardRecord,
+    /// All of them, the earlier day first.
+    pub(super) evaluations: Vec<EvaluationId>,
+    /// Their runs.
+    pub(super) runs: Vec<RunId>,
+}
+
+impl Standing {
+    fn alone(record: BoardRecord) -> Self {
+        Self {
+            evaluations: vec![record.evaluation],
+            runs: vec![record.run],
+            record,
+        }
+    }
+
+    /// Of a team's evaluations, the earlier day first; `None` of none.
+    fn mean(mut records: Vec<BoardRecord>) -> Result<Option<Self>, Problem> {
+        let results: Vec<_> = records.iter().map(|record| &record.result).collect();
+        let Some(result) = mean_result(&results).map_err(Problem::internal)? else {
+            return Ok(None);
+        };
+        let evaluations = records.iter().map(|record| record.evaluation).collect();
+        let runs = records.iter().map(|record| record.run).collect();
+        // What is told of the days' episodes is told of none before all are released.
+        let all_released = records.iter().all(|record| record.released_at.is_some());
+        let newest = records.pop();
+        Ok(newest.map(|newest| Self {
+            record: BoardRecord {
+                released_at: newest.released_at.filter(|_| all_released),
+                result,
+                ..newest
+            },
+            evaluations,
+            runs,
+        }))
+    }
+}
+
+/// How rows stand at the moment: a stage that waits for its final day shows the newest until then.
+pub(super) async fn at_the_moment(app: &AppState, stage: &Stage) -> Result<Standings, Problem> {
+    let standings = stage.settings.standings;
+    if standings == Standings::Final && app.store.final_cut(stage.id).await?.is_none() {
+        return Ok(Standings::Latest);
+    }
+    Ok(standings)
+}
+
+/// One row of each team with a result within the scope by a revision of a stage's rules, in the teams' order of names.
+/// `beside` are results that are taken as if they counted.
+pub(super) async fn rows(
+    app: &AppState,
+    stage: &Stage,
+    revision: u32,
+    (scope, beside): (&BoardScope, Vec<BoardRecord>),
+    standings: Standings,
+    task: Option<Task>,
+) -> Result<Vec<Standing>, Problem> {
+    let days = match standings {
+        Standings::Latest => None,
+        Standings::Final => Some(BoardDays::Final),
+        Standings::Best => Some(BoardDays::All),
+        Standings::MeanOfLast(days) => Some(BoardDays::Last(days)),
+    };
+    let mut records = match days {
+        None => app.store.board_within(stage.id, revision, scope).await?,
+        Some(days) => {
+            let board = app.store.board_of_days(stage.id, revision, days, scope);
+            board.await?
+        }
+    };
+    if !beside.is_empty() {
+        let final_cut = app.store.final_cut(stage.id).await?;
+        let final_day = final_cut.map(|at| stage.day(at).date);
+        let is_eligible =
+            |record: &BoardRecord| standings != Standings::Final || Some(record.day) == final_day;
+        records.extend(beside.into_iter().filter(is_eligible));
+        records.sort_by(|a, b| {
+            let key = |record: &BoardRecord| (record.team.name.clone(), record.team.id, record.day);
+            key(a).cmp(&key(b))
+        });
+    }
+    let teams = by_team(records);
+    match standings {
+        Standings::Latest | Standings::Final => {
+            let newest = teams.filter_map(|mut days| days.pop());
+            Ok(newest.map(Standing::alone).collect())
+        }
+        Standings::Best => {
+            let best = teams.filter_map(|days| best(days, task));
+            Ok(best.map(Standing::alone).collect())
+        }
+        Standings::MeanOfLast(last) => teams
+            .filter_map(|mut days| {
+                let older = days.len().saturating_sub(last as usize);
+                days.drain(..older);
+                Standing::mean(days).transpose()
+            })
+            .collect(),
+    }
+}
+
+/// Records that stand team by team.
+fn by_team(records: Vec<BoardRecord>) -> impl Iterator<Item = Vec<BoardRecord>> {
+    let mut records = records.into_iter().peekable();
+    std::iter::from_fn(move || {
+        let first = records.next()?;
+        let team = first.team.id;
+        let mut of_team = vec![first];
+        while let Some(next) = records.next_if(|next| next.team.id == team) {
+            of_team.push(next);
+        }
+        Some(of_team)
+    })
+}
+
+/// The one that stands highest by the board's own order; of level ones the earliest.
+fn best(records: Vec<BoardRecord>, task: Option<Task>) -> Option<BoardRecord> {
+    let ranked = ranked(records, task, |record| record);
+    ranked.into_iter().next().map(|first| first.entry.key)
+}
+
+/// In board order.
+pub(super) fn ranked<K>(
+    rows: Vec<K>,
+    task: Option<Task>,
+    record: impl Fn(&K) -> &BoardRecord,
+) -> Vec<RankedEntry<K>> {
+    let entries = rows.into_iter().map(|row| BoardEntry {
+        result: record(&row).result.clone(),
+        submitted_at_ms: record(&row).submitted_at.as_millisecond(),
+        key: row,
+    });
+    match task {
+        None => overall_board(entries.collect()),
+        Some(task) => task_board(task, entries.collect()),
+    }
+}

@@ -1,0 +1,153 @@
+//! Results are provisional until the organiser signs them off.
+
+use crate::site::{ADMIN, Answer, Site, result};
+use reqwest::Method;
+use serde_json::{Value, json};
+
+async fn change(site: &Site, stage: &str, body: Value) -> Answer {
+    let request = site.request(
+        Method::PATCH,
+        &format!("/api/v1/stages/{stage}"),
+        Some(ADMIN),
+    );
+    Answer::of(request.json(&body).send().await.unwrap()).await
+}
+
+#[tokio::test]
+async fn a_closed_stage_is_signed_off_by_name_and_then_nothing_of_it_changes() {
+    let site = Site::start().await;
+    let (alpha, beta) = (site.team("Alpha").await, site.team("Beta").await);
+    let submission = site.valid_submission(&alpha, "a").await;
+    site.valid_submission(&beta, "b").await;
+    let path = site.evaluate(&alpha, &submission).await;
+    let stage = site.stage().await.to_string();
+    let sign = format!("/api/v1/stages/{stage}/finalise");
+    let ask = async |body: Value| site.post(&sign, Some(ADMIN), &body).await;
+    let confirmed = json!({ "confirm": "Qualifying" });
+    ask(confirmed.clone())
+        .await
+        .problem(409, "conflict", &["has not closed", "no end yet"]);
+    change(
+        &site,
+        &stage,
+        json!({ "closes_at": "2026-03-01T12:00:00Z" }),
+    )
+    .await
+    .json(200);
+    ask(confirmed.clone())
+        .await
+        .problem(409, "conflict", &["2026-03-01 at 12:00:00 UTC"]);
+    site.later(3 * 3600);
+    ask(confirmed.clone()).await.problem(
+        409,
+        "conflict",
+        &["2 evaluations", "wait until they are over"],
+    );
+    for score in [0.5, 0.6] {
+        site.finish(&result([score, 0.6, 0.7], 100.0)).await;
+    }
+    for body in [json!({}), json!({ "confirm": "qualifying" })] {
+        let problem =
+            ask(body)
+                .await
+                .problem(409, "not-confirmed", &["Qualifying", "for good", "confirm"]);
+        assert_eq!(problem["confirm"], "Qualifying");
+    }
+    ask(json!({ "confirm": 7 }))
+        .await
+        .problem(422, "invalid-content", &["confirm"]);
+    ask(json!({ "name": "Qualifying" }))
+        .await
+        .problem(422, "invalid-content", &["name"]);
+    for (token, status) in [(None, 401), (Some(alpha.token.as_str()), 403)] {
+        assert_eq!(
+            site.post(&sign, token, &confirmed).await.status.as_u16(),
+            status
+        );
+    }
+    let none = "/api/v1/stages/01890000-0000-7000-8000-000000000000/finalise";
+    site.post(none, Some(ADMIN), &confirmed)
+        .await
+        .problem(404, "not-found", &["stage"]);
+    let board = site.get("/api/v1/board", None).await.json(200);
+    assert_eq!(
+        (&board["provisional"], &board["finalised"]),
+        (&json!(true), &json!(null))
+    );
+
+    let done = ask(confirmed.clone()).await.json(200);
+    let signed = json!({ "at": "2026-03-01T13:00:00Z", "by": "organiser" });
+    assert_eq!(done["finalised"], signed);
+    let board = site.get("/api/v1/board", None).await.json(200);
+    assert_eq!(
+        (&board["provisional"], &board["finalised"]),
+        (&json!(false), &signed)
+    );
+    let page = site.get("/", None).await.body;
+    assert!(
+        page.contains("signed off on 2026-03-01 13:00 UTC by organiser"),
+        "{page}"
+    );
+    assert!(site.get("/season", None).await.body.contains("signed off"));
+
+    let words = ["signed off on 2026-03-01 at 13:00:00 UTC"];
+    ask(confirmed).await.problem(409, "conflict", &words);
+    let void = json!({ "reason": "why", "confirm": "Alpha" });
+    site.post(&format!("{path}/void"), Some(ADMIN), &void)
+        .await
+        .problem(409, "conflict", &words);
+    let void = json!({ "reason": "why", "confirm": "2026-03-01" });
+    let of_day = format!("/api/v1/stages/{stage}/days/2026-03-01/void");
+    site.post(&of_day, Some(ADMIN), &void)
+        .await
+        .problem(409, "conflict", &words);
+    for body in [
+        json!({ "name": "Other" }),
+        json!({ "publishes": "at_release" }),
+        json!({ "closes_at": null }),
+    ] {
+        change(&site, &stage, body)
+            .await
+            .problem(409, "conflict", &words);
+    }
+    let out = json!({ "reason": "why", "confirm": "Beta" });
+    site.post(
+        &format!("/api/v1/teams/{}/disqualify", beta.id),
+        Some(ADMIN),
+        &out,
+    )
+    .await
+    .json(200);
+    let after = site.get("/api/v1/board", None).await.json(200);
+    assert_eq!(after["rows"], board["rows"], "it stays as it was signed");
+    assert_eq!(after["disqualified"], json!([]));
+    let log = site
+        .get("/api/v1/events?kind=stage_finalised", Some(ADMIN))
+        .await
+        .json(200);
+    assert_eq!(log["events"].as_array().unwrap().len(), 1);
+}
+
+#[tokio::test]
+async fn the_season_is_not_closed_over_a_blind_stage() {
+    let site = Site::start().await;
+    let stage = site.stage().await.to_string();
+    change(&site, &stage, json!({ "blind": true }))
+        .await
+        .json(200);
+    let close = json!({ "confirm": "Test season" });
+    site.post("/api/v1/season/close", Some(ADMIN), &close)
+        .await
+        .problem(409, "conflict", &["Qualifying", "blind", "open it first"]);
+    change(&site, &stage, json!({ "blind": false }))
+        .await
+        .json(200);
+    site.post("/api/v1/season/close", Some(ADMIN), &close)
+        .await
+        .json(200);
+    let sign = format!("/api/v1/stages/{stage}/finalise");
+    let confirmed = json!({ "confirm": "Qualifying" });
+    // The stage had no end of its own; the season's is its.
+    let done = site.post(&sign, Some(ADMIN), &confirmed).await.json(200);
+    assert_eq!(done["finalised"]["by"], "organiser");
+}

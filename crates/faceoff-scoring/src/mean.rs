@@ -1,0 +1,206 @@
+//! Several evaluations of one team, taken together: rows that are means of several days.
+
+use crate::{
+    evaluation::score_evaluation,
+    interval::wilson95,
+    summary::{EpisodeSummary, TaskSummary},
+    tier::tier_within,
+};
+use faceoff_types::{
+    ComputationTimeSummary, EvaluationResult, Ruleset, Seed, Task, TaskResult, TierBounds,
+    UnknownRuleset, ViolationCounts,
+};
+use std::collections::BTreeMap;
+
+/// Names the hash that stands for the seeds of several days.
+const SEEDS: &str = "faceoff-scoring seeds of several days 1";
+
+/// The mean of evaluations by the same rules, which played equally many episodes of the same tasks: success rates and
+/// penalty points are means over the evaluations, and tier and score follow from these. `None` of none.
+///
+/// A task's `episodes`, `successes`, violations and steps are sums, so that its interval is that of all episodes. Of
+/// the computation times the mean is over all steps, the others are the worst of the days. `seed` stands for the
+/// evaluations' seeds in their order.
+///
+/// # Errors
+/// If the first one's ruleset is unknown.
+pub fn mean_result(
+    results: &[&EvaluationResult],
+) -> Result<Option<EvaluationResult>, UnknownRuleset> {
+    let [first, ..] = results else {
+        return Ok(None);
+    };
+    let ruleset: Ruleset = first.ruleset.parse()?;
+    let tasks = first.tasks.keys().map(|task| {
+        let days: Vec<&TaskResult> = results
+            .iter()
+            .filter_map(|result| result.tasks.get(task))
+            .collect();
+        (*task, mean_task(&days, &first.variation.tier_bounds))
+    });
+    let tasks: BTreeMap<Task, TaskResult> = tasks.collect();
+    let seed = joint_seed(results.iter().map(|result| result.seed));
+    let mean = score_evaluation(ruleset, first.profile, seed, &first.variation, tasks);
+    Ok(Some(mean))
+}
+
+fn mean_task(days: &[&TaskResult], bounds: &TierBounds) -> TaskResult {
+    let sum = |of: fn(&TaskResult) -> u32| -> u32 {
+        days.iter().fold(0, |sum, day| sum.saturating_add(of(day)))
+    };
+    let (episodes, successes) = (sum(|day| day.episodes), sum(|day| day.successes));
+    // Multiples of one half: the sum is exact in any order.
+    let points: f64 = days.iter().map(|day| day.penalty_points).sum();
+    let steps: u64 = days.iter().map(|day| day.steps).sum();
+    let worst = |of: fn(&ComputationTimeSummary) -> f64| {
+        let times = days.iter().map(|day| of(&day.computation_time_s));
+        times.fold(0.0, f64::max)
+    };
+    let all_times: f64 = days
+        .iter()
+        .map(|day| day.computation_time_s.mean * day.steps as f64)
+        .sum();
+    TaskResult {
+        episodes,
+        successes,
+        success_rate: f64::from(successes) / f64::from(episodes.max(1)),
+        success_ci95: wilson95(successes, episodes),
+        penalty_points: points / days.len().max(1) as f64,
+        violations: ViolationCounts {
+            ee: sum(|day| day.violations.ee),
+            link: sum(|day| day.violations.link),
+            joint_pos: sum(|day| day.violations.joint_pos),
+            joint_vel: sum(|day| day.violations.joint_vel),
+            computation_time: sum(|day| day.violations.computation_time),
+        },
+        tier: tier_within(bounds, points, episodes),
+        steps,
+        computation_time_s: ComputationTimeSummary {
+            mean: all_times / (steps.max(1) as f64),
+            p99: worst(|times| times.p99),
+            max: worst(|times| times.max),
+        },
+    }
+}
+
+/// What stands for the seeds of several days: the same only if all are. That of one day is the day's.
+fn joint_seed(seeds: impl Iterator<Item = Seed>) -> Seed {
+    let seeds: Vec<Seed> = seeds.collect();
+    if let [seed] = seeds[..] {
+        return seed;
+    }
+    let mut hash = blake3::Hasher::new_derive_key(SEEDS);
+    for seed in seeds {
+        hash.update(seed.to_string().as_bytes());
+    }
+    Seed::from_bytes(*hash.finalize().as_bytes())
+}
+
+/// The episodes of several evaluations as if they were one's, in the order in which they are given. How sure its
+/// tiers are is not known of them: that would need all outcomes.
+#[must_use]
+pub fn joined_summary(summaries: &[&EpisodeSummary]) -> EpisodeSummary {
+    let mut tasks: BTreeMap<Task, Vec<&TaskSummary>> = BTreeMap::new();
+    for summary in summaries {
+        for (task, of_task) in &summary.tasks {
+            tasks.entry(*task).or_default().push(of_task);
+        }
+    }
+    let tasks = tasks.into_iter().map(|(task, days)| {
+        let summary = TaskSummary {
+            successes: days
+                .iter()
+                .flat_map(|day| day.successes.episodes_solved())
+                .collect(),
+            penalty_points: days.iter().map(|day| day.penalty_points).sum(),
+            tier_change: 0.0,
+        };
+        (task, summary)
+    });
+    EpisodeSummary {
+        tasks: tasks.collect(),
+        tier_change: 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tier::tier_of;
+    use faceoff_types::{Profile, Tier, Variation};
+
+    fn day(seed: u64, successes: u32, penalty_points: f64) -> EvaluationResult {
+        let task = TaskResult {
+            episodes: 100,
+            successes,
+            success_rate: f64::from(successes) / 100.0,
+            success_ci95: wilson95(successes, 100),
+            penalty_points,
+            violations: ViolationCounts {
+                ee: 3,
+                ..ViolationCounts::default()
+            },
+            tier: tier_of(penalty_points, 100),
+            steps: 1000,
+            computation_time_s: ComputationTimeSummary {
+                mean: 0.001 * f64::from(successes),
+                p99: 0.1,
+                max: 0.2,
+            },
+        };
+        score_evaluation(
+            Ruleset::CURRENT,
+            Profile::Evaluation,
+            Seed::from_number(seed),
+            &Variation::default(),
+            [(Task::Hit, task)].into(),
+        )
+    }
+
+    #[test]
+    fn a_mean_is_of_rates_and_points_and_its_tier_follows() {
+        assert_eq!(mean_result(&[]).unwrap(), None);
+        let (a, b) = (day(1, 40, 20.0), day(2, 60, 100.0));
+        assert_eq!((a.tier, b.tier), (Tier::Deployable, Tier::Improvable));
+        assert_eq!(mean_result(&[&a]).unwrap().unwrap(), a);
+        let mean = mean_result(&[&a, &b]).unwrap().unwrap();
+        let hit = &mean.tasks[&Task::Hit];
+        assert_eq!(
+            (hit.episodes, hit.successes, hit.success_rate),
+            (200, 100, 0.5)
+        );
+        assert_eq!(hit.success_ci95, wilson95(100, 200));
+        assert_eq!((hit.penalty_points, mean.penalty_points), (60.0, 60.0));
+        assert_eq!(mean.tier, Tier::Improvable, "60 points over 100 episodes");
+        assert_eq!(mean.score, 20.0);
+        assert_eq!((hit.violations.ee, hit.steps), (6, 2000));
+        assert!((hit.computation_time_s.mean - 0.05).abs() < 1e-12);
+        let same_days = mean_result(&[&a, &b]).unwrap().unwrap();
+        assert_eq!(mean.seed, same_days.seed);
+        let other_order = mean_result(&[&b, &a]).unwrap().unwrap();
+        assert_ne!(mean.seed, other_order.seed);
+    }
+
+    #[test]
+    fn episodes_of_several_days_stand_one_after_the_other() {
+        let summary = |solved: &[bool]| EpisodeSummary {
+            tasks: [(
+                Task::Hit,
+                TaskSummary {
+                    successes: solved.iter().copied().collect(),
+                    penalty_points: 1.5,
+                    tier_change: 0.5,
+                },
+            )]
+            .into(),
+            tier_change: 0.5,
+        };
+        let joined = joined_summary(&[&summary(&[true, false]), &summary(&[false, true])]);
+        let hit = &joined.tasks[&Task::Hit];
+        assert_eq!(
+            hit.successes,
+            [true, false, false, true].into_iter().collect()
+        );
+        assert_eq!((hit.penalty_points, hit.tier_change), (3.0, 0.0));
+    }
+}

@@ -1,0 +1,364 @@
+use crate::{Millionths, PerturbationSettings, Task, millionths::NotMillionths};
+use serde::{Deserialize, Serialize};
+use std::{fmt, str::FromStr};
+
+/// What scores by otherwise than the ruleset has it. What is left out is the ruleset's.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+pub struct Variation {
+    /// What each task's success rate weighs in the overall score; absent: 0.4, 0.4 and 0.2.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub weights: TaskWeights,
+    /// Penalty points per episode up to which an agent is in a tier; absent: 0.5 and 1.5.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub tier_bounds: TierBounds,
+    /// Magnitudes of the perturbations that the profile switches on; what is absent is the ruleset's.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub perturbations: Box<PerturbationSettings>,
+}
+
+impl Variation {
+    /// Is all of it the ruleset's?
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        is_default(self)
+    }
+}
+
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
+/// What each task's success rate weighs in the overall score: fractions that sum to 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "WeightFields", into = "WeightFields")]
+pub struct TaskWeights {
+    hit: Millionths,
+    defend: Millionths,
+    prepare: Millionths,
+}
+
+/// Weights that are none, or bounds that are none.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum InvalidVariation {
+    /// They are parts of one.
+    #[error(
+        "expected three weights that sum to 1, got {hit} (hit), {defend} (defend) and {prepare} (prepare)"
+    )]
+    Weights {
+        /// Of `hit`.
+        hit: Millionths,
+        /// Of `defend`.
+        defend: Millionths,
+        /// Of `prepare`.
+        prepare: Millionths,
+    },
+    /// The better tier has the lower bound.
+    #[error(
+        "expected 0 < deployable < improvable, in points per episode, got {deployable} and {improvable}"
+    )]
+    Bounds {
+        /// Of the best tier.
+        deployable: Millionths,
+        /// Of the second.
+        improvable: Millionths,
+    },
+    /// A number too many, or too few.
+    #[error("expected {expected} numbers with commas between them, as in {example}, got {got:?}")]
+    Count {
+        /// How many.
+        expected: usize,
+        /// The ruleset's.
+        example: &'static str,
+        /// As it was given.
+        got: String,
+    },
+    /// One of them is none.
+    #[error(transparent)]
+    Number(#[from] NotMillionths),
+}
+
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+struct WeightFields {
+    /// From 0 to 1, with at most six decimals.
+    #[cfg_attr(feature = "openapi", schema(value_type = f64, example = 0.4))]
+    hit: Millionths,
+    /// The same.
+    #[cfg_attr(feature = "openapi", schema(value_type = f64, example = 0.4))]
+    defend: Millionths,
+    /// The same; the three sum to 1.
+    #[cfg_attr(feature = "openapi", schema(value_type = f64, example = 0.2))]
+    prepare: Millionths,
+}
+
+const WHOLE: u64 = 1_000_000;
+
+impl TaskWeights {
+    /// Of `hit`, `defend` and `prepare`.
+    ///
+    /// # Errors
+    /// If they do not sum to 1.
+    pub fn new(
+        hit: Millionths,
+        defend: Millionths,
+        prepare: Millionths,
+    ) -> Result<Self, InvalidVariation> {
+        let sum: u64 = [hit, defend, prepare]
+            .map(|weight| u64::from(weight.count()))
+            .iter()
+            .sum();
+        if sum == WHOLE {
+            Ok(Self {
+                hit,
+                defend,
+                prepare,
+            })
+        } else {
+            Err(InvalidVariation::Weights {
+                hit,
+                defend,
+                prepare,
+            })
+        }
+    }
+
+    /// A task's.
+    #[must_use]
+    pub const fn of(&self, task: Task) -> Millionths {
+        match task {
+            Task::Hit => self.hit,
+            Task::Defend => self.defend,
+            Task::Prepare => self.prepare,
+        }
+    }
+}
+
+impl Default for TaskWeights {
+    fn default() -> Self {
+        Self {
+            hit: Millionths::new(400_000),
+            defend: Millionths::new(400_000),
+            prepare: Millionths::new(200_000),
+        }
+    }
+}
+
+impl TryFrom<WeightFields> for TaskWeights {
+    type Error = InvalidVariation;
+    fn try_from(fields: WeightFields) -> Result<Self, InvalidVariation> {
+        Self::new(fields.hit, fields.defend, fields.prepare)
+    }
+}
+
+impl From<TaskWeights> for WeightFields {
+    fn from(weights: TaskWeights) -> Self {
+        Self {
+            hit: weights.hit,
+            defend: weights.defend,
+            prepare: weights.prepare,
+        }
+    }
+}
+
+/// In the order of the tasks, as the command line takes them.
+impl fmt::Display for TaskWeights {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{},{},{}", self.hit, self.defend, self.prepare)
+    }
+}
+
+impl FromStr for TaskWeights {
+    type Err = InvalidVariation;
+    fn from_str(text: &str) -> Result<Self, InvalidVariation> {
+        let [hit, defend, prepare] = numbers(text, "0.4,0.4,0.2")?;
+        Self::new(hit, defend, prepare)
+    }
+}
+
+/// Penalty points per episode up to which an agent is in a tier; the bound belongs to the better one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "BoundFields", into = "BoundFields")]
+pub struct TierBounds {
+    deployable: Millionths,
+    improvable: Millionths,
+}
+
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(deny_unknown_fields)]
+struct BoundFields {
+    /// Points per episode: above 0, with at most six decimals.
+    #[cfg_attr(feature = "openapi", schema(value_type = f64, example = 0.5))]
+    deployable: Millionths,
+    /// Points per episode: above the other.
+    #[cfg_attr(feature = "openapi", schema(value_type = f64, example = 1.5))]
+    improvable: Millionths,
+}
+
+impl TierBounds {
+    /// Of the best tier and of the second.
+    ///
+    /// # Errors
+    /// If the first is 0, or the second not above it.
+    pub fn new(deployable: Millionths, improvable: Millionths) -> Result<Self, InvalidVariation> {
+        if deployable.count() > 0 && deployable < improvable {
+            Ok(Self {
+                deployable,
+                improvable,
+            })
+        } else {
+            Err(InvalidVariation::Bounds {
+                deployable,
+                improvable,
+            })
+        }
+    }
+
+    /// Of the best tier, points per episode.
+    #[must_use]
+    pub const fn deployable(&self) -> Millionths {
+        self.deployable
+    }
+
+    /// Of the second, points per episode.
+    #[must_use]
+    pub const fn improvable(&self) -> Millionths {
+        self.improvable
+    }
+}
+
+impl Default for TierBounds {
+    fn default() -> Self {
+        Self {
+            deployable: Millionths::new(500_000),
+            improvable: Millionths::new(1_500_000),
+        }
+    }
+}
+
+impl TryFrom<BoundFields> for TierBounds {
+    type Error = InvalidVariation;
+    fn try_from(fields: BoundFields) -> Result<Self, InvalidVariation> {
+        Self::new(fields.deployable, fields.improvable)
+    }
+}
+
+impl From<TierBounds> for BoundFields {
+    fn from(bounds: TierBounds) -> Self {
+        Self {
+            deployable: bounds.deployable,
+            improvable: bounds.improvable,
+        }
+    }
+}
+
+/// The lower one first, as the command line takes them.
+impl fmt::Display for TierBounds {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{},{}", self.deployable, self.improvable)
+    }
+}
+
+impl FromStr for TierBounds {
+    type Err = InvalidVariation;
+    fn from_str(text: &str) -> Result<Self, InvalidVariation> {
+        let [deployable, improvable] = numbers(text, "0.5,1.5")?;
+        Self::new(deployable, improvable)
+    }
+}
+
+fn numbers<const N: usize>(
+    text: &str,
+    example: &'static str,
+) -> Result<[Millionths; N], InvalidVariation> {
+    let count = || InvalidVariation::Count {
+        expected: N,
+        example,
+        got: text.to_owned(),
+    };
+    let numbers = text
+        .split(',')
+        .map(|part| part.trim().parse::<f64>().map_err(|_| count()));
+    let numbers: Vec<f64> = numbers.collect::<Result<_, _>>()?;
+    let numbers: [f64; N] = numbers.try_into().map_err(|_| count())?;
+    let mut exact = [Millionths::new(0); N];
+    for (exact, number) in exact.iter_mut().zip(numbers) {
+        *exact = Millionths::try_from(number)?;
+    }
+    Ok(exact)
+}
+
+#[cfg(feature = "openapi")]
+mod schemas {
+    use super::{BoundFields, TaskWeights, TierBounds, WeightFields};
+    use utoipa::{PartialSchema, ToSchema, openapi};
+
+    impl PartialSchema for TaskWeights {
+        fn schema() -> openapi::RefOr<openapi::Schema> {
+            WeightFields::schema()
+        }
+    }
+
+    impl ToSchema for TaskWeights {}
+
+    impl PartialSchema for TierBounds {
+        fn schema() -> openapi::RefOr<openapi::Schema> {
+            BoundFields::schema()
+        }
+    }
+
+    impl ToSchema for TierBounds {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_the_rulesets_is_left_out_and_read_back() {
+        assert_eq!(serde_json::to_string(&Variation::default()).unwrap(), "{}");
+        let read: Variation = serde_json::from_str("{}").unwrap();
+        assert!(read.is_none());
+        let text = r#"{"weights":{"hit":0.5,"defend":0.25,"prepare":0.25},"tier_bounds":{"deployable":0.1,"improvable":2.0}}"#;
+        let read: Variation = serde_json::from_str(text).unwrap();
+        assert!(!read.is_none());
+        assert_eq!(serde_json::to_string(&read).unwrap(), text);
+        let calm = r#"{"perturbations":{"tracking_loss":{"probability":0.0}}}"#;
+        let read: Variation = serde_json::from_str(calm).unwrap();
+        let mut expected = PerturbationSettings::default();
+        expected.tracking_loss.probability = 0.0;
+        assert_eq!(*read.perturbations, expected);
+        let written = serde_json::to_string(&read).unwrap();
+        assert_eq!(serde_json::from_str::<Variation>(&written).unwrap(), read);
+    }
+
+    #[test]
+    fn weights_sum_to_one_and_bounds_rise() {
+        assert_eq!("0.4, 0.4,0.2".parse(), Ok(TaskWeights::default()));
+        assert_eq!("0.5,1.5".parse(), Ok(TierBounds::default()));
+        for (wrong, words) in [
+            ("0.4,0.4,0.3", "sum to 1"),
+            ("1,1,-1", "at most six decimals"),
+            ("0.33333333,0.33333333,0.33333334", "at most six decimals"),
+            ("0.5,0.5", "3 numbers"),
+            ("a,b,c", "0.4,0.4,0.2"),
+        ] {
+            let error = wrong.parse::<TaskWeights>().unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+        }
+        for (wrong, words) in [
+            ("0,1", "0 < deployable"),
+            ("1.5,0.5", "deployable < improvable"),
+            ("1,1", "deployable < improvable"),
+            ("1", "2 numbers"),
+            ("NaN,1", "six decimals"),
+        ] {
+            let error = wrong.parse::<TierBounds>().unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+        }
+        let wrong = r#"{"hit":1.0,"defend":0.0}"#;
+        assert!(serde_json::from_str::<TaskWeights>(wrong).is_err());
+    }
+}
