@@ -89,6 +89,20 @@ const TABLE: &[(&str, &str)] = &[
     ("POST /tokens", "?-+-+++"),
     ("DELETE /tokens/{id}", "?00++++"),
     ("POST /tokens/{id}/rotate", "?00++++"),
+    ("POST /evaluations/{id}/publish", "?00++--"),
+    ("GET /proposals", "?----++"),
+    ("GET /proposals/{id}", "?----++"),
+    ("POST /proposals/{id}/apply", "?----++"),
+    ("POST /proposals/{id}/drop", "?----++"),
+    ("GET /stages/{id}/capacity", "?----++"),
+    ("POST /stages/{id}/days", "?----++"),
+    ("POST /stages/{id}/days/{day}/extra-turn", "?----++"),
+    ("POST /stages/{id}/final", "?----++"),
+    ("POST /stages/{id}/finalise", "?----++"),
+    ("POST /stages/{id}/freeze", "?----++"),
+    ("POST /stages/{id}/proposals", "?----++"),
+    ("POST /stages/{id}/trial", "?----++"),
+    ("POST /stages/{id}/unfreeze", "?----++"),
     ("GET /whoami", "?++++++"),
 ];
 
@@ -104,7 +118,14 @@ fn body(route: &str) -> Value {
         | "POST /stages/{id}/days/{day}/void"
         | "POST /teams/{id}/disqualify"
         | "POST /teams/{id}/reinstate"
-        | "POST /queue/pause" => json!({ "reason": "" }),
+        | "POST /queue/pause"
+        | "POST /stages/{id}/freeze"
+        | "POST /stages/{id}/trial"
+        | "POST /stages/{id}/proposals" => json!({ "reason": "" }),
+        "POST /stages/{id}/days" => json!({ "day": "2020-01-01", "reason": "" }),
+        "POST /stages/{id}/days/{day}/extra-turn" => {
+            json!({ "team": "00000000-0000-7000-8000-000000000000", "reason": "" })
+        }
         "POST /invitations" => json!({ "role": "member", "note": "" }),
         "POST /invitations/accept" => json!({ "code": "" }),
         "PUT /people/{id}/password" => json!({ "old": "", "password": "" }),
