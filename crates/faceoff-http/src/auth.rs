@@ -45,7 +45,14 @@ pub(crate) struct Organiser;
 
 /// What the organiser sees of what everybody may ask for: the proof, or why there is none.
 #[derive(Debug)]
-pub(crate) struct PerhapsOrganiser(pub(crate) Result<Organiser, Problem>);
+pub(crate) struct PerhapsOrganiser(Result<Organiser, Problem>);
+
+impl PerhapsOrganiser {
+    /// Refuses anybody else, where it has to be the organiser.
+    pub(crate) fn check_if(self, must_be: bool) -> Result<(), Problem> {
+        if must_be { self.0.map(drop) } else { Ok(()) }
+    }
+}
 
 /// Proof that the caller is this team.
 #[derive(Debug, Clone)]

@@ -25,7 +25,8 @@ pub(crate) async fn board(
     caller: PerhapsOrganiser,
     QueryParams(query): QueryParams<BoardQuery>,
 ) -> Result<Json<BoardView>, Problem> {
-    BoardView::asked(&app, caller, query, None).await.map(Json)
+    caller.check_if(query.live)?;
+    BoardView::asked(&app, query, None).await.map(Json)
 }
 
 /// The board of one task, ranked by its success rate and its penalty points.
@@ -43,7 +44,6 @@ pub(crate) async fn task_board(
     caller: PerhapsOrganiser,
     QueryParams(query): QueryParams<BoardQuery>,
 ) -> Result<Json<BoardView>, Problem> {
-    BoardView::asked(&app, caller, query, Some(task))
-        .await
-        .map(Json)
+    caller.check_if(query.live)?;
+    BoardView::asked(&app, query, Some(task)).await.map(Json)
 }

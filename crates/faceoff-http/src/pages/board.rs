@@ -253,8 +253,9 @@ pub(super) async fn overall(
     query: Result<QueryParams<BoardQuery>, Problem>,
 ) -> Result<Response, PageProblem> {
     let QueryParams(query) = query?;
+    caller.check_if(query.live)?;
     let season = SeasonHead::now(&app).await?;
-    let board = BoardView::asked(&app, caller, query, None).await?;
+    let board = BoardView::asked(&app, query, None).await?;
     let today = app.store.stage(board.stage).await.map_err(Problem::from)?;
     let today = today.day(app.config.clock.now());
     let setting = common_setting(&board.rows);
@@ -357,6 +358,7 @@ pub(super) async fn by_task(
     query: Result<QueryParams<BoardQuery>, Problem>,
 ) -> Result<Response, PageProblem> {
     let (PathParam(task), QueryParams(query)) = (task?, query?);
+    caller.check_if(query.live)?;
     let season = SeasonHead::now(&app).await?;
     let (title, aim) = match task {
         Task::Hit => (
@@ -372,7 +374,7 @@ pub(super) async fn by_task(
             "Bring a puck from the border to a good hitting position.",
         ),
     };
-    let mut board = BoardView::asked(&app, caller, query, Some(task)).await?;
+    let mut board = BoardView::asked(&app, query, Some(task)).await?;
     // The board leaves out teams without the task; a row without one could show nothing.
     board.rows.retain(|row| row.tasks.contains_key(&task));
     let setting = common_setting(&board.rows);

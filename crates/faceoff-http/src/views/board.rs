@@ -2,8 +2,7 @@
 
 use super::{ruling::RulingView, stage, task::TaskView, team::TeamView};
 use crate::{
-    app::AppState, auth::PerhapsOrganiser, problem::Problem, requests::BoardQuery,
-    summaries::RunSummaries, views::shown,
+    app::AppState, problem::Problem, requests::BoardQuery, summaries::RunSummaries, views::shown,
 };
 use faceoff_scoring::{
     BoardEntry, Played, RankedEntry, SIGNIFICANCE, TIER_CHANGE_RESAMPLES, overall_board,
@@ -96,17 +95,13 @@ pub struct BoardRow {
 }
 
 impl BoardView {
-    /// The board that a request asks for: the overall one, or that of one task. The live one of a frozen stage is the
-    /// organiser's alone.
+    /// The board that a request asks for: the overall one, or that of one task. Whether the caller may see the live
+    /// one of a frozen stage is checked before.
     pub(crate) async fn asked(
         app: &AppState,
-        caller: PerhapsOrganiser,
         query: BoardQuery,
         task: Option<Task>,
     ) -> Result<Self, Problem> {
-        if query.live {
-            caller.0?;
-        }
         let stage = match query.stage {
             Some(id) => app.store.stage(id).await?,
             None => stage::current(app).await?,
