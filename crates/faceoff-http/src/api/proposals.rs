@@ -144,7 +144,7 @@ pub(crate) async fn apply_proposal(
         });
         let what = format!(
             "{} evaluations of {day} would count from now on in the place of those that they play again, {} teams would \
-             have another score and {} another rank, and everybody would read {:?}",
+             have another row and {} another rank, and everybody would read {:?}",
             view.evaluations.len(),
             outcome.changes.len(),
             ranks.count(),

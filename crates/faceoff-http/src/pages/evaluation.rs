@@ -403,10 +403,14 @@ async fn others(
     };
     let same_day = EvaluationView::of_day(app, sight, day).await?;
     let mut others = Vec::new();
-    for view in same_day.into_iter().filter(same_episodes) {
-        if freeze::hides_evaluation(app, &view).await?.is_some() {
-            continue;
-        }
+    let frozen = app.store.boards_frozen(of.stage).await;
+    let frozen_at = frozen.map_err(Problem::from)?.map(|frozen| frozen.at);
+    let is_shown = |view: &EvaluationView| {
+        let later = view.status.finished_at().zip(frozen_at);
+        later.is_none_or(|(finished_at, frozen_at)| finished_at <= frozen_at)
+    };
+    let shown = same_day.into_iter().filter(same_episodes).filter(is_shown);
+    for view in shown {
         // An extra turn may have had episodes of its own.
         if let EvaluationStatus::Finished {
             result: Some(result),

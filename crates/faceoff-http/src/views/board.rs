@@ -126,8 +126,8 @@ pub struct BoardRow {
 }
 
 impl BoardView {
-    /// The board that a request asks for: the overall one, or that of one task. The live one of a frozen stage is the
-    /// organiser's alone.
+    /// The board that a request asks for: the overall one, or that of one task. Whether the caller may see the live
+    /// one of a frozen stage is checked before.
     pub(crate) async fn asked(
         app: &AppState,
         sight: &Sight,

@@ -116,13 +116,13 @@ impl DayLoad {
             (false, teams) => format!("{teams} teams would have"),
         };
         let expected = match self.expected_hours {
-            Some(hours) => format!("{hours:.1} hours by what such episodes took of late"),
+            Some(hours) => format!("{hours:.1} hours expected, by what such episodes took of late"),
             None => {
-                "nobody can tell how long (nothing was measured in the last seven days)".to_owned()
+                "nobody can tell how long it takes, since nothing was measured in the last seven days".to_owned()
             }
         };
         let load = format!(
-            "{}: {whose} {} episodes to play, which take {expected}, and {:.1} hours if every agent uses up its time",
+            "{}: {whose} {} episodes to play: {expected}; {:.1} hours if every agent uses up its time",
             self.day, self.episodes, self.worst_case_hours
         );
         let Some(available) = self.hours_until_deadline else {

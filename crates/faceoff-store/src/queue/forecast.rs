@@ -15,7 +15,8 @@ pub(crate) struct Forecast {
 /// Whoever work is done for in one lane, as both were served until now.
 #[derive(Debug)]
 pub(crate) struct Holder {
-    pub(crate) lane: String,
+    /// A number that those of one lane have in common.
+    pub(crate) lane: usize,
     pub(crate) urgency: u32,
     pub(crate) rank: u32,
     pub(crate) lane_served_ms: f64,
@@ -143,30 +144,28 @@ impl Forecast {
         while played.free_ms.len() < slots.max(1) {
             played.free_ms.push(0.0);
         }
-        while let Some(slot) = self.next_slot(&mut played) {
+        while let Some(slot) = first_free(&played.free_ms) {
             let now_ms = played.free_ms[slot];
             if let Some((takes, job)) = played.next_ended(now_ms) {
                 played.play(slot, takes, job);
             } else if let Some(unit) = self.claim(now_ms) {
                 played.play(slot, unit.takes, unit.job);
+            } else if let Some(from_ms) = self.next_from_ms(&played) {
+                // Nothing can be begun before that.
+                played.free_ms[slot] = now_ms.max(from_ms);
+            } else {
+                break;
             }
         }
         ends(&played.jobs)
     }
 
-    /// The slot that is free first, once there is something for it to do; `None` if nothing is left.
-    fn next_slot(&self, played: &mut Played) -> Option<usize> {
-        let free = played.free_ms.iter().enumerate();
-        let (slot, _) = free.min_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    /// When something of what is left can be begun first; `None` if nothing is left.
+    fn next_from_ms(&self, played: &Played) -> Option<f64> {
         let ended = played.ended.iter().map(|(from_ms, _)| *from_ms);
         let waiting = self.accounts.iter().flat_map(|account| &account.waiting);
-        let from_ms = waiting
-            .map(|unit| unit.from_ms)
-            .chain(ended)
-            .min_by(f64::total_cmp)?;
-        let free_ms = &mut played.free_ms[slot];
-        *free_ms = free_ms.max(from_ms);
-        Some(slot)
+        let waiting = waiting.map(|unit| unit.from_ms);
+        waiting.chain(ended).min_by(f64::total_cmp)
     }
 
     /// Takes out the unit whose turn it is, and charges it.
@@ -180,7 +179,7 @@ impl Forecast {
         let (account, unit) = candidates.min_by(|a, b| self.by_turn(*a, *b))?;
         let unit = self.accounts[account].waiting.remove(unit)?;
         let takes_ms = unit.takes.unwrap_or(NOMINAL_MS);
-        let lane = self.accounts[account].lane.clone();
+        let lane = self.accounts[account].lane;
         self.accounts[account].served_ms += takes_ms;
         for holder in self.accounts.iter_mut().filter(|other| other.lane == lane) {
             holder.lane_served_ms += takes_ms;
@@ -201,6 +200,12 @@ impl Forecast {
     }
 }
 
+fn first_free(free_ms: &[f64]) -> Option<usize> {
+    let slots = free_ms.iter().enumerate();
+    let (slot, _) = slots.min_by(|(_, a), (_, b)| a.total_cmp(b))?;
+    Some(slot)
+}
+
 fn ends(jobs: &[Progress]) -> Vec<End> {
     let mut by_end: Vec<usize> = (0..jobs.len()).collect();
     by_end.sort_by(|a, b| jobs[*a].end_ms.total_cmp(&jobs[*b].end_ms));
@@ -219,9 +224,9 @@ fn ends(jobs: &[Progress]) -> Vec<End> {
 mod tests {
     use super::*;
 
-    fn holder(lane: &str, rank: u32, waiting: &[(i64, i64, f64, usize)]) -> Holder {
+    fn holder(lane: usize, rank: u32, waiting: &[(i64, i64, f64, usize)]) -> Holder {
         Holder {
-            lane: lane.into(),
+            lane,
             urgency: 1,
             rank,
             lane_served_ms: 0.0,
@@ -251,12 +256,8 @@ mod tests {
     fn teams_take_turns_by_slot_time_and_older_batches_come_first() {
         let forecast = |batch_of_b| Forecast {
             accounts: vec![
-                holder("shard", 0, &[(1, 1, 10.0, 0), (1, 2, 10.0, 0)]),
-                holder(
-                    "shard",
-                    0,
-                    &[(batch_of_b, 3, 30.0, 1), (batch_of_b, 4, 30.0, 1)],
-                ),
+                holder(0, 0, &[(1, 1, 10.0, 0), (1, 2, 10.0, 0)]),
+                holder(0, 0, &[(batch_of_b, 3, 30.0, 1), (batch_of_b, 4, 30.0, 1)]),
             ],
             jobs: jobs(2, None),
             running: Vec::new(),
@@ -276,8 +277,8 @@ mod tests {
     fn what_follows_a_job_comes_before_all_that_waits() {
         let forecast = Forecast {
             accounts: vec![
-                holder("shard", 0, &[(1, 1, 10.0, 0)]),
-                holder("shard", 0, &[(1, 2, 10.0, 1)]),
+                holder(0, 0, &[(1, 1, 10.0, 0)]),
+                holder(0, 0, &[(1, 2, 10.0, 1)]),
             ],
             jobs: jobs(2, Some(Some(5.0))),
             running: vec![(Some(3.0), 0)],
@@ -287,13 +288,10 @@ mod tests {
 
     #[test]
     fn what_was_never_measured_hides_every_end_after_it_and_no_place() {
-        let mut unknown = holder("smoke", 0, &[(0, 2, 1.0, 1)]);
+        let mut unknown = holder(1, 0, &[(0, 2, 1.0, 1)]);
         unknown.waiting[0].takes = None;
         let forecast = Forecast {
-            accounts: vec![
-                holder("shard", 1, &[(1, 1, 10.0, 0), (1, 3, 10.0, 2)]),
-                unknown,
-            ],
+            accounts: vec![holder(0, 1, &[(1, 1, 10.0, 0), (1, 3, 10.0, 2)]), unknown],
             jobs: jobs(3, None),
             running: vec![(Some(4.0), 0)],
         };
@@ -304,7 +302,7 @@ mod tests {
 
     #[test]
     fn what_rests_is_waited_for() {
-        let mut resting = holder("shard", 0, &[(1, 1, 10.0, 0), (1, 2, 10.0, 1)]);
+        let mut resting = holder(0, 0, &[(1, 1, 10.0, 0), (1, 2, 10.0, 1)]);
         resting.waiting[0].from_ms = 100.0;
         let forecast = Forecast {
             accounts: vec![resting],

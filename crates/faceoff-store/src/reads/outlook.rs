@@ -96,11 +96,17 @@ async fn holders(connection: &mut SqliteConnection) -> Result<BTreeMap<i64, Hold
     )
     .fetch_all(connection)
     .await?;
+    let mut lanes = Vec::new();
     Ok(rows
         .into_iter()
         .map(|row| {
+            let known = lanes.iter().position(|lane| *lane == row.lane);
+            let lane = known.unwrap_or_else(|| {
+                lanes.push(row.lane);
+                lanes.len() - 1
+            });
             let holder = Holder {
-                lane: row.lane,
+                lane,
                 urgency: row.urgency,
                 rank: row.rank,
                 lane_served_ms: row.of_lane as f64,

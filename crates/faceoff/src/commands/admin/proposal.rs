@@ -152,7 +152,7 @@ fn whole(proposal: &ProposalView) -> String {
     if let Some(outcome) = &proposal.outcome {
         if outcome.old_board.is_some() {
             lines.push(match outcome.changes.len() {
-                0 => "applied, it would change no rank and no score".to_owned(),
+                0 => "applied, it would change no row".to_owned(),
                 1 => "applied, it would change this:".to_owned(),
                 count => format!("applied, it would change these {count}:"),
             });
@@ -187,7 +187,10 @@ fn played(draft: &DraftView) -> String {
 
 fn change(change: &ChangeView) -> String {
     let standing = |standing: Option<StandingView>| match standing {
-        Some(standing) => format!("rank {} ({:.1})", standing.rank, standing.score),
+        Some(standing) => format!(
+            "rank {} (score {:.1}, {:.1} points)",
+            standing.rank, standing.score, standing.penalty_points
+        ),
         None => "no row".to_owned(),
     };
     format!(
