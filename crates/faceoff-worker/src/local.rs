@@ -8,7 +8,7 @@ use crate::{
 use faceoff_store::{
     Claim, Claimed as Leased, Committed, RunOwner, ShardCommit, Store, StoreError, Work,
 };
-use faceoff_types::{AgentLimits, BundleRef, Clock, EvaluationResult};
+use faceoff_types::{AgentLimits, BundleRef, Clock, EvaluationResult, StageLimits};
 use faceoff_wire::work::{
     AgentOrder, Assignment, EvaluationMeta, Lease, ShardSpec, SmokeSpec, WorkOrder, WorkReport,
 };
@@ -76,9 +76,13 @@ impl LocalServer {
     fn order(&self, leased: Leased) -> WorkOrder {
         let Leased { claim, work } = leased;
         let assignment = match work {
-            Work::Smoke { submission, seeds } => Assignment::Smoke {
+            Work::Smoke {
+                submission,
+                seeds,
+                limits,
+            } => Assignment::Smoke {
                 submission: submission.id,
-                agent: self.agent(submission.bundle),
+                agent: self.agent(submission.bundle, &limits),
                 spec: SmokeSpec {
                     seed: seeds.episodes,
                     mismatch_seed: seeds.mismatch,
@@ -96,7 +100,7 @@ impl LocalServer {
                     RunOwner::Evaluation(id) => id.as_uuid(),
                     RunOwner::Ablation(id) => id.as_uuid(),
                 },
-                agent: self.agent(bundle),
+                agent: self.agent(bundle, &run.plan.limits),
                 spec: ShardSpec {
                     ruleset: run.ruleset,
                     platform_retries,
@@ -140,10 +144,10 @@ impl LocalServer {
         WorkOrder { lease, assignment }
     }
 
-    fn agent(&self, bundle: BundleRef) -> AgentOrder {
+    fn agent(&self, bundle: BundleRef, own: &StageLimits) -> AgentOrder {
         AgentOrder {
             bundle,
-            limits: self.limits.clone(),
+            limits: own.over(&self.limits),
         }
     }
 

@@ -359,6 +359,7 @@ impl Config {
                 tier_bounds: evaluation.tier_bounds,
                 perturbations: evaluation.perturbations.clone().unwrap_or_default(),
             },
+            limits: Default::default(),
         }
     }
 

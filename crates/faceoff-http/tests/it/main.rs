@@ -12,6 +12,7 @@ mod comparisons;
 mod days;
 mod evaluations;
 mod events;
+mod limits;
 mod openapi;
 mod problems;
 mod publication;
