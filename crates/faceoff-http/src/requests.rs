@@ -7,7 +7,8 @@ pub use people::*;
 
 use faceoff_types::{
     DayDeadline, EvaluationId, PerturbationSettings, Profile, Publishes, Schedule, StageId,
-    Standings, SubmissionId, Task, TaskWeights, TeamId, TierBounds, Zone,
+    StageLimits, StageUploads, Standings, SubmissionId, Task, TaskWeights, TeamId, TierBounds,
+    Zone,
 };
 use jiff::{Timestamp, civil::Date};
 use left_out::{given, given_or_null};
@@ -126,6 +127,12 @@ pub struct NewStage {
     /// Magnitudes of the perturbations that the profile switches on; what of it is left out is the ruleset's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub perturbations: Option<Box<PerturbationSettings>>,
+    /// What agents are held to; what of it is left out is as the server's configuration has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limits: Option<Box<StageLimits>>,
+    /// What each team may upload meanwhile; likewise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uploads: Option<StageUploads>,
     /// When its days start; left out, when the organiser starts them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub schedule: Option<Schedule>,
@@ -197,6 +204,12 @@ pub struct StageChange {
     /// ruleset's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub perturbations: Option<Box<PerturbationSettings>>,
+    /// What agents are held to, all of it anew: what of it is left out is as the server's configuration has it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limits: Option<Box<StageLimits>>,
+    /// What each team may upload meanwhile, all of it anew.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub uploads: Option<StageUploads>,
     /// When its days start; null: when the organiser starts them.
     #[serde(
         skip_serializing_if = "Option::is_none",

@@ -173,6 +173,7 @@ fn board(criterion: &mut Criterion) {
             episodes_per_task: 1000,
             max_faults: 10,
             variation: Default::default(),
+            limits: Default::default(),
         };
         store
             .configure_stage(rules, StageSettings::default(), Zone::UTC, now)

@@ -1,6 +1,6 @@
 use crate::{
-    LONGEST_DEADLINE_H, MAX_EPISODES_PER_TASK, MAX_MEAN_DAYS, Profile, Ruleset, StageId, Task,
-    Variation, perturbations::InvalidPerturbation,
+    MAX_EPISODES_PER_TASK, Profile, Ruleset, StageId, StageLimits, Task, Variation,
+    stage_bounds::InvalidStageRules,
 };
 use jiff::civil::Date;
 use serde::{Deserialize, Serialize};
@@ -55,48 +55,9 @@ pub struct StageRules {
     /// Weights, bounds of the tiers and magnitudes, as far as they are not the ruleset's.
     #[serde(flatten)]
     pub variation: Variation,
-}
-
-/// Rules or settings by which nothing could be played.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum InvalidStageRules {
-    /// No task, or one twice.
-    #[error("tasks: each task at most once, and at least one")]
-    Tasks,
-    /// None, or more than are ever played.
-    #[error("episodes_per_task: expected 1 to {MAX_EPISODES_PER_TASK}, got {0}")]
-    Episodes(u32),
-    /// None, or more than are ever played.
-    #[error("episodes_per_shard: expected 1 to {MAX_EPISODES_PER_TASK}, got {0}")]
-    Shards(u32),
-    /// More than are ever played.
-    #[error("ablation_episodes: expected at most {MAX_EPISODES_PER_TASK}, got {0}")]
-    Ablations(u32),
-    /// A day without time, or with more than any has.
-    #[error("day_deadline: expected 1 to {LONGEST_DEADLINE_H} hours, got {0}")]
-    Deadline(u32),
-    /// A mean of no days, or of more than a board is made of.
-    #[error("standings: a mean is of 1 to {MAX_MEAN_DAYS} days, got {0}")]
-    MeanDays(u32),
-    /// Magnitudes that no world has.
-    #[error("perturbations.{0}")]
-    Perturbations(#[from] InvalidPerturbation),
-}
-
-impl InvalidStageRules {
-    /// The field that is wrong, as JSON has it.
-    #[must_use]
-    pub const fn field(&self) -> &'static str {
-        match self {
-            Self::Tasks => "tasks",
-            Self::Episodes(_) => "episodes_per_task",
-            Self::Shards(_) => "episodes_per_shard",
-            Self::Ablations(_) => "ablation_episodes",
-            Self::Deadline(_) => "day_deadline",
-            Self::MeanDays(_) => "standings",
-            Self::Perturbations(_) => "perturbations",
-        }
-    }
+    /// What agents are held to otherwise than by the server's configuration; absent if all is the server's.
+    #[serde(default, skip_serializing_if = "StageLimits::is_none")]
+    pub limits: Box<StageLimits>,
 }
 
 impl StageRules {
@@ -113,7 +74,7 @@ impl StageRules {
             return Err(InvalidStageRules::Episodes(self.episodes_per_task));
         }
         self.variation.perturbations.check()?;
-        Ok(())
+        self.limits.check().map_err(InvalidStageRules::Limits)
     }
 }
 
@@ -130,6 +91,7 @@ mod tests {
             episodes_per_task,
             max_faults: 3,
             variation: Variation::default(),
+            limits: Default::default(),
         };
         assert_eq!(rules(&Task::ALL, 1).check(), Ok(()));
         assert_eq!(rules(&[], 1).check(), Err(InvalidStageRules::Tasks));

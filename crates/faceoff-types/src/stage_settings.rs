@@ -1,9 +1,9 @@
-use crate::{DayDeadline, InvalidStageRules, LONGEST_DEADLINE_H, MAX_EPISODES_PER_TASK, Schedule};
+use crate::{
+    DayDeadline, LONGEST_DEADLINE_H, MAX_EPISODES_PER_TASK, Schedule, StageUploads,
+    stage_bounds::{InvalidStageRules, MAX_MEAN_DAYS},
+};
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
-
-/// The most days that a row of a board is a mean of.
-pub const MAX_MEAN_DAYS: u32 = 100;
 
 /// How a stage goes on, without a score depending on it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -25,6 +25,9 @@ pub struct StageSettings {
     pub publishes: Publishes,
     /// What a team's row on its board is made of.
     pub standings: Standings,
+    /// What each team may upload meanwhile; absent if all is the server's.
+    #[serde(skip_serializing_if = "StageUploads::is_none")]
+    pub uploads: StageUploads,
 }
 
 impl Default for StageSettings {
@@ -37,6 +40,7 @@ impl Default for StageSettings {
             blind: false,
             publishes: Publishes::AtClose,
             standings: Standings::Latest,
+            uploads: StageUploads::default(),
         }
     }
 }
@@ -58,6 +62,7 @@ impl StageSettings {
         {
             return Err(InvalidStageRules::Deadline(hours));
         }
+        self.uploads.check().map_err(InvalidStageRules::Uploads)?;
         match self.standings {
             Standings::MeanOfLast(days) if !(1..=MAX_MEAN_DAYS).contains(&days) => {
                 Err(InvalidStageRules::MeanDays(days))

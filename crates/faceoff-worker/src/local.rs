@@ -8,7 +8,7 @@ use crate::{
 use faceoff_store::{
     Claim, Claimed as Leased, Committed, RunOwner, ShardCommit, Store, StoreError, Work,
 };
-use faceoff_types::{AgentLimits, BundleRef, Clock, EvaluationResult};
+use faceoff_types::{AgentLimits, BundleRef, Clock, EvaluationResult, StageLimits};
 use faceoff_wire::work::{
     AgentOrder, Assignment, EvaluationMeta, Lease, ShardSpec, SmokeSpec, WorkOrder, WorkReport,
 };
@@ -79,9 +79,13 @@ impl LocalServer {
     fn order(&self, leased: Leased) -> WorkOrder {
         let Leased { claim, work } = leased;
         let assignment = match work {
-            Work::Smoke { submission, seeds } => Assignment::Smoke {
+            Work::Smoke {
+                submission,
+                seeds,
+                limits,
+            } => Assignment::Smoke {
                 submission: submission.id,
-                agent: self.agent(submission.bundle),
+                agent: self.agent(submission.bundle, &limits),
                 spec: SmokeSpec {
                     seed: seeds.episodes,
                     mismatch_seed: seeds.mismatch,
@@ -100,7 +104,7 @@ impl LocalServer {
                     RunOwner::Ablation(id) => id.as_uuid(),
                     RunOwner::Draft { id, .. } => id.as_uuid(),
                 },
-                agent: self.agent(bundle),
+                agent: self.agent(bundle, &run.plan.limits),
                 spec: ShardSpec {
                     ruleset: run.ruleset,
                     platform_retries,
@@ -144,10 +148,10 @@ impl LocalServer {
         WorkOrder { lease, assignment }
     }
 
-    fn agent(&self, bundle: BundleRef) -> AgentOrder {
+    fn agent(&self, bundle: BundleRef, own: &StageLimits) -> AgentOrder {
         AgentOrder {
             bundle,
-            limits: self.limits.clone(),
+            limits: own.over(&self.limits),
         }
     }
 

@@ -366,6 +366,7 @@ impl Config {
                 tier_bounds: evaluation.tier_bounds,
                 perturbations: evaluation.perturbations.clone().unwrap_or_default(),
             },
+            limits: Default::default(),
         }
     }
 

@@ -85,7 +85,7 @@ fn other_magnitudes_than_those_that_were_played_are_found() {
 #[test]
 fn shards_of_other_magnitudes_are_not_joined() {
     let mut played = Evaluation::play_by(wild(), Some(moving), &SHARDS);
-    played.meta.variation.perturbations = Box::default();
+    *played.meta.variation.perturbations = PerturbationSettings::default();
     let refused = played.assemble("dataset.zip").unwrap_err().to_string();
     assert!(refused.contains("other magnitudes"), "{refused}");
 }

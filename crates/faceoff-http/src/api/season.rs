@@ -52,7 +52,7 @@ pub(crate) async fn change_season(
     request_body = CloseSeason,
     responses(
         (status = 200, body = SeasonView),
-        (status = 409, description = "evaluations are queued or running, a stage is blind, or it is closed already"),
+        (status = 409, description = "evaluations are queued or running, a stage is blind or waits for its final day, or it is closed already"),
         (status = 422, description = "not the season's name"),
     )
 )]

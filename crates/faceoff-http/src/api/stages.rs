@@ -99,6 +99,7 @@ pub(crate) async fn create_stage(
                 .perturbations
                 .unwrap_or(like.rules.rules.variation.perturbations),
         },
+        limits: new.limits.unwrap_or(like.rules.rules.limits),
     };
     let default = StageSettings::default();
     let settings = StageSettings {
@@ -111,6 +112,7 @@ pub(crate) async fn create_stage(
         blind: new.blind.unwrap_or(default.blind),
         publishes: new.publishes.unwrap_or(default.publishes),
         standings: new.standings.unwrap_or(default.standings),
+        uploads: new.uploads.unwrap_or(like.settings.uploads),
     };
     check(&rules, &settings)?;
     check_robot(&app, &rules).await?;
@@ -158,7 +160,8 @@ pub(crate) async fn change_stage(
         || change.max_faults.is_some()
         || change.weights.is_some()
         || change.tier_bounds.is_some()
-        || change.perturbations.is_some();
+        || change.perturbations.is_some()
+        || change.limits.is_some();
     let rules = StageRules {
         // An upgrade of the program alone changes nothing of a stage.
         ruleset: if other_rules {
@@ -177,6 +180,7 @@ pub(crate) async fn change_stage(
                 .perturbations
                 .unwrap_or_else(|| is.variation.perturbations.clone()),
         },
+        limits: change.limits.unwrap_or_else(|| is.limits.clone()),
     };
     let settings = StageSettings {
         schedule: change
@@ -192,6 +196,7 @@ pub(crate) async fn change_stage(
         blind: change.blind.unwrap_or(stage.settings.blind),
         publishes: change.publishes.unwrap_or(stage.settings.publishes),
         standings: change.standings.unwrap_or(stage.settings.standings),
+        uploads: change.uploads.unwrap_or(stage.settings.uploads),
     };
     check(&rules, &settings)?;
     if rules.variation.perturbations != is.variation.perturbations {

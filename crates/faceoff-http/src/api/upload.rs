@@ -9,7 +9,7 @@ use crate::{
     problem::{Problem, ProblemKind},
     room,
     uploads::Place,
-    views::submission::SubmissionView,
+    views::{stage, submission::SubmissionView},
 };
 use axum::{
     Json,
@@ -18,7 +18,7 @@ use axum::{
     http::{HeaderMap, HeaderName, StatusCode, header},
     response::{AppendHeaders, IntoResponse},
 };
-use faceoff_store::{Actor, StoreError, Submission, Team, UploadUsage};
+use faceoff_store::{Actor, StoreError, Submission, Team, UploadQuota, UploadUsage};
 use faceoff_types::{ArchiveFormat, BundleRef};
 use jiff::{Timestamp, tz::TimeZone};
 use serde::Deserialize;
@@ -89,7 +89,7 @@ pub(crate) async fn create_submission(
     if let Some(closed_at) = app.store.season().await?.closed_at {
         return Err(StoreError::SeasonClosed { closed_at }.into());
     }
-    let limits = &app.config.limits;
+    let may = May::now(&app).await?;
     let pending = app
         .store
         .submissions_of(team.id)
@@ -97,7 +97,7 @@ pub(crate) async fn create_submission(
         .iter()
         .filter(|submission| !submission.state.is_settled())
         .count();
-    if pending >= limits.pending_submissions {
+    if pending >= may.wait {
         return Err(Problem::new(
             ProblemKind::TooManyPending,
             format!(
@@ -117,8 +117,8 @@ pub(crate) async fn create_submission(
         body,
         headers.get(header::CONTENT_LENGTH),
         &app.config.upload_dir,
-        &allowance(&app, used, now),
-        limits.upload_rate,
+        &allowance(&app, may.quota, used, now),
+        app.config.limits.upload_rate,
     )
     .await?;
     // A client that goes away ends this handler; what is on disk is brought to its end all the same.
@@ -129,9 +129,33 @@ pub(crate) async fn create_submission(
     Ok((StatusCode::CREATED, AppendHeaders(location), Json(view)))
 }
 
+/// What a team may upload: as the server's configuration has it, or the stage that matters now.
+#[derive(Clone, Copy)]
+struct May {
+    /// Uploads that wait for their smoke run.
+    wait: usize,
+    quota: UploadQuota,
+}
+
+impl May {
+    async fn now(app: &App) -> Result<Self, Problem> {
+        let limits = &app.config.limits;
+        let own = stage::current(app).await?.settings.uploads;
+        let quota = limits.upload_quota;
+        Ok(Self {
+            wait: own
+                .waiting
+                .map_or(limits.pending_submissions, |waiting| waiting as usize),
+            quota: UploadQuota {
+                day_bytes: own.day_bytes.unwrap_or(quota.day_bytes),
+                stored_bytes: own.stored_bytes.unwrap_or(quota.stored_bytes),
+            },
+        })
+    }
+}
+
 /// What a bundle may have: as much as any, or what is left of the team's quota.
-fn allowance(app: &App, used: UploadUsage, now: Timestamp) -> Allowance {
-    let quota = app.config.limits.upload_quota;
+fn allowance(app: &App, quota: UploadQuota, used: UploadUsage, now: Timestamp) -> Allowance {
     let largest = app.config.max_bundle_bytes;
     let left = quota.left(used);
     Allowance {
@@ -189,10 +213,10 @@ async fn store(
         .await?;
     let key = bundle.key.clone();
     let now = app.config.clock.now();
-    let quota = &app.config.limits.upload_quota;
+    let quota = May::now(&app).await?.quota;
     let created = app
         .store
-        .create_submission(actor, team.id, bundle, quota, now)
+        .create_submission(actor, team.id, bundle, &quota, now)
         .await;
     match created {
         Ok(submission) => {

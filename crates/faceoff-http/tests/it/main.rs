@@ -14,6 +14,7 @@ mod comparisons;
 mod days;
 mod evaluations;
 mod events;
+mod limits;
 mod openapi;
 mod people;
 mod problems;

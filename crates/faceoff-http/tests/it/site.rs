@@ -449,6 +449,7 @@ fn plan() -> RunPlan {
         episodes_per_shard: 4,
         max_faults: 1,
         variation: Default::default(),
+        limits: Default::default(),
     }
 }
 
@@ -466,6 +467,7 @@ async fn stage_by(
         episodes_per_task: plan.episodes_per_task,
         max_faults: plan.max_faults,
         variation: Default::default(),
+        limits: Default::default(),
     };
     let settings = StageSettings {
         schedule,

@@ -14,11 +14,12 @@ use crate::{
         runs::Run,
         season,
         shards::{self, Shard},
+        stages,
         submissions::{self, Submission},
     },
     write::Tx,
 };
-use faceoff_types::{BundleRef, EvaluationId, RunId, Seed, SubmissionId};
+use faceoff_types::{BundleRef, EvaluationId, RunId, Seed, StageLimits, SubmissionId};
 use jiff::{SignedDuration, Timestamp};
 use uuid::Uuid;
 
@@ -45,6 +46,8 @@ pub enum Work {
         submission: Submission,
         /// Of the episodes that it plays, its own.
         seeds: RunSeeds,
+        /// What the agent is held to: as in the stage that matters now.
+        limits: Box<StageLimits>,
     },
     /// Play a range of episodes.
     Shard {
@@ -145,7 +148,15 @@ async fn describe(tx: &mut Tx, unit: &Leased) -> Result<Work> {
                 episodes: secret.smoke(id),
                 mismatch: secret.model_mismatch(),
             };
-            Ok(Work::Smoke { submission, seeds })
+            let all = stages::all(tx).await?;
+            let limits = stages::current(&all, tx.now)
+                .map(|stage| stage.rules.rules.limits.clone())
+                .unwrap_or_default();
+            Ok(Work::Smoke {
+                submission,
+                seeds,
+                limits,
+            })
         }
         Purpose::Shard { run: id, shard } => {
             let owner = runs::owner(tx, id).await?;

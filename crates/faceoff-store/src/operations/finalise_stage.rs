@@ -34,6 +34,14 @@ fn check_closed(stage: &Stage, now: Timestamp, what: &str) -> Result<()> {
     ))
 }
 
+/// Is the stage decided by a final day that has not had its cut? Not one in which nobody has a score.
+pub(crate) async fn final_is_owed(tx: &mut Tx, stage: &Stage) -> Result<bool> {
+    Ok(stage.settings.standings == Standings::Final
+        && stage.finalised.is_none()
+        && finalised::final_cut(tx, stage.id).await?.is_none()
+        && finalised::count_scored(tx, stage.id).await? > 0)
+}
+
 /// Can the stage be signed off?
 async fn check_settled(tx: &mut Tx, stage: &Stage) -> Result<()> {
     finalised::check_not(tx, stage.id).await?;
@@ -71,9 +79,7 @@ async fn check_settled(tx: &mut Tx, stage: &Stage) -> Result<()> {
             stage.name.as_str()
         ));
     }
-    let owed = stage.settings.standings == Standings::Final
-        && finalised::final_cut(tx, stage.id).await?.is_none();
-    if owed {
+    if final_is_owed(tx, stage).await? {
         return conflict(format!(
             "the stage {:?} is decided by its final day, and that has not been played: start it first",
             stage.name.as_str()

@@ -1,6 +1,7 @@
 use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
+    operations::finalise_stage::final_is_owed,
     store::Store,
     tables::{drafts, evaluations, season, stages},
 };
@@ -21,7 +22,7 @@ impl Store {
 
     /// Closes the season for good: nothing more is uploaded or evaluated, and its secret is public.
     /// [`StoreError::SeasonClosed`] if it is closed already, [`StoreError::Conflict`] while
-    /// evaluations are under way or a stage is blind.
+    /// evaluations are under way or a stage is blind or waits for its final day.
     pub async fn close_season(&self, actor: Actor, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
@@ -39,12 +40,18 @@ impl Store {
                      their seeds: wait until they are over, or cancel them"
                 )));
             }
-            let mut stages = stages::all(tx).await?.into_iter();
-            if let Some(blind) = stages.find(|stage| stage.settings.blind) {
+            for stage in stages::all(tx).await? {
+                let why = if stage.settings.blind {
+                    "is blind, and closing the season publishes the seeds that its scores follow from: open it first"
+                } else if final_is_owed(tx, &stage).await? {
+                    "is decided by a final day that has not been played, and nothing is played in a closed season: start \
+                     it first, or give the stage other standings while it is open"
+                } else {
+                    continue;
+                };
                 return Err(StoreError::Conflict(format!(
-                    "the stage {:?} is blind, and closing the season publishes the seeds that its scores follow \
-                     from: open it first",
-                    blind.name.as_str()
+                    "the stage {:?} {why}",
+                    stage.name.as_str()
                 )));
             }
             season::close(tx, now).await?;

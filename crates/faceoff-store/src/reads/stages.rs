@@ -1,7 +1,7 @@
 use crate::{
     error::Result,
     store::Store,
-    tables::stages::{self, Revision, Stage, StagePhase},
+    tables::stages::{self, Revision, Stage},
 };
 use faceoff_types::StageId;
 use jiff::Timestamp;
@@ -21,12 +21,7 @@ impl Store {
     /// first to open. `None` before the server has made one.
     pub async fn current_stage(&self, now: Timestamp) -> Result<Option<Stage>> {
         let stages = self.stages().await?;
-        let of = |phase| stages.iter().filter(move |stage| stage.phase(now) == phase);
-        let current = of(StagePhase::Open)
-            .next_back()
-            .or_else(|| of(StagePhase::Closed).max_by_key(|stage| stage.closes_at))
-            .or_else(|| of(StagePhase::Upcoming).next());
-        Ok(current.cloned())
+        Ok(stages::current(&stages, now).cloned())
     }
 
     /// The rules that a stage has had, the first ones first.

@@ -4,8 +4,8 @@ use crate::{
     tables::{plan::RunPlan, rulings::Ruling, runs::RunState},
 };
 use faceoff_types::{
-    EvaluationId, EvaluationResult, Profile, RunId, StageDay, StageId, SubmissionId, Task, TeamId,
-    Variation,
+    EvaluationId, EvaluationResult, Profile, RunId, StageDay, StageId, StageLimits, SubmissionId,
+    Task, TeamId, Variation,
 };
 use jiff::{Timestamp, civil::Date};
 use sqlx::{SqliteConnection, types::Text};
@@ -125,6 +125,7 @@ pub(crate) struct EvaluationRow {
     episodes_per_shard: u32,
     max_faults: u32,
     variation: Option<Json<Variation>>,
+    limits: Option<Json<Box<StageLimits>>>,
     run_state: RunState,
     created_at: Instant,
     state: String,
@@ -160,6 +161,7 @@ impl EvaluationRow {
                 .variation
                 .map(|variation| variation.0)
                 .unwrap_or_default(),
+            limits: self.limits.map(|limits| limits.0).unwrap_or_default(),
         };
         let finished_at = || {
             self.finished_at
@@ -246,7 +248,8 @@ macro_rules! select_evaluations {
                       r.episodes_per_task AS "episodes_per_task: u32",
                       r.episodes_per_shard AS "episodes_per_shard: u32",
                       r.max_faults AS "max_faults: u32",
-                      r.variation AS "variation: Json<Variation>", r.state AS "run_state: RunState",
+                      r.variation AS "variation: Json<Variation>",
+                      r.limits AS "limits: Json<Box<StageLimits>>", r.state AS "run_state: RunState",
                       e.created_at AS "created_at: Instant", e.state,
                       e.finished_at AS "finished_at: Instant",
                       e.result AS "result: Json<EvaluationResult>", e.dataset, e.dataset_blake3,

@@ -1,5 +1,5 @@
 use crate::error::{Result, StoreError};
-use faceoff_types::{Profile, Task, Variation};
+use faceoff_types::{Profile, StageLimits, Task, Variation};
 
 /// What a run plays.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,6 +16,8 @@ pub struct RunPlan {
     pub max_faults: u32,
     /// What is played and scored by otherwise than the ruleset has it.
     pub variation: Variation,
+    /// What agents are held to otherwise than by the server's configuration.
+    pub limits: Box<StageLimits>,
 }
 
 impl RunPlan {

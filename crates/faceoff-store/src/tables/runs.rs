@@ -3,7 +3,9 @@ use crate::{
     error::{Result, StoreError},
     tables::plan::RunPlan,
 };
-use faceoff_types::{Profile, Ruleset, RunId, SeedLabel, SubmissionId, Task, Variation};
+use faceoff_types::{
+    Profile, Ruleset, RunId, SeedLabel, StageLimits, SubmissionId, Task, Variation,
+};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
@@ -44,11 +46,12 @@ pub(crate) async fn insert(
     let (id, plan) = (Text(run.id), &run.plan);
     let (profile, seed, tasks) = (Text(plan.profile), Text(run.seed), Json(&plan.tasks));
     let ruleset = Text(run.ruleset);
+    let limits = (!plan.limits.is_none()).then_some(Json(&plan.limits));
     let variation = (!plan.variation.is_none()).then_some(Json(&plan.variation));
     sqlx::query!(
         "INSERT INTO runs (id, profile, seed, tasks, episodes_per_task, episodes_per_shard, max_faults,
-                           keeps_recordings, ruleset, variation, state)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 'queued')",
+                           keeps_recordings, ruleset, variation, limits, state)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 'queued')",
         id,
         profile,
         seed,
@@ -59,6 +62,7 @@ pub(crate) async fn insert(
         run.keeps_recordings,
         ruleset,
         variation,
+        limits,
     )
     .execute(&mut *connection)
     .await?;
@@ -83,7 +87,7 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: RunId) -> Result
                   tasks AS "tasks: Json<Vec<Task>>", episodes_per_task AS "episodes_per_task: u32",
                   episodes_per_shard AS "episodes_per_shard: u32", max_faults AS "max_faults: u32",
                   keeps_recordings AS "keeps_recordings: bool", ruleset AS "ruleset: Text<Ruleset>",
-                  variation AS "variation: Json<Variation>"
+                  variation AS "variation: Json<Variation>", limits AS "limits: Json<Box<StageLimits>>"
            FROM runs WHERE id = ?"#,
         id_text,
     )
@@ -103,6 +107,7 @@ pub(crate) async fn find(connection: &mut SqliteConnection, id: RunId) -> Result
                 .variation
                 .map(|variation| variation.0)
                 .unwrap_or_default(),
+            limits: row.limits.map(|limits| limits.0).unwrap_or_default(),
         },
         seed: row.seed.0,
         keeps_recordings: row.keeps_recordings,

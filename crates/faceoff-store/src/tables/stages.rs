@@ -134,6 +134,7 @@ impl Stage {
             episodes_per_shard: self.settings.episodes_per_shard,
             max_faults: rules.max_faults,
             variation: rules.variation.clone(),
+            limits: rules.limits.clone(),
         }
     }
 
@@ -207,6 +208,16 @@ pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Stage>>
     .fetch_all(connection)
     .await?;
     Ok(rows.into_iter().map(Stage::from).collect())
+}
+
+/// The one that matters at `now`: of the open ones the last that opened, else the last that closed, else the first to
+/// open.
+pub(crate) fn current(stages: &[Stage], now: Timestamp) -> Option<&Stage> {
+    let of = |phase| stages.iter().filter(move |stage| stage.phase(now) == phase);
+    of(StagePhase::Open)
+        .next_back()
+        .or_else(|| of(StagePhase::Closed).max_by_key(|stage| stage.closes_at))
+        .or_else(|| of(StagePhase::Upcoming).next())
 }
 
 pub(crate) async fn find(connection: &mut SqliteConnection, id: StageId) -> Result<Stage> {
@@ -374,6 +385,7 @@ mod tests {
                     episodes_per_task: 1,
                     max_faults: 1,
                     variation: Default::default(),
+                    limits: Default::default(),
                 },
             },
             names_seeds: true,

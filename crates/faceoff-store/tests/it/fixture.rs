@@ -262,6 +262,7 @@ pub fn rules_of(plan: &RunPlan) -> (StageRules, StageSettings) {
         episodes_per_task: plan.episodes_per_task,
         max_faults: plan.max_faults,
         variation: Default::default(),
+        limits: Default::default(),
     };
     let settings = StageSettings {
         episodes_per_shard: plan.episodes_per_shard,
@@ -306,6 +307,7 @@ pub fn plan() -> RunPlan {
         episodes_per_shard: 2,
         max_faults: 3,
         variation: Default::default(),
+        limits: Default::default(),
     }
 }
 

@@ -285,6 +285,10 @@ async fn a_final_day_is_cut_once_after_the_close_and_owed_before_the_signature()
     assert_eq!(f.store.final_cut(stage.id).await.unwrap(), None);
     f.now = at(CLOSES);
     refused(finalise(&f, &stage).await, &["final day", "start it first"]);
+    refused(
+        f.store.close_season(Actor::Organiser, f.now).await,
+        &["Warm-up", "final day", "start it first"],
+    );
 
     let started = last(f.now).await.unwrap();
     assert_eq!(started.len(), 1);

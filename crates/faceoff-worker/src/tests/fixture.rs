@@ -294,6 +294,7 @@ impl Server {
             episodes_per_shard: 2,
             max_faults: 10,
             variation: Default::default(),
+            limits: Default::default(),
         };
         let stage = stage_by(&self.store, &plan, None, self.now()).await;
         let started = self
@@ -422,6 +423,7 @@ pub(super) async fn stage_by(
         episodes_per_task: plan.episodes_per_task,
         max_faults: plan.max_faults,
         variation: Default::default(),
+        limits: Default::default(),
     };
     let settings = StageSettings {
         schedule,

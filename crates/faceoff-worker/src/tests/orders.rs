@@ -72,6 +72,7 @@ async fn no_order_tells_the_seasons_secret() {
         episodes_per_shard: 3,
         max_faults: 0,
         variation: Default::default(),
+        limits: Default::default(),
     };
     server
         .store
@@ -147,6 +148,46 @@ async fn a_stages_weights_bounds_and_magnitudes_go_with_its_orders_and_its_ablat
         assert_eq!(commit(&server, &order, report).await, Holding::Held);
     }
     assert!(wildly_played > 0);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_stages_limits_hold_for_smoke_runs_and_for_what_is_cut_by_its_rules() {
+    let server = Server::new().await;
+    server.evaluation().await;
+    let stage = server.store.stages().await.unwrap()[0].clone();
+    let mut rules = stage.rules.rules.clone();
+    rules.limits.pids = Some(7);
+    rules.limits.step_s = Some(0.25);
+    let change = StageChange {
+        rules: Some(rules),
+        ..StageChange::default()
+    };
+    let changed = server
+        .store
+        .change_stage(Actor::Organiser, stage.id, change, server.now());
+    assert_eq!(changed.await.unwrap().plan().limits.pids, Some(7));
+    server.upload("Beta", b"archive").await;
+    let (mut smoke, mut shards) = (Vec::new(), Vec::new());
+    while let Some(order) = next(&server).await {
+        match &order.assignment {
+            Assignment::Smoke { agent, .. } => smoke.push(agent.limits.clone()),
+            Assignment::Play { agent, .. } => shards.push(agent.limits.clone()),
+            Assignment::Finalise { .. } => {}
+        }
+        let report = report(&server, &order).await;
+        assert_eq!(commit(&server, &order, report).await, Holding::Held);
+    }
+    let [of_smoke] = &smoke[..] else {
+        panic!("expected one smoke run: {smoke:?}");
+    };
+    // What was cut by the rules of before is held to the server's limits.
+    let of_server = shards[0].clone();
+    assert!(shards.iter().all(|limits| *limits == of_server));
+    assert_ne!(of_server.resources.pids, 7);
+    let mut expected = of_server;
+    expected.resources.pids = 7;
+    expected.time.step_s = 0.25;
+    assert_eq!(*of_smoke, expected, "as in the stage that is open");
 }
 
 /// Plays all shards of an evaluation and returns the order to finalise it.

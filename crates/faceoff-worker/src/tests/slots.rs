@@ -167,6 +167,7 @@ async fn the_schedule_starts_a_missed_day_once() {
         episodes_per_shard: 1,
         max_faults: 0,
         variation: Default::default(),
+        limits: Default::default(),
     };
     let midnight = Schedule::daily(jiff::civil::Time::midnight());
     // A stage that opened after midnight would wait for the next one.

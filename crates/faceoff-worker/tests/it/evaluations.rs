@@ -11,6 +11,7 @@ pub fn plan(episodes_per_shard: u32) -> RunPlan {
         episodes_per_shard,
         max_faults: 2,
         variation: Default::default(),
+        limits: Default::default(),
     }
 }
 

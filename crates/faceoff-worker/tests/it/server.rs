@@ -213,6 +213,7 @@ pub async fn stage_by(store: &Store, plan: &RunPlan, now: Timestamp) -> StageId 
         episodes_per_task: plan.episodes_per_task,
         max_faults: plan.max_faults,
         variation: Default::default(),
+        limits: Default::default(),
     };
     let settings = StageSettings {
         episodes_per_shard: plan.episodes_per_shard,

@@ -43,6 +43,7 @@ async fn site(max_bundle_bytes: u64) -> Site {
         episodes_per_task: 1,
         max_faults: 0,
         variation: Default::default(),
+        limits: Default::default(),
     };
     store
         .configure_stage(rules, StageSettings::default(), Zone::UTC, now())
@@ -234,6 +235,8 @@ async fn a_stage_is_changed_by_what_is_said_and_by_nothing_else() {
         weights: Some("0.5,0.5,0".parse().unwrap()),
         tier_bounds: None,
         perturbations: None,
+        limits: None,
+        uploads: None,
         schedule: Some(faceoff_types::Schedule::cron("0 6 * * 1-5").unwrap()),
         ablation_episodes: None,
         day_deadline: Some(DayDeadline::Hours(30)),

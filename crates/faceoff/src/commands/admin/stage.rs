@@ -11,13 +11,14 @@ use faceoff_http::{
     views::stage::{PhaseView, StageView},
 };
 use faceoff_types::{
-    DayDeadline, PerturbationSettings, Profile, Publishes, Schedule, StageId, Standings, Task,
-    TaskWeights, TierBounds, Zone,
+    DayDeadline, PerturbationSettings, Profile, Publishes, Schedule, StageId, StageLimits,
+    StageUploads, Standings, Task, TaskWeights, TierBounds, Zone,
 };
 use jiff::{
     Timestamp, Zoned,
     civil::{Date, DateTime, Time},
 };
+use serde::de::DeserializeOwned;
 use std::path::PathBuf;
 
 #[derive(Debug, Subcommand)]
@@ -34,7 +35,7 @@ pub(super) enum StageAction {
         /// 1 to 40 letters, digits, spaces and . _ -
         name: String,
         #[command(flatten)]
-        wanted: Wanted,
+        wanted: Box<Wanted>,
     },
     /// Change a stage: what is left out stays as it is
     Change {
@@ -44,7 +45,7 @@ pub(super) enum StageAction {
         #[arg(long, value_name = "NAME")]
         rename: Option<String>,
         #[command(flatten)]
-        wanted: Wanted,
+        wanted: Box<Wanted>,
         /// No end as yet
         #[arg(long, conflicts_with = "closes")]
         open_end: bool,
@@ -102,6 +103,12 @@ pub(super) struct Wanted {
     /// A JSON file with magnitudes of the perturbations; what it leaves out is the ruleset's, so {} gives up all others
     #[arg(long, value_name = "FILE")]
     perturbations: Option<PathBuf>,
+    /// Limits of agents in place of the server's, e.g. '{"memory_bytes":4294967296,"step_s":0.5}'; {} gives them up
+    #[arg(long, value_name = "JSON", value_parser = json::<StageLimits>)]
+    limits: Option<StageLimits>,
+    /// What each team may upload in place of the server's, e.g. '{"waiting":2,"day_bytes":1073741824}'
+    #[arg(long, value_name = "JSON", value_parser = json::<StageUploads>)]
+    uploads: Option<StageUploads>,
     /// Its days start every day at this time
     #[arg(long, value_name = "HH:MM", conflicts_with = "cron")]
     daily: Option<Time>,
@@ -164,6 +171,11 @@ impl Wanted {
             schedule.without(self.days_off.clone().unwrap_or_default()),
         ))
     }
+}
+
+fn json<T: DeserializeOwned>(text: &str) -> Result<T, String> {
+    let mut json = serde_json::Deserializer::from_str(text);
+    serde_path_to_error::deserialize(&mut json).map_err(|error| error.to_string())
 }
 
 /// An instant as people write it: with an offset or a zone, or by the clocks of `zone`.
@@ -238,6 +250,8 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 max_faults: wanted.max_faults,
                 weights: wanted.weights,
                 tier_bounds: wanted.tier_bounds,
+                limits: wanted.limits.map(Box::new),
+                uploads: wanted.uploads,
                 ablation_episodes: wanted.ablation_episodes,
                 episodes_per_shard: wanted.episodes_per_shard,
                 day_deadline: wanted.deadline,
@@ -276,6 +290,8 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 max_faults: wanted.max_faults,
                 weights: wanted.weights,
                 tier_bounds: wanted.tier_bounds,
+                limits: wanted.limits.map(Box::new),
+                uploads: wanted.uploads,
                 ablation_episodes: wanted.ablation_episodes,
                 episodes_per_shard: wanted.episodes_per_shard,
                 day_deadline: wanted.deadline,
@@ -332,11 +348,28 @@ fn told(stage: &StageView) -> String {
         None => "provisional".to_owned(),
     };
     let settings = &stage.settings;
+    let own = [
+        (
+            "limits ",
+            !rules.limits.is_none(),
+            serde_json::to_string(&rules.limits),
+        ),
+        (
+            "uploads",
+            !settings.uploads.is_none(),
+            serde_json::to_string(&settings.uploads),
+        ),
+    ];
+    let limits: String = own
+        .into_iter()
+        .filter(|(_, is_own, _)| *is_own)
+        .filter_map(|(name, _, json)| Some(format!("\n  {name}  {}", json.ok()?)))
+        .collect();
     let blind = if settings.blind { ", blind" } else { "" };
     format!(
         "{} ({phase}{blind})\n  id       {}\n  times    {} to {closes}, {}\n  next day {next}\n  deadline {}\n  rules    revision {} since {}: {}, {} \
          episodes of each of {}, at most {} faults\n  score    weights {}, tiers up to {} \
-         points per episode, perturbations {}\n  board    by {}, {result}\n  datasets public {}",
+         points per episode, perturbations {}{limits}\n  board    by {}, {result}\n  datasets public {}",
         stage.name,
         stage.id,
         there(stage.opens_at),

@@ -1,0 +1,113 @@
+//! A stage's own limits of agents and quotas of uploads; what it does not say is the server's.
+
+use crate::site::{ADMIN, Answer, GZIP, Site};
+use faceoff_store::Work;
+use reqwest::Method;
+use serde_json::{Value, json};
+
+async fn change(site: &Site, body: Value) -> Answer {
+    let path = format!("/api/v1/stages/{}", site.stage().await);
+    let request = site.request(Method::PATCH, &path, Some(ADMIN));
+    Answer::of(request.json(&body).send().await.unwrap()).await
+}
+
+#[tokio::test]
+async fn limits_are_rules_and_go_with_what_is_played() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let before = site.get("/api/v1/stages", None).await.json(200)[0].clone();
+    assert_eq!((before.get("limits"), before.get("uploads")), (None, None));
+    let own = json!({ "limits": { "memory_bytes": 67108864, "step_s": 0.5 } });
+    change(&site, own.clone())
+        .await
+        .problem(409, "not-confirmed", &["revision 2"]);
+    let mut own = own;
+    own["confirm"] = json!("Qualifying");
+    let changed = change(&site, own).await.json(200);
+    assert_eq!(
+        changed["limits"],
+        json!({ "memory_bytes": 67108864, "step_s": 0.5 })
+    );
+    assert_eq!(changed["revision"], 2);
+    assert_eq!(changed["revisions"][0].get("limits"), None);
+    site.upload(&team.token, GZIP.to_vec()).await.json(201);
+    let Work::Smoke { limits, .. } = site.claim().await.work else {
+        panic!("expected a smoke run");
+    };
+    assert_eq!((limits.memory_bytes, limits.pids), (Some(64 << 20), None));
+    // An empty object is the server's again.
+    let back = json!({ "limits": {}, "confirm": "Qualifying" });
+    assert_eq!(change(&site, back).await.json(200).get("limits"), None);
+}
+
+#[tokio::test]
+async fn quotas_are_those_of_the_stage_that_is_open() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let own = json!({ "uploads": { "waiting": 1, "day_bytes": 10 } });
+    assert_eq!(
+        change(&site, own).await.json(200)["uploads"],
+        json!({ "waiting": 1, "day_bytes": 10 })
+    );
+    let upload = async || site.upload(&team.token, GZIP.to_vec()).await;
+    upload().await.json(201);
+    upload()
+        .await
+        .problem(429, "too-many-pending", &["1 uploads"]);
+    change(&site, json!({ "uploads": { "day_bytes": 10 } }))
+        .await
+        .json(200);
+    upload().await.json(201);
+    let spent = upload()
+        .await
+        .problem(429, "day-quota-spent", &["at most 10 bytes"]);
+    assert_eq!(
+        (&spent["limit_bytes"], &spent["used_bytes"]),
+        (&json!(10), &json!(8))
+    );
+    change(&site, json!({ "uploads": { "stored_bytes": 9 } }))
+        .await
+        .json(200);
+    upload()
+        .await
+        .problem(409, "stored-quota-spent", &["at most 9 bytes"]);
+    change(&site, json!({ "uploads": {} })).await.json(200);
+    upload().await.json(201);
+}
+
+#[tokio::test]
+async fn wrong_limits_and_quotas_are_refused_by_name() {
+    let site = Site::start().await;
+    for (body, words) in [
+        (
+            json!({ "limits": { "memory_bytes": 10 } }),
+            &["limits.memory_bytes", "at least 16777216", "got 10"][..],
+        ),
+        (
+            json!({ "limits": { "pids": 1 } }),
+            &["limits.pids", "at least 2"],
+        ),
+        (
+            json!({ "limits": { "cpus": 0 } }),
+            &["limits.cpus", "0.01 to 1024"],
+        ),
+        (json!({ "limits": { "step_s": -1 } }), &["limits.step_s"]),
+        (json!({ "limits": { "memory": 1 } }), &["memory"]),
+        (json!({ "limits": { "pids": "many" } }), &["pids"]),
+        (
+            json!({ "uploads": { "waiting": 0 } }),
+            &["uploads.waiting", "at least 1"],
+        ),
+        (
+            json!({ "uploads": { "day_bytes": 0 } }),
+            &["uploads.day_bytes"],
+        ),
+        (json!({ "uploads": { "per_week": 1 } }), &["per_week"]),
+    ] {
+        let mut body = body;
+        body["confirm"] = json!("Qualifying");
+        change(&site, body)
+            .await
+            .problem(422, "invalid-content", words);
+    }
+}

@@ -1,0 +1,228 @@
+use crate::AgentLimits;
+use serde::{Deserialize, Serialize};
+
+/// What agents are held to in a stage otherwise than by the server's configuration, which has all that is absent.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(default, deny_unknown_fields)]
+pub struct StageLimits {
+    /// Memory of an agent's process tree in bytes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub memory_bytes: Option<u64>,
+    /// Processes and threads.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pids: Option<u32>,
+    /// Its scratch folder in bytes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scratch_bytes: Option<u64>,
+    /// CPU time per time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cpus: Option<f64>,
+    /// Seconds from the start of the process to its answer to `hello`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub startup_s: Option<f64>,
+    /// Seconds to answer `reset`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reset_s: Option<f64>,
+    /// Seconds to answer one `step`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub step_s: Option<f64>,
+    /// Seconds: the mean of the answers of a smoke run, for each task.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_s: Option<f64>,
+    /// All answers of an episode: so many times the control time of its steps …
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub episode_control_times: Option<f64>,
+    /// … and so many seconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub episode_extra_s: Option<f64>,
+    /// All resets of a shard: so many seconds for each of its episodes …
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reset_mean_s: Option<f64>,
+    /// … and so many more.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub resets_extra_s: Option<f64>,
+}
+
+/// A limit that no agent can live by, or that none meets.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{field}: expected {expected}, got {got}")]
+pub struct InvalidLimit {
+    field: &'static str,
+    expected: String,
+    got: String,
+}
+
+impl StageLimits {
+    /// Has the server's configuration all of them?
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Can an agent be held to them?
+    ///
+    /// # Errors
+    /// The first that none can.
+    pub fn check(&self) -> Result<(), InvalidLimit> {
+        for (field, value, least) in [
+            ("memory_bytes", self.memory_bytes, 16 << 20),
+            ("pids", self.pids.map(u64::from), 2),
+            ("scratch_bytes", self.scratch_bytes, 0),
+        ] {
+            if let Some(value) = value.filter(|value| *value < least) {
+                return Err(InvalidLimit {
+                    field,
+                    expected: format!("at least {least}"),
+                    got: value.to_string(),
+                });
+            }
+        }
+        for (field, value, least, most) in [
+            ("cpus", self.cpus, 0.01, 1024.0),
+            ("startup_s", self.startup_s, 0.001, 3600.0),
+            ("reset_s", self.reset_s, 0.001, 3600.0),
+            ("step_s", self.step_s, 0.001, 3600.0),
+            ("mean_s", self.mean_s, 0.001, 3600.0),
+            (
+                "episode_control_times",
+                self.episode_control_times,
+                0.001,
+                3600.0,
+            ),
+            ("episode_extra_s", self.episode_extra_s, 0.001, 3600.0),
+            ("reset_mean_s", self.reset_mean_s, 0.001, 3600.0),
+            ("resets_extra_s", self.resets_extra_s, 0.001, 3600.0),
+        ] {
+            if let Some(value) = value.filter(|value| !(least..=most).contains(value)) {
+                return Err(InvalidLimit {
+                    field,
+                    expected: format!("{least} to {most}"),
+                    got: value.to_string(),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// The server's limits with these in their places.
+    #[must_use]
+    pub fn over(&self, server: &AgentLimits) -> AgentLimits {
+        let mut limits = server.clone();
+        let (resources, time) = (&mut limits.resources, &mut limits.time);
+        set(&mut resources.memory_bytes, self.memory_bytes);
+        set(&mut resources.pids, self.pids);
+        set(&mut resources.scratch_bytes, self.scratch_bytes);
+        set(&mut resources.cpus, self.cpus);
+        set(&mut time.startup_s, self.startup_s);
+        set(&mut time.reset_s, self.reset_s);
+        set(&mut time.step_s, self.step_s);
+        set(&mut time.mean_s, self.mean_s);
+        set(&mut time.episode_control_times, self.episode_control_times);
+        set(&mut time.episode_extra_s, self.episode_extra_s);
+        set(&mut time.reset_mean_s, self.reset_mean_s);
+        set(&mut time.resets_extra_s, self.resets_extra_s);
+        limits
+    }
+}
+
+fn set<T>(limit: &mut T, own: Option<T>) {
+    if let Some(own) = own {
+        *limit = own;
+    }
+}
+
+/// What each team may upload while a stage is the one that matters, otherwise than by the server's configuration, which
+/// has all that is absent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(default, deny_unknown_fields)]
+pub struct StageUploads {
+    /// Uploads that wait for their smoke run; at least one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub waiting: Option<u32>,
+    /// Bytes on a UTC day; at least one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub day_bytes: Option<u64>,
+    /// Bytes of bundles kept; at least one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stored_bytes: Option<u64>,
+}
+
+impl StageUploads {
+    /// Has the server's configuration all of them?
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Can anything be uploaded?
+    ///
+    /// # Errors
+    /// What lets nothing through.
+    pub fn check(&self) -> Result<(), InvalidLimit> {
+        for (field, value) in [
+            ("waiting", self.waiting.map(u64::from)),
+            ("day_bytes", self.day_bytes),
+            ("stored_bytes", self.stored_bytes),
+        ] {
+            if value == Some(0) {
+                return Err(InvalidLimit {
+                    field,
+                    expected: "at least 1".to_owned(),
+                    got: "0".to_owned(),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn own_limits_take_the_places_of_the_servers_and_no_others() {
+        let none: StageLimits = serde_json::from_str("{}").unwrap();
+        assert!(none.is_none());
+        assert_eq!(serde_json::to_string(&none).unwrap(), "{}");
+        let server = AgentLimits::default();
+        assert_eq!(none.over(&server), server);
+        let own: StageLimits =
+            serde_json::from_str(r#"{"memory_bytes":33554432,"step_s":0.5}"#).unwrap();
+        assert_eq!(own.check(), Ok(()));
+        let mut expected = server.clone();
+        expected.resources.memory_bytes = 32 << 20;
+        expected.time.step_s = 0.5;
+        assert_eq!(own.over(&server), expected);
+    }
+
+    #[test]
+    fn limits_that_nobody_can_live_by_are_named() {
+        for (json, words) in [
+            (
+                r#"{"memory_bytes":10}"#,
+                "memory_bytes: expected at least 16777216, got 10",
+            ),
+            (r#"{"pids":1}"#, "pids: expected at least 2, got 1"),
+            (r#"{"cpus":0.0}"#, "cpus: expected 0.01 to 1024, got 0"),
+            (r#"{"step_s":-1.0}"#, "step_s"),
+            (r#"{"startup_s":3601.0}"#, "startup_s"),
+        ] {
+            let limits: StageLimits = serde_json::from_str(json).unwrap();
+            let error = limits.check().unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+        }
+        assert!(serde_json::from_str::<StageLimits>(r#"{"memory":1}"#).is_err());
+        let nothing: StageUploads = serde_json::from_str(r#"{"waiting":0}"#).unwrap();
+        assert!(
+            nothing
+                .check()
+                .unwrap_err()
+                .to_string()
+                .contains("waiting: expected at least 1")
+        );
+        assert_eq!(StageUploads::default().check(), Ok(()));
+    }
+}
