@@ -107,6 +107,9 @@ fn a_data_folder_of_the_first_release_continues_where_it_was_cut_off() {
         let fields = found.as_object_mut().expect("an answer is an object");
         assert_eq!(fields.remove("stage"), Some(stage["id"].clone()), "{over}");
         assert_eq!(fields.remove("revision"), Some(1.into()), "{over}");
+        assert_eq!(fields.remove("deadline_at"), Some(Value::Null), "{over}");
+        let next = fields.remove("next").expect("it is told");
+        assert!(next.is_string(), "{over}");
         assert_eq!(stage["names_seeds"], false, "its days keep their seeds");
         assert_eq!(&found, told.answer(over), "{over}");
     }

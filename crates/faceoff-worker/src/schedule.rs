@@ -10,9 +10,8 @@ use tokio_util::sync::CancellationToken;
 const LONGEST_SLEEP: Duration = Duration::from_secs(1);
 
 /// Ends the days whose deadline has come, and starts those of all stages that have a schedule, each once, at its
-/// time, until `shutdown` is cancelled. A
-/// day whose time passed while the server was down is started when it comes up, on the same date still. What a
-/// failing database keeps from starting is tried again every second.
+/// time, until `shutdown` is cancelled. A day whose time passed while the server was down is started when it comes
+/// up, on the same date still. What a failing database keeps from ending or starting is tried again every second.
 pub async fn run_schedule(
     store: Store,
     clock: Clock,
@@ -50,10 +49,8 @@ pub async fn run_schedule(
 
 /// Ends and starts what is due at `now`; when the next day is, if one comes.
 async fn start_due(store: &Store, now: Timestamp) -> anyhow::Result<Option<Timestamp>> {
-    let overdue = store.end_overdue_days(now).await;
-    for (of, not_played) in overdue.context("ending the days whose deadline has come")? {
-        tracing::warn!(stage = %of.stage, day = %of.date, not_played, "the day's deadline came before all of it was played");
-    }
+    // A day that cannot be ended keeps no other from starting.
+    let ended = end_overdue(store, now).await;
     let mut first = None;
     let stages = store.stages().await.context("reading the stages")?;
     for stage in stages {
@@ -76,7 +73,18 @@ async fn start_due(store: &Store, now: Timestamp) -> anyhow::Result<Option<Times
             (first, next) => first.or(next),
         };
     }
-    Ok(first)
+    ended.map(|()| first)
+}
+
+async fn end_overdue(store: &Store, now: Timestamp) -> anyhow::Result<()> {
+    let ended = store.end_overdue_days(now).await;
+    for (of, not_played) in ended.context("ending the days whose deadline has come")? {
+        tracing::warn!(
+            stage = %of.stage, day = %of.date, not_played,
+            "the day's deadline came before all of it was played"
+        );
+    }
+    Ok(())
 }
 
 /// When the schedule starts the stage's next day.
