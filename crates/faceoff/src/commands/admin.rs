@@ -8,22 +8,21 @@ mod people;
 mod proposal;
 mod season;
 mod stage;
+mod teams;
 
 use super::{
     output::{or_none, print},
     serve::ADMIN_TOKEN_FILE,
-    team::team_text,
     token::{self, TokenAction},
 };
 use crate::{client::Client, config::Config};
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
 use faceoff_http::{
-    requests::{Decision, TeamChange},
+    requests::Decision,
     views::{evaluation::EvaluationStatus, event::EventView},
 };
-use faceoff_types::{DivisionName, EvaluationId, QuestionId, StageDay, TeamName};
-use find::find_team;
+use faceoff_types::{EvaluationId, QuestionId, StageDay};
 use jiff::civil::Date;
 use lines::line;
 use season::of_season;
@@ -62,22 +61,8 @@ pub struct AdminCommand {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// Create a team and print its token, which is shown this once
-    CreateTeam {
-        /// 1 to 40 letters, digits, spaces and . _ -
-        name: String,
-    },
-    /// Change a team's name or division
-    ChangeTeam {
-        /// The team's name or id
-        team: String,
-        /// Another name
-        #[arg(long, value_name = "NAME")]
-        rename: Option<TeamName>,
-        /// In which it is ranked; empty: none
-        #[arg(long)]
-        division: Option<String>,
-    },
+    #[command(flatten)]
+    Team(teams::TeamAction),
     /// Invite and remove people, organisers and members of teams
     People {
         #[command(subcommand)]
@@ -116,11 +101,6 @@ enum Action {
     PublishTerms {
         /// A text file
         file: PathBuf,
-    },
-    /// Replace a team's own tokens by one; the old ones are worth nothing from then on
-    NewToken {
-        /// The team's name or id
-        team: String,
     },
     /// Start a stage's day: what each team has active now plays it. A day starts once
     StartDay {
@@ -182,30 +162,11 @@ enum Action {
     },
     /// Let a paused queue go on
     Resume,
-    /// Disqualify a team: it neither plays nor is ranked, at once; without --confirm, say what that would do
-    Disqualify {
-        /// The team's name or id
-        team: String,
-        /// Shown to everybody
-        reason: String,
-        /// The team's name
-        #[arg(long, value_name = "TEAM")]
-        confirm: Option<String>,
-    },
-    /// Let a disqualified team play and be ranked again
-    Reinstate {
-        /// The team's name or id
-        team: String,
-        /// Kept in the log
-        reason: String,
-    },
     /// Show the season, or close it
     Season {
         #[command(subcommand)]
         action: SeasonAction,
     },
-    /// List the teams
-    Teams,
     /// List what was changed, when and by whom, the newest first
     Log {
         /// Who: organiser (the host), person:ID, team:ID, visitor, schedule, worker:NAME or server; person, team, worker: all
@@ -260,34 +221,7 @@ impl AdminCommand {
         };
         let client = Client::new(&self.server, Some(token.trim()))?;
         match self.action {
-            Action::CreateTeam { name } => {
-                let created = client.create_team(&name).await?;
-                print(self.json, &created, || {
-                    format!(
-                        "team {} ({})\ntoken {}\nIt is not shown again; give it to the team.",
-                        created.team.name, created.team.id, created.token
-                    )
-                })
-            }
-            Action::ChangeTeam {
-                team,
-                rename,
-                division,
-            } => {
-                let team = find_team(&client, &team).await?;
-                let division = match division.as_deref().map(str::trim) {
-                    None => None,
-                    Some("") => Some(None),
-                    Some(name) => Some(Some(name.parse::<DivisionName>().context("--division")?)),
-                };
-                let change = TeamChange {
-                    name: rename,
-                    division,
-                    ..TeamChange::default()
-                };
-                let team = client.change_team(team, &change).await?;
-                print(self.json, &team, || team_text(&team))
-            }
+            Action::Team(action) => teams::act(&client, self.json, action).await,
             Action::People { action } => people::people(&client, self.json, action).await,
             Action::Registration { action } => {
                 people::registrations(&client, self.json, action).await
@@ -303,16 +237,6 @@ impl AdminCommand {
                 public,
             } => news::answer(&client, self.json, question, text, public).await,
             Action::PublishTerms { file } => news::publish_terms(&client, self.json, &file).await,
-            Action::NewToken { team } => {
-                let team = find_team(&client, &team).await?;
-                let replaced = client.replace_token(team).await?;
-                print(self.json, &replaced, || {
-                    format!(
-                        "team {} ({})\ntoken {}\nThe old token is worth nothing from now on.",
-                        replaced.team.name, replaced.team.id, replaced.token
-                    )
-                })
-            }
             Action::Day(action) => day::act(&client, self.json, action).await,
             Action::Proposal { action } => proposal::act(&client, self.json, action).await,
             Action::Stage { action } => stage::act(&client, self.json, action).await,
@@ -379,23 +303,6 @@ impl AdminCommand {
                 let season = client.season().await?;
                 print(self.json, &season, || of_season(&season))
             }
-            Action::Disqualify {
-                team,
-                reason,
-                confirm,
-            } => {
-                let team = find_team(&client, &team).await?;
-                let decision = Decision { reason, confirm };
-                let team = client.disqualify(team, &decision).await?;
-                print(self.json, &team, || {
-                    format!("{} is disqualified", team.name)
-                })
-            }
-            Action::Reinstate { team, reason } => {
-                let team = find_team(&client, &team).await?;
-                let team = client.reinstate(team, &reason).await?;
-                print(self.json, &team, || format!("{} is reinstated", team.name))
-            }
             Action::Season {
                 action: SeasonAction::Show,
             } => {
@@ -416,30 +323,6 @@ impl AdminCommand {
                 };
                 let season = client.close_season(&confirm).await?;
                 print(self.json, &season, || of_season(&season))
-            }
-            Action::Teams => {
-                let teams = client.teams().await?;
-                print(self.json, &teams, || {
-                    let lines: Vec<_> = teams
-                        .iter()
-                        .map(|team| {
-                            let disqualified = match &team.disqualified {
-                                Some(ruling) => format!("  disqualified: {}", ruling.reason),
-                                None => String::new(),
-                            };
-                            format!(
-                                "{:<40} {}  since {}{disqualified}",
-                                team.name,
-                                team.id,
-                                team.created_at.strftime("%Y-%m-%d")
-                            )
-                        })
-                        .collect();
-                    or_none(
-                        lines,
-                        "no team yet; create one with faceoff admin create-team NAME",
-                    )
-                })
             }
             Action::Log {
                 actor,
