@@ -56,8 +56,10 @@ def in_another_process():
             one.execute("create table t (x)")
         one.close()
         write = "import sqlite3, sys\nc = sqlite3.connect(sys.argv[1], timeout=60)\nwith c: c.execute('insert into t values (1)')"
-        writers = [subprocess.Popen([sys.executable, "-c", write, path]) for _ in range(3)]
-        assert [writer.wait() for writer in writers] == [0, 0, 0]
+        command = [sys.executable, "-c", write, path]
+        writers = [subprocess.Popen(command, stderr=subprocess.PIPE, text=True) for _ in range(3)]
+        told = [writer.communicate()[1] for writer in writers]
+        assert [writer.returncode for writer in writers] == [0, 0, 0], told
         with sqlite3.connect(path) as one:
             assert one.execute("select count(*) from t").fetchone() == (3,)
         one.close()

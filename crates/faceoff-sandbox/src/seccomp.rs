@@ -126,9 +126,10 @@ const UNHEEDED_ADVICE: [libc::c_int; 3] =
 
 /// Requests of `fcntl` that are answered as if the kernel did not know them (`EINVAL`). Locks for an agent's
 /// own files stay, but nobody is told of another's: not of those by `flock`'s heirs, which `/proc/locks`
-/// shows to all, nor by asking for one.
-const UNKNOWN_REQUESTS: [libc::c_int; 11] = [
-    libc::F_GETLK,
+/// shows to all, nor by asking for one: `F_GETLK` succeeds and leaves the question as it was, so that whoever asks
+/// finds the lock taken, whether it is or not. SQLite asks so where several processes write, and gives up if that
+/// fails.
+const UNKNOWN_REQUESTS: [libc::c_int; 10] = [
     libc::F_OFD_GETLK,
     libc::F_OFD_SETLK,
     libc::F_OFD_SETLKW,
@@ -186,6 +187,7 @@ impl Filters {
 
         let mut unheeded = whatever_arguments(&[UNHEEDED]);
         unheeded.insert(libc::SYS_madvise, one_of(2, &UNHEEDED_ADVICE)?);
+        unheeded.insert(libc::SYS_fcntl, one_of(1, &[libc::F_GETLK])?);
         let mut unknown_requests = Rules::new();
         unknown_requests.insert(libc::SYS_fcntl, one_of(1, &UNKNOWN_REQUESTS)?);
         // Collapsing pages of a file changes what others find of it.

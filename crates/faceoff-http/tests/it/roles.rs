@@ -223,6 +223,7 @@ impl Cast {
                 "registrations",
                 "00000000-0000-7000-8000-000000000000".into(),
             ),
+            ("proposals", "00000000-0000-7000-8000-000000000000".into()),
         ]);
         let tokens = vec![
             None,
@@ -312,6 +313,7 @@ async fn every_route_answers_each_role_as_the_table_says() {
             if seen == '0' && expected == '+' && answer.body.contains("there is no such") {
                 let whole = [
                     "registrations",
+                    "proposals/",
                     "POST /days",
                     "days/{day}/void",
                     "/ablation",

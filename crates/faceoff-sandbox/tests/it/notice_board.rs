@@ -37,7 +37,6 @@ const REFUSED: [(&str, &[&str]); 6] = [
     (
         "EINVAL",
         &[
-            "lock_is_asked_for",
             "open_file_lock",
             "open_file_lock_waiting",
             "open_file_lock_is_asked_for",
@@ -62,9 +61,11 @@ const REFUSED: [(&str, &[&str]); 6] = [
     ("EACCES", &["locks_of_all", "counters_of_memory"]),
 ];
 
-/// What seems to work: a lock that nobody is told of, and advice that is not followed.
-const WITHOUT_EFFECT: [&str; 6] = [
+/// What seems to work: a lock that nobody is told of, a question about one that is not answered, and advice that is
+/// not followed.
+const WITHOUT_EFFECT: [&str; 7] = [
     "lock",
+    "lock_is_asked_for",
     "advice_will_need",
     "advice_do_not_need",
     "readahead",

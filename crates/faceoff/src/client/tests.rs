@@ -196,9 +196,7 @@ async fn a_refusal_keeps_the_servers_words() {
     let refused = error.downcast_ref::<ApiError>().unwrap();
     assert_eq!(refused.status, StatusCode::UNAUTHORIZED);
     assert!(
-        error
-            .to_string()
-            .contains("Ask the organiser for a new one"),
+        error.to_string().contains("ask the organiser for one"),
         "{error}"
     );
     assert!(Client::new("https://127.0.0.1", None).is_err());
