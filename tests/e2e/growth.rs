@@ -9,7 +9,7 @@ use std::{
     process::{Command, Stdio},
     sync::atomic::{AtomicBool, Ordering},
     thread,
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 /// The bound that the server keeps, and what may come on top while it is at it.
@@ -27,13 +27,18 @@ fn log_bytes(data_dir: &Path) -> u64 {
 
 /// Writes: a team, and the event that tells of it.
 fn create_team(server: &Server, number: u32) {
-    let name = format!("Team {number}");
-    let answer = server.post(
-        "/api/v1/teams",
-        &server.admin_token,
-        &json!({ "name": name }),
-    );
-    assert_eq!(answer.status(), 201);
+    let new = json!({ "name": format!("Team {number}") });
+    loop {
+        let answer = server.post("/api/v1/teams", &server.admin_token, &new);
+        // On a busy machine the server may lose its patience, and says so: a client tries again.
+        match answer.status().as_u16() {
+            503 => thread::sleep(Duration::from_millis(200)),
+            status => {
+                let text = answer.text().unwrap_or_default();
+                return assert_eq!(status, 201, "{text}");
+            }
+        }
+    }
 }
 
 /// Ends the readers, also when the test fails.

@@ -108,6 +108,7 @@ fn a_data_folder_of_the_first_release_continues_where_it_was_cut_off() {
         assert_eq!(fields.remove("stage"), Some(stage["id"].clone()), "{over}");
         assert_eq!(fields.remove("revision"), Some(1.into()), "{over}");
         assert_eq!(fields.remove("deadline_at"), Some(Value::Null), "{over}");
+        assert_eq!(fields.remove("public"), Some(false.into()), "{over}");
         let next = fields.remove("next").expect("it is told");
         assert!(next.is_string(), "{over}");
         assert_eq!(stage["names_seeds"], false, "its days keep their seeds");
