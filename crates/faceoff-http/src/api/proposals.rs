@@ -4,7 +4,7 @@ use super::rulings::checked_reason;
 use crate::{
     app::App,
     auth::Organiser,
-    extract::{Json as Body, PathParam},
+    extract::{Json as Body, OptionalJson, PathParam},
     problem::Problem,
     requests::{Confirmation, Decision, NewProposal, Trial},
     views::proposal::{ProposalStateView, ProposalView},
@@ -166,17 +166,27 @@ pub(crate) async fn apply_proposal(
 #[utoipa::path(
     post, path = "/proposals/{id}/drop", tag = "organiser", security(("organiser" = [])),
     params(("id" = ProposalId, Path)),
+    request_body(content = Option<Confirmation>, content_type = "application/json"),
     responses(
         (status = 200, body = ProposalView),
         (status = 404),
-        (status = 409, description = "it is settled"),
+        (status = 409, description = "not confirmed with the stage's name (nothing is done), or it is settled"),
     )
 )]
 pub(crate) async fn drop_proposal(
     organiser: Organiser,
     State(app): State<App>,
     PathParam(id): PathParam<ProposalId>,
+    OptionalJson(Confirmation { confirm }): OptionalJson<Confirmation>,
 ) -> Result<Json<ProposalView>, Problem> {
+    let view = ProposalView::find(&app, id).await?;
+    if view.settled_at.is_none() {
+        let what = format!(
+            "{} evaluations would never count, what is under way of them be stopped, and their datasets be removed",
+            view.evaluations.len()
+        );
+        Problem::check_confirmed(confirm.as_deref(), view.stage_name.as_str(), &what)?;
+    }
     let now = app.config.clock.now();
     app.store.drop_proposal(organiser.actor(), id, now).await?;
     tracing::info!(proposal = %id, "a proposal was dropped");

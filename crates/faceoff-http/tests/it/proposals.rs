@@ -132,7 +132,11 @@ async fn a_day_is_tried_and_only_the_organiser_sees_it() {
     post(&site, &format!("{own}/apply"), json!({}))
         .await
         .problem(409, "conflict", &["nothing to apply"]);
-    let dropped = post(&site, &format!("{own}/drop"), json!({}))
+    post(&site, &format!("{own}/drop"), json!({}))
+        .await
+        .problem(409, "not-confirmed", &["would never count", "Qualifying"]);
+    let confirmed = json!({ "confirm": "Qualifying" });
+    let dropped = post(&site, &format!("{own}/drop"), confirmed)
         .await
         .json(200);
     assert_eq!(dropped["state"], "dropped");

@@ -40,6 +40,76 @@ pub struct BoardRecord {
     pub result: EvaluationResult,
 }
 
+/// A row of both boards' statements.
+pub(super) struct Row {
+    pub(super) team: Text<TeamId>,
+    pub(super) name: Text<TeamName>,
+    pub(super) invited_at: Instant,
+    pub(super) affiliation: Option<String>,
+    pub(super) link: Option<String>,
+    pub(super) division: Option<Text<DivisionName>>,
+    pub(super) retired_at: Option<Instant>,
+    pub(super) submission: Text<SubmissionId>,
+    pub(super) submitted_at: Instant,
+    pub(super) agent_name: Option<String>,
+    pub(super) evaluation: Text<EvaluationId>,
+    pub(super) run: Text<RunId>,
+    pub(super) day: Text<Date>,
+    pub(super) released_at: Option<Instant>,
+    pub(super) extra_for: Option<String>,
+    pub(super) finished_at: Instant,
+    pub(super) result: Json<EvaluationResult>,
+}
+
+impl From<Row> for BoardRecord {
+    fn from(row: Row) -> Self {
+        Self {
+            team: Team {
+                id: row.team.0,
+                name: row.name.0,
+                created_at: row.invited_at.0,
+                disqualified: None,
+                profile: TeamProfile {
+                    affiliation: row.affiliation,
+                    link: row.link,
+                    division: row.division.map(|name| name.0),
+                },
+                retired_at: row.retired_at.map(|at| at.0),
+            },
+            submission: row.submission.0,
+            submitted_at: row.submitted_at.0,
+            agent_name: row.agent_name,
+            evaluation: row.evaluation.0,
+            run: row.run.0,
+            day: row.day.0,
+            released_at: row.released_at.map(|at| at.0),
+            extra_for: row.extra_for,
+            finished_at: row.finished_at.0,
+            result: row.result.0,
+        }
+    }
+}
+
+/// `SELECT` of board records: the statement's name as a comment, what follows the columns, and its arguments.
+macro_rules! select_board {
+    ($name:literal, $tail:literal, $($argument:expr),* $(,)?) => {
+        sqlx::query_as!(
+            crate::reads::board::Row,
+            $name + r#"SELECT t.id AS "team: Text<TeamId>", t.name AS "name: Text<TeamName>",
+                      t.created_at AS "invited_at: Instant", t.affiliation, t.link,
+                      t.division AS "division: Text<DivisionName>", t.retired_at AS "retired_at: Instant",
+                      s.id AS "submission: Text<SubmissionId>",
+                      s.created_at AS "submitted_at: Instant", s.agent_name,
+                      e.id AS "evaluation: Text<EvaluationId>", e.run_id AS "run: Text<RunId>",
+                      e.day AS "day: Text<Date>", d.released_at AS "released_at: Instant",
+                      e.extra_for, e.finished_at AS "finished_at!: Instant",
+                      e.result AS "result!: Json<EvaluationResult>" "# + $tail,
+            $($argument),*
+        )
+    };
+}
+pub(super) use select_board;
+
 /// What of a stage's results is left out of its board.
 #[derive(Debug, Clone, Default)]
 pub struct BoardScope {
@@ -90,17 +160,9 @@ impl Store {
     ) -> Result<Vec<BoardRecord>> {
         let (stage, until) = (Text(stage), scope.until.map(Instant));
         let without = Json(&scope.without);
-        let rows = sqlx::query!(
-            r#"/* board */ SELECT t.id AS "team: Text<TeamId>", t.name AS "name: Text<TeamName>",
-                      t.created_at AS "invited_at: Instant", t.affiliation, t.link,
-                      t.division AS "division: Text<DivisionName>", t.retired_at AS "retired_at: Instant",
-                      s.id AS "submission: Text<SubmissionId>",
-                      s.created_at AS "submitted_at: Instant", s.agent_name,
-                      e.id AS "evaluation: Text<EvaluationId>", e.run_id AS "run: Text<RunId>",
-                      e.day AS "day: Text<Date>", d.released_at AS "released_at: Instant",
-                      e.extra_for, e.finished_at AS "finished_at!: Instant",
-                      e.result AS "result!: Json<EvaluationResult>"
-               FROM teams t
+        let rows = select_board!(
+            "/* board */ ",
+            r#"FROM teams t
                JOIN evaluations e ON e.rowid = (SELECT n.rowid FROM evaluations n
                                                 WHERE n.team_id = t.id AND n.stage_id = ?1
                                                   AND n.revision = ?2 AND n.state = 'finished'
@@ -118,35 +180,8 @@ impl Store {
             revision,
             until,
             without,
-        )
-        .fetch_all(&self.database.read)
-        .await?;
-        Ok(rows
-            .into_iter()
-            .map(|row| BoardRecord {
-                team: Team {
-                    id: row.team.0,
-                    name: row.name.0,
-                    created_at: row.invited_at.0,
-                    disqualified: None,
-                    profile: TeamProfile {
-                        affiliation: row.affiliation,
-                        link: row.link,
-                        division: row.division.map(|name| name.0),
-                    },
-                    retired_at: row.retired_at.map(|at| at.0),
-                },
-                submission: row.submission.0,
-                submitted_at: row.submitted_at.0,
-                agent_name: row.agent_name,
-                evaluation: row.evaluation.0,
-                run: row.run.0,
-                day: row.day.0,
-                released_at: row.released_at.map(|at| at.0),
-                extra_for: row.extra_for,
-                finished_at: row.finished_at.0,
-                result: row.result.0,
-            })
-            .collect())
+        );
+        let rows = rows.fetch_all(&self.database.read).await?;
+        Ok(rows.into_iter().map(BoardRecord::from).collect())
     }
 }

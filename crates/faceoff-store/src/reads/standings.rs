@@ -1,9 +1,8 @@
 use crate::{
     column::{Instant, Json},
     error::Result,
-    reads::board::{BoardRecord, BoardScope},
+    reads::board::{BoardRecord, BoardScope, select_board},
     store::Store,
-    tables::teams::{Team, TeamProfile},
 };
 use faceoff_types::{
     DivisionName, EvaluationId, EvaluationResult, RunId, StageId, SubmissionId, TeamId, TeamName,
@@ -43,17 +42,9 @@ impl Store {
             BoardDays::Last(days) => (days, false),
             BoardDays::Final => (u32::MAX, true),
         };
-        let rows = sqlx::query!(
-            r#"/* board of days */ SELECT t.id AS "team: Text<TeamId>", t.name AS "name: Text<TeamName>",
-                      t.created_at AS "invited_at: Instant", t.affiliation, t.link,
-                      t.division AS "division: Text<DivisionName>", t.retired_at AS "retired_at: Instant",
-                      s.id AS "submission: Text<SubmissionId>",
-                      s.created_at AS "submitted_at: Instant", s.agent_name,
-                      e.id AS "evaluation: Text<EvaluationId>", e.run_id AS "run: Text<RunId>",
-                      e.day AS "day: Text<Date>", d.released_at AS "released_at: Instant",
-                      e.extra_for, e.finished_at AS "finished_at!: Instant",
-                      e.result AS "result!: Json<EvaluationResult>"
-               FROM (SELECT n.rowid AS row, ROW_NUMBER() OVER (PARTITION BY n.team_id ORDER BY n.day DESC) AS age
+        let rows = select_board!(
+            "/* board of days */ ",
+            r#"FROM (SELECT n.rowid AS row, ROW_NUMBER() OVER (PARTITION BY n.team_id ORDER BY n.day DESC) AS age
                      FROM evaluations n
                      WHERE n.stage_id = ?1 AND n.revision = ?2 AND n.state = 'finished'
                        AND n.voided_at IS NULL AND (?5 IS NULL OR n.finished_at <= ?5)
@@ -73,35 +64,8 @@ impl Store {
             only_final,
             until,
             without,
-        )
-        .fetch_all(&self.database.read)
-        .await?;
-        Ok(rows
-            .into_iter()
-            .map(|row| BoardRecord {
-                team: Team {
-                    id: row.team.0,
-                    name: row.name.0,
-                    created_at: row.invited_at.0,
-                    disqualified: None,
-                    profile: TeamProfile {
-                        affiliation: row.affiliation,
-                        link: row.link,
-                        division: row.division.map(|name| name.0),
-                    },
-                    retired_at: row.retired_at.map(|at| at.0),
-                },
-                submission: row.submission.0,
-                submitted_at: row.submitted_at.0,
-                agent_name: row.agent_name,
-                evaluation: row.evaluation.0,
-                run: row.run.0,
-                day: row.day.0,
-                released_at: row.released_at.map(|at| at.0),
-                extra_for: row.extra_for,
-                finished_at: row.finished_at.0,
-                result: row.result.0,
-            })
-            .collect())
+        );
+        let rows = rows.fetch_all(&self.database.read).await?;
+        Ok(rows.into_iter().map(BoardRecord::from).collect())
     }
 }

@@ -46,8 +46,12 @@ impl Client {
     }
 
     /// Organiser: has it never count.
-    pub async fn drop_proposal(&self, id: ProposalId) -> anyhow::Result<ProposalView> {
+    pub async fn drop_proposal(
+        &self,
+        id: ProposalId,
+        confirm: Option<String>,
+    ) -> anyhow::Result<ProposalView> {
         let request = self.request(Method::POST, &format!("/proposals/{id}/drop"));
-        read(self.send(request).await?).await
+        read(self.send(request.json(&Confirmation { confirm })).await?).await
     }
 }

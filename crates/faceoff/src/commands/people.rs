@@ -1,8 +1,12 @@
 //! How commands print people and invitations.
 
+use super::output::or_none;
 use faceoff_http::{
     requests::InvitedRole,
-    views::{invitation::InvitationView, person::PersonView},
+    views::{
+        invitation::{InvitationView, NewInvitationView},
+        person::PersonView,
+    },
 };
 
 /// A person in a list.
@@ -37,4 +41,19 @@ pub(super) fn invitation_line(invitation: &InvitationView) -> String {
         invitation.note,
         invitation.expires_at.strftime("%Y-%m-%d %H:%M UTC")
     )
+}
+
+/// A new invitation, with its link.
+pub(super) fn invited(made: &NewInvitationView) -> String {
+    format!(
+        "{}\n{}\nIt is not shown again; it is good for one person, once.",
+        invitation_line(&made.invitation),
+        made.link
+    )
+}
+
+/// All invitations.
+pub(super) fn invitation_lines(invitations: &[InvitationView]) -> String {
+    let lines = invitations.iter().map(invitation_line).collect();
+    or_none(lines, "nobody was invited yet")
 }

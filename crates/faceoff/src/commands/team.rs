@@ -2,7 +2,7 @@
 
 use super::{
     output::{or_none, print},
-    people::{invitation_line, person_line},
+    people::{invitation_line, invitation_lines, invited, person_line},
     team_server::TeamServer,
 };
 use crate::client::Client;
@@ -147,20 +147,11 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
                 expires_at: None,
             };
             let made = client.invite(&new).await?;
-            print(json, &made, || {
-                format!(
-                    "{}\n{}\nIt is not shown again; it is good for one person, once.",
-                    invitation_line(&made.invitation),
-                    made.link
-                )
-            })
+            print(json, &made, || invited(&made))
         }
         Action::Invitations => {
             let invitations = client.invitations().await?;
-            print(json, &invitations, || {
-                let lines = invitations.iter().map(invitation_line).collect();
-                or_none(lines, "nobody was invited yet")
-            })
+            print(json, &invitations, || invitation_lines(&invitations))
         }
         Action::Uninvite { invitation } => {
             let revoked = client.revoke_invitation(invitation).await?;

@@ -5,7 +5,7 @@ use crate::{
     client::Client,
     commands::{
         output::{or_none, print},
-        people::{invitation_line, person_line},
+        people::{invitation_line, invitation_lines, invited, person_line},
     },
 };
 use anyhow::bail;
@@ -99,13 +99,7 @@ async fn find_person(client: &Client, wanted: &str) -> anyhow::Result<PersonId> 
 
 async fn invite(client: &Client, json: bool, new: NewInvitation) -> anyhow::Result<()> {
     let made = client.invite(&new).await?;
-    print(json, &made, || {
-        format!(
-            "{}\n{}\nIt is not shown again; it is good for one person, once.",
-            invitation_line(&made.invitation),
-            made.link
-        )
-    })
+    print(json, &made, || invited(&made))
 }
 
 const fn new(role: InvitedRole, note: String) -> NewInvitation {
@@ -156,10 +150,7 @@ pub(super) async fn people(
         }
         PeopleAction::Invitations => {
             let invitations = client.invitations().await?;
-            print(json, &invitations, || {
-                let lines = invitations.iter().map(invitation_line).collect();
-                or_none(lines, "nobody was invited yet")
-            })
+            print(json, &invitations, || invitation_lines(&invitations))
         }
         PeopleAction::Uninvite { invitation } => {
             let revoked = client.revoke_invitation(invitation).await?;

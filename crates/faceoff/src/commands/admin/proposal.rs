@@ -63,10 +63,13 @@ pub(super) enum ProposalAction {
         #[arg(long, value_name = "DATE")]
         confirm: Option<String>,
     },
-    /// Have it never count; what is under way of it is stopped
+    /// Have it never count; what is under way of it is stopped; without --confirm, say what that would do
     Drop {
         /// Its id
         proposal: ProposalId,
+        /// The stage's name
+        #[arg(long, value_name = "NAME")]
+        confirm: Option<String>,
     },
 }
 
@@ -117,7 +120,9 @@ pub(super) async fn act(client: &Client, json: bool, action: ProposalAction) -> 
         ProposalAction::Apply { proposal, confirm } => {
             client.apply_proposal(proposal, confirm).await?
         }
-        ProposalAction::Drop { proposal } => client.drop_proposal(proposal).await?,
+        ProposalAction::Drop { proposal, confirm } => {
+            client.drop_proposal(proposal, confirm).await?
+        }
     };
     print(json, &shown, || whole(&shown))
 }
