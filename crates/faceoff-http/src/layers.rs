@@ -88,7 +88,17 @@ fn span(request: &Request) -> Span {
         .and_then(|id| id.to_str().ok())
         .unwrap_or_default();
     // The query and the headers stay out of the log: they may hold names and tokens.
-    tracing::info_span!("http", method = %request.method(), path = request.uri().path(), id)
+    let path = without_code(request.uri().path());
+    tracing::info_span!("http", method = %request.method(), path, id)
+}
+
+/// Who reads the log must not be able to follow an invitation.
+fn without_code(path: &str) -> &str {
+    const JOIN: &str = "/join/";
+    match path.strip_prefix(JOIN) {
+        Some(_) => JOIN,
+        None => path,
+    }
 }
 
 async fn security_headers(mut response: Response) -> Response {
@@ -127,4 +137,15 @@ fn panicked(panic: Box<dyn Any + Send + 'static>) -> Response {
         .or_else(|| panic.downcast_ref::<&str>().copied())
         .unwrap_or("no message");
     Problem::internal(format_args!("a handler panicked: {message}")).into_response()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_code_of_an_invitation_stays_out_of_the_log() {
+        assert_eq!(without_code("/join/fo_invite_abc"), "/join/");
+        assert_eq!(without_code("/api/v1/board"), "/api/v1/board");
+    }
 }
