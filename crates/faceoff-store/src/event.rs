@@ -92,7 +92,7 @@ pub enum Event {
         /// From 1.
         version: u32,
     },
-    /// Teams are ranked in these.
+    /// Teams can be in these.
     DivisionsSet {
         /// In their order.
         divisions: Vec<DivisionName>,
@@ -129,7 +129,7 @@ pub enum Event {
         affiliation: Option<String>,
         /// Its page.
         link: Option<String>,
-        /// In which it is ranked.
+        /// The division that it is in.
         division: Option<DivisionName>,
     },
     /// The team plays no more, by its own wish.

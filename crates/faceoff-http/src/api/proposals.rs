@@ -6,7 +6,7 @@ use crate::{
     auth::Organiser,
     extract::{Json as Body, OptionalJson, PathParam},
     problem::Problem,
-    requests::{Confirmation, Decision, NewProposal, Trial},
+    requests::{Confirmation, NewProposal, Trial},
     views::proposal::{ProposalStateView, ProposalView},
 };
 use axum::{Json, extract::State, http::StatusCode};
@@ -150,11 +150,7 @@ pub(crate) async fn apply_proposal(
             ranks.count(),
             view.reason
         );
-        let decision = Decision {
-            reason: view.reason.clone(),
-            confirm,
-        };
-        Problem::check_confirmed(decision.confirm.as_deref(), &day.to_string(), &what)?;
+        Problem::check_confirmed(confirm.as_deref(), &day.to_string(), &what)?;
     }
     let now = app.config.clock.now();
     app.store.apply_proposal(organiser.actor(), id, now).await?;

@@ -70,17 +70,12 @@ pub(crate) async fn finalise_stage(
     let now = app.config.clock.now();
     let stage = app.store.check_stage_settled(id, now).await?;
     let name = stage.name.as_str();
-    if confirm.as_deref() != Some(name) {
-        return Err(Problem::new(
-            ProblemKind::NotConfirmed,
-            format!(
-                "nothing is done yet: the result of the stage {name:?} would be signed off for good. None of its \
-                 evaluations could be voided or played again, none of its settings changed, and who is disqualified or \
-                 reinstated later would not change its boards. To do it, send “confirm” with {name:?}"
-            ),
-        )
-        .with("confirm", name));
-    }
+    let what = format!(
+        "the result of the stage {name:?} would be signed off for good. None of its evaluations could be voided or \
+         played again, none of its settings changed, and who is disqualified or reinstated later would not change its \
+         boards"
+    );
+    Problem::check_confirmed(confirm.as_deref(), name, &what)?;
     let done = app.store.finalise_stage(organiser.actor(), id, now).await?;
     tracing::info!(stage = %done.name, %id, "stage signed off");
     StageView::of(&app, done).await.map(Json)

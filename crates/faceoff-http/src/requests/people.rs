@@ -144,7 +144,7 @@ pub struct SeasonChange {
     /// May anybody register a team? An organiser approves each.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub takes_registrations: Option<bool>,
-    /// In which teams are ranked apart, in the order in which they are shown; empty: none.
+    /// That teams can be in, in the order in which they are shown; empty: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub divisions: Option<Vec<DivisionName>>,
 }

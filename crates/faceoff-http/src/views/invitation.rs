@@ -87,7 +87,7 @@ pub struct RegistrationView {
     pub affiliation: Option<String>,
     /// Its page.
     pub link: Option<String>,
-    /// In which it wants to be ranked.
+    /// The division that it wants to be in.
     pub division: Option<DivisionName>,
     /// How the organisers reach it.
     pub contact: String,

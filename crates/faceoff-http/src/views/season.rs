@@ -34,7 +34,7 @@ pub struct SeasonView {
     /// May anybody register a team?
     #[serde(default)]
     pub takes_registrations: bool,
-    /// In which teams are ranked apart.
+    /// That teams can be in.
     #[serde(default)]
     pub divisions: Vec<DivisionName>,
     /// The newest version of the terms; null: there are none.

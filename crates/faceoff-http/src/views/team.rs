@@ -27,7 +27,7 @@ pub struct TeamView {
     /// Its page; null: none.
     #[serde(default)]
     pub link: Option<String>,
-    /// In which it is ranked; null: none.
+    /// The division that it is in; null: none.
     #[serde(default)]
     pub division: Option<DivisionName>,
     /// Since when it plays no more, by its own wish; null: it plays.

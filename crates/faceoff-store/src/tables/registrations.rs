@@ -38,7 +38,7 @@ pub struct Registration {
     pub affiliation: Option<String>,
     /// Its page.
     pub link: Option<String>,
-    /// In which it wants to be ranked.
+    /// The division that it wants to be in.
     pub division: Option<DivisionName>,
     /// How the organisers reach it; nobody else sees it.
     pub contact: String,

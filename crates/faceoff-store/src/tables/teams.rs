@@ -31,7 +31,7 @@ pub struct TeamProfile {
     pub affiliation: Option<String>,
     /// Its page, an address of http or https.
     pub link: Option<String>,
-    /// In which it is ranked.
+    /// The division that it is in.
     pub division: Option<DivisionName>,
 }
 

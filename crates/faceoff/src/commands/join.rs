@@ -34,7 +34,7 @@ pub struct JoinCommand {
     /// Its page
     #[arg(long, requires = "team", value_name = "URL")]
     team_link: Option<String>,
-    /// In which it is ranked
+    /// The division that it is in
     #[arg(long, requires = "team")]
     division: Option<DivisionName>,
     /// Print the server's answer as JSON

@@ -79,7 +79,7 @@ pub(super) enum RegistrationAction {
         /// For whoever has the registration's link
         reason: String,
     },
-    /// Set the divisions in which teams are ranked, in their order; none without names
+    /// Set the divisions that teams can be in, in their order; none without names
     Divisions {
         /// Their names
         names: Vec<DivisionName>,

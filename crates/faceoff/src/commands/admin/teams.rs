@@ -27,7 +27,7 @@ pub(super) enum TeamAction {
         /// Another name
         #[arg(long, value_name = "NAME")]
         rename: Option<TeamName>,
-        /// In which it is ranked; empty: none
+        /// The division that it is in; empty: none
         #[arg(long)]
         division: Option<String>,
     },
