@@ -123,15 +123,21 @@ impl LinePipe {
         max_bytes: usize,
         deadline: Instant,
     ) -> io::Result<ReadLine> {
+        // An agent on the CPU that asked it has often answered when that comes back: to look is cheaper than to
+        // ask first whether there is something.
+        let mut may_be_there = self.is_all_sent();
         loop {
             if let Some(outcome) = self.take_line(max_bytes) {
                 return Ok(outcome);
             }
-            let ready = if self.is_all_sent() {
+            let ready = if may_be_there {
+                true
+            } else if self.is_all_sent() {
                 wait_for(self.output.as_fd(), PollFlags::IN, deadline)?
             } else {
                 wait_for_any(&mut self.awaited(), deadline)?
             };
+            may_be_there = false;
             if !ready {
                 return Ok(ReadLine::TimedOut);
             }
