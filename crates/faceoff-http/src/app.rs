@@ -1,4 +1,7 @@
-use crate::{config::HttpConfig, passwords::Passwords, summaries::Summaries, uploads::Uploads};
+use crate::{
+    config::HttpConfig, passwords::Passwords, standing::KeptRows, summaries::Summaries,
+    uploads::Uploads,
+};
 use faceoff_store::Store;
 use std::sync::Arc;
 use tokio::sync::Semaphore;
@@ -12,7 +15,10 @@ pub(crate) struct AppState {
     pub(crate) uploads: Arc<Uploads>,
     /// One permit per upload that is copied to where it stays.
     pub(crate) storing: Semaphore,
+    /// One permit: an archive is made and sent.
+    pub(crate) archiving: Arc<Semaphore>,
     pub(crate) summaries: Summaries,
+    pub(crate) rows: KeptRows,
     pub(crate) passwords: Passwords,
 }
 
@@ -26,7 +32,9 @@ impl AppState {
         Self {
             uploads: Arc::new(Uploads::new(config.limits.team_uploads)),
             storing: Semaphore::new(STORING),
+            archiving: Arc::new(Semaphore::new(1)),
             summaries: Summaries::new(store.clone(), config.clock.clone()),
+            rows: KeptRows::new(store.clone()),
             passwords: Passwords::default(),
             store,
             config,

@@ -43,6 +43,8 @@ pub struct Capacity {
     pub slots: u32,
     /// How long an agent may take.
     pub time: TimeLimits,
+    /// The runtimes that agents may name.
+    pub runtimes: Vec<String>,
 }
 
 /// What [`router`](crate::router) needs besides the store.

@@ -10,10 +10,12 @@
 mod acts;
 mod api;
 mod app;
+mod archive;
+mod archived;
 mod auth;
+mod capacity_watch;
 mod config;
 mod extract;
-mod freeze;
 mod layers;
 mod pace;
 mod pages;
@@ -25,6 +27,7 @@ pub mod requests;
 mod room;
 mod serve;
 mod session;
+mod standing;
 mod summaries;
 mod text;
 pub mod token;
@@ -33,12 +36,14 @@ mod viewer;
 pub mod views;
 
 pub use axum::Router;
+pub use capacity_watch::{CapacityWatch, Overflow};
 pub use config::{Capacity, HttpConfig, HttpLimits};
 pub use pace::LeastRate;
 pub use paths::API_BASE;
 pub use serve::{ConnectionLimits, serve};
 
 use app::AppState;
+use axum::middleware;
 use faceoff_store::Store;
 use std::sync::Arc;
 
@@ -48,11 +53,16 @@ use std::sync::Arc;
 /// get the same as a page.
 pub fn router(store: Store, config: HttpConfig) -> Router {
     let limits = config.limits;
+    let app = Arc::new(AppState::new(store, config));
     let site = Router::new()
         .merge(api::router(limits.answer))
         .merge(pages::router(limits.answer))
         .fallback(pages::unknown_path)
         .method_not_allowed_fallback(pages::unknown_method)
-        .with_state(Arc::new(AppState::new(store, config)));
+        .layer(middleware::from_fn_with_state(
+            Arc::clone(&app),
+            archived::refuse_changes,
+        ))
+        .with_state(app);
     layers::around(site, limits.requests)
 }

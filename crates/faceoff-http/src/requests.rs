@@ -5,10 +5,11 @@ mod people;
 
 pub use people::*;
 
+use faceoff_archive::Edition;
 use faceoff_types::{
-    DayDeadline, EvaluationId, PerturbationSettings, Profile, Publishes, Schedule, StageId,
-    StageLimits, StageUploads, Standings, SubmissionId, Task, TaskWeights, TeamId, TierBounds,
-    Zone,
+    DayDeadline, DivisionName, EvaluationId, PerturbationSettings, Profile, Publishes, Retention,
+    Runtimes, Schedule, StageId, StageLimits, StageUploads, Standings, SubmissionId, Task,
+    TaskWeights, TeamId, TierBounds, Zone,
 };
 use jiff::{Timestamp, civil::Date};
 use left_out::{given, given_or_null};
@@ -24,7 +25,7 @@ pub struct NewTeam {
 }
 
 /// Which board.
-#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, IntoParams)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct BoardQuery {
@@ -34,10 +35,24 @@ pub struct BoardQuery {
     /// By which of the stage's rules; without it by the newest with results. No board mixes two.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub revision: Option<u32>,
+    /// Of the teams of one of the season's divisions alone, ranked among themselves; without it of all teams.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub division: Option<DivisionName>,
     /// The organiser: with what was finished since the boards were frozen.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[param(required = false)]
     pub live: bool,
+}
+
+/// Which archive of the season.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct ArchiveQuery {
+    /// For whom: `public`, or `organiser` (which it is without this).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[param(value_type = Option<String>, example = "public")]
+    pub edition: Option<Edition>,
 }
 
 /// A day to be played after all.
@@ -130,6 +145,15 @@ pub struct NewStage {
     /// What agents are held to; what of it is left out is as the server's configuration has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub limits: Option<Box<StageLimits>>,
+    /// The runtimes that its agents may use, of those that the server offers; null: all of them.
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "given",
+        serialize_with = "given_or_null"
+    )]
+    #[schema(value_type = Option<Runtimes>)]
+    pub runtimes: Option<Option<Runtimes>>,
     /// What each team may upload meanwhile; likewise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub uploads: Option<StageUploads>,
@@ -159,6 +183,9 @@ pub struct NewStage {
     /// What a team's row on its board is made of; left out, its newest evaluation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub standings: Option<Standings>,
+    /// What is kept of its files; left out, everything.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub retention: Option<Retention>,
 }
 
 /// What of a stage is to be another; what is left out stays as it is.
@@ -207,6 +234,14 @@ pub struct StageChange {
     /// What agents are held to, all of it anew: what of it is left out is as the server's configuration has it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limits: Option<Box<StageLimits>>,
+    /// The runtimes that its agents may use, of those that the server offers; null: all of them.
+    #[serde(
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "given",
+        serialize_with = "given_or_null"
+    )]
+    #[schema(value_type = Option<Runtimes>)]
+    pub runtimes: Option<Option<Runtimes>>,
     /// What each team may upload meanwhile, all of it anew.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uploads: Option<StageUploads>,
@@ -236,8 +271,11 @@ pub struct StageChange {
     /// What a team's row on its board is made of.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standings: Option<Standings>,
-    /// The stage's name, if other rules or standings are to begin while it is open: its board begins anew then, or is
-    /// ordered anew.
+    /// What is kept of its files, all of it anew; `{}`: everything. Also after its close and its sign-off.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub retention: Option<Retention>,
+    /// The stage's name, if other rules or standings are to begin while it is open (its board begins anew then, or is
+    /// ordered anew), or if another retention would remove something.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub confirm: Option<String>,
 }
@@ -277,12 +315,38 @@ pub struct NewProposal {
     pub reason: String,
 }
 
-/// What a team calls a submission.
-#[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Label {
-    /// 1 to 80 characters; null: nothing.
-    pub label: Option<String>,
+/// What a team says of a submission; what is left out stays as it is, null takes it away.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SubmissionChange {
+    /// What it calls it; 1 to 80 characters.
+    #[serde(
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "given",
+        serialize_with = "given_or_null"
+    )]
+    #[schema(value_type = Option<String>)]
+    pub label: Option<Option<String>>,
+    /// What it writes about it, on any number of lines; 1 to 2000 characters.
+    #[serde(
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "given",
+        serialize_with = "given_or_null"
+    )]
+    #[schema(value_type = Option<String>)]
+    pub note: Option<Option<String>>,
+}
+
+/// That the archive of a submission is to be removed for good.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct DeleteSubmission {
+    /// The name of its archive. Without it nothing is done, and the answer says what would be.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub confirm: Option<String>,
+    /// The team reads it; 1 to 500 characters. An organiser gives one, a team may.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
 }
 
 /// Why an evaluation is stopped.

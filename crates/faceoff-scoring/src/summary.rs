@@ -35,7 +35,8 @@ pub struct TaskSummary {
 
 impl EpisodeSummary {
     /// Changes whenever the same outcomes would give another summary: one that was stored under
-    /// another version is to be made again.
+    /// another version is to be made again. Of runs that are long over the outcomes are gone: a new version has to
+    /// come with a way to make it of the one before.
     pub const VERSION: u32 = 2;
 
     /// Sums up an evaluation's episodes, given in any order, whose tiers are by these bounds. The same episodes give the same summary,

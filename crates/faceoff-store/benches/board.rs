@@ -167,6 +167,7 @@ fn board(criterion: &mut Criterion) {
         let store = Store::open(folder.path()).await.unwrap();
         let now = Timestamp::now();
         let rules = StageRules {
+            runtimes: None,
             ruleset: Ruleset::CURRENT,
             profile: Profile::Evaluation,
             tasks: Task::ALL.to_vec(),

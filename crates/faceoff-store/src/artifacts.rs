@@ -100,6 +100,15 @@ impl Artifacts {
         Ok(self.folder.join(parse(key)?.as_ref()))
     }
 
+    /// Length of an artifact, in bytes; `None` if there is none of this key.
+    pub async fn bytes_of(&self, key: &str) -> Result<Option<u64>> {
+        match self.objects.head(&parse(key)?).await {
+            Ok(found) => Ok(Some(found.size)),
+            Err(object_store::Error::NotFound { .. }) => Ok(None),
+            Err(error) => Err(artifact_error(error)),
+        }
+    }
+
     /// Length and bytes of an artifact, for a download.
     pub async fn read(&self, key: &str) -> Result<(u64, ArtifactStream)> {
         let found = self

@@ -11,7 +11,7 @@ use sqlx::{
 };
 use std::{path::Path, sync::Arc, time::Duration};
 
-static MIGRATIONS: Migrator = sqlx::migrate!("../../migrations");
+pub(crate) static MIGRATIONS: Migrator = sqlx::migrate!("../../migrations");
 
 /// How long a writer waits for the writer of another process.
 pub(crate) const BUSY_TIMEOUT: Duration = Duration::from_secs(30);
@@ -38,6 +38,7 @@ fn is_sound(
 pub(crate) struct Database {
     pub(crate) read: SqlitePool,
     pub(crate) write: SqlitePool,
+    pub(crate) file: Arc<Path>,
     pub(crate) log: Arc<Log>,
 }
 
@@ -79,6 +80,7 @@ impl Database {
         Ok(Self {
             read,
             write,
+            file: file.into(),
             log: Arc::new(Log::new(log.into())),
         })
     }

@@ -9,6 +9,12 @@ pub enum StoreError {
     /// No such team, submission, evaluation or artifact.
     #[error("{0} not found")]
     NotFound(&'static str),
+    /// The outcomes of a run that has long been over; its summary and its dataset have what is asked for.
+    #[error("the run's single outcomes were removed at {at}; its dataset has them")]
+    Cleared {
+        /// When.
+        at: Timestamp,
+    },
     /// Names that differ only in case count as the same.
     #[error("a team named {0:?} exists already")]
     TeamNameTaken(String),
@@ -67,6 +73,14 @@ pub enum StoreError {
     SeasonClosed {
         /// When.
         closed_at: Timestamp,
+    },
+    /// The season is an archive's: nothing of it changes.
+    #[error("the season is archived as it was at {made_at}")]
+    Archived {
+        /// The moment that the archive shows.
+        made_at: Timestamp,
+        /// When it was taken in here.
+        imported_at: Option<Timestamp>,
     },
     /// The team has uploaded as much as it may on one UTC day.
     #[error(

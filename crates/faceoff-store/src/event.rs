@@ -1,7 +1,9 @@
 //! What is recorded of every change: who did what to what. The audit log, and what feeds read.
 
 mod actor;
+mod kinds;
 mod parse;
+mod public;
 mod subject;
 
 pub use actor::Actor;
@@ -9,8 +11,9 @@ pub use parse::ParseEventError;
 pub use subject::Subject;
 
 use faceoff_types::{
-    DivisionName, EvaluationId, InvitationId, PersonName, ProposalId, RunId, ShardId, StageId,
-    StageName, StageRules, StageSettings, SubmissionId, Task, TeamId, TeamName, TokenId, Zone,
+    DivisionName, EvaluationId, InvitationId, PersonName, ProposalId, Retention, RunId, ShardId,
+    StageId, StageName, StageRules, StageSettings, SubmissionId, Task, TeamId, TeamName, TokenId,
+    Zone,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
@@ -175,13 +178,34 @@ pub enum Event {
     },
     /// It is what its team enters at the next cut: the newest that is valid, or the team's choice.
     SubmissionActivated,
+    /// It does not play a day, since the stage does not take its runtime.
+    SubmissionNotTaken {
+        /// Whose day.
+        stage: StageId,
+        /// Its date.
+        day: Date,
+        /// What the stage takes, and what came.
+        reason: String,
+    },
     /// Its team has taken it back: it enters no further day.
     SubmissionWithdrawn,
+    /// Its archive is removed; what it has played stays.
+    SubmissionDeleted {
+        /// As its team reads it.
+        reason: String,
+    },
+    /// Nobody plays it any more, and its archive is removed.
+    ArchiveRemoved {
+        /// By which retention.
+        reason: String,
+    },
     /// Its team calls it so.
     SubmissionLabelled {
         /// None any more, if it is null.
         label: Option<String>,
     },
+    /// Its team has written something else about it, or nothing any more.
+    SubmissionNoted,
     /// A submission is to play a day.
     EvaluationQueued {
         /// Whose it is.
@@ -234,6 +258,11 @@ pub enum Event {
     },
     /// Its team has made its dataset public.
     EvaluationPublished,
+    /// Its dataset is removed; its result stays.
+    DatasetRemoved {
+        /// By which retention.
+        reason: String,
+    },
     /// All of a day does not count any more; each of its evaluations has an event of its own.
     DayVoided {
         /// As everybody may read it.
@@ -365,6 +394,11 @@ pub enum Event {
         /// What no score depends on.
         settings: StageSettings,
     },
+    /// The stage keeps other files of what it has played.
+    StageRetentionChanged {
+        /// From now on.
+        retention: Retention,
+    },
     /// The stage has other rules from now on; before it opens, from its opening on.
     StageRulesChanged {
         /// From 1; before the opening, the one that there was.
@@ -393,23 +427,11 @@ pub enum Event {
     },
     /// The secret is public and nothing more is evaluated.
     SeasonClosed,
-}
-
-impl Event {
-    /// Is there an event of this name?
-    ///
-    /// # Errors
-    /// If not, with the names that there are.
-    pub fn check_kind(name: &str) -> Result<(), String> {
-        let named = serde_json::json!({ "kind": name });
-        match serde_json::from_value::<Self>(named) {
-            Err(error) if error.to_string().starts_with("unknown variant") => {
-                Err(error.to_string())
-            }
-            // There is, whether or not it has fields that are wanting here.
-            _ => Ok(()),
-        }
-    }
+    /// Somebody began to take an archive of the season with them.
+    SeasonExported {
+        /// `public` or `organiser`.
+        edition: String,
+    },
 }
 
 /// An event as it is stored.
@@ -445,19 +467,5 @@ impl Change {
             Self::Recorded(record) => record.subject,
             Self::Progress(subject) => *subject,
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_of_events_are_known_with_and_without_fields() {
-        for kind in ["season_closed", "team_created", "day_started"] {
-            assert_eq!(Event::check_kind(kind), Ok(()));
-        }
-        let unknown = Event::check_kind("day_start").unwrap_err();
-        assert!(unknown.contains("day_started"), "{unknown}");
     }
 }

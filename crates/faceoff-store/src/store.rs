@@ -1,6 +1,6 @@
 use crate::{
     artifacts::Artifacts, database::Database, error::Result, event::Change, pulse::Pulse,
-    room::Room, signals::Signals,
+    room::Room, signals::Signals, tables::archived::Archived,
 };
 use std::sync::Arc;
 use tokio::sync::{broadcast, watch};
@@ -14,6 +14,7 @@ pub struct Store {
     pub(crate) artifacts: Artifacts,
     pub(crate) room: Arc<Room>,
     pub(crate) pulse: Arc<Pulse>,
+    pub(crate) archived: Option<Arc<Archived>>,
 }
 
 impl Store {
@@ -31,6 +32,12 @@ impl Store {
     #[must_use]
     pub fn room(&self) -> &Room {
         &self.room
+    }
+
+    /// The season is an archive's and never changes, if it is.
+    #[must_use]
+    pub fn archived(&self) -> Option<&Archived> {
+        self.archived.as_deref()
     }
 
     /// Copies the database's log into the database, as far as nobody must wait for it. Run it now and

@@ -100,11 +100,28 @@ async fn append(
 }
 
 impl Store {
+    /// As [`keep`](Self::keep), of a season that runs: [`StoreError::Archived`] of one that is an archive's, whatever
+    /// was asked.
+    pub(crate) async fn write<T>(
+        &self,
+        actor: Actor,
+        now: Timestamp,
+        change: impl AsyncFnOnce(&mut Tx) -> Result<T>,
+    ) -> Result<T> {
+        match self.archived() {
+            None => self.keep(actor, now, change).await,
+            Some(archived) => Err(StoreError::Archived {
+                made_at: archived.made_at,
+                imported_at: archived.imported_at,
+            }),
+        }
+    }
+
     /// Runs `change` as one transaction that nobody else's write comes into: what it did and what it
     /// recorded are stored together, and then the listeners are woken. Nothing is changed and nobody
     /// woken if it fails, or if the process dies. An error of the commit itself leaves open whether
     /// it is stored.
-    pub(crate) async fn write<T>(
+    pub(crate) async fn keep<T>(
         &self,
         actor: Actor,
         now: Timestamp,

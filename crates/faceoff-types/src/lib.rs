@@ -23,7 +23,9 @@ mod outcome;
 mod perturbations;
 mod profile;
 mod result;
+mod retention;
 mod ruleset;
+mod runtimes;
 mod schedule;
 mod seed;
 mod seed_label;
@@ -63,9 +65,11 @@ pub use perturbations::{
 };
 pub use profile::{Factor, Factors, ParseProfileError, Profile};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult, ViolationCounts};
+pub use retention::{InvalidRetention, MAX_DAYS_AFTER_SIGN_OFF, MAX_LAST, Retention};
 pub use ruleset::{
     ACTION_LIMIT, FOULS_PER_POINT, GAME_WINDOWS, RULESET, Ruleset, UnknownRuleset, WINDOW_STEPS,
 };
+pub use runtimes::{InvalidRuntimes, RuntimeNotTaken, Runtimes, StageRuntimes};
 pub use schedule::{InvalidSchedule, Schedule};
 pub use seed::{ParseSeedError, Seed};
 pub use seed_label::{ParseSeedLabelError, SeedLabel};

@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 pub enum SmokeOutcome {
     /// The agent starts, answers and keeps time.
     Valid {
+        /// As its manifest names it.
+        runtime: String,
         /// The name in its manifest.
         agent_name: String,
         /// How long its answers took, for each task in turn.
@@ -16,6 +18,8 @@ pub enum SmokeOutcome {
     },
     /// The team's fault.
     Invalid {
+        /// As its manifest names it, if that could be read.
+        runtime: Option<String>,
         /// The name in its manifest, if that could be read.
         agent_name: Option<String>,
         /// What is wrong and where.

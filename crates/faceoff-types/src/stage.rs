@@ -1,5 +1,5 @@
 use crate::{
-    MAX_EPISODES_PER_TASK, Profile, Ruleset, StageId, StageLimits, Task, Variation,
+    MAX_EPISODES_PER_TASK, Profile, Ruleset, Runtimes, StageId, StageLimits, Task, Variation,
     stage_bounds::InvalidStageRules,
 };
 use jiff::civil::Date;
@@ -58,6 +58,9 @@ pub struct StageRules {
     /// What agents are held to otherwise than by the server's configuration; absent if all is the server's.
     #[serde(default, skip_serializing_if = "StageLimits::is_none")]
     pub limits: Box<StageLimits>,
+    /// The runtimes that its agents may use; absent: all that the server offers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub runtimes: Option<Runtimes>,
 }
 
 impl StageRules {
@@ -74,6 +77,9 @@ impl StageRules {
             return Err(InvalidStageRules::Episodes(self.episodes_per_task));
         }
         self.variation.perturbations.check()?;
+        if let Some(runtimes) = &self.runtimes {
+            runtimes.check()?;
+        }
         self.limits.check().map_err(InvalidStageRules::Limits)
     }
 }
@@ -85,6 +91,7 @@ mod tests {
     #[test]
     fn rules_play_each_task_once_and_some_episodes() {
         let rules = |tasks: &[Task], episodes_per_task| StageRules {
+            runtimes: None,
             ruleset: Ruleset::CURRENT,
             profile: Profile::Evaluation,
             tasks: tasks.to_vec(),

@@ -1,4 +1,6 @@
-use crate::{InvalidLimit, InvalidPerturbation, LONGEST_DEADLINE_H, MAX_EPISODES_PER_TASK};
+use crate::{
+    InvalidLimit, InvalidPerturbation, InvalidRuntimes, LONGEST_DEADLINE_H, MAX_EPISODES_PER_TASK,
+};
 
 /// The most days that a row of a board is a mean of.
 pub const MAX_MEAN_DAYS: u32 = 100;
@@ -30,6 +32,9 @@ pub enum InvalidStageRules {
     /// Limits that no agent can live by.
     #[error("limits.{0}")]
     Limits(InvalidLimit),
+    /// Runtimes that no agent can have.
+    #[error("runtimes: {0}")]
+    Runtimes(#[from] InvalidRuntimes),
     /// Quotas that let nothing through.
     #[error("uploads.{0}")]
     Uploads(InvalidLimit),
@@ -48,6 +53,7 @@ impl InvalidStageRules {
             Self::MeanDays(_) => "standings",
             Self::Perturbations(_) => "perturbations",
             Self::Limits(_) => "limits",
+            Self::Runtimes(_) => "runtimes",
             Self::Uploads(_) => "uploads",
         }
     }

@@ -5,7 +5,7 @@
 
 use faceoff_types::{
     AgentLimits, BundleRef, EpisodeOutcome, EvaluationId, EvaluationResult, PerturbationSettings,
-    Profile, Ruleset, Seed, SmokeOutcome, SubmissionId, Task, Variation,
+    Profile, Ruleset, Seed, SmokeOutcome, StageRuntimes, SubmissionId, Task, Variation,
 };
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -49,6 +49,9 @@ pub enum Assignment {
         agent: AgentOrder,
         /// What it is to play.
         spec: SmokeSpec,
+        /// It is refused if none of these stages takes its runtime; none: any is taken.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        runtimes: Vec<StageRuntimes>,
     },
     /// Play a range of episodes.
     Play {

@@ -10,7 +10,7 @@ use crate::{
 use anyhow::Context as _;
 use faceoff_runner::{AgentEnvironment, bundle::Bundle};
 use faceoff_sandbox::{Isolation, Runtime};
-use faceoff_types::{AgentLimits, SmokeOutcome};
+use faceoff_types::{AgentLimits, SmokeOutcome, StageRuntimes};
 use faceoff_wire::work::{
     AgentOrder, Assignment, EvaluationMeta, ShardSpec, SmokeSpec, WorkReport,
 };
@@ -58,9 +58,14 @@ impl Executor {
         progress: &Progress,
     ) -> anyhow::Result<WorkReport> {
         match assignment {
-            Assignment::Smoke { agent, spec, .. } => {
-                self.smoke(agent, spec, progress).map(WorkReport::Smoke)
-            }
+            Assignment::Smoke {
+                agent,
+                spec,
+                runtimes,
+                ..
+            } => self
+                .smoke(agent, spec, runtimes, progress)
+                .map(WorkReport::Smoke),
             Assignment::Play {
                 agent,
                 spec,
@@ -102,6 +107,7 @@ impl Executor {
         &mut self,
         agent: &AgentOrder,
         spec: &SmokeSpec,
+        runtimes: &[StageRuntimes],
         progress: &Progress,
     ) -> anyhow::Result<SmokeOutcome> {
         let bundle = match self.bundle(agent, progress)? {
@@ -109,12 +115,23 @@ impl Executor {
             Unpacked::Invalid(reason) => {
                 return Ok(SmokeOutcome::Invalid {
                     agent_name: None,
+                    runtime: None,
                     reason,
                     timing: Vec::new(),
                     log: String::new(),
                 });
             }
         };
+        let runtime = bundle.manifest.runtime.clone();
+        if let Some(reason) = StageRuntimes::refused_by_all(runtimes, &runtime) {
+            return Ok(SmokeOutcome::Invalid {
+                agent_name: Some(bundle.manifest.name),
+                runtime: Some(runtime),
+                reason,
+                timing: Vec::new(),
+                log: String::new(),
+            });
+        }
         let environment = self.host.environment(&agent.limits);
         let smoke = self
             .evaluator
@@ -123,11 +140,13 @@ impl Executor {
         Ok(match smoke.defect {
             None => SmokeOutcome::Valid {
                 agent_name,
+                runtime,
                 timing,
                 log,
             },
             Some(defect) => SmokeOutcome::Invalid {
                 agent_name: Some(agent_name),
+                runtime: Some(runtime),
                 reason: defect.to_string(),
                 timing,
                 log,

@@ -25,8 +25,10 @@ mod slot;
 mod slot_threads;
 #[cfg(test)]
 mod tests;
+mod tidying;
 
 pub use cpus::{CpuLayout, SlotCpus};
-pub use schedule::run_schedule;
+pub use schedule::{run_schedule, start_due};
 pub use service::{WorkerConfig, run};
 pub use slot_threads::{SlotStarter, SlotThreads};
+pub use tidying::tidy;

@@ -4,6 +4,7 @@
 use crate::{
     full_disk::{self, Pause},
     server::{Claimed, GivenBack, Holding, QueueMark, WorkServer},
+    tidying,
 };
 use faceoff_store::{
     Claim, Claimed as Leased, Committed, RunOwner, ShardCommit, Store, StoreError, Work,
@@ -12,13 +13,9 @@ use faceoff_types::{AgentLimits, BundleRef, Clock, EvaluationResult, StageLimits
 use faceoff_wire::work::{
     AgentOrder, Assignment, EvaluationMeta, Lease, ShardSpec, SmokeSpec, WorkOrder, WorkReport,
 };
-use jiff::SignedDuration;
 use std::{path::Path, time::Duration};
 use tokio::runtime::Handle;
 use tokio_util::sync::CancellationToken;
-
-/// No artifact is under way longer than this.
-const LONGEST_WRITE: SignedDuration = SignedDuration::from_hours(1);
 
 /// A store, and what the organiser has configured for all orders.
 #[derive(Debug, Clone)]
@@ -38,44 +35,6 @@ impl LocalServer {
         self.store.end_leases_of(worker, self.clock.now()).await
     }
 
-    /// Removes recordings that are no longer needed and what kills left half written, and keeps the
-    /// database's log short.
-    pub(crate) async fn tidy(&self) {
-        let now = self.clock.now();
-        if let Err(error) = self.store.remove_old_recordings(now).await {
-            tracing::warn!(%error, "old recordings could not be removed");
-        }
-        if let Err(error) = self.store.remove_dropped_datasets(now).await {
-            tracing::warn!(%error, "datasets of dropped proposals could not be removed");
-        }
-        if let Err(error) = self.store.checkpoint().await {
-            tracing::warn!(%error, "the database's log could not be copied");
-        }
-        let abandoned = self.store.artifacts().remove_abandoned(now - LONGEST_WRITE);
-        if let Err(error) = abandoned.await {
-            tracing::warn!(%error, "half-written artifacts could not be removed");
-        }
-        self.remove_refused().await;
-        match self
-            .store
-            .remove_orphaned_bundles(now - LONGEST_WRITE)
-            .await
-        {
-            Ok(0) => {}
-            Ok(bundles) => tracing::info!(bundles, "bundles of no submission were removed"),
-            Err(error) => tracing::warn!(%error, "bundles of no submission could not be removed"),
-        }
-    }
-
-    /// Removes the bundles that were found invalid. What fails is done by the next call.
-    async fn remove_refused(&self) {
-        match self.store.remove_refused_bundles(self.clock.now()).await {
-            Ok(0) => {}
-            Ok(bundles) => tracing::info!(bundles, "refused bundles were removed"),
-            Err(error) => tracing::warn!(%error, "refused bundles could not be removed"),
-        }
-    }
-
     fn order(&self, leased: Leased) -> WorkOrder {
         let Leased { claim, work } = leased;
         let assignment = match work {
@@ -83,6 +42,7 @@ impl LocalServer {
                 submission,
                 seeds,
                 limits,
+                runtimes,
             } => Assignment::Smoke {
                 submission: submission.id,
                 agent: self.agent(submission.bundle, &limits),
@@ -90,6 +50,7 @@ impl LocalServer {
                     seed: seeds.episodes,
                     mismatch_seed: seeds.mismatch,
                 },
+                runtimes,
             },
             Work::Shard {
                 owner,
@@ -235,7 +196,7 @@ impl WorkServer for LocalServer {
             match report {
                 WorkReport::Smoke(outcome) => {
                     let holding = holding(self.store.commit_smoke(&claim, outcome, now).await?);
-                    self.remove_refused().await;
+                    tidying::remove_refused(&self.store, now).await;
                     Ok(holding)
                 }
                 WorkReport::Play {

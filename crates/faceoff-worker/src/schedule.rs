@@ -47,8 +47,9 @@ pub async fn run_schedule(
     }
 }
 
-/// Ends and starts what is due at `now`; when the next day is, if one comes.
-async fn start_due(store: &Store, now: Timestamp) -> anyhow::Result<Option<Timestamp>> {
+/// Ends and starts what is due at `now`; when the next day is, if one comes. [`run_schedule`] does so at the right
+/// times.
+pub async fn start_due(store: &Store, now: Timestamp) -> anyhow::Result<Option<Timestamp>> {
     // A day that cannot be ended keeps no other from starting.
     let ended = end_overdue(store, now).await;
     let mut first = None;

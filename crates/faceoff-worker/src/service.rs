@@ -9,6 +9,7 @@ use crate::{
     server::WorkServer,
     slot::Slot,
     slot_threads::SlotThreads,
+    tidying,
 };
 use anyhow::Context as _;
 use faceoff_runner::{AgentEnvironment, bundle::BundleLimits};
@@ -209,7 +210,7 @@ async fn wait_for(
 /// Clears away, now and then, what nobody needs.
 async fn tidy(server: LocalServer, every: Duration, shutdown: CancellationToken) {
     loop {
-        server.tidy().await;
+        tidying::tidy(&server.store, server.clock.now()).await;
         tokio::select! {
             () = shutdown.cancelled() => return,
             () = tokio::time::sleep(every) => {}

@@ -6,4 +6,5 @@ mod fixture;
 mod full_disk;
 mod interrupted;
 mod orders;
+mod runtimes;
 mod slots;

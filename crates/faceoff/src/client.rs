@@ -1,6 +1,9 @@
 //! A client of the REST API. It reads the very types that the server writes.
 
+mod archive;
 mod bundle_file;
+mod http;
+mod kept;
 mod people;
 mod proposals;
 
@@ -9,8 +12,8 @@ use bundle_file::BundleFile;
 use faceoff_http::{
     API_BASE,
     requests::{
-        Cancellation, CloseSeason, Confirmation, Decision, ExtraTurn, Label, MissedDay, NewStage,
-        NewTeam, Reason, StageChange, StartDay,
+        Cancellation, CloseSeason, Confirmation, Decision, ExtraTurn, MissedDay, NewStage, NewTeam,
+        Reason, StageChange, StartDay, SubmissionChange,
     },
     views::{
         board::BoardView,
@@ -28,12 +31,12 @@ use faceoff_http::{
 };
 use faceoff_types::{EvaluationId, StageDay, StageId, SubmissionId, TeamId};
 use futures::StreamExt;
+use http::http;
 use indicatif::ProgressBar;
 use jiff::civil::Date;
 use reqwest::{Method, RequestBuilder, Response, StatusCode, header};
 use serde::{Deserialize, de::DeserializeOwned};
 use std::{path::Path, time::Duration};
-use tokio::io::AsyncWriteExt;
 use tokio_util::io::ReaderStream;
 
 /// Longest silence of the server.
@@ -74,16 +77,8 @@ impl Client {
                  (e.g. ssh -L) or upload with another client, as docs/api.md shows"
             );
         }
-        let http = reqwest::Client::builder()
-            .user_agent(concat!("faceoff/", env!("CARGO_PKG_VERSION")))
-            .connect_timeout(Duration::from_secs(10))
-            .read_timeout(PATIENCE)
-            // The server is named by the user; a proxy of the environment is meant for other hosts.
-            .no_proxy()
-            .build()
-            .context("setting up the HTTP client")?;
         Ok(Self {
-            http,
+            http: http(PATIENCE)?,
             base: server.trim_end_matches('/').to_owned(),
             token: token.map(str::to_owned),
         })
@@ -375,14 +370,14 @@ impl Client {
         read(self.send(request).await?).await
     }
 
-    /// Team: gives a submission a name, or takes it away.
-    pub async fn label(
+    /// Team: changes what it says of a submission.
+    pub async fn describe(
         &self,
         id: SubmissionId,
-        label: Option<String>,
+        change: &SubmissionChange,
     ) -> anyhow::Result<SubmissionView> {
         let request = self.request(Method::PATCH, &format!("/submissions/{id}"));
-        read(self.send(request.json(&Label { label })).await?).await
+        read(self.send(request.json(change)).await?).await
     }
 
     /// Organiser: all evaluations of a day (today). Team: its own (all).
@@ -404,39 +399,6 @@ impl Client {
     /// Team or organiser: one evaluation.
     pub async fn evaluation(&self, id: EvaluationId) -> anyhow::Result<EvaluationView> {
         self.get(&format!("/evaluations/{id}")).await
-    }
-
-    /// Team or organiser: downloads a dataset to `file`; returns its size in bytes.
-    pub async fn download_dataset(&self, id: EvaluationId, file: &Path) -> anyhow::Result<u64> {
-        let request = self.request(Method::GET, &format!("/evaluations/{id}/dataset"));
-        let response = self.send(request).await?;
-        let announced = response.content_length();
-        // A download that breaks off must not leave a file that looks whole.
-        let partial = file.with_extension("part");
-        let mut writer = tokio::fs::File::create(&partial)
-            .await
-            .with_context(|| format!("making {}", partial.display()))?;
-        let mut bytes = 0;
-        let mut stream = response.bytes_stream();
-        while let Some(chunk) = stream.next().await {
-            let chunk = chunk.context("downloading the dataset")?;
-            bytes += chunk.len() as u64;
-            writer
-                .write_all(&chunk)
-                .await
-                .with_context(|| format!("writing {}", partial.display()))?;
-        }
-        writer
-            .flush()
-            .await
-            .with_context(|| format!("writing {}", partial.display()))?;
-        if announced.is_some_and(|announced| announced != bytes) {
-            bail!("the download broke off after {bytes} bytes; try again");
-        }
-        tokio::fs::rename(&partial, file)
-            .await
-            .with_context(|| format!("naming {}", file.display()))?;
-        Ok(bytes)
     }
 
     fn request(&self, method: Method, path: &str) -> RequestBuilder {

@@ -356,6 +356,7 @@ impl Config {
     pub fn rules(&self) -> StageRules {
         let evaluation = &self.evaluation;
         StageRules {
+            runtimes: None,
             ruleset: Ruleset::CURRENT,
             profile: evaluation.profile,
             tasks: evaluation.tasks.clone(),

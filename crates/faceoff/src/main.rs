@@ -53,6 +53,7 @@ enum Command {
     Token(commands::token::TokenCommand),
     /// Organise a running competition.
     Admin(commands::admin::AdminCommand),
+    Import(commands::import::ImportCommand),
     /// Check what this host offers and what is missing.
     Doctor(commands::doctor::DoctorCommand),
 }
@@ -77,6 +78,7 @@ fn main() -> ExitCode {
         Command::Team(command) => command.run(),
         Command::Token(command) => command.run(),
         Command::Admin(command) => command.run(),
+        Command::Import(command) => command.run(),
         Command::Doctor(command) => command.run(),
     };
     commands::exit_code(outcome)

@@ -17,7 +17,7 @@ use faceoff_types::Task;
     responses(
         (status = 200, body = BoardView),
         (status = 401, description = "the live board of a frozen stage is the organiser's"),
-        (status = 404),
+        (status = 404, description = "no such stage, revision or division"),
     )
 )]
 pub(crate) async fn board(
@@ -35,7 +35,7 @@ pub(crate) async fn board(
     responses(
         (status = 200, body = BoardView),
         (status = 401, description = "the live board of a frozen stage is the organiser's"),
-        (status = 404),
+        (status = 404, description = "no such stage, revision or division"),
     )
 )]
 pub(crate) async fn task_board(

@@ -1,7 +1,9 @@
 //! Recorded datasets: the archive, and what of it is read without a download.
 
+use super::{downloads::download, proposals};
 use crate::{
     app::App,
+    archived,
     auth::TeamCaller,
     extract::PathParam,
     problem::{Problem, ProblemKind},
@@ -9,20 +11,15 @@ use crate::{
     viewer::Viewer,
     views::{evaluation::EvaluationView, sight::Sight, violations::ViolationsView},
 };
-use axum::{
-    Json,
-    body::Body,
-    extract::State,
-    http::{HeaderValue, header},
-    response::{IntoResponse, Response},
-};
-use faceoff_store::{Evaluation, EvaluationState};
+use axum::{Json, extract::State, response::Response};
+use faceoff_store::{Evaluation, EvaluationState, StoreError};
 use faceoff_types::EvaluationId;
 use jiff::civil::Date;
 
 /// The recorded dataset, a zip archive; for its team and the organiser, and once it is public for everybody.
 ///
-/// It carries the day's seed. So it comes out when the day is released, with all others of the day.
+/// It carries the day's seed. So it comes out when the day is released, with all others of the day. What a proposal or
+/// a trial has played is the organiser's alone, before the proposal is settled.
 #[utoipa::path(
     get, path = "/evaluations/{id}/dataset", tag = "team",
     security((), ("team" = []), ("organiser" = [])),
@@ -31,6 +28,7 @@ use jiff::civil::Date;
         (status = 200, body = Vec<u8>, content_type = "application/zip"),
         (status = 404),
         (status = 409, description = "not finished yet, or failed, its day is not released, or its stage is blind"),
+        (status = 410, description = "it was removed, by a retention or with its proposal; the detail says when and why"),
     )
 )]
 pub(crate) async fn dataset(
@@ -38,27 +36,25 @@ pub(crate) async fn dataset(
     State(app): State<App>,
     PathParam(id): PathParam<EvaluationId>,
 ) -> Result<Response, Problem> {
-    let (evaluation, dataset) = released(viewer, &app, id).await?;
-    // A dataset that a finished evaluation names must be there: without it, we lost it.
-    let (bytes, stream) = app
-        .store
-        .artifacts()
-        .read(&dataset)
-        .await
-        .map_err(Problem::internal)?;
-    let team = app.store.team(evaluation.team).await?;
-    let name = download_name(team.name.as_str(), evaluation.of.date);
-    let disposition = HeaderValue::try_from(format!("attachment; filename=\"{name}\""))
-        .map_err(Problem::internal)?;
-    let headers = [
-        (
-            header::CONTENT_TYPE,
-            HeaderValue::from_static("application/zip"),
-        ),
-        (header::CONTENT_LENGTH, HeaderValue::from(bytes)),
-        (header::CONTENT_DISPOSITION, disposition),
-    ];
-    Ok((headers, Body::from_stream(stream)).into_response())
+    let (team, date, dataset) = match proposals::dataset(viewer, &app, id).await? {
+        Some(proposed) => proposed,
+        None => {
+            let (evaluation, dataset) = released(viewer, &app, id).await?;
+            (evaluation.team, evaluation.of.date, dataset)
+        }
+    };
+    let team = app.store.team(team).await?;
+    let name = download_name(team.name.as_str(), date);
+    match download(&app, &dataset, "application/zip", &name).await {
+        Err(StoreError::NotFound(_)) => {
+            // It may have gone meanwhile. A dataset that is promised must be there: without it, we lost it.
+            if proposals::dataset(viewer, &app, id).await?.is_none() {
+                released(viewer, &app, id).await?;
+            }
+            Err(Problem::internal(format_args!("{dataset} is lost")))
+        }
+        answer => Ok(answer?),
+    }
 }
 
 /// Where each constraint was broken and which answers were slow, by episode: `violations.json` of the dataset,
@@ -72,6 +68,7 @@ pub(crate) async fn dataset(
         (status = 200, body = ViolationsView),
         (status = 404),
         (status = 409, description = "not finished yet, or failed, its day is not released, or its stage is blind"),
+        (status = 410, description = "the dataset was removed; the detail says when and by which retention"),
     )
 )]
 pub(crate) async fn violations(
@@ -91,7 +88,7 @@ pub(crate) async fn violations(
     responses(
         (status = 200, body = EvaluationView),
         (status = 404),
-        (status = 409, description = "not finished, its day is not released, or its stage is blind"),
+        (status = 409, description = "not finished, its day is not released, its stage is blind, or its boards are frozen and leave it out"),
     )
 )]
 pub(crate) async fn publish_evaluation(
@@ -111,6 +108,7 @@ pub(crate) async fn publish_evaluation(
     sight.check_shown(evaluation.of.stage)?;
     if let EvaluationState::Finished { .. } = &evaluation.state {
         check_released(&app, &evaluation).await?;
+        sight.check_not_frozen(&evaluation, "published")?;
     }
     let now = app.config.clock.now();
     let published = app
@@ -133,7 +131,12 @@ async fn released(
     let why_not = match &evaluation.state {
         EvaluationState::Finished { dataset, .. } => {
             check_released(app, &evaluation).await?;
+            if let Some(removed) = &evaluation.dataset_removed {
+                let what = "the dataset, with all that is read out of it,";
+                return Err(Problem::removed(what, removed));
+            }
             let dataset = dataset.clone();
+            archived::check_kept(app, &dataset).await?;
             return Ok((evaluation, dataset));
         }
         EvaluationState::Queued | EvaluationState::Running { .. } | EvaluationState::Finalising => {

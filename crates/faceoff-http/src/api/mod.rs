@@ -10,6 +10,7 @@ mod comparisons;
 mod datasets;
 mod days;
 mod document;
+mod downloads;
 mod episodes;
 mod evaluations;
 mod events;
@@ -22,9 +23,12 @@ mod proposals;
 mod registrations;
 mod rulings;
 mod season;
+mod season_archive;
 mod sessions;
 mod sign_off;
 mod stages;
+mod storage;
+mod submission_archives;
 mod submissions;
 mod teams;
 mod terms;
@@ -103,8 +107,12 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(submissions::list_submissions))
         .routes(routes!(
             submissions::submission,
-            submissions::label_submission
+            submissions::describe_submission,
+            submission_archives::delete_submission
         ))
+        .routes(routes!(submission_archives::submission_archive))
+        .routes(routes!(storage::storage))
+        .routes(routes!(storage::team_storage))
         .routes(routes!(submissions::withdraw_submission))
         .routes(routes!(submissions::activate_submission))
         .routes(routes!(submissions::evaluate_submission))
@@ -129,8 +137,10 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
     let uploads = OpenApiRouter::new()
         .routes(routes!(upload::create_submission))
         .layer(DefaultBodyLimit::disable());
+    // Neither can an archive's making be told in advance.
+    let archives = OpenApiRouter::new().routes(routes!(season_archive::season_archive));
     let (router, mut document) = OpenApiRouter::new()
-        .nest(API_BASE, resources.merge(uploads))
+        .nest(API_BASE, resources.merge(uploads).merge(archives))
         .split_for_parts();
     document.info = Document::openapi().info;
     describe_errors(&mut document);

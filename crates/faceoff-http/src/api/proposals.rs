@@ -5,13 +5,15 @@ use crate::{
     app::App,
     auth::Organiser,
     extract::{Json as Body, OptionalJson, PathParam},
-    problem::Problem,
+    problem::{Problem, ProblemKind},
     requests::{Confirmation, NewProposal, Trial},
+    viewer::Viewer,
     views::proposal::{ProposalStateView, ProposalView},
 };
 use axum::{Json, extract::State, http::StatusCode};
-use faceoff_store::Reevaluation;
-use faceoff_types::{ProposalId, StageDay, StageId};
+use faceoff_store::{EvaluationState, Reevaluation, Settled, StoreError};
+use faceoff_types::{EvaluationId, ProposalId, StageDay, StageId, TeamId};
+use jiff::civil::Date;
 
 /// All trials and proposals, the newest first, without what they play.
 #[utoipa::path(
@@ -187,4 +189,69 @@ pub(crate) async fn drop_proposal(
     app.store.drop_proposal(organiser.actor(), id, now).await?;
     tracing::info!(proposal = %id, "a proposal was dropped");
     ProposalView::find(&app, id).await.map(Json)
+}
+
+/// Of what a trial or a proposal has played, that is not applied: its team, its date, and the name of its dataset among
+/// the artifacts. `None` of what it is not, and for everybody but organisers.
+///
+/// # Errors
+/// `Gone` once it is dropped; `Conflict` if it has no dataset.
+pub(super) async fn dataset(
+    viewer: Viewer,
+    app: &App,
+    id: EvaluationId,
+) -> Result<Option<(TeamId, Date, String)>, Problem> {
+    if viewer != Viewer::Organiser {
+        return Ok(None);
+    }
+    let (proposal, draft) = match app.store.draft(id).await {
+        Ok(found) => found,
+        Err(StoreError::NotFound(_)) => return Ok(None),
+        Err(error) => return Err(error.into()),
+    };
+    match proposal.settled {
+        // It is an evaluation like others.
+        Some(Settled::Applied(_)) => return Ok(None),
+        Some(Settled::Dropped(at)) => {
+            return Err(Problem::new(
+                ProblemKind::Gone,
+                format!(
+                    "the proposal {} was dropped at {at}, and its datasets with it; GET /api/v1/proposals/{} still tells \
+                     what came of it",
+                    proposal.id, proposal.id
+                ),
+            ));
+        }
+        None => {}
+    }
+    let why_not = match draft.state {
+        EvaluationState::Finished { dataset, .. } => {
+            let date = match proposal.kind.day() {
+                Some(day) => day,
+                None => {
+                    let stage = app.store.stage(proposal.stage).await?;
+                    stage.day(proposal.created_at).date
+                }
+            };
+            return Ok(Some((draft.team, date, dataset)));
+        }
+        EvaluationState::Queued | EvaluationState::Running { .. } | EvaluationState::Finalising => {
+            "is not finished; follow it there until its state is “finished”"
+        }
+        EvaluationState::AgentFailed { .. } => {
+            "has no dataset, since the agent failed too often; its faults are there"
+        }
+        EvaluationState::PlatformFailed { .. }
+        | EvaluationState::NotPlayed { .. }
+        | EvaluationState::Cancelled { .. } => {
+            "has no dataset, since it was not played to its end; the reason is there"
+        }
+    };
+    Err(Problem::new(
+        ProblemKind::Conflict,
+        format!(
+            "the evaluation {id} of GET /api/v1/proposals/{} {why_not}",
+            proposal.id
+        ),
+    ))
 }

@@ -6,12 +6,14 @@ use crate::{
     extract::{Json as Body, PathParam},
     problem::{Problem, ProblemKind},
     requests::{NewStage, StageChange},
+    viewer::Viewer,
     views::stage::{self, StageView},
 };
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_store::{Stage, StagePhase};
 use faceoff_types::{
-    MismatchSettings, Ruleset, StageId, StageName, StageRules, StageSettings, Standings, Variation,
+    MismatchSettings, Retention, Ruleset, Runtimes, StageId, StageName, StageRules, StageSettings,
+    Standings, Variation,
 };
 
 fn name(text: &str) -> Result<StageName, Problem> {
@@ -22,6 +24,30 @@ fn name(text: &str) -> Result<StageName, Problem> {
 fn check(rules: &StageRules, settings: &StageSettings) -> Result<(), Problem> {
     let checked = rules.check().and_then(|()| settings.check());
     checked.map_err(|error| Problem::invalid(error.field(), error))
+}
+
+/// Refuses runtimes that the server does not offer.
+fn check_offered(app: &App, wanted: Option<&Option<Runtimes>>) -> Result<(), Problem> {
+    let Some(Some(wanted)) = wanted else {
+        return Ok(());
+    };
+    wanted
+        .check()
+        .map_err(|error| Problem::invalid("runtimes", error))?;
+    let offered = &app.config.capacity.runtimes;
+    match wanted
+        .names()
+        .find(|name| !offered.iter().any(|one| one == name))
+    {
+        Some(name) => {
+            let detail = format!(
+                "expected some of those that this server offers, {}, got {name:?}; null is all of them",
+                offered.join(", ")
+            );
+            Err(Problem::invalid("runtimes", detail))
+        }
+        None => Ok(()),
+    }
 }
 
 /// Refuses magnitudes that no robot of the season meets.
@@ -50,8 +76,11 @@ async fn check_robot(app: &App, rules: &StageRules) -> Result<(), Problem> {
 #[utoipa::path(
     get, path = "/stages", tag = "public", responses((status = 200, body = Vec<StageView>))
 )]
-pub(crate) async fn list_stages(State(app): State<App>) -> Result<Json<Vec<StageView>>, Problem> {
-    StageView::all(&app).await.map(Json)
+pub(crate) async fn list_stages(
+    viewer: Viewer,
+    State(app): State<App>,
+) -> Result<Json<Vec<StageView>>, Problem> {
+    StageView::all_seen_by(&app, viewer).await.map(Json)
 }
 
 /// One stage.
@@ -60,10 +89,12 @@ pub(crate) async fn list_stages(State(app): State<App>) -> Result<Json<Vec<Stage
     responses((status = 200, body = StageView), (status = 404))
 )]
 pub(crate) async fn stage(
+    viewer: Viewer,
     State(app): State<App>,
     PathParam(id): PathParam<StageId>,
 ) -> Result<Json<StageView>, Problem> {
-    StageView::find(&app, id).await.map(Json)
+    let view = StageView::find(&app, id).await?;
+    view.seen_by(&app, viewer).await.map(Json)
 }
 
 /// Makes a stage: from its opening on its rules are fixed.
@@ -82,6 +113,7 @@ pub(crate) async fn create_stage(
 ) -> Result<(StatusCode, Json<StageView>), Problem> {
     let like = stage::current(&app).await?;
     let now = app.config.clock.now();
+    check_offered(&app, new.runtimes.as_ref())?;
     let rules = StageRules {
         ruleset: Ruleset::CURRENT,
         profile: new.profile.unwrap_or(like.rules.rules.profile),
@@ -100,6 +132,7 @@ pub(crate) async fn create_stage(
                 .unwrap_or(like.rules.rules.variation.perturbations),
         },
         limits: new.limits.unwrap_or(like.rules.rules.limits),
+        runtimes: new.runtimes.unwrap_or(like.rules.rules.runtimes),
     };
     let default = StageSettings::default();
     let settings = StageSettings {
@@ -115,6 +148,7 @@ pub(crate) async fn create_stage(
         uploads: new.uploads.unwrap_or(like.settings.uploads),
     };
     check(&rules, &settings)?;
+    let retention = checked_retention(new.retention)?.unwrap_or_default();
     check_robot(&app, &rules).await?;
     let wanted = faceoff_store::NewStage {
         name: name(&new.name)?,
@@ -126,22 +160,23 @@ pub(crate) async fn create_stage(
     };
     let made = app
         .store
-        .create_stage(organiser.actor(), wanted, now)
+        .create_stage_keeping(organiser.actor(), wanted, retention, now)
         .await?;
     tracing::info!(stage = %made.name, id = %made.id, "stage made");
     let view = StageView::of(&app, made).await?;
+    let view = view.seen_by(&app, Viewer::Organiser).await?;
     Ok((StatusCode::CREATED, Json(view)))
 }
 
 /// Changes a stage. Other rules of one that is open are another revision, which begins an empty board. `blind` false opens
-/// a blind stage.
+/// a blind stage. Another `retention` is no other rule; what it would remove is to be confirmed.
 #[utoipa::path(
     patch, path = "/stages/{id}", tag = "organiser", security(("organiser" = [])),
     params(("id" = StageId, Path)), request_body = StageChange,
     responses(
         (status = 200, body = StageView),
         (status = 404),
-        (status = 409, description = "what is to be changed has begun or is over, the name is taken, other rules or standings of an open stage are not confirmed, it is signed off, or the season is closed"),
+        (status = 409, description = "what is to be changed has begun or is over, the name is taken, other rules or standings of an open stage, or what another retention would remove, are not confirmed, it is signed off, or the season is closed"),
         (status = 422),
     )
 )]
@@ -161,7 +196,9 @@ pub(crate) async fn change_stage(
         || change.weights.is_some()
         || change.tier_bounds.is_some()
         || change.perturbations.is_some()
-        || change.limits.is_some();
+        || change.limits.is_some()
+        || change.runtimes.is_some();
+    check_offered(&app, change.runtimes.as_ref())?;
     let rules = StageRules {
         // An upgrade of the program alone changes nothing of a stage.
         ruleset: if other_rules {
@@ -181,6 +218,7 @@ pub(crate) async fn change_stage(
                 .unwrap_or_else(|| is.variation.perturbations.clone()),
         },
         limits: change.limits.unwrap_or_else(|| is.limits.clone()),
+        runtimes: change.runtimes.unwrap_or_else(|| is.runtimes.clone()),
     };
     let settings = StageSettings {
         schedule: change
@@ -199,6 +237,7 @@ pub(crate) async fn change_stage(
         uploads: change.uploads.unwrap_or(stage.settings.uploads),
     };
     check(&rules, &settings)?;
+    let retention = checked_retention(change.retention)?;
     if rules.variation.perturbations != is.variation.perturbations {
         check_robot(&app, &rules).await?;
     }
@@ -209,6 +248,9 @@ pub(crate) async fn change_stage(
         let told: Vec<String> = other_rules.into_iter().chain(other_order).collect();
         check_confirmed(&stage, &told, change.confirm.as_deref())?;
     }
+    if let Some(retention) = &retention {
+        check_removal(&app, &stage, retention, change.confirm.as_deref()).await?;
+    }
     let wanted = faceoff_store::StageChange {
         name: change.name.as_deref().map(name).transpose()?,
         opens_at: change.opens_at,
@@ -216,13 +258,55 @@ pub(crate) async fn change_stage(
         zone: change.zone,
         rules: Some(rules),
         settings: Some(settings),
+        retention,
     };
     let changed = app
         .store
         .change_stage(organiser.actor(), id, wanted, now)
         .await?;
     tracing::info!(stage = %changed.name, %id, revision = changed.rules.number, "stage changed");
-    StageView::of(&app, changed).await.map(Json)
+    let view = StageView::of(&app, changed).await?;
+    view.seen_by(&app, Viewer::Organiser).await.map(Json)
+}
+
+fn checked_retention(retention: Option<Retention>) -> Result<Option<Retention>, Problem> {
+    if let Some(retention) = &retention {
+        let checked = retention.check();
+        checked.map_err(|error| Problem::invalid("retention", error))?;
+    }
+    Ok(retention)
+}
+
+/// Refuses a retention by which something would go unless the stage is named.
+async fn check_removal(
+    app: &App,
+    stage: &Stage,
+    retention: &Retention,
+    confirm: Option<&str>,
+) -> Result<(), Problem> {
+    if app.store.stage_retention(stage.id).await? == *retention {
+        return Ok(());
+    }
+    let now = app.config.clock.now();
+    let removed = app.store.would_remove(stage.id, retention, now).await?;
+    if removed.is_nothing() {
+        return Ok(());
+    }
+    let unmeasured = match removed.unmeasured {
+        0 => String::new(),
+        unmeasured => format!(", and {unmeasured} datasets that are not measured yet"),
+    };
+    let what = format!(
+        "of the stage {:?} {retention} would be kept; {} datasets of {} teams and {} archives of submissions that nobody \
+         plays any more ({} bytes{unmeasured}) would be removed for good, at once or when nothing of the stage is under way, \
+         to be decided, or blind; results stay",
+        stage.name.as_str(),
+        removed.datasets,
+        removed.teams,
+        removed.archives,
+        removed.bytes
+    );
+    Problem::check_confirmed(confirm, stage.name.as_str(), &what)
 }
 
 fn begins_anew(stage: &Stage) -> String {

@@ -5,14 +5,18 @@ use crate::{
     auth::{Caller, TeamCaller},
     extract::{Json as Body, PathParam},
     problem::{Problem, ProblemKind},
-    requests::Label,
+    requests::SubmissionChange,
     views::submission::SubmissionView,
 };
 use axum::{Json, extract::State};
+use faceoff_store::SubmissionWords;
 use faceoff_types::SubmissionId;
 
 /// Longest name that a team has for a submission.
 const MAX_LABEL_CHARS: usize = 80;
+
+/// Longest note of a team on a submission.
+const MAX_NOTE_CHARS: usize = 2000;
 
 /// The calling team's submissions, newest first.
 #[utoipa::path(
@@ -96,30 +100,47 @@ pub(crate) async fn withdraw_submission(
     SubmissionView::of(&app, submission).await.map(Json)
 }
 
-/// Gives a submission the name that its team has for it. Only the team and the organiser see it.
+/// Changes what a team says of a submission: a name for it, and a note. Only the team and the organiser read them.
 #[utoipa::path(
     patch, path = "/submissions/{id}", tag = "team", security(("team" = [])),
-    params(("id" = SubmissionId, Path)), request_body = Label,
+    params(("id" = SubmissionId, Path)), request_body = SubmissionChange,
     responses((status = 200, body = SubmissionView), (status = 404), (status = 422))
 )]
-pub(crate) async fn label_submission(
+pub(crate) async fn describe_submission(
     caller: TeamCaller,
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,
-    Body(Label { label }): Body<Label>,
+    Body(change): Body<SubmissionChange>,
 ) -> Result<Json<SubmissionView>, Problem> {
     let found = app.store.submission(id).await;
     caller.visible("submission", found, |submission| submission.team)?;
-    let label = label.as_deref().map(str::trim);
-    let chars = label.map_or(1, |label| label.chars().count());
-    if !(1..=MAX_LABEL_CHARS).contains(&chars) {
-        let detail = format!("expected 1 to {MAX_LABEL_CHARS} characters, or null, got {chars}");
-        return Err(Problem::invalid("label", detail));
+    let words = SubmissionWords {
+        label: said("label", &change.label, MAX_LABEL_CHARS)?,
+        note: said("note", &change.note, MAX_NOTE_CHARS)?,
+    };
+    if words.label.is_none() && words.note.is_none() {
+        let detail = "expected label, note, or both; there is nothing to change";
+        return Err(Problem::new(ProblemKind::InvalidContent, detail));
     }
-    let actor = caller.actor();
-    let now = app.config.clock.now();
-    let submission = app.store.label_submission(actor, id, label, now).await?;
+    let (actor, now) = (caller.actor(), app.config.clock.now());
+    let submission = app.store.describe_submission(actor, id, words, now).await?;
     SubmissionView::of(&app, submission).await.map(Json)
+}
+
+/// Words without the space around them, if they are given and not too many.
+#[expect(clippy::option_option, reason = "null and left out are told apart")]
+fn said<'w>(
+    field: &str,
+    words: &'w Option<Option<String>>,
+    most_chars: usize,
+) -> Result<Option<Option<&'w str>>, Problem> {
+    let words = words.as_ref().map(|words| words.as_deref().map(str::trim));
+    let chars = words.flatten().map_or(1, |words| words.chars().count());
+    if !(1..=most_chars).contains(&chars) {
+        let detail = format!("expected 1 to {most_chars} characters, or null, got {chars}");
+        return Err(Problem::invalid(field, detail));
+    }
+    Ok(words)
 }
 
 /// Gone: nobody starts the evaluation of a single submission.

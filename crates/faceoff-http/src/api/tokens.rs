@@ -132,7 +132,7 @@ pub(crate) async fn create_token(
     responses(
         (status = 200, body = NewTokenView),
         (status = 404),
-        (status = 409, description = "it is a session, revoked, or has expired"),
+        (status = 409, description = "it is a session, revoked, has expired, or is the host's of the data folder"),
     )
 )]
 pub(crate) async fn rotate_token(

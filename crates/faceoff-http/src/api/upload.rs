@@ -125,7 +125,7 @@ pub(crate) async fn create_submission(
     let stored = tokio::spawn(store(app, (team, actor), uploaded, claimed_name, place));
     let submission = stored.await.map_err(Problem::internal)??;
     let location = [(header::LOCATION, paths::submission(submission.id))];
-    let view = SubmissionView::new(submission, None);
+    let view = SubmissionView::new(submission, None, &[], now);
     Ok((StatusCode::CREATED, AppendHeaders(location), Json(view)))
 }
 

@@ -24,7 +24,9 @@ use crate::{
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
-use faceoff_types::{EvaluationId, StageDay, Task, TaskWeights, Tier, TierBounds, ViolationCounts};
+use faceoff_types::{
+    DivisionName, EvaluationId, StageDay, Task, TaskWeights, Tier, TierBounds, ViolationCounts,
+};
 use figures::Rate;
 use jiff::{Timestamp, civil};
 
@@ -36,6 +38,7 @@ struct Who {
     /// Of the tier on this board.
     tier_change: String,
     team: String,
+    division: Option<DivisionName>,
     agent: Option<String>,
     evaluation: EvaluationId,
     day: civil::Date,
@@ -86,6 +89,7 @@ impl Who {
                 .tier_change_probability
                 .map_or_else(|| "not computed of means".to_owned(), figures::chance),
             team: row.team.to_string(),
+            division: row.division.clone(),
             agent: row.agent.clone(),
             evaluation: row.evaluation,
             day: row.day,
@@ -165,6 +169,11 @@ struct Heading {
     /// Of the rules, if the stage has had several.
     rules: Option<String>,
     others: Vec<OtherBoard>,
+    /// Of which the board can be asked for; with the one that is shown, if one is.
+    divisions: Vec<DivisionName>,
+    division: Option<DivisionName>,
+    /// The query that asks for this board of all teams.
+    of_all: String,
     /// The organiser holds the queue.
     paused: Option<RulingView>,
     /// The organiser has frozen the board.
@@ -232,6 +241,9 @@ impl Heading {
                     }),
                     stage: stage.name.to_string(),
                     others: Vec::new(),
+                    divisions: app.store.divisions().await.map_err(Problem::from)?,
+                    division: board.division.clone(),
+                    of_all: format!("?stage={}&revision={}", board.stage, board.revision),
                     paused: None,
                     frozen: board.frozen.clone(),
                     rows: standing::rows(board),
@@ -297,6 +309,12 @@ pub(super) async fn overall(
     let today = app.store.stage(board.stage).await.map_err(Problem::from)?;
     let today = today.day(app.config.clock.now());
     let setting = common_setting(&board.rows);
+    let mut under_way = under_way(&app, &sight, today).await?;
+    if let Some(division) = &board.division {
+        let mut teams = TeamView::all(&app).await?;
+        teams.retain(|team| team.division.as_ref() == Some(division));
+        under_way.retain(|of| teams.iter().any(|team| team.name.as_str() == of.team));
+    }
     let page = OverallPage {
         frame: Frame::of(&app, season.name, "/"),
         today: today.date,
@@ -304,7 +322,7 @@ pub(super) async fn overall(
         commitment: season.commitment,
         tiers: by_tier(&board, |row| OverallRow::of(row, setting.as_ref())),
         setting,
-        under_way: under_way(&app, &sight, today).await?,
+        under_way,
         disqualified: board.disqualified,
     };
     render(&page)

@@ -7,8 +7,8 @@ use super::{
 };
 use crate::{
     app::App,
+    archived,
     extract::PathParam,
-    freeze,
     problem::Problem,
     viewer::Viewer,
     views::{
@@ -126,6 +126,8 @@ struct SlowAnswers {
     episodes: usize,
     /// They are in the dataset, which cannot be read.
     lost: bool,
+    /// They were in the dataset, which was removed.
+    removed: bool,
 }
 
 /// The slowest answer of an episode that lost points by slow answers; times in milliseconds.
@@ -156,10 +158,19 @@ impl SlowAnswers {
         if !result.tasks.values().any(of_task) {
             return Ok(Self::default());
         }
+        if view.dataset_removed.is_some() {
+            return Ok(Self {
+                removed: true,
+                ..Self::default()
+            });
+        }
         let evaluation = app.store.evaluation(view.id).await?;
         let EvaluationState::Finished { dataset, .. } = &evaluation.state else {
             return Ok(Self::default());
         };
+        if archived::is_left_out(app, dataset).await? {
+            return Ok(Self::default());
+        }
         Ok(match ViolationsView::read(app, dataset).await {
             Ok(violations) => Self::worst(violations),
             // It is logged; the rest of the page is not worse for it.
@@ -191,6 +202,7 @@ impl SlowAnswers {
                 .map(|(task, episode)| SlowAnswer::of(task, &episode))
                 .collect(),
             lost: false,
+            removed: false,
         }
     }
 }
@@ -274,6 +286,8 @@ struct Page {
     state: String,
     /// Is its dataset there for everybody?
     public: bool,
+    /// When and why it was removed, if it was.
+    dataset_removed: Option<RulingView>,
     progress: Option<Progress>,
     /// Where it stands in the queue, in words.
     place: Option<String>,
@@ -305,7 +319,8 @@ pub(super) async fn page(
     let submission = SubmissionView::find(&app, view.submission).await?;
     let ablation = ablation::exists(&app, submission.id).await?;
     let season = SeasonHead::now(&app).await?;
-    let frozen = freeze::hides_evaluation(&app, &view).await?;
+    let scored_at = view.status.finished_at();
+    let frozen = scored_at.and_then(|at| sight.freeze_hiding(view.stage, at));
     let finished = match &view.status {
         _ if frozen.is_some() => None,
         EvaluationStatus::Finished {
@@ -348,6 +363,7 @@ pub(super) async fn page(
             None => in_words(&view).to_owned(),
         },
         public: view.public,
+        dataset_removed: view.dataset_removed.clone(),
         progress: (!view.status.is_final()).then_some(view.progress),
         place: view.queue.as_ref().map(place),
         next: view.next.clone(),
@@ -403,11 +419,9 @@ async fn others(
     };
     let same_day = EvaluationView::of_day(app, sight, day).await?;
     let mut others = Vec::new();
-    let frozen = app.store.boards_frozen(of.stage).await;
-    let frozen_at = frozen.map_err(Problem::from)?.map(|frozen| frozen.at);
     let is_shown = |view: &EvaluationView| {
-        let later = view.status.finished_at().zip(frozen_at);
-        later.is_none_or(|(finished_at, frozen_at)| finished_at <= frozen_at)
+        let scored_at = view.status.finished_at();
+        scored_at.is_none_or(|at| sight.freeze_hiding(view.stage, at).is_none())
     };
     let shown = same_day.into_iter().filter(same_episodes).filter(is_shown);
     for view in shown {

@@ -12,6 +12,8 @@ pub(super) struct Frame {
     pub(super) ruleset: &'static str,
     /// Something is amiss that everybody who waits should know of.
     pub(super) notice: Option<&'static str>,
+    /// The season is an archive's, in words; none of one that runs.
+    pub(super) archived: Option<String>,
     /// Path of the navigation entry that this page is.
     pub(super) current: String,
     pub(super) style: &'static str,
@@ -27,6 +29,12 @@ impl Frame {
                 "The server's disk has too little room: the queue pauses and uploads are refused. Nothing \
                  is lost; work goes on by itself when there is room again.",
             ),
+            archived: app.store.archived().map(|archived| {
+                format!(
+                    "Archived season: you see it as it was on {}. Nothing changes any more.",
+                    archived.made_at.strftime("%Y-%m-%d at %H:%M UTC")
+                )
+            }),
             ..Self::new(season, current)
         }
     }
@@ -36,6 +44,7 @@ impl Frame {
         Self {
             season,
             notice: None,
+            archived: None,
             ruleset: RULESET,
             current: current.into(),
             style: assets::style_url(),

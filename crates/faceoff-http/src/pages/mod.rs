@@ -20,7 +20,7 @@ mod sign_in;
 mod standing;
 mod unknown;
 
-pub(crate) use unknown::{unknown_method, unknown_path};
+pub(crate) use unknown::{for_whom, unknown_method, unknown_path};
 
 use crate::{app::App, extract::MAX_JSON_BYTES, layers};
 use axum::{

@@ -6,7 +6,11 @@ use crate::{
     app::App,
     problem::Problem,
     viewer::Viewer,
-    views::{season::SeasonView, stage::StageView},
+    views::{
+        capacity::{DayLoad, Fit},
+        season::SeasonView,
+        stage::StageView,
+    },
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
@@ -31,6 +35,17 @@ impl Page {
     fn name(&self, id: &StageId) -> String {
         let stage = self.season.stages.iter().find(|stage| stage.id == *id);
         stage.map_or_else(|| id.to_string(), |stage| stage.name.to_string())
+    }
+
+    /// What is to be played, with the name of its stage; for organisers alone.
+    fn loads(&self) -> Vec<(&str, &DayLoad)> {
+        let stages = self.season.stages.iter();
+        stages
+            .flat_map(|stage| {
+                let loads = stage.capacity.iter().flatten();
+                loads.map(|load| (stage.name.as_str(), load))
+            })
+            .collect()
     }
 
     /// The stage whose id enters no seed, if there is one.

@@ -11,7 +11,8 @@ use axum::{
     response::{IntoResponse, Response},
 };
 
-fn for_whom(path: &str, headers: &HeaderMap, problem: Problem) -> Response {
+/// A problem as whoever asked can read it.
+pub(crate) fn for_whom(path: &str, headers: &HeaderMap, problem: Problem) -> Response {
     let wants_page = headers
         .get(header::ACCEPT)
         .and_then(|accept| accept.to_str().ok())

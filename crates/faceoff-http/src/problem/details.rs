@@ -4,6 +4,8 @@ use axum::{
     http::{HeaderName, HeaderValue, header},
     response::{IntoResponse, Response},
 };
+use faceoff_store::Ruling;
+use jiff::Timestamp;
 use serde::Serialize;
 use serde_json::{Map, Value};
 use std::fmt::Display;
@@ -95,6 +97,31 @@ impl Problem {
         }
         let detail = format!("nothing is done yet: {what}. To do it, send “confirm” with {name:?}");
         Err(Self::new(ProblemKind::NotConfirmed, detail).with("confirm", name))
+    }
+
+    /// A file that is kept no more.
+    pub(crate) fn removed(what: &str, removed: &Ruling) -> Self {
+        let at = removed.at.strftime("%Y-%m-%d at %H:%M:%S UTC");
+        let detail = format!("{what} was removed on {at} {}", removed.reason);
+        Self::new(ProblemKind::Removed, detail).with("removed_at", removed.at.to_string())
+    }
+
+    /// What would change the season of an archive.
+    pub(crate) fn archived(made_at: Timestamp, imported_at: Option<Timestamp>) -> Self {
+        let shown = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M UTC").to_string();
+        let imported = imported_at.map_or_else(String::new, |at| {
+            format!(", which was imported at {}", shown(at))
+        });
+        Self::new(
+            ProblemKind::ReadOnly,
+            format!(
+                "this server shows the archive of a season as it was at {}{imported}: everything can be read, and nothing \
+                 changes any more",
+                shown(made_at)
+            ),
+        )
+        .with("made_at", made_at.to_string())
+        .with("imported_at", imported_at.map(|at| at.to_string()))
     }
 
     /// Our fault: `cause` goes to the log only.

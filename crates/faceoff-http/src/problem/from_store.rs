@@ -58,6 +58,7 @@ impl From<StoreError> for Problem {
                 ),
             )
             .with("version", version),
+            error @ StoreError::Cleared { .. } => Self::new(ProblemKind::Gone, error.to_string()),
             StoreError::PersonNameTaken(name) => Self::new(
                 ProblemKind::PersonNameTaken,
                 format!("a person named {name:?} exists already; choose another name"),
@@ -113,6 +114,10 @@ impl From<StoreError> for Problem {
             )
             .with("limit_bytes", limit_bytes)
             .with("used_bytes", used_bytes),
+            StoreError::Archived {
+                made_at,
+                imported_at,
+            } => Self::archived(made_at, imported_at),
             StoreError::Conflict(detail) => Self::new(ProblemKind::Conflict, detail),
             error @ (StoreError::Database(_)
             | StoreError::Artifacts(_)

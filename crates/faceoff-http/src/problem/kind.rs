@@ -30,6 +30,9 @@ kinds! {
     Forbidden "forbidden" FORBIDDEN
         "This token may not do that"
         "The token is valid, but of the wrong kind: some requests are a team's, some are the organiser's."
+    ReadOnly "read-only" FORBIDDEN
+        "The season is archived"
+        "This server shows the archive of a season as it was at one moment: everything can be read, nothing changes, and nobody signs in."
     Disqualified "disqualified" FORBIDDEN
         "The team is disqualified"
         "The organiser has disqualified the team; the detail says when and why. It keeps what it has, and neither uploads nor plays."
@@ -99,6 +102,9 @@ kinds! {
     Gone "gone" GONE
         "No longer offered"
         "The server no longer does this. The detail says why, and what there is instead."
+    Removed "removed" GONE
+        "It was removed"
+        "The file was kept for a time, and is no more: by the retention of its stage, or because its team or an organiser had it deleted. The detail says when and why; results stay."
     TooManyPending "too-many-pending" TOO_MANY_REQUESTS
         "Too many uploads are waiting"
         "Several uploads of the team are not validated yet. Wait until one has its verdict."

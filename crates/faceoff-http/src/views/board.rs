@@ -1,16 +1,12 @@
 //! Who stands where, and how sure that is.
 
 use super::{
-    finalised::FinalisedView,
-    ruling::RulingView,
-    sight::Sight,
-    stage,
-    standings::{self, Standing},
-    task::TaskView,
-    team::TeamView,
+    division, finalised::FinalisedView, ruling::RulingView, sight::Sight, stage, standings,
+    task::TaskView, team::TeamView,
 };
 use crate::{
-    app::AppState, problem::Problem, requests::BoardQuery, summaries::RunSummaries, views::shown,
+    app::AppState, problem::Problem, requests::BoardQuery, standing::Standing,
+    summaries::RunSummaries, views::shown,
 };
 use faceoff_scoring::{
     EpisodeSummary, Played, RankedEntry, SIGNIFICANCE, TIER_CHANGE_RESAMPLES, joined_summary,
@@ -18,8 +14,8 @@ use faceoff_scoring::{
 };
 use faceoff_store::{BoardRecord, BoardScope, Stage};
 use faceoff_types::{
-    EvaluationId, PerturbationSettings, Profile, Seed, StageId, StageName, Standings, Task,
-    TaskWeights, TeamId, TeamName, Tier, TierBounds,
+    DivisionName, EvaluationId, PerturbationSettings, Profile, Seed, StageId, StageName, Standings,
+    Task, TaskWeights, TeamId, TeamName, Tier, TierBounds,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
@@ -60,6 +56,9 @@ pub struct BoardView {
     pub finalised: Option<FinalisedView>,
     /// The task, or null for the overall board.
     pub task: Option<Task>,
+    /// Whose teams are ranked, among themselves alone; absent where all teams are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub division: Option<DivisionName>,
     /// The level at which teams are told apart: rows of one rank group stand in the same tier and
     /// cannot be told from the group's first row.
     #[schema(example = 0.05)]
@@ -80,7 +79,7 @@ pub struct BoardView {
 /// One team on a board.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct BoardRow {
-    /// Place on the whole board, from 1.
+    /// Place on this board, from 1.
     pub rank: u32,
     /// Teams of one group cannot be told from the group's first; from 1 down the board.
     pub rank_group: u32,
@@ -93,6 +92,9 @@ pub struct BoardRow {
     pub team: TeamName,
     /// Stays when names change.
     pub team_id: TeamId,
+    /// The division that the team is in now; absent if it is in none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub division: Option<DivisionName>,
     /// The agent's own name.
     pub agent: Option<String>,
     /// What the row shows; of a mean, the newest of its evaluations.
@@ -125,6 +127,21 @@ pub struct BoardRow {
     pub tasks: BTreeMap<Task, TaskView>,
 }
 
+/// What a board ranks, and whom.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Whose {
+    /// One task; `None`: all of them together.
+    pub(crate) task: Option<Task>,
+    /// The teams of one division; `None`: all teams.
+    pub(crate) division: Option<DivisionName>,
+}
+
+impl Whose {
+    fn is_ranked(&self, division: Option<&DivisionName>) -> bool {
+        self.division.is_none() || self.division.as_ref() == division
+    }
+}
+
 impl BoardView {
     /// The board that a request asks for: the overall one, or that of one task. Whether the caller may see the live
     /// one of a frozen stage is checked before.
@@ -141,7 +158,7 @@ impl BoardView {
             Some(id) => app.store.stage(id).await?,
             None => stage::current(app).await?,
         };
-        let frozen = app.store.boards_frozen(stage.id).await?;
+        let frozen = sight.frozen(stage.id).cloned();
         let scope = BoardScope {
             until: frozen
                 .as_ref()
@@ -153,7 +170,12 @@ impl BoardView {
             Some(number) => number,
             None => app.store.board_revision_until(&stage, scope.until).await?,
         };
-        let board = Self::of(app, sight, &stage, revision, task, (&scope, Vec::new())).await?;
+        let division = match query.division {
+            Some(name) => Some(division::find(app, &name).await?),
+            None => None,
+        };
+        let whose = Whose { task, division };
+        let board = Self::of(app, sight, &stage, revision, whose, (&scope, Vec::new())).await?;
         Ok(Self {
             frozen: frozen.map(RulingView::from),
             ..board
@@ -161,14 +183,13 @@ impl BoardView {
     }
 
     /// The board of a stage by one revision of its rules within a scope, with results that are taken as if they counted
-    /// beside it, ranked by all tasks or by one. A constant number of
-    /// reads, however many teams there are.
+    /// beside it. A constant number of reads, however many teams there are.
     pub(crate) async fn of(
         app: &AppState,
         sight: &Sight,
         stage: &Stage,
         number: u32,
-        task: Option<Task>,
+        whose: Whose,
         (scope, beside): (&BoardScope, Vec<BoardRecord>),
     ) -> Result<Self, Problem> {
         let mut revisions = app.store.stage_revisions(stage.id).await?.into_iter();
@@ -180,12 +201,13 @@ impl BoardView {
             None => disqualified.retain(|team| team.disqualified.is_some()),
             Some(finalised) => disqualified.retain(|team| finalised.without.contains(&team.id)),
         }
+        disqualified.retain(|team| whose.is_ranked(team.division.as_ref()));
         let variation = revision.rules.variation;
         let rows_by = standings::at_the_moment(app, stage).await?;
         let rows = if sight.is_hidden(stage.id) {
             Vec::new()
         } else {
-            ranked_rows(app, stage, number, (scope, beside), rows_by, task).await?
+            ranked_rows(app, stage, number, (scope, beside), rows_by, &whose).await?
         };
         Ok(Self {
             stage: stage.id,
@@ -202,7 +224,8 @@ impl BoardView {
             blind: stage.settings.blind,
             provisional: stage.finalised.is_none(),
             finalised: stage.finalised.clone().map(FinalisedView::from),
-            task,
+            task: whose.task,
+            division: whose.division,
             significance: SIGNIFICANCE,
             tier_change_resamples: TIER_CHANGE_RESAMPLES,
             frozen: None,
@@ -219,9 +242,11 @@ async fn ranked_rows(
     revision: u32,
     results: (&BoardScope, Vec<BoardRecord>),
     rows_by: Standings,
-    task: Option<Task>,
+    whose: &Whose,
 ) -> Result<Vec<BoardRow>, Problem> {
-    let rows = standings::rows(app, stage, revision, results, rows_by, task).await?;
+    let task = whose.task;
+    let mut rows = standings::rows(app, stage, revision, results, rows_by, task).await?;
+    rows.retain(|row| whose.is_ranked(row.record.team.profile.division.as_ref()));
     let runs: Vec<_> = rows.iter().flat_map(|row| row.runs.clone()).collect();
     let summaries = app.summaries.of(&runs).await?;
     let mismatch_seed = app.store.season().await?.secret.model_mismatch();
@@ -294,6 +319,7 @@ fn row(ranked: RankedEntry<Row>, rank_group: u32, task: Option<Task>) -> BoardRo
         tier_change_probability: (!is_mean).then(|| row.summary.tier_change_of(task)),
         team: record.team.name,
         team_id: record.team.id,
+        division: record.team.profile.division,
         agent: record.agent_name.map(shown),
         evaluation: record.evaluation,
         evaluations,

@@ -1,7 +1,7 @@
 //! Whether a day fits: what its teams play against the slots and the time that there are.
 
 use crate::{app::AppState, config::Capacity, problem::Problem};
-use faceoff_store::{Measured, OpenWork, Stage};
+use faceoff_store::{Measured, OpenWork, Stage, Store, StoreError};
 use faceoff_types::{StageId, StageName, TeamId};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
@@ -207,19 +207,32 @@ fn open_load(
 
 impl CapacityView {
     pub(crate) async fn of(app: &AppState, id: StageId) -> Result<Self, Problem> {
-        let stage = app.store.stage(id).await?;
-        let (now, capacity) = (app.config.clock.now(), &app.config.capacity);
-        let (work, measured) = app.store.open_work(now).await?;
-        let under_way = app.store.days_under_way(id).await?;
+        let now = app.config.clock.now();
+        let forecast = Self::forecast(&app.store, &app.config.capacity, id, now);
+        Ok(forecast.await?)
+    }
+
+    /// As things are at `now`.
+    pub(crate) async fn forecast(
+        store: &Store,
+        capacity: &Capacity,
+        id: StageId,
+        now: Timestamp,
+    ) -> Result<Self, StoreError> {
+        let stage = store.stage(id).await?;
+        let (work, measured) = store.open_work(now).await?;
+        let under_way = store.days_under_way(id).await?;
         let mut loads: Vec<Load> = under_way
             .iter()
             .map(|day| open_load(day, &work, capacity, now))
             .collect();
-        let newest = app.store.newest_day(id).await?;
-        let season_is_open = app.store.season().await?.closed_at.is_none();
+        let newest = store.newest_day(id).await?;
+        let season_is_open = store.season().await?.closed_at.is_none();
         let next = stage.next_cut(newest.map(|day| day.of.date), now);
         if let Some((day, at)) = next.filter(|_| season_is_open) {
-            let teams = app.store.active_teams().await?;
+            let mut active = store.active_submissions().await?;
+            active.retain(|submission| stage.check_takes(submission).is_ok());
+            let teams: Vec<TeamId> = active.iter().map(|submission| submission.team).collect();
             let cut_at = at.unwrap_or(now).max(now);
             loads.push(next_load(&stage, day, cut_at, &teams, &measured, capacity));
         }

@@ -3,7 +3,6 @@
 use super::sight::Sight;
 use crate::{
     app::AppState,
-    freeze,
     problem::{Problem, ProblemKind},
     release::check_released,
 };
@@ -100,25 +99,6 @@ impl Side {
     }
 }
 
-/// Refuses what frozen boards leave out.
-async fn check_shown(app: &AppState, evaluation: &Evaluation) -> Result<(), Problem> {
-    let Some(at) = freeze::scored_at(&evaluation.state) else {
-        return Ok(());
-    };
-    match freeze::hides(app, evaluation.of.stage, at).await? {
-        None => Ok(()),
-        Some(frozen) => Err(Problem::new(
-            ProblemKind::NotYet,
-            format!(
-                "the boards of the stage are frozen since {} ({}), and this result came later; it is compared once they \
-                 are unfrozen",
-                frozen.at.strftime("%Y-%m-%d %H:%M UTC"),
-                frozen.reason
-            ),
-        )),
-    }
-}
-
 impl ComparisonView {
     /// Compares two finished evaluations.
     ///
@@ -157,7 +137,7 @@ impl ComparisonView {
         }
         check_released(app, &a.evaluation).await?;
         for side in [&a, &b] {
-            check_shown(app, &side.evaluation).await?;
+            sight.check_not_frozen(&side.evaluation, "compared")?;
         }
         // that of the season, which both share
         let mismatch_seed = app.store.season().await?.secret.model_mismatch();

@@ -1,6 +1,11 @@
 //! The day's cut: what it brought about, and when the next one is.
 
-use super::{evaluation::EvaluationView, sight::Sight, team::TeamView};
+use super::{
+    evaluation::EvaluationView,
+    not_taken::{self, NotTakenTeam},
+    sight::Sight,
+    team::TeamView,
+};
 use crate::{app::AppState, problem::Problem};
 use faceoff_store::Stage;
 use faceoff_types::{StageDay, StageId, StageName, TeamId, Zone};
@@ -20,6 +25,9 @@ pub struct DayView {
     pub created: Vec<EvaluationView>,
     /// Teams that have no valid submission; what they upload now plays another day.
     pub without_submission: Vec<TeamView>,
+    /// Teams that have one whose runtime the stage does not take, and why; absent without one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub not_taken: Vec<NotTakenTeam>,
 }
 
 impl DayView {
@@ -29,12 +37,16 @@ impl DayView {
         EvaluationView::place(app, &mut created).await?;
         let evaluated: BTreeSet<TeamId> = created.iter().map(|created| created.team).collect();
         let mut without_submission = TeamView::all(app).await?;
-        without_submission.retain(|team| !evaluated.contains(&team.id));
+        let mut not_taken = not_taken::by(app, &app.store.stage(of.stage).await?).await?;
+        not_taken.retain(|left_out| !evaluated.contains(&left_out.team));
+        let is_left_out = |id| not_taken.iter().any(|left_out| left_out.team == id);
+        without_submission.retain(|team| !evaluated.contains(&team.id) && !is_left_out(team.id));
         Ok(Self {
             stage: of.stage,
             day: of.date,
             created,
             without_submission,
+            not_taken,
         })
     }
 }

@@ -55,6 +55,9 @@ pub struct EvaluationView {
     pub blind: bool,
     /// Everybody sees it and its dataset, without a token.
     pub public: bool,
+    /// Its dataset was removed, if it was: when, and by which retention; absent otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dataset_removed: Option<RulingView>,
     /// The perturbations.
     pub profile: Profile,
     /// In the order of play.
@@ -74,6 +77,9 @@ pub struct EvaluationView {
     #[serde(flatten)]
     pub status: EvaluationStatus,
 }
+
+/// What happens next to a finished evaluation of a released day without its dataset.
+const DATASET_GONE: &str = "Nothing more: its result stays, its dataset was removed.";
 
 /// How much of an evaluation or of an ablation is played.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -196,6 +202,7 @@ impl EvaluationView {
 
     fn new(sight: &Sight, evaluation: Evaluation, team_name: TeamName) -> Self {
         let released = evaluation.released_at.is_some();
+        let has_dataset = evaluation.dataset_removed.is_none();
         let (hidden, public) = (
             sight.is_hidden(evaluation.of.stage),
             sight.is_public(&evaluation),
@@ -222,7 +229,8 @@ impl EvaluationView {
             } => EvaluationStatus::Finished {
                 finished_at,
                 result: (!hidden).then(|| Box::new(ResultView::new(*result, released))),
-                dataset: (!hidden).then(|| format!("{}/dataset", paths::evaluation(evaluation.id))),
+                dataset: (!hidden && has_dataset)
+                    .then(|| format!("{}/dataset", paths::evaluation(evaluation.id))),
                 dataset_blake3: dataset_blake3.filter(|_| !hidden),
             },
             EvaluationState::AgentFailed { finished_at } => EvaluationStatus::AgentFailed {
@@ -268,6 +276,7 @@ impl EvaluationView {
             voided: evaluation.voided.map(RulingView::from),
             blind: hidden,
             public,
+            dataset_removed: evaluation.dataset_removed.map(RulingView::from),
             profile: evaluation.plan.profile,
             tasks: evaluation.plan.tasks,
             episodes_per_task: evaluation.plan.episodes_per_task,
@@ -277,7 +286,11 @@ impl EvaluationView {
                 episodes_total,
             },
             queue: None,
-            next: status.next(released, voided).to_owned(),
+            next: match status.next(released, voided) {
+                EvaluationStatus::DONE if !has_dataset => DATASET_GONE,
+                next => next,
+            }
+            .to_owned(),
             status,
         }
     }

@@ -26,7 +26,7 @@ pub enum EvaluationStatus {
         /// The score; absent while the stage is blind.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         result: Option<Box<ResultView>>,
-        /// Path of the recorded dataset on this server; absent while the stage is blind.
+        /// Path of the recorded dataset on this server; absent while the stage is blind, and once it was removed.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         dataset: Option<String>,
         /// BLAKE3 of its archive, 64 hexadecimal digits; absent for datasets of older versions, and while the stage is
@@ -70,6 +70,10 @@ pub enum EvaluationStatus {
 }
 
 impl EvaluationStatus {
+    /// What happens to a finished one next once its day is released.
+    pub(crate) const DONE: &'static str =
+        "Nothing more: its dataset is its team's, and anybody may check the score.";
+
     /// What happens to an evaluation next.
     pub(crate) const fn next(&self, released: bool, voided: bool) -> &'static str {
         if voided {
@@ -85,9 +89,7 @@ impl EvaluationStatus {
              is ended, and the turn given back."
             }
             Self::Finalising => "The score is computed and published, without anybody's doing.",
-            Self::Finished { .. } if released => {
-                "Nothing more: its dataset is its team's, and anybody may check the score."
-            }
+            Self::Finished { .. } if released => Self::DONE,
             Self::Finished { .. } => {
                 "Dataset and details come out when the last evaluation of its day has ended."
             }

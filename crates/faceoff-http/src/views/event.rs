@@ -84,7 +84,7 @@ impl EventsView {
 }
 
 /// Of everybody who may have changed something, by how the log calls them.
-async fn names(app: &AppState) -> Result<BTreeMap<String, String>, Problem> {
+pub(crate) async fn names(app: &AppState) -> Result<BTreeMap<String, String>, Problem> {
     let people = app.store.people().await?.into_iter();
     let teams = app.store.teams().await?.into_iter();
     let people = people.map(|person| {

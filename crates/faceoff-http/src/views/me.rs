@@ -3,6 +3,7 @@
 use super::{
     day::NextCut,
     evaluation::EvaluationView,
+    not_taken::NotTakenView,
     queue::QueueView,
     sight::Sight,
     stage,
@@ -25,6 +26,9 @@ pub struct MeView {
     pub turn: TurnView,
     /// What it enters at the next cut; null while it has no valid submission.
     pub active_submission: Option<SubmissionId>,
+    /// The stages that are not over and do not take what is active: it does not play there, and why; absent without one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub not_taken: Vec<NotTakenView>,
     /// What waits for its smoke run or is in it, the newest first.
     pub validating: Vec<ValidatingView>,
     /// When that cut is; null if none comes.
@@ -105,6 +109,7 @@ impl MeView {
             },
             validating: validating.collect(),
             active_submission: active.map(|submission| submission.id),
+            not_taken: active.map_or_else(Vec::new, |active| active.not_taken.clone()),
             next_cut: NextCut::first(app).await?,
             max_bundle_bytes: app.config.max_bundle_bytes,
         })

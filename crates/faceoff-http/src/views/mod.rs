@@ -6,16 +6,19 @@
 
 pub mod ablation;
 pub mod announcement;
+pub mod archived;
 pub mod board;
 pub mod capacity;
 pub mod comparison;
 pub mod day;
+mod division;
 pub mod evaluation;
 mod evaluation_status;
 pub mod event;
 pub mod finalised;
 pub mod invitation;
 pub mod me;
+pub mod not_taken;
 pub mod person;
 pub mod proposal;
 pub mod queue;
@@ -24,6 +27,7 @@ pub mod season;
 pub(crate) mod sight;
 pub mod stage;
 mod standings;
+pub mod storage;
 pub mod submission;
 pub mod task;
 pub mod team;

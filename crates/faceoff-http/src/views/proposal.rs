@@ -1,12 +1,12 @@
 //! What is tried without counting, and what a re-evaluation would change.
 
 use super::{
-    board::BoardView,
+    board::{BoardView, Whose},
     evaluation::{FaultView, Progress, ResultView},
     shown,
     sight::Sight,
 };
-use crate::{app::AppState, problem::Problem};
+use crate::{app::AppState, paths, problem::Problem};
 use faceoff_store::{
     BoardRecord, BoardScope, Draft, EvaluationState, Proposal, ProposalKind, Settled, Stage,
 };
@@ -150,6 +150,13 @@ pub enum DraftStatus {
         finished_at: Timestamp,
         /// All of it.
         result: Box<ResultView>,
+        /// Path of the recorded dataset on this server, for organisers alone until it is applied; absent once it is
+        /// dropped.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        dataset: Option<String>,
+        /// BLAKE3 of its archive, 64 hexadecimal digits; likewise.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        dataset_blake3: Option<String>,
     },
     /// The agent broke the protocol or a limit too often: applied, it has no score.
     AgentFailed {
@@ -173,7 +180,7 @@ pub enum DraftStatus {
 }
 
 impl DraftView {
-    async fn of(app: &AppState, draft: Draft) -> Result<Self, Problem> {
+    async fn of(app: &AppState, draft: Draft, is_dropped: bool) -> Result<Self, Problem> {
         let (mut done, mut total) = (0, 0);
         if let EvaluationState::Running {
             episodes_done,
@@ -189,10 +196,13 @@ impl DraftView {
             EvaluationState::Finished {
                 finished_at,
                 result,
+                dataset_blake3,
                 ..
             } => DraftStatus::Finished {
                 finished_at,
                 result: Box::new(ResultView::new(*result, true)),
+                dataset: (!is_dropped).then(|| format!("{}/dataset", paths::evaluation(draft.id))),
+                dataset_blake3: dataset_blake3.filter(|_| !is_dropped),
             },
             EvaluationState::AgentFailed { finished_at } => {
                 let of_run = app.store.run_faults(draft.run).await?;
@@ -288,7 +298,8 @@ impl OutcomeView {
                     without: Vec::new(),
                 };
                 let tried = (&nothing, played);
-                let new_board = BoardView::of(app, &sight, &stage, revision, None, tried).await?;
+                let new_board =
+                    BoardView::of(app, &sight, &stage, revision, Whose::default(), tried).await?;
                 return Ok(Self {
                     changes: Vec::new(),
                     old_board: None,
@@ -299,7 +310,8 @@ impl OutcomeView {
             ProposalKind::Evaluation(_) | ProposalKind::Day(_) => revision,
         };
         let now = (&BoardScope::default(), Vec::new());
-        let old_board = BoardView::of(app, &sight, &stage, old_revision, None, now).await?;
+        let old_board =
+            BoardView::of(app, &sight, &stage, old_revision, Whose::default(), now).await?;
         // What we broke replaces nothing.
         let replaces = |draft: &Draft| match draft.state {
             EvaluationState::Finished { .. } | EvaluationState::AgentFailed { .. } => {
@@ -312,7 +324,8 @@ impl OutcomeView {
             without: drafts.iter().filter_map(replaces).collect(),
         };
         let then = (&scope, played);
-        let new_board = BoardView::of(app, &sight, &stage, revision, None, then).await?;
+        let new_board =
+            BoardView::of(app, &sight, &stage, revision, Whose::default(), then).await?;
         Ok(Self {
             changes: changes(&old_board, &new_board),
             old_board: Some(old_board),
@@ -363,9 +376,10 @@ impl ProposalView {
             ProposalStateView::Played => Some(OutcomeView::of(app, &proposal, &drafts).await?),
             _ => None,
         };
+        let is_dropped = matches!(proposal.settled, Some(Settled::Dropped(_)));
         let mut evaluations = Vec::new();
         for draft in drafts {
-            evaluations.push(DraftView::of(app, draft).await?);
+            evaluations.push(DraftView::of(app, draft, is_dropped).await?);
         }
         Ok(Self {
             evaluations,

@@ -1,6 +1,7 @@
 //! The season's commitment, and what may be known of its seeds.
 
 use super::{
+    archived::ArchivedView,
     day::NextCut,
     ruling::RulingView,
     sight::Sight,
@@ -31,6 +32,9 @@ pub struct SeasonView {
     /// The organiser holds the queue: since when, and why; absent otherwise. Nothing is begun meanwhile.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub paused: Option<RulingView>,
+    /// It stands still, as an archive has it; absent of a season that runs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub archived: Option<ArchivedView>,
     /// May anybody register a team?
     #[serde(default)]
     pub takes_registrations: bool,
@@ -84,23 +88,24 @@ impl SeasonView {
         let missed: HashMap<StageDay, String> =
             app.store.missed_days().await?.into_iter().collect();
         let stages = app.store.stages().await?;
-        let seed = |of: StageDay| {
-            let stage = stages.iter().find(|stage| stage.id == of.stage)?;
-            Some(stage.seed_label(of.date).seed(&season.secret))
-        };
+        let seeds = app
+            .store
+            .day_seeds(&season, &stages, days.iter().map(|(day, _)| day.of))
+            .await?;
         let revealed = |seed: Seed| season.closed_at.map(|_| seed);
         Ok(Self {
             ruleset: RULESET.to_owned(),
             created_at: season.created_at,
             closed_at: season.closed_at,
             paused: season.paused.map(RulingView::from),
+            archived: app.store.archived().map(ArchivedView::from),
             takes_registrations: season.takes_registrations,
             divisions: app.store.divisions().await?,
             terms_version: app.store.terms().await?.first().map(|terms| terms.version),
             secret: revealed(season.secret),
             mismatch_seed: revealed(season.secret.model_mismatch()),
             today: stage::current(app).await?.day(app.config.clock.now()).date,
-            stages: StageView::all(app).await?,
+            stages: StageView::all_seen_by(app, viewer).await?,
             next_cut: NextCut::first(app).await?,
             days: days
                 .into_iter()
@@ -115,7 +120,7 @@ impl SeasonView {
                     seed: day
                         .released_at
                         .filter(|_| !sight.is_hidden(day.of.stage))
-                        .and_then(|_| seed(day.of)),
+                        .and_then(|_| seeds.get(&day.of).copied()),
                 })
                 .collect(),
             name: season.name,

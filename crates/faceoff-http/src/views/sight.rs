@@ -1,13 +1,14 @@
-//! What a viewer sees of stages: nobody but the organiser the scores of a blind one, and without a token what is
-//! published.
+//! What a viewer sees of stages: nobody but the organiser the scores of a blind one, and what was scored since boards
+//! stand still only its team beside; without a token what is published.
 
 use crate::{
     app::AppState,
     problem::{Problem, ProblemKind},
     viewer::Viewer,
 };
-use faceoff_store::{Evaluation, Stage, StagePhase, StoreError};
+use faceoff_store::{Evaluation, EvaluationState, Ruling, Stage, StagePhase, StoreError};
 use faceoff_types::{Publishes, StageId};
+use jiff::Timestamp;
 use std::collections::BTreeMap;
 
 /// The stages as they are now, seen by somebody.
@@ -24,14 +25,34 @@ struct Told {
     is_blind: bool,
     publishes: Publishes,
     has_closed: bool,
+    /// Its boards stand still, if they do.
+    frozen: Option<Ruling>,
+}
+
+impl Told {
+    /// What its boards leave out of what was scored at this time.
+    fn leaves_out(&self, scored_at: Timestamp) -> Option<&Ruling> {
+        self.frozen.as_ref().filter(|frozen| scored_at > frozen.at)
+    }
+}
+
+/// When an evaluation got its score, if it has one.
+const fn scored_at(state: &EvaluationState) -> Option<Timestamp> {
+    match state {
+        EvaluationState::Finished { finished_at, .. } => Some(*finished_at),
+        _ => None,
+    }
 }
 
 impl Sight {
     pub(crate) async fn of(app: &AppState, viewer: Viewer) -> Result<Self, Problem> {
         let now = app.config.clock.now();
         let season_has_closed = app.store.season().await?.closed_at.is_some();
+        let mut frozen: BTreeMap<StageId, Ruling> =
+            app.store.frozen_boards().await?.into_iter().collect();
         let told = |stage: Stage| {
             let told = Told {
+                frozen: frozen.remove(&stage.id),
                 is_blind: stage.settings.blind,
                 publishes: stage.settings.publishes,
                 has_closed: season_has_closed || stage.phase(now) == StagePhase::Closed,
@@ -86,7 +107,46 @@ impl Sight {
         ))
     }
 
-    /// Does anybody see an evaluation, and its dataset if it has one, without a token?
+    /// Since when a stage's boards stand still, and why; `None` if they do not.
+    pub(crate) fn frozen(&self, stage: StageId) -> Option<&Ruling> {
+        self.stages.get(&stage)?.frozen.as_ref()
+    }
+
+    /// The freeze of a stage's boards that keeps what was scored at this time from the viewer, on boards, pages and in
+    /// comparisons; `None` if none does, and for organisers.
+    pub(crate) fn freeze_hiding(&self, stage: StageId, scored_at: Timestamp) -> Option<&Ruling> {
+        if self.viewer == Viewer::Organiser {
+            return None;
+        }
+        self.stages.get(&stage)?.leaves_out(scored_at)
+    }
+
+    /// Refuses an evaluation with a score that frozen boards leave out, unless the viewer is an organiser; `then` says
+    /// what is done with it once they are unfrozen.
+    ///
+    /// # Errors
+    /// `NotYet`.
+    pub(crate) fn check_not_frozen(
+        &self,
+        evaluation: &Evaluation,
+        then: &str,
+    ) -> Result<(), Problem> {
+        let at = scored_at(&evaluation.state);
+        let Some(frozen) = at.and_then(|at| self.freeze_hiding(evaluation.of.stage, at)) else {
+            return Ok(());
+        };
+        Err(Problem::new(
+            ProblemKind::NotYet,
+            format!(
+                "the boards of the stage are frozen since {} ({}), and this result came later; it is {then} once they \
+                 are unfrozen",
+                frozen.at.strftime("%Y-%m-%d %H:%M UTC"),
+                frozen.reason
+            ),
+        ))
+    }
+
+    /// Does anybody see an evaluation, and its dataset if it has one, without a token? Not what frozen boards leave out.
     pub(crate) fn is_public(&self, evaluation: &Evaluation) -> bool {
         let Some(told) = self.stages.get(&evaluation.of.stage) else {
             return false;
@@ -96,7 +156,10 @@ impl Sight {
             Publishes::AtClose => told.has_closed,
             Publishes::AtRelease => true,
         };
+        let is_left_out =
+            scored_at(&evaluation.state).is_some_and(|at| told.leaves_out(at).is_some());
         !told.is_blind
+            && !is_left_out
             && evaluation.released_at.is_some()
             && (by_stage || evaluation.published_at.is_some())
     }

@@ -1,9 +1,14 @@
 //! A stage: when it is open, by which rules it is played, and when its next day starts.
 
-use super::{day::NextCut, finalised::FinalisedView, ruling::RulingView};
-use crate::{app::AppState, problem::Problem};
+use super::{
+    capacity::{CapacityView, DayLoad},
+    day::NextCut,
+    finalised::FinalisedView,
+    ruling::RulingView,
+};
+use crate::{app::AppState, problem::Problem, viewer::Viewer};
 use faceoff_store::{Revision, Stage, StagePhase};
-use faceoff_types::{StageId, StageName, StageRules, StageSettings, Zone};
+use faceoff_types::{Retention, StageId, StageName, StageRules, StageSettings, Zone};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -35,6 +40,9 @@ pub struct StageView {
     pub configured: bool,
     /// Its result is signed off, if it is: nothing of it changes any more. Null: its result is provisional.
     pub finalised: Option<FinalisedView>,
+    /// What is kept of its datasets and of the archives of what has played it; `{}`: everything.
+    #[serde(default)]
+    pub retention: Retention,
     /// What no score depends on.
     #[serde(flatten)]
     pub settings: StageSettings,
@@ -43,6 +51,9 @@ pub struct StageView {
     pub rules: RevisionView,
     /// All rules that it has had, the first ones first. A board shows results of one revision.
     pub revisions: Vec<RevisionView>,
+    /// Do its days fit: those under way and the next one. For organisers, absent for everybody else.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub capacity: Option<Vec<DayLoad>>,
 }
 
 /// Where a stage is.
@@ -103,9 +114,31 @@ impl StageView {
         Self::of(app, app.store.stage(id).await?).await
     }
 
+    /// As the viewer sees it.
+    pub(crate) async fn seen_by(self, app: &AppState, viewer: Viewer) -> Result<Self, Problem> {
+        let capacity = match viewer {
+            // an archive has no slots that could play a day
+            Viewer::Organiser if app.store.archived().is_none() => {
+                Some(CapacityView::of(app, self.id).await?.days)
+            }
+            Viewer::Organiser | Viewer::Team(_) | Viewer::Anybody => None,
+        };
+        Ok(Self { capacity, ..self })
+    }
+
+    /// All of the season as the viewer sees them, the first to open first.
+    pub(crate) async fn all_seen_by(app: &AppState, viewer: Viewer) -> Result<Vec<Self>, Problem> {
+        let mut views = Vec::new();
+        for view in Self::all(app).await? {
+            views.push(view.seen_by(app, viewer).await?);
+        }
+        Ok(views)
+    }
+
     pub(crate) async fn of(app: &AppState, stage: Stage) -> Result<Self, Problem> {
         let revisions = app.store.stage_revisions(stage.id).await?;
         Ok(Self {
+            retention: app.store.stage_retention(stage.id).await?,
             next_cut: NextCut::of(app, &stage).await?,
             frozen: app
                 .store
@@ -124,6 +157,7 @@ impl StageView {
             settings: stage.settings,
             rules: stage.rules.into(),
             revisions: revisions.into_iter().map(RevisionView::from).collect(),
+            capacity: None,
         })
     }
 }

@@ -1,52 +1,13 @@
 //! What a board's rows are made of: of each team one evaluation, or the mean of several.
 
-use crate::{app::AppState, problem::Problem};
-use faceoff_scoring::{BoardEntry, RankedEntry, mean_result, overall_board, task_board};
+use crate::{
+    app::AppState,
+    problem::Problem,
+    standing::{RowsOf, Standing},
+};
+use faceoff_scoring::{BoardEntry, RankedEntry, overall_board, task_board};
 use faceoff_store::{BoardDays, BoardRecord, BoardScope, Stage};
-use faceoff_types::{EvaluationId, RunId, Standings, Task};
-
-/// What a row is made of.
-#[derive(Debug)]
-pub(super) struct Standing {
-    /// The newest of its evaluations; of a mean, with the mean as its result.
-    pub(super) record: BoardRecord,
-    /// All of them, the earlier day first.
-    pub(super) evaluations: Vec<EvaluationId>,
-    /// Their runs.
-    pub(super) runs: Vec<RunId>,
-}
-
-impl Standing {
-    fn alone(record: BoardRecord) -> Self {
-        Self {
-            evaluations: vec![record.evaluation],
-            runs: vec![record.run],
-            record,
-        }
-    }
-
-    /// Of a team's evaluations, the earlier day first; `None` of none.
-    fn mean(mut records: Vec<BoardRecord>) -> Result<Option<Self>, Problem> {
-        let results: Vec<_> = records.iter().map(|record| &record.result).collect();
-        let Some(result) = mean_result(&results).map_err(Problem::internal)? else {
-            return Ok(None);
-        };
-        let evaluations = records.iter().map(|record| record.evaluation).collect();
-        let runs = records.iter().map(|record| record.run).collect();
-        // What is told of the days' episodes is told of none before all are released.
-        let all_released = records.iter().all(|record| record.released_at.is_some());
-        let newest = records.pop();
-        Ok(newest.map(|newest| Self {
-            record: BoardRecord {
-                released_at: newest.released_at.filter(|_| all_released),
-                result,
-                ..newest
-            },
-            evaluations,
-            runs,
-        }))
-    }
-}
+use faceoff_types::{Standings, Task};
 
 /// How rows stand at the moment: a stage that waits for its final day shows the newest until then.
 pub(super) async fn at_the_moment(app: &AppState, stage: &Stage) -> Result<Standings, Problem> {
@@ -60,6 +21,30 @@ pub(super) async fn at_the_moment(app: &AppState, stage: &Stage) -> Result<Stand
 /// One row of each team with a result within the scope by a revision of a stage's rules, in the teams' order of names.
 /// `beside` are results that are taken as if they counted.
 pub(super) async fn rows(
+    app: &AppState,
+    stage: &Stage,
+    revision: u32,
+    (scope, beside): (&BoardScope, Vec<BoardRecord>),
+    standings: Standings,
+    task: Option<Task>,
+) -> Result<Vec<Standing>, Problem> {
+    let is_plain = scope.without.is_empty() && beside.is_empty();
+    let make = async || made(app, stage, revision, (scope, beside), standings, task).await;
+    // The newest results alone are read as quickly as it is seen that nothing has changed.
+    if standings == Standings::Latest || !is_plain {
+        return make().await;
+    }
+    let of = RowsOf {
+        stage: stage.id,
+        revision,
+        by: standings,
+        task,
+        until: scope.until,
+    };
+    app.rows.get(of, make).await
+}
+
+async fn made(
     app: &AppState,
     stage: &Stage,
     revision: u32,

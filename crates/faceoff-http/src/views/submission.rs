@@ -1,8 +1,12 @@
 //! An uploaded agent and its smoke run's verdict.
 
-use super::queue::{self, QueueView};
+use super::{
+    not_taken::{self, NotTakenView},
+    queue::{self, QueueView},
+    ruling::RulingView,
+};
 use crate::{app::AppState, problem::Problem, views::shown};
-use faceoff_store::{Submission, SubmissionState};
+use faceoff_store::{Stage, Submission, SubmissionState};
 use faceoff_types::{SmokeTiming, SubmissionId, TeamId};
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
@@ -25,6 +29,12 @@ pub struct SubmissionView {
     pub created_at: Timestamp,
     /// The agent's own name, known once the bundle was unpacked.
     pub agent_name: Option<String>,
+    /// The runtime that its `agent.toml` names; absent until that was read, and of what older versions have checked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub runtime: Option<String>,
+    /// The stages that are not over and do not take its runtime: it does not play there, and why; absent without one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub not_taken: Vec<NotTakenView>,
     /// How long its answers took in the smoke run, for each task that was played.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub timing: Vec<SmokeTiming>,
@@ -36,9 +46,18 @@ pub struct SubmissionView {
     /// What its team calls it; absent without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub label: Option<String>,
+    /// What its team writes about it; absent without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub note: Option<String>,
     /// The team's first submission of the same archive, if this is another; absent otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub same_as: Option<SubmissionId>,
+    /// Its archive was removed, if it was: when and why; nobody plays it any more. Absent otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub archive_removed: Option<RulingView>,
+    /// Who has deleted it, and when; absent if nobody has.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub deleted: Option<DeletedView>,
     /// Where its smoke run stands in the queue; absent once there is a verdict.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub queue: Option<QueueView>,
@@ -48,6 +67,18 @@ pub struct SubmissionView {
     #[serde(flatten)]
     pub status: SubmissionStatus,
 }
+
+/// Who has had the archive of a submission removed.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct DeletedView {
+    /// When.
+    pub at: Timestamp,
+    /// As the log has them: `team:ID`, `person:ID` or `organiser`.
+    pub by: String,
+}
+
+/// What happens next to what was valid and has no archive any more.
+const GONE: &str = "It plays nothing any more: its archive was removed. What it has played stays; to play it again, upload it again.";
 
 /// What has become of a submission.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -109,7 +140,8 @@ impl SubmissionView {
     /// With its log.
     pub(crate) async fn of(app: &AppState, submission: Submission) -> Result<Self, Problem> {
         let log = app.store.submission_log(submission.id).await?;
-        let mut view = Self::new(submission, log);
+        let (stages, now) = (app.store.stages().await?, app.config.clock.now());
+        let mut view = Self::new(submission, log, &stages, now);
         Self::place(app, std::slice::from_mut(&mut view)).await?;
         Ok(view)
     }
@@ -117,7 +149,8 @@ impl SubmissionView {
     /// Of a team, newest first; without their logs, which are long.
     pub(crate) async fn of_team(app: &AppState, team: TeamId) -> Result<Vec<Self>, Problem> {
         let submissions = app.store.submissions_of(team).await?;
-        let without_log = |submission| Self::new(submission, None);
+        let (stages, now) = (app.store.stages().await?, app.config.clock.now());
+        let without_log = |submission| Self::new(submission, None, &stages, now);
         let mut views: Vec<Self> = submissions.into_iter().map(without_log).collect();
         Self::place(app, &mut views).await?;
         Ok(views)
@@ -138,7 +171,13 @@ impl SubmissionView {
         Ok(())
     }
 
-    pub(crate) fn new(submission: Submission, log: Option<String>) -> Self {
+    pub(crate) fn new(
+        submission: Submission,
+        log: Option<String>,
+        stages: &[Stage],
+        now: Timestamp,
+    ) -> Self {
+        let not_taken = not_taken::by_stages(stages, &submission, now);
         let status = match submission.state {
             SubmissionState::Validating => SubmissionStatus::Validating,
             SubmissionState::Valid => SubmissionStatus::Valid {
@@ -154,7 +193,17 @@ impl SubmissionView {
             },
         };
         let is_withdrawn = submission.withdrawn_at.is_some();
-        let next = status.next(submission.active, is_withdrawn);
+        let is_gone = matches!(status, SubmissionStatus::Valid { .. })
+            && submission.archive_removed.is_some();
+        let next = if is_gone {
+            GONE.to_owned()
+        } else {
+            let mut next = status.next(submission.active, is_withdrawn).to_owned();
+            for one in &not_taken {
+                next.push_str(&format!(" It plays no day of one stage: {}.", one.reason));
+            }
+            next
+        };
         Self {
             id: submission.id,
             team: submission.team,
@@ -163,13 +212,21 @@ impl SubmissionView {
             blake3: submission.bundle.blake3,
             created_at: submission.created_at,
             agent_name: submission.agent_name.map(shown),
+            runtime: submission.runtime,
+            not_taken,
             timing: submission.timing,
             active: submission.active,
             withdrawn_at: submission.withdrawn_at,
             label: submission.label.map(shown),
+            note: submission.note.map(shown),
             same_as: submission.same_as,
+            archive_removed: submission.archive_removed.map(RulingView::from),
+            deleted: submission.deleted.map(|deleted| DeletedView {
+                at: deleted.at,
+                by: deleted.by.to_string(),
+            }),
             queue: None,
-            next: next.to_owned(),
+            next,
             status,
         }
     }

@@ -5,14 +5,14 @@ use faceoff_store::*;
 use reqwest::Method;
 use serde_json::{Value, json};
 
-async fn change(site: &Site, stage: &str, body: Value) -> Answer {
+pub async fn change(site: &Site, stage: &str, body: Value) -> Answer {
     let path = format!("/api/v1/stages/{stage}");
     let request = site.request(Method::PATCH, &path, Some(ADMIN)).json(&body);
     Answer::of(request.send().await.unwrap()).await
 }
 
 /// Plays the next evaluation; each shard takes so many seconds.
-async fn play_slowly(site: &Site, seconds: i64) {
+pub async fn play_slowly(site: &Site, seconds: i64) {
     loop {
         let Claimed { claim, work } = site.claim().await;
         site.later(seconds);
@@ -184,6 +184,7 @@ async fn what_waits_tells_its_place_its_time_and_what_comes_next() {
     let smoke = site.claim().await;
     site.later(20);
     let outcome = faceoff_types::SmokeOutcome::Invalid {
+        runtime: None,
         agent_name: None,
         reason: "no agent.toml".into(),
         timing: Vec::new(),
@@ -281,4 +282,97 @@ async fn capacity_is_the_organisers_and_deadlines_are_checked() {
         .await
         .json(200);
     assert_eq!(is["day_deadline"], "next_cut");
+}
+
+#[tokio::test]
+async fn organisers_are_warned_once_of_each_day_that_does_not_fit() {
+    let site = Site::start_daily("12:00").await;
+    let alpha = site.team("Alpha").await;
+    let stage = site.stage().await.to_string();
+    let submission = site.valid_submission(&alpha, "a").await;
+    let mut watch = site.capacity_watch();
+    let plays = async |episodes: u32| {
+        let rules = json!({ "episodes_per_task": episodes, "confirm": "Qualifying" });
+        change(&site, &stage, rules).await.json(200)
+    };
+    let lasts = async |hours: u32| {
+        let deadline = json!({ "day_deadline": { "hours": hours } });
+        change(&site, &stage, deadline).await.json(200);
+    };
+    lasts(1).await;
+    let changed = plays(1000).await;
+    // Nothing was measured: it says so, and nobody is warned.
+    let load = &changed["capacity"][0];
+    assert_eq!(
+        (&load["fit"], &load["expected_hours"]),
+        (&json!("unknown"), &Value::Null)
+    );
+    assert!(text(&load["summary"]).contains("nothing was measured"));
+    assert_eq!(watch.look().await.unwrap(), []);
+    let page = async |token: Option<&str>| site.get("/season", token).await.body;
+    let shown = page(Some(ADMIN)).await;
+    assert!(
+        shown.contains("nothing was measured") && !shown.contains("does not fit"),
+        "{shown}"
+    );
+
+    plays(4).await;
+    site.evaluate(&alpha, &submission).await;
+    play_slowly(&site, 300).await;
+    site.next_day();
+    assert_eq!(watch.look().await.unwrap(), [], "12 episodes fit");
+    plays(1000).await;
+    let warned = watch.look().await.unwrap();
+    let days = |warned: &[faceoff_http::Overflow]| -> Vec<(String, bool)> {
+        let days = warned.iter().map(|one| &one.load);
+        days.map(|load| (load.day.to_string(), load.is_under_way))
+            .collect()
+    };
+    assert_eq!(days(&warned), [("2026-03-02".to_owned(), false)]);
+    assert_eq!(warned[0].stage.as_str(), "Qualifying");
+    assert!(warned[0].load.summary.contains("does not fit"));
+    assert_eq!(watch.look().await.unwrap(), [], "once");
+
+    // On the page and in the views of stages, for organisers alone.
+    for path in [
+        "/api/v1/stages".to_owned(),
+        format!("/api/v1/stages/{stage}"),
+        "/api/v1/season".to_owned(),
+    ] {
+        let of_stage = |answer: Value| match path.as_str() {
+            "/api/v1/stages" => answer[0].clone(),
+            "/api/v1/season" => answer["stages"][0].clone(),
+            _ => answer,
+        };
+        let seen = of_stage(site.get(&path, Some(ADMIN)).await.json(200));
+        assert_eq!(seen["capacity"][0]["fit"], "not", "{path}");
+        for token in [None, Some(alpha.token.as_str())] {
+            let seen = of_stage(site.get(&path, token).await.json(200));
+            assert_eq!(seen.get("capacity"), None, "{path}");
+        }
+    }
+    let shown = page(Some(ADMIN)).await;
+    assert!(
+        shown.contains("does not fit") && shown.contains(&warned[0].load.summary),
+        "{shown}"
+    );
+    assert!(!page(None).await.contains("Do the days fit"));
+
+    // Again at the cut, of the day that is under way now; the next one is another.
+    site.evaluate(&alpha, &submission).await;
+    let warned = watch.look().await.unwrap();
+    let expected = [
+        ("2026-03-02".to_owned(), true),
+        ("2026-03-03".to_owned(), false),
+    ];
+    assert_eq!(days(&warned), expected);
+    lasts(100).await;
+    assert_eq!(watch.look().await.unwrap(), []);
+    lasts(1).await;
+    assert_eq!(
+        days(&watch.look().await.unwrap()),
+        expected,
+        "it fitted in between"
+    );
+    assert_eq!(watch.look().await.unwrap(), []);
 }

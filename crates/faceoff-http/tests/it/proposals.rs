@@ -369,3 +369,106 @@ async fn a_day_by_other_rules_is_a_board_of_its_own() {
         "the board of the old rules stays"
     );
 }
+
+#[tokio::test]
+async fn what_a_proposal_has_played_is_the_organisers_to_download_until_it_is_dropped() {
+    let site = Site::start().await;
+    played(&site).await;
+    let stage = site.stage().await;
+    let gamma = site.team("Gamma").await;
+    let path = format!("/api/v1/stages/{stage}/proposals");
+    let wanted = json!({ "day": "2026-03-01", "reason": WHY });
+    let made = post(&site, &path, wanted).await.json(201);
+    let own = format!("/api/v1/proposals/{}", text(&made["id"]));
+    let dataset_of = |proposal: &Value, place: usize| {
+        let id = text(&proposal["evaluations"][place]["evaluation"]);
+        format!("/api/v1/evaluations/{id}/dataset")
+    };
+    let [first, second] = [dataset_of(&made, 0), dataset_of(&made, 1)];
+    site.get(&first, Some(ADMIN))
+        .await
+        .problem(409, "conflict", &["is not finished", &own]);
+    site.finish_as(solves(1)).await;
+    site.play_shards(4).await;
+
+    let seen = site.get(&own, Some(ADMIN)).await.json(200);
+    let finished = &seen["evaluations"][0];
+    assert_eq!(text(&finished["dataset"]), first);
+    let download = site.get(&first, Some(ADMIN)).await;
+    assert_eq!(
+        (download.status.as_u16(), download.header("content-type")),
+        (200, "application/zip")
+    );
+    assert!(
+        download
+            .header("content-disposition")
+            .contains("faceoff-Alpha-2026-03-01.zip"),
+        "{download:?}"
+    );
+    assert!(download.body.starts_with("PK"));
+    let hash = blake3::hash(download.body.as_bytes()).to_hex().to_string();
+    assert_eq!(text(&finished["dataset_blake3"]), hash);
+    site.get(&second, Some(ADMIN))
+        .await
+        .problem(409, "conflict", &["the agent failed too often"]);
+    // For others, its team among them, there is none.
+    let alpha = text(&seen["evaluations"][0]["team"]);
+    let token = format!("/api/v1/teams/{alpha}/token");
+    let token = post(&site, &token, json!({})).await.json(200);
+    for (token, status, slug) in [
+        (None, 401, "unauthenticated"),
+        (Some(gamma.token.as_str()), 404, "not-found"),
+        (token["token"].as_str(), 404, "not-found"),
+    ] {
+        site.get(&first, token).await.problem(status, slug, &[]);
+    }
+
+    // Applied, it is where it was, as any evaluation's: its team's, too.
+    post(
+        &site,
+        &format!("{own}/apply"),
+        json!({ "confirm": "2026-03-01" }),
+    )
+    .await
+    .json(200);
+    for token in [Some(ADMIN), token["token"].as_str()] {
+        assert_eq!(site.get(&first, token).await.status, 200);
+    }
+    site.get(&first, Some(&gamma.token))
+        .await
+        .problem(404, "not-found", &[]);
+
+    // Dropped, it is gone at once.
+    let trial = format!("/api/v1/stages/{stage}/trial");
+    let wanted = json!({ "reason": WHY, "submission": seen["evaluations"][0]["submission"] });
+    let trial = post(&site, &trial, wanted).await.json(201);
+    site.finish_as(solves(2)).await;
+    let of_trial = dataset_of(&trial, 0);
+    assert_eq!(site.get(&of_trial, Some(ADMIN)).await.status, 200);
+    let own = format!("/api/v1/proposals/{}", text(&trial["id"]));
+    let confirmed = json!({ "confirm": "Qualifying" });
+    let dropped = post(&site, &format!("{own}/drop"), confirmed)
+        .await
+        .json(200);
+    let finished = &dropped["evaluations"][0];
+    assert_eq!(
+        (
+            &finished["state"],
+            &finished["dataset"],
+            &finished["dataset_blake3"]
+        ),
+        (&json!("finished"), &Value::Null, &Value::Null)
+    );
+    for _ in ["before and", "after its removal"] {
+        site.get(&of_trial, Some(ADMIN))
+            .await
+            .problem(410, "gone", &["was dropped at", &own]);
+        site.store
+            .remove_dropped_datasets(site.now())
+            .await
+            .unwrap();
+    }
+    site.get(&of_trial, Some(&gamma.token))
+        .await
+        .problem(404, "not-found", &[]);
+}

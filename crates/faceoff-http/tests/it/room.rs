@@ -23,6 +23,8 @@ async fn uploads_wait_for_room_and_everybody_is_told() {
     let refused = site.upload(&team.token, archive()).await;
     refused.problem(507, "storage-full", &["too little room", "try again"]);
     assert!(refused.headers.contains_key("retry-after"));
+    let refused = site.get("/api/v1/season/archive", Some(ADMIN)).await;
+    refused.problem(507, "storage-full", &["too little room"]);
     let uploads = site.folder.path().join("uploads");
     assert_eq!(std::fs::read_dir(uploads).unwrap().count(), 0);
     let own = site.get("/api/v1/submissions", Some(&team.token)).await;

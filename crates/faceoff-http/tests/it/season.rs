@@ -28,7 +28,7 @@ async fn closing_the_season_reveals_the_secret_and_ends_it_for_good() {
     site.finish(&result([0.5, 0.6, 0.7], 100.0)).await;
 
     let closed = site.post(CLOSE, Some(ADMIN), &confirm).await.json(200);
-    let season = site.get("/api/v1/season", None).await.json(200);
+    let season = site.get("/api/v1/season", Some(ADMIN)).await.json(200);
     assert_eq!(closed, season);
     assert_eq!(season["closed_at"], "2026-03-01T10:00:00Z");
     // The secret is the one that was committed to, and everything follows from it as documented.

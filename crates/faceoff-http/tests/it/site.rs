@@ -2,7 +2,8 @@
 //! and the steps that a worker would take.
 
 use faceoff_http::{
-    Capacity, ConnectionLimits, HttpConfig, HttpLimits, LeastRate, router, token::hash_token,
+    Capacity, CapacityWatch, ConnectionLimits, HttpConfig, HttpLimits, LeastRate, router,
+    token::hash_token,
 };
 use faceoff_store::*;
 use faceoff_types::*;
@@ -153,6 +154,7 @@ impl Site {
             capacity: Capacity {
                 slots: 2,
                 time: TimeLimits::default(),
+                runtimes: ["native", "python3"].map(str::to_owned).to_vec(),
             },
         };
         let (url, server) = serve(&store, &config).await;
@@ -168,10 +170,54 @@ impl Site {
         }
     }
 
+    /// A server on a data folder that an archive was imported into, at the moment that it shows.
+    pub async fn showing(folder: tempfile::TempDir) -> Self {
+        let upload_dir = folder.path().join("uploads");
+        std::fs::create_dir(&upload_dir).unwrap();
+        let store = Store::open(folder.path()).await.unwrap();
+        let made_at = store.archived().unwrap().made_at;
+        assert!(
+            store
+                .set_host_token(hash_token(ADMIN), made_at)
+                .await
+                .unwrap()
+        );
+        let config = HttpConfig {
+            max_bundle_bytes: MAX_BUNDLE,
+            public_url: None,
+            upload_dir,
+            clock: Clock::new(move || made_at),
+            limits: patient(),
+            capacity: Capacity {
+                slots: 0,
+                runtimes: Vec::new(),
+                time: TimeLimits::default(),
+            },
+        };
+        let (url, server) = serve(&store, &config).await;
+        Self {
+            url,
+            store,
+            folder,
+            config,
+            now: Arc::new(Mutex::new(made_at)),
+            http: reqwest::Client::builder().no_proxy().build().unwrap(),
+            server,
+        }
+    }
+
     /// Another server on the same folder, which remembers nothing.
     pub async fn restart(&mut self) {
         self.server.abort();
         (self.url, self.server) = serve(&self.store, &self.config).await;
+    }
+
+    /// What warns of days that do not fit, with nothing seen yet.
+    pub fn capacity_watch(&self) -> CapacityWatch {
+        let HttpConfig {
+            clock, capacity, ..
+        } = self.config.clone();
+        CapacityWatch::new(self.store.clone(), clock, capacity)
     }
 
     pub fn now(&self) -> Timestamp {
@@ -180,6 +226,10 @@ impl Site {
 
     pub fn later(&self, seconds: i64) {
         *self.now.lock().unwrap() += SignedDuration::from_secs(seconds);
+    }
+
+    pub fn turn_to(&self, now: Timestamp) {
+        *self.now.lock().unwrap() = now;
     }
 
     pub fn next_day(&self) {
@@ -231,6 +281,7 @@ impl Site {
     pub async fn valid_submission(&self, team: &TestTeam, agent: &str) -> String {
         let submission = self.upload(&team.token, GZIP.to_vec()).await.json(201);
         let outcome = SmokeOutcome::Valid {
+            runtime: "native".into(),
             agent_name: agent.into(),
             timing: Vec::new(),
             log: "ready\n".into(),
@@ -347,28 +398,7 @@ impl Site {
                     seeds,
                     ..
                 } => {
-                    let tasks = Task::ALL.map(|task| {
-                        let of_task: Vec<_> = outcomes
-                            .iter()
-                            .filter(|o| o.task == task)
-                            .cloned()
-                            .collect();
-                        (
-                            task,
-                            faceoff_scoring::score_task(
-                                &of_task,
-                                &Default::default(),
-                                &run.plan.variation.tier_bounds,
-                            ),
-                        )
-                    });
-                    let result = faceoff_scoring::score_evaluation(
-                        run.ruleset,
-                        run.plan.profile,
-                        seeds.episodes,
-                        &run.plan.variation,
-                        tasks.into(),
-                    );
+                    let result = scored(&run, seeds.episodes, &outcomes);
                     self.publish(&claim, evaluation, &result).await;
                     return evaluation;
                 }
@@ -378,7 +408,7 @@ impl Site {
     }
 
     /// Ends an evaluation with its score and a dataset.
-    async fn publish(&self, claim: &Claim, id: EvaluationId, result: &EvaluationResult) {
+    pub async fn publish(&self, claim: &Claim, id: EvaluationId, result: &EvaluationResult) {
         let dataset = self.folder.path().join("dataset.zip");
         let archive = b"PK the recorded dataset";
         std::fs::write(&dataset, archive).unwrap();
@@ -440,6 +470,30 @@ impl Site {
     }
 }
 
+/// What these episodes of a run come to, by the rules.
+pub fn scored(run: &Run, seed: Seed, outcomes: &[EpisodeOutcome]) -> EvaluationResult {
+    let plan = &run.plan;
+    let tasks = plan.tasks.iter().map(|task| {
+        let of_task: Vec<_> = outcomes
+            .iter()
+            .filter(|outcome| outcome.task == *task)
+            .cloned()
+            .collect();
+        let bounds = &plan.variation.tier_bounds;
+        (
+            *task,
+            faceoff_scoring::score_task(&of_task, &Default::default(), bounds),
+        )
+    });
+    faceoff_scoring::score_evaluation(
+        run.ruleset,
+        plan.profile,
+        seed,
+        &plan.variation,
+        tasks.collect(),
+    )
+}
+
 /// What the first stage plays.
 fn plan() -> RunPlan {
     RunPlan {
@@ -461,6 +515,7 @@ async fn stage_by(
     now: Timestamp,
 ) -> StageId {
     let rules = StageRules {
+        runtimes: None,
         ruleset: Ruleset::CURRENT,
         profile: plan.profile,
         tasks: plan.tasks.clone(),

@@ -46,12 +46,12 @@ async fn a_stage_is_made_seen_changed_and_played() {
     assert_eq!(made["next_cut"]["day"], "2026-03-02");
     assert_eq!(made["next_cut"]["at"], "2026-03-02T08:00:00Z");
     let path = format!("/api/v1/stages/{}", made["id"].as_str().unwrap());
-    assert_eq!(site.get(&path, None).await.json(200), made);
-    let all = site.get("/api/v1/stages", None).await.json(200);
+    assert_eq!(site.get(&path, Some(ADMIN)).await.json(200), made);
+    let all = site.get("/api/v1/stages", Some(ADMIN)).await.json(200);
     assert_eq!(all.as_array().unwrap().len(), 2);
     assert_eq!(all[1], made);
     assert_eq!(
-        site.get("/api/v1/season", None).await.json(200)["stages"],
+        site.get("/api/v1/season", Some(ADMIN)).await.json(200)["stages"],
         all
     );
 

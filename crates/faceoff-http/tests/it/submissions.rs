@@ -56,6 +56,7 @@ async fn an_upload_is_stored_hashed_and_queued() {
     assert_eq!(uploads_left(&site), 0);
 
     let outcome = SmokeOutcome::Valid {
+        runtime: "native".into(),
         agent_name: "striker 1.0".into(),
         timing: Vec::new(),
         log: "model loaded\n".into(),
@@ -80,6 +81,7 @@ async fn an_invalid_bundle_shows_its_reason_and_its_log() {
     let team = site.team("Alpha").await;
     let id = text(&site.upload(&team.token, GZIP.to_vec()).await.json(201)["id"]);
     let outcome = SmokeOutcome::Invalid {
+        runtime: None,
         agent_name: None,
         reason: "no answer within the start-up limit of 120 s".into(),
         timing: Vec::new(),
@@ -125,6 +127,7 @@ async fn the_newest_valid_upload_is_active_until_the_team_chooses() {
         .problem(409, "conflict", &["wait"]);
     assert_eq!(active().await, first);
     let outcome = SmokeOutcome::Valid {
+        runtime: "native".into(),
         agent_name: "second".into(),
         timing: Vec::new(),
         log: String::new(),
@@ -159,6 +162,7 @@ async fn what_agents_wrote_is_shown_as_text() {
     let team = site.team("Alpha").await;
     let id = text(&site.upload(&team.token, GZIP.to_vec()).await.json(201)["id"]);
     let outcome = SmokeOutcome::Invalid {
+        runtime: None,
         timing: Vec::new(),
         agent_name: Some("a\u{202e}b".into()),
         reason: "expected act, got \u{2066}\u{1b}[2J".into(),
@@ -278,6 +282,7 @@ async fn a_team_cannot_fill_the_queue_with_uploads() {
     refused.problem(429, "too-many-pending", &["2 uploads", "verdict"]);
     assert_eq!(refused.header("retry-after"), "30");
     site.smoke(SmokeOutcome::Valid {
+        runtime: "native".into(),
         agent_name: "a".into(),
         timing: Vec::new(),
         log: String::new(),
@@ -342,8 +347,27 @@ async fn a_team_names_and_withdraws_its_own() {
         "invalid-content",
         &["name", "label"],
     );
+    name(&team.token, json!({})).await.problem(
+        422,
+        "invalid-content",
+        &["label, note, or both", "nothing to change"],
+    );
+    let note = "line one\nline two";
+    let noted = name(&team.token, json!({ "note": note })).await.json(200);
+    assert_eq!(
+        (&noted["note"], &noted["label"]),
+        (&json!(note), &json!("baseline"))
+    );
+    for wrong in [json!(" "), json!("x".repeat(2001))] {
+        name(&team.token, json!({ "note": wrong })).await.problem(
+            422,
+            "invalid-content",
+            &["note", "1 to 2000"],
+        );
+    }
     let named = name(&team.token, json!({ "label": null })).await.json(200);
     assert_eq!(named.get("label"), None);
+    assert_eq!(named["note"], note, "what is left out stays");
 
     let withdraw = format!("{path}/withdraw");
     for (token, status, slug) in [

@@ -135,6 +135,7 @@ async fn a_refused_bundle_gives_its_room_back() {
     let problem = full.problem(409, "stored-quota-spent", &["6000 are kept of yours"]);
     assert_eq!(problem["limit_bytes"], 10_000);
     site.smoke(SmokeOutcome::Invalid {
+        runtime: None,
         agent_name: None,
         reason: "there is no agent.toml".into(),
         timing: Vec::new(),

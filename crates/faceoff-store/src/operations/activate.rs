@@ -3,7 +3,7 @@ use crate::{
     event::{Actor, Event, Subject},
     store::Store,
     tables::{
-        active_submissions, season,
+        active_submissions, bundles, season,
         submissions::{self, Submission, SubmissionState},
         teams,
     },
@@ -33,6 +33,7 @@ async fn activate(tx: &mut Tx, id: SubmissionId) -> Result<Submission> {
     let submission = submissions::find(tx, id).await?;
     teams::check_may_play(tx, submission.team).await?;
     check_valid(&submission)?;
+    bundles::check_kept(tx, id).await?;
     let now = tx.now;
     active_submissions::choose(tx, submission.team, id, now).await?;
     submissions::set_withdrawn(tx, id, None).await?;
@@ -45,7 +46,8 @@ async fn activate(tx: &mut Tx, id: SubmissionId) -> Result<Submission> {
 impl Store {
     /// Chooses what a team enters at the next cut, and at those after it, until a later upload turns
     /// valid; also what it had withdrawn. A day that had its cut goes on with what was active then.
-    /// [`StoreError::Conflict`] if the submission is not valid (yet); [`StoreError::Disqualified`] if its team is;
+    /// [`StoreError::Conflict`] if the submission is not valid (yet), or its archive was removed;
+    /// [`StoreError::Disqualified`] if its team is;
     /// [`StoreError::SeasonClosed`] once the season is over.
     pub async fn activate_submission(
         &self,

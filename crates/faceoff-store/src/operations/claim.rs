@@ -14,12 +14,14 @@ use crate::{
         runs::Run,
         season,
         shards::{self, Shard},
-        stages,
+        stage_runtimes, stages,
         submissions::{self, Submission},
     },
     write::Tx,
 };
-use faceoff_types::{BundleRef, EvaluationId, RunId, Seed, StageLimits, SubmissionId};
+use faceoff_types::{
+    BundleRef, EvaluationId, RunId, Seed, StageLimits, StageRuntimes, SubmissionId,
+};
 use jiff::{SignedDuration, Timestamp};
 use uuid::Uuid;
 
@@ -48,6 +50,9 @@ pub enum Work {
         seeds: RunSeeds,
         /// What the agent is held to: as in the stage that matters now.
         limits: Box<StageLimits>,
+        /// It is refused if none of these takes its runtime: the stages that it could play in; none, if one of them takes
+        /// any.
+        runtimes: Vec<StageRuntimes>,
     },
     /// Play a range of episodes.
     Shard {
@@ -152,10 +157,12 @@ async fn describe(tx: &mut Tx, unit: &Leased) -> Result<Work> {
             let limits = stages::current(&all, tx.now)
                 .map(|stage| stage.rules.rules.limits.clone())
                 .unwrap_or_default();
+            let runtimes = stage_runtimes::of_uploads(&all, tx.now);
             Ok(Work::Smoke {
                 submission,
                 seeds,
                 limits,
+                runtimes,
             })
         }
         Purpose::Shard { run: id, shard } => {

@@ -14,7 +14,7 @@ use crate::{
         days, entries,
         evaluations::Evaluation,
         plan::RunPlan,
-        season,
+        season, stage_runtimes,
         stages::{self, Stage},
         standings, submissions, teams,
     },
@@ -40,7 +40,7 @@ impl Store {
     /// the day's episodes; once that is released, episodes of its own, since the day's are known. A result of the day
     /// that counts is voided first, if `replaces` says so. [`StoreError::NotFound`] if the day had no cut,
     /// [`StoreError::Conflict`] if the team has nothing active, has one of the day under way, or one that counts and is
-    /// not to be replaced; [`StoreError::Disqualified`], [`StoreError::StageNotOpen`],
+    /// not to be replaced, or if the day's rules do not take what it has active; [`StoreError::Disqualified`], [`StoreError::StageNotOpen`],
     /// [`StoreError::SeasonClosed`].
     pub async fn extra_turn(
         &self,
@@ -64,6 +64,10 @@ impl Store {
                     "the team has no submission active: it uploads one, or chooses one, and then it can play".into(),
                 ));
             };
+            let stage = rules_of_day(tx, stage, of).await?;
+            stage
+                .check_takes(&active)
+                .map_err(|why| stage_runtimes::conflict(&why))?;
             for standing in standings::of_day_and_team(tx, of, team).await? {
                 if standing.is_open {
                     return Err(StoreError::Conflict(
@@ -80,7 +84,6 @@ impl Store {
                     void(tx, standing.id, &why).await?;
                 }
             }
-            let stage = rules_of_day(tx, stage, of).await?;
             let id = EvaluationId::new();
             let plan: RunPlan = stage.plan();
             let turn = Turn {

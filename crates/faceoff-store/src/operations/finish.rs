@@ -9,7 +9,7 @@ use crate::{
     },
     queue::Claim,
     store::Store,
-    tables::{drafts, evaluations},
+    tables::{drafts, evaluations, retentions},
 };
 use faceoff_types::EvaluationResult;
 use jiff::Timestamp;
@@ -27,9 +27,13 @@ impl Store {
         dataset_blake3: &str,
         now: Timestamp,
     ) -> Result<Committed> {
+        let bytes = self.artifacts().bytes_of(dataset).await?;
         self.commit(claim, now, async |tx, purpose| match purpose {
             Purpose::Finalise(id) => {
                 evaluations::set_finished(tx, id, result, dataset, dataset_blake3, now).await?;
+                if let Some(bytes) = bytes {
+                    retentions::set_measured(tx, id, bytes).await?;
+                }
                 let event = Event::EvaluationFinished {
                     score: result.score,
                     dataset_blake3: dataset_blake3.to_owned(),
@@ -39,6 +43,9 @@ impl Store {
             }
             Purpose::FinaliseDraft { id, proposal, .. } => {
                 drafts::set_finished(tx, id, result, dataset, dataset_blake3, now).await?;
+                if let Some(bytes) = bytes {
+                    retentions::set_measured(tx, id, bytes).await?;
+                }
                 draft_ends::tell_if_over(tx, proposal).await
             }
             other => Err(other_work("finalisation", &other)),

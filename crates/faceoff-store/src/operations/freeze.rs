@@ -58,6 +58,11 @@ impl Store {
         .await
     }
 
+    /// All stages whose boards stand still: since when, and why.
+    pub async fn frozen_boards(&self) -> Result<Vec<(StageId, Ruling)>> {
+        freezes::all(&mut *self.database.read.acquire().await?).await
+    }
+
     /// Since when the boards of a stage stand still, and why; `None` if they do not.
     pub async fn boards_frozen(&self, stage: StageId) -> Result<Option<Ruling>> {
         freezes::find(&mut *self.database.read.acquire().await?, stage).await

@@ -6,7 +6,7 @@ use crate::{
     room::Room,
     signals::Signals,
     store::Store,
-    tables::season,
+    tables::{archived, season},
 };
 use std::{fs::File, path::Path, sync::Arc};
 
@@ -20,6 +20,7 @@ impl Store {
         let database = Database::open(&data_dir.join("faceoff.sqlite3")).await?;
         let mut tx = database.begin().await?;
         season::draw_secret_once(&mut tx).await?;
+        let archived = archived::read(&mut tx).await?;
         tx.commit().await?;
         Ok(Self {
             database,
@@ -27,6 +28,7 @@ impl Store {
             artifacts,
             room: Arc::new(Room::new(vec![data_dir.to_owned()], 0)),
             pulse: Arc::new(Pulse::new()),
+            archived: archived.map(Arc::new),
         })
     }
 }

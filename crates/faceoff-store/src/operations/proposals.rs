@@ -15,9 +15,9 @@ use crate::{
         finalisations, finalised, freezes,
         plan::RunPlan,
         proposals::{self, Proposal, ProposalKind, Settled},
-        runs as run_rows,
+        retentions, runs as run_rows,
         runs::Run,
-        season,
+        season, stage_runtimes,
         stages::{self, Stage, StagePhase},
         standings, submissions,
     },
@@ -112,6 +112,12 @@ async fn again(
         .collect();
     let mut played = Vec::new();
     for entry in all.into_iter().filter(|entry| !done.contains(&entry.team)) {
+        if let Some(stage) = newest {
+            let submission = submissions::find(tx, entry.submission).await?;
+            if stage.check_takes(&submission).is_err() {
+                continue;
+            }
+        }
         let run = run_rows::find(tx, entry.run).await?;
         let (revision, ruleset, plan) = match newest {
             None => (entry.revision, run.ruleset, run.plan),
@@ -149,17 +155,27 @@ impl Store {
                 return conflict("the stage has closed, and nothing of it begins again");
             }
             let active = match submission {
-                None => submissions::active(tx).await?,
+                None => {
+                    let mut active = submissions::active(tx).await?;
+                    active.retain(|one| stage.check_takes(one).is_ok());
+                    active
+                }
                 Some(id) => vec![submissions::find(tx, id).await?],
             };
             if active.is_empty() {
-                return conflict("no team has a valid submission, so there is nothing to try");
+                return conflict(
+                    "no team has a valid submission that the stage takes, so there is nothing to try",
+                );
             }
             if active
                 .iter()
                 .any(|one| one.state != submissions::SubmissionState::Valid)
             {
                 return conflict("only a valid submission can be tried");
+            }
+            for one in &active {
+                let taken = stage.check_takes(one);
+                taken.map_err(|why| stage_runtimes::conflict(&why))?;
             }
             let id = ProposalId::new();
             let proposal = Proposal {
@@ -226,7 +242,7 @@ impl Store {
             let played = again(tx, &counting, newest).await?;
             let Some(revision) = played.iter().map(|(revision, _)| *revision).max() else {
                 return conflict(if newest.is_some() && !counting.is_empty() {
-                    "all that counts of that day was played by the stage's newest rules"
+                    "all that counts of that day was played by the stage's newest rules, or by agents that these do not take"
                 } else {
                     "nothing of that counts, so there is nothing to play again; `rerun` plays what was voided or cancelled"
                 });
@@ -381,6 +397,7 @@ async fn apply(tx: &mut Tx, proposal: &Proposal, of: StageDay, draft: Draft) -> 
             let dataset_blake3 = dataset_blake3.unwrap_or_default();
             evaluations::set_finished(tx, draft.id, &result, &dataset, &dataset_blake3, now)
                 .await?;
+            retentions::follow_draft(tx, draft.id).await?;
             let event = Event::EvaluationFinished {
                 score: result.score,
                 dataset_blake3,

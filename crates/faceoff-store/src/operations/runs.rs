@@ -5,7 +5,7 @@ use crate::{
     event::Subject,
     queue::{self, NewUnit},
     tables::{
-        ablations, drafts, evaluations, runs,
+        ablations, bundles, drafts, evaluations, runs,
         runs::Run,
         shards::{self, Shard},
     },
@@ -40,6 +40,18 @@ impl RunOwner {
     }
 }
 
+/// What the events of a run's playing are about: of one that was played before it counted, what it was a part of then.
+pub(crate) async fn subjects(
+    connection: &mut SqliteConnection,
+    run: RunId,
+) -> Result<Vec<Subject>> {
+    let mut subjects = vec![owner(connection, run).await?.subject()];
+    if let Some((id, proposal)) = drafts::of_run(connection, run).await? {
+        subjects.push(RunOwner::Draft { id, proposal }.subject());
+    }
+    Ok(subjects)
+}
+
 /// What owns a run.
 pub(crate) async fn owner(connection: &mut SqliteConnection, run: RunId) -> Result<RunOwner> {
     if let Some(id) = evaluations::of_run(connection, run).await? {
@@ -55,7 +67,7 @@ pub(crate) async fn owner(connection: &mut SqliteConnection, run: RunId) -> Resu
 }
 
 /// Adds a run, cuts it into shards, in (task, first episode) order, and queues them; their slot time is
-/// charged to `team`.
+/// charged to `team`. [`StoreError::Conflict`] if the archive of a contestant was removed.
 pub(crate) async fn create(
     tx: &mut Tx,
     run: &Run,
@@ -63,6 +75,9 @@ pub(crate) async fn create(
     unit: NewUnit,
     team: TeamId,
 ) -> Result<()> {
+    for contestant in contestants {
+        bundles::check_kept(tx, *contestant).await?;
+    }
     runs::insert(tx, run, contestants).await?;
     let account = queue::account(tx, unit.lane, &team.to_string()).await?;
     let mut tasks = run.plan.tasks.clone();

@@ -32,10 +32,12 @@ impl Store {
             match outcome {
                 SmokeOutcome::Valid {
                     agent_name,
+                    runtime,
                     timing,
                     log,
                 } => {
-                    submissions::set_valid(tx, id, &agent_name, &timing, &log).await?;
+                    let named = (agent_name.as_str(), runtime.as_str());
+                    submissions::set_valid(tx, id, named, &timing, &log).await?;
                     tx.record(subject, Event::SubmissionValid { agent_name });
                     let Submission {
                         team,
@@ -51,12 +53,13 @@ impl Store {
                 }
                 SmokeOutcome::Invalid {
                     agent_name,
+                    runtime,
                     reason,
                     timing,
                     log,
                 } => {
-                    submissions::set_invalid(tx, id, agent_name.as_deref(), &reason, &timing, &log)
-                        .await?;
+                    let named = (agent_name.as_deref(), runtime.as_deref());
+                    submissions::set_invalid(tx, id, named, &reason, &timing, &log).await?;
                     tx.record(subject, Event::SubmissionInvalid { reason });
                 }
             }

@@ -3,7 +3,7 @@
 use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::deadlines,
+    operations::{deadlines, retention},
     store::Store,
     tables::{
         days, finalised, season,
@@ -11,7 +11,7 @@ use crate::{
     },
     write::Tx,
 };
-use faceoff_types::{StageId, StageName, StageRules, StageSettings, Zone};
+use faceoff_types::{Retention, StageId, StageName, StageRules, StageSettings, Zone};
 use jiff::Timestamp;
 
 /// A stage to be made.
@@ -46,6 +46,23 @@ pub struct StageChange {
     pub rules: Option<StageRules>,
     /// What no score depends on.
     pub settings: Option<StageSettings>,
+    /// What is kept of its files; also once it is signed off, and when the season is over.
+    pub retention: Option<Retention>,
+}
+
+impl StageChange {
+    /// Is anything to be another, beside what is kept?
+    fn changes(&self, stage: &Stage) -> bool {
+        fn other<T: PartialEq>(wanted: Option<&T>, is: &T) -> bool {
+            wanted.is_some_and(|wanted| wanted != is)
+        }
+        other(self.name.as_ref(), &stage.name)
+            || other(self.opens_at.as_ref(), &stage.opens_at)
+            || other(self.closes_at.as_ref(), &stage.closes_at)
+            || other(self.zone.as_ref(), &stage.zone)
+            || other(self.rules.as_ref(), &stage.rules.rules)
+            || other(self.settings.as_ref(), &stage.settings)
+    }
 }
 
 /// The name of a season's first stage.
@@ -217,6 +234,18 @@ impl Store {
     /// Makes a stage. [`StoreError::StageNameTaken`] if another has its name, [`StoreError::Conflict`] if its times
     /// or its rules cannot be, [`StoreError::SeasonClosed`] once the season is over.
     pub async fn create_stage(&self, actor: Actor, new: NewStage, now: Timestamp) -> Result<Stage> {
+        self.create_stage_keeping(actor, new, Retention::default(), now)
+            .await
+    }
+
+    /// The same of a stage that does not keep all of its files for ever.
+    pub async fn create_stage_keeping(
+        &self,
+        actor: Actor,
+        new: NewStage,
+        retention: Retention,
+        now: Timestamp,
+    ) -> Result<Stage> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
             let opens_at = stored(new.opens_at.max(now));
@@ -239,6 +268,7 @@ impl Store {
                 finalised: None,
             };
             create(tx, &stage).await?;
+            retention::change(tx, stage.id, retention).await?;
             stages::find(tx, stage.id).await
         })
         .await
@@ -254,8 +284,14 @@ impl Store {
         now: Timestamp,
     ) -> Result<Stage> {
         self.write(actor, now, async |tx| {
-            season::check_open(tx).await?;
             let stage = stages::find(tx, id).await?;
+            if let Some(retention) = wanted.retention {
+                retention::change(tx, id, retention).await?;
+                if !wanted.changes(&stage) {
+                    return Ok(stage);
+                }
+            }
+            season::check_open(tx).await?;
             change(tx, &stage, wanted, By::Hand).await?;
             stages::find(tx, id).await
         })

@@ -104,6 +104,15 @@ pub(crate) async fn begin(
     };
     let mut started = Vec::new();
     for submission in submissions::active(tx).await? {
+        if let Err(why) = stage.check_takes(&submission) {
+            let event = Event::SubmissionNotTaken {
+                stage: of.stage,
+                day: of.date,
+                reason: why.to_string(),
+            };
+            tx.record(Subject::Submission(submission.id), event);
+            continue;
+        }
         let entrant = Entrant {
             id: EvaluationId::new(),
             submission: submission.id,
@@ -127,13 +136,13 @@ fn unless_empty(started: Vec<Evaluation>) -> Result<Vec<Evaluation>> {
 
 pub(crate) fn nobody_plays() -> StoreError {
     StoreError::Conflict(
-        "no team has a valid submission, so nothing was started, and the day still has its cut"
+        "no team has a valid submission that the stage takes, so nothing was started, and the day still has its cut"
             .into(),
     )
 }
 
 impl Store {
-    /// The cut of a stage's day at `now`: queues an evaluation of what each team has active, earliest
+    /// The cut of a stage's day at `now`: queues an evaluation of what each team has active that the stage takes, earliest
     /// upload first. [`StoreError::DayHasCut`] if the day has had it, [`StoreError::StageNotOpen`] before and
     /// after the stage, [`StoreError::Conflict`] if no team has anything to play (the day keeps its cut),
     /// [`StoreError::SeasonClosed`] once the season is over.

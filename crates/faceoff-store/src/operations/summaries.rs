@@ -12,7 +12,7 @@ impl Store {
         summary: &str,
         now: Timestamp,
     ) -> Result<()> {
-        self.write(Actor::Server, now, async |tx| {
+        self.keep(Actor::Server, now, async |tx| {
             episode_summaries::put(tx, run, version, summary).await
         })
         .await

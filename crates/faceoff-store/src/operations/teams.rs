@@ -7,7 +7,7 @@ use crate::{
     },
     store::Store,
     tables::{
-        divisions, season,
+        divisions, people, season,
         teams::{self, Team, TeamProfile},
         tokens::{TokenKind, TokenOwner},
     },
@@ -115,14 +115,20 @@ impl Store {
         .await
     }
 
-    /// Takes a team out of all days to come, by its own wish: it neither uploads nor enters a day. What had its cut goes
-    /// on, and its results stay. [`StoreError::Conflict`] if it has retired.
+    /// Takes a team out of all days to come, by its own wish or an organiser's: it neither uploads nor enters a day. What
+    /// had its cut goes on, and its results stay; if it was an organiser's, its files, too.
+    /// [`StoreError::Conflict`] if it has retired.
     pub async fn retire_team(&self, actor: Actor, id: TeamId, now: Timestamp) -> Result<Team> {
-        self.write(actor, now, async |tx| {
+        self.write(actor.clone(), now, async |tx| {
+            let by_organiser = match actor {
+                Actor::Organiser => true,
+                Actor::Person(person) => people::find(tx, person).await?.team.is_none(),
+                _ => false,
+            };
             if teams::find(tx, id).await?.retired_at.is_some() {
                 return Err(StoreError::Conflict("the team has retired already".into()));
             }
-            teams::set_retired(tx, id, Some(now)).await?;
+            teams::set_retired(tx, id, Some(now), by_organiser).await?;
             tx.record(Subject::Team(id), Event::TeamRetired);
             teams::find(tx, id).await
         })
@@ -135,7 +141,7 @@ impl Store {
             if teams::find(tx, id).await?.retired_at.is_none() {
                 return Err(StoreError::Conflict("the team has not retired".into()));
             }
-            teams::set_retired(tx, id, None).await?;
+            teams::set_retired(tx, id, None, false).await?;
             tx.record(Subject::Team(id), Event::TeamReturned);
             teams::find(tx, id).await
         })

@@ -61,6 +61,9 @@ pub struct NewToken {
     pub expires_at: Option<Timestamp>,
 }
 
+/// The name of the token that the host has in a file of the data folder.
+const HOST_FILE: &str = "admin-token";
+
 const fn subject(owner: TokenOwner) -> Subject {
     match owner {
         TokenOwner::Host => Subject::Season,
@@ -175,7 +178,7 @@ impl Store {
 
     /// Notes that a token was used. Often enough is once in [`LAST_USE`].
     pub async fn token_used(&self, token: &Token, now: Timestamp) -> Result<()> {
-        self.write(Actor::Server, now, async |tx| {
+        self.keep(Actor::Server, now, async |tx| {
             tokens::set_last_used(tx, token.id, now).await
         })
         .await
@@ -194,7 +197,7 @@ impl Store {
     }
 
     /// Gives a token another secret; from now on the old one is worth nothing. [`StoreError::Conflict`] if the token
-    /// is not a key, or is worth nothing.
+    /// is not a key, is worth nothing, or is the one of the host's file, which would still have the old secret.
     pub async fn rotate_token(
         &self,
         actor: Actor,
@@ -207,6 +210,13 @@ impl Store {
             if token.kind == TokenKind::Session {
                 return Err(StoreError::Conflict(
                     "a session has no secret that anybody could use: end it, or sign in again"
+                        .into(),
+                ));
+            }
+            if token.owner == TokenOwner::Host && token.name == HOST_FILE {
+                return Err(StoreError::Conflict(
+                    "the host's token stands in the server's data folder (admin-token), which would keep the old one: \
+                     revoke it, and the next start of the server leaves another there"
                         .into(),
                 ));
             }
@@ -246,14 +256,15 @@ impl Store {
     /// Lets the token of this hash be the host's, and none that was the host's file's before. False if it is revoked:
     /// the host needs another one.
     pub async fn set_host_token(&self, hash: [u8; 32], now: Timestamp) -> Result<bool> {
-        const NAME: &str = "admin-token";
-        self.write(Actor::Server, now, async |tx| {
+        self.keep(Actor::Server, now, async |tx| {
             let known = tokens::by_hash(tx, hash).await?;
             if let Some(known) = known {
                 return Ok(known.owner == TokenOwner::Host && known.is_good(now));
             }
             let before = tokens::all(tx).await?.into_iter().filter(|token| {
-                token.owner == TokenOwner::Host && token.name == NAME && token.revoked_at.is_none()
+                token.owner == TokenOwner::Host
+                    && token.name == HOST_FILE
+                    && token.revoked_at.is_none()
             });
             for token in before {
                 tokens::revoke(tx, token.id, now).await?;
@@ -264,7 +275,7 @@ impl Store {
                 hash,
                 kind: TokenKind::Key,
                 owner: TokenOwner::Host,
-                name: NAME.to_owned(),
+                name: HOST_FILE.to_owned(),
                 expires_at: None,
             };
             add(tx, new).await?;

@@ -43,24 +43,4 @@ impl Store {
         })
         .await
     }
-
-    /// Gives a submission the name that its team has for it; `None` takes it away.
-    pub async fn label_submission(
-        &self,
-        actor: Actor,
-        id: SubmissionId,
-        label: Option<&str>,
-        now: Timestamp,
-    ) -> Result<Submission> {
-        self.write(actor, now, async |tx| {
-            let submission = submissions::find(tx, id).await?;
-            if submission.label.as_deref() != label {
-                submissions::set_label(tx, id, label).await?;
-                let label = label.map(str::to_owned);
-                tx.record(Subject::Submission(id), Event::SubmissionLabelled { label });
-            }
-            submissions::find(tx, id).await
-        })
-        .await
-    }
 }

@@ -12,6 +12,11 @@ impl Store {
         events::after(&mut *self.database.read.acquire().await?, after, limit).await
     }
 
+    /// The id of what happened last that anything but the progress of a run may depend on; 0 before the first.
+    pub async fn newest_change(&self) -> Result<i64> {
+        events::newest_change(&mut *self.database.read.acquire().await?).await
+    }
+
     /// What happened last of what the filter lets through, the newest first, `limit` at most.
     pub async fn newest_events(
         &self,

@@ -12,6 +12,7 @@ pub(crate) mod runs;
 mod season;
 mod stages;
 pub(crate) mod standings;
+pub(crate) mod storage;
 mod submissions;
 mod summaries;
 mod teams;

@@ -7,7 +7,7 @@ use crate::{
         proposals::{self, Proposal},
     },
 };
-use faceoff_types::ProposalId;
+use faceoff_types::{EvaluationId, ProposalId};
 use sqlx::SqliteConnection;
 
 /// The drafts of a proposal with their progress, in the order in which they were queued.
@@ -30,6 +30,17 @@ impl Store {
     /// All proposals and trials, the newest first.
     pub async fn proposals(&self) -> Result<Vec<Proposal>> {
         proposals::all(&mut *self.database.read.acquire().await?).await
+    }
+
+    /// One evaluation of a proposal or a trial, with this. [`StoreError::NotFound`](crate::StoreError::NotFound) of
+    /// those that never were of one.
+    pub async fn draft(&self, id: EvaluationId) -> Result<(Proposal, Draft)> {
+        let mut tx = self.database.read.begin().await?;
+        let row = drafts::find(&mut tx, id).await?;
+        let proposal = proposals::find(&mut tx, row.proposal.0).await?;
+        let done = progress::of_runs(&mut tx, &[row.run.0]).await?;
+        let episodes_done = done.get(&row.run.0).copied().unwrap_or(0);
+        Ok((proposal, row.into_draft(episodes_done)?))
     }
 
     /// A proposal with its evaluations.

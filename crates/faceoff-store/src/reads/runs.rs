@@ -1,5 +1,5 @@
 use crate::{
-    error::Result,
+    error::{Result, StoreError},
     store::Store,
     tables::{
         runs as run_rows,
@@ -34,9 +34,13 @@ impl Store {
     }
 
     /// The outcomes of a run's committed shards in (task, episode) order: all that scoring needs,
-    /// without opening a recording.
+    /// without opening a recording. Of a run that was cleared they are gone.
     pub async fn outcomes(&self, run: RunId) -> Result<Vec<EpisodeOutcome>> {
-        shards::outcomes(&mut *self.database.read.acquire().await?, run).await
+        let mut connection = self.database.read.acquire().await?;
+        match run_rows::cleared_at(&mut connection, run).await? {
+            None => shards::outcomes(&mut connection, run).await,
+            Some(at) => Err(StoreError::Cleared { at }),
+        }
     }
 
     /// What the agent did wrong in a run, and what it said.

@@ -16,13 +16,9 @@ impl Store {
         submissions::of_team(&mut *self.database.read.acquire().await?, team).await
     }
 
-    /// The teams that have a submission active and may play, by their submissions' uploads.
-    pub async fn active_teams(&self) -> Result<Vec<TeamId>> {
-        let active = submissions::active(&mut *self.database.read.acquire().await?).await?;
-        Ok(active
-            .into_iter()
-            .map(|submission| submission.team)
-            .collect())
+    /// What each team that may play has active, the earliest upload first.
+    pub async fn active_submissions(&self) -> Result<Vec<Submission>> {
+        submissions::active(&mut *self.database.read.acquire().await?).await
     }
 
     /// The tail of the agent's standard error in its smoke run; `None` until that is over, and where

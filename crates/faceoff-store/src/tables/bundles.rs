@@ -4,6 +4,8 @@
 use crate::{
     column::Instant,
     error::{Result, StoreError},
+    event::Actor,
+    tables::submissions::REFUSED,
 };
 use faceoff_types::{SubmissionId, TeamId};
 use jiff::Timestamp;
@@ -98,7 +100,7 @@ pub(crate) async fn usage(
 }
 
 /// Refused uploads whose archives are kept, with their keys: what is invalid, and what we failed to check
-/// if it came at `before` or earlier. Nothing that a run names, and no key of an upload that may play.
+/// if it came at `before` or earlier. Nothing that a run names, no key of an upload that may play, and no evidence.
 pub(crate) async fn refused(
     connection: &mut SqliteConnection,
     before: Timestamp,
@@ -109,6 +111,8 @@ pub(crate) async fn refused(
            WHERE s.bundle_removed_at IS NULL AND s.state IN ('invalid', 'validation_error')
              AND (s.state = 'invalid' OR s.created_at <= ?)
              AND NOT EXISTS (SELECT 1 FROM contestants c WHERE c.submission_id = s.id)
+             AND NOT EXISTS (SELECT 1 FROM teams t
+                             WHERE t.id = s.team_id AND (t.disqualified_at IS NOT NULL OR t.retired_by_organiser = 1))
              AND NOT EXISTS (SELECT 1 FROM submissions o
                              WHERE o.team_id = s.team_id AND o.bundle_key = s.bundle_key
                                AND o.state IN ('validating', 'valid'))"#,
@@ -129,8 +133,8 @@ pub(crate) async fn set_removed(
 ) -> Result<()> {
     let (id, now) = (Text(id), Instant(now));
     sqlx::query!(
-        "UPDATE submissions SET bundle_removed_at = ?
-         WHERE id = ? AND state IN ('invalid', 'validation_error')",
+        "UPDATE submissions SET bundle_removed_at = ?, bundle_gone = 1
+         WHERE id = ? AND state IN ('invalid', 'validation_error') AND bundle_removed_at IS NULL",
         now,
         id,
     )
@@ -139,11 +143,133 @@ pub(crate) async fn set_removed(
     Ok(())
 }
 
-/// The keys of all archives that are kept.
+/// The keys of all archives whose files have not gone.
 pub(crate) async fn kept(connection: &mut SqliteConnection) -> Result<HashSet<String>> {
-    let keys =
-        sqlx::query_scalar!("SELECT bundle_key FROM submissions WHERE bundle_removed_at IS NULL")
-            .fetch_all(connection)
-            .await?;
+    let keys = sqlx::query_scalar!("SELECT bundle_key FROM submissions WHERE bundle_gone = 0")
+        .fetch_all(connection)
+        .await?;
     Ok(keys.into_iter().collect())
+}
+
+/// From now on nobody is promised the archive of a submission.
+pub(crate) async fn remove(
+    connection: &mut SqliteConnection,
+    id: SubmissionId,
+    reason: &str,
+    now: Timestamp,
+) -> Result<()> {
+    let (id, now) = (Text(id), Instant(now));
+    sqlx::query!(
+        "UPDATE submissions SET bundle_removed_at = ?, bundle_removed_for = ? WHERE id = ?",
+        now,
+        reason,
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Somebody wished it away.
+pub(crate) async fn set_deleted(
+    connection: &mut SqliteConnection,
+    id: SubmissionId,
+    by: &Actor,
+    now: Timestamp,
+) -> Result<()> {
+    let (id, by, now) = (Text(id), Text(by), Instant(now));
+    sqlx::query!(
+        "UPDATE submissions SET deleted_at = ?, deleted_by = ? WHERE id = ?",
+        now,
+        by,
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// The archives whose files are there although nobody is promised them since `before`, with their keys; none that
+/// another submission has, too, and none that has become evidence.
+pub(crate) async fn going(
+    connection: &mut SqliteConnection,
+    before: Timestamp,
+) -> Result<Vec<(SubmissionId, String)>> {
+    let before = Instant(before);
+    let rows = sqlx::query!(
+        r#"SELECT s.id AS "id: Text<SubmissionId>", s.bundle_key FROM submissions s
+           JOIN teams t ON t.id = s.team_id
+           WHERE s.bundle_removed_at IS NOT NULL AND s.bundle_removed_at <= ? AND s.bundle_gone = 0
+             AND t.disqualified_at IS NULL AND t.retired_by_organiser = 0
+             AND NOT EXISTS (SELECT 1 FROM submissions o
+                             WHERE o.team_id = s.team_id AND o.bundle_key = s.bundle_key
+                               AND o.bundle_removed_at IS NULL)"#,
+        before
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows
+        .into_iter()
+        .map(|row| (row.id.0, row.bundle_key))
+        .collect())
+}
+
+/// The file of a removed archive has gone.
+pub(crate) async fn set_gone(connection: &mut SqliteConnection, id: SubmissionId) -> Result<()> {
+    let id = Text(id);
+    sqlx::query!("UPDATE submissions SET bundle_gone = 1 WHERE id = ?", id)
+        .execute(connection)
+        .await?;
+    Ok(())
+}
+
+/// Refuses to have a submission play whose archive was removed.
+pub(crate) async fn check_kept(connection: &mut SqliteConnection, id: SubmissionId) -> Result<()> {
+    let text = Text(id);
+    let removed = sqlx::query!(
+        r#"SELECT bundle_removed_at AS "at!: Instant", bundle_removed_for AS reason FROM submissions
+           WHERE id = ? AND bundle_removed_at IS NOT NULL"#,
+        text
+    )
+    .fetch_optional(connection)
+    .await?;
+    match removed {
+        None => Ok(()),
+        Some(row) => Err(StoreError::Conflict(format!(
+            "the archive of the submission {id} was removed on {} {}, so it cannot be played again",
+            row.at.0.strftime("%Y-%m-%d at %H:%M:%S UTC"),
+            row.reason.as_deref().unwrap_or(REFUSED),
+        ))),
+    }
+}
+
+/// What a submission's archive is needed for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Needs {
+    /// It enters the next cut.
+    pub(crate) is_active: bool,
+    /// Evaluations, and an ablation, that are not over.
+    pub(crate) open: u32,
+    /// Its evaluations of days that are not released.
+    pub(crate) unreleased: u32,
+    /// Trials and proposals with it that are neither applied nor dropped.
+    pub(crate) proposed: u32,
+}
+
+pub(crate) async fn needs(connection: &mut SqliteConnection, id: SubmissionId) -> Result<Needs> {
+    let id = Text(id);
+    Ok(sqlx::query_as!(
+        Needs,
+        r#"SELECT EXISTS (SELECT 1 FROM active_submissions WHERE submission_id = ?1) AS "is_active!: bool",
+                  (SELECT COUNT(*) FROM evaluations WHERE submission_id = ?1 AND state = 'open')
+                  + (SELECT COUNT(*) FROM ablations WHERE submission_id = ?1 AND finished_at IS NULL)
+                  AS "open!: u32",
+                  (SELECT COUNT(*) FROM evaluations e JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
+                   WHERE e.submission_id = ?1 AND d.released_at IS NULL) AS "unreleased!: u32",
+                  (SELECT COUNT(DISTINCT p.id) FROM drafts d JOIN proposals p ON p.id = d.proposal_id
+                   WHERE d.submission_id = ?1 AND p.outcome IS NULL) AS "proposed!: u32""#,
+        id
+    )
+    .fetch_one(connection)
+    .await?)
 }

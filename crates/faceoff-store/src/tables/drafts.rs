@@ -37,7 +37,7 @@ pub struct Draft {
 /// A draft with its run, without the run's progress.
 pub(crate) struct DraftRow {
     id: Text<EvaluationId>,
-    proposal: Text<ProposalId>,
+    pub(crate) proposal: Text<ProposalId>,
     submission: Text<SubmissionId>,
     team: Text<TeamId>,
     replaces: Option<Text<EvaluationId>>,
@@ -98,27 +98,42 @@ impl DraftRow {
     }
 }
 
+/// `SELECT` of drafts with their runs; the arguments are what follows the tables, and what it asks for.
+macro_rules! select_drafts {
+    ($tail:literal, $argument:expr) => {
+        sqlx::query_as!(
+            DraftRow,
+            r#"SELECT d.id AS "id: Text<EvaluationId>", d.proposal_id AS "proposal: Text<ProposalId>",
+                      d.submission_id AS "submission: Text<SubmissionId>", d.team_id AS "team: Text<TeamId>",
+                      d.replaces AS "replaces: Text<EvaluationId>", d.run_id AS "run: Text<RunId>",
+                      r.state AS "run_state: RunState",
+                      r.episodes_per_task * json_array_length(r.tasks) AS "episodes_total!: u32",
+                      d.created_at AS "created_at: Instant", d.state, d.finished_at AS "finished_at: Instant",
+                      d.reason, d.dataset, d.dataset_blake3, d.result AS "result: Json<EvaluationResult>"
+               FROM drafts d JOIN runs r ON r.id = d.run_id "# + $tail,
+            $argument
+        )
+    };
+}
+
+/// The draft that becomes this evaluation.
+pub(crate) async fn find(connection: &mut SqliteConnection, id: EvaluationId) -> Result<DraftRow> {
+    let id = Text(id);
+    let found = select_drafts!("WHERE d.id = ?", id).fetch_optional(connection);
+    found.await?.ok_or(StoreError::NotFound("evaluation"))
+}
+
 /// The drafts of a proposal, in the order in which they were queued.
 pub(crate) async fn of_proposal(
     connection: &mut SqliteConnection,
     proposal: ProposalId,
 ) -> Result<Vec<DraftRow>> {
     let proposal = Text(proposal);
-    Ok(sqlx::query_as!(
-        DraftRow,
-        r#"SELECT d.id AS "id: Text<EvaluationId>", d.proposal_id AS "proposal: Text<ProposalId>",
-                  d.submission_id AS "submission: Text<SubmissionId>", d.team_id AS "team: Text<TeamId>",
-                  d.replaces AS "replaces: Text<EvaluationId>", d.run_id AS "run: Text<RunId>",
-                  r.state AS "run_state: RunState",
-                  r.episodes_per_task * json_array_length(r.tasks) AS "episodes_total!: u32",
-                  d.created_at AS "created_at: Instant", d.state, d.finished_at AS "finished_at: Instant", d.reason,
-                  d.dataset, d.dataset_blake3, d.result AS "result: Json<EvaluationResult>"
-           FROM drafts d JOIN runs r ON r.id = d.run_id
-           WHERE d.proposal_id = ? ORDER BY d.created_at, d.id"#,
+    let drafts = select_drafts!(
+        "WHERE d.proposal_id = ? ORDER BY d.created_at, d.id",
         proposal
-    )
-    .fetch_all(connection)
-    .await?)
+    );
+    Ok(drafts.fetch_all(connection).await?)
 }
 
 /// The draft that owns a run, if one does, and its proposal.

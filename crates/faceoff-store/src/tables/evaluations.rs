@@ -41,6 +41,8 @@ pub struct Evaluation {
     pub voided: Option<Ruling>,
     /// When its team made its dataset public, if it did.
     pub published_at: Option<Timestamp>,
+    /// Its dataset was removed, if it was: by which retention.
+    pub dataset_removed: Option<Ruling>,
     /// How far it is.
     pub state: EvaluationState,
 }
@@ -139,6 +141,8 @@ pub(crate) struct EvaluationRow {
     voided_at: Option<Instant>,
     voided_for: Option<String>,
     published_at: Option<Instant>,
+    dataset_removed_at: Option<Instant>,
+    dataset_removed_for: Option<String>,
 }
 
 impl EvaluationRow {
@@ -228,6 +232,7 @@ impl EvaluationRow {
             extra_for: self.extra_for,
             voided: Ruling::of(self.voided_at, self.voided_for),
             published_at: self.published_at.map(|at| at.0),
+            dataset_removed: Ruling::of(self.dataset_removed_at, self.dataset_removed_for),
             state,
         })
     }
@@ -254,7 +259,8 @@ macro_rules! select_evaluations {
                       e.finished_at AS "finished_at: Instant",
                       e.result AS "result: Json<EvaluationResult>", e.dataset, e.dataset_blake3,
                       e.reason, e.unplayed AS "unplayed: bool", e.extra_for, e.voided_at AS "voided_at: Instant", e.voided_for,
-                      e.published_at AS "published_at: Instant"
+                      e.published_at AS "published_at: Instant",
+                      e.dataset_removed_at AS "dataset_removed_at: Instant", e.dataset_removed_for
                FROM evaluations e JOIN runs r ON r.id = e.run_id 
                LEFT JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day "# + $tail
             $(, $argument)*

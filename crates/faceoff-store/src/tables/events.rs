@@ -1,10 +1,12 @@
-//! What happened. Rows are added by [`write`](crate::write) alone, and never changed.
+//! What happened. Rows are added by [`write`](crate::write) alone, and never changed; what was told of a run while it
+//! was played goes with its shards.
 
 use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
     event::{Actor, Event, EventRecord, Subject},
 };
+use faceoff_types::RunId;
 use serde_json::{Map, Value};
 use sqlx::{SqliteConnection, types::Text};
 
@@ -69,6 +71,35 @@ pub(crate) async fn after(
     .fetch_all(connection)
     .await?;
     rows.into_iter().map(EventRecord::try_from).collect()
+}
+
+/// The id of the newest event that does not tell of a run's progress; 0 before the first.
+pub(crate) async fn newest_change(connection: &mut SqliteConnection) -> Result<i64> {
+    let newest = sqlx::query_scalar!(
+        r#"SELECT id AS "id!" FROM events WHERE kind NOT IN ('shard_committed', 'unit_given_back')
+           ORDER BY id DESC LIMIT 1"#
+    );
+    Ok(newest.fetch_optional(connection).await?.unwrap_or_default())
+}
+
+/// Removes what was told of a run while it was played.
+pub(crate) async fn remove_progress(
+    connection: &mut SqliteConnection,
+    subject: &Subject,
+    run: RunId,
+) -> Result<()> {
+    let (subject_kind, subject_id) = subject.columns();
+    let run = Text(run);
+    sqlx::query!(
+        "DELETE FROM events WHERE subject_kind = ? AND subject_id = ? AND kind = 'shard_committed'
+                            AND payload ->> 'run' = ?",
+        subject_kind,
+        subject_id,
+        run,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
 }
 
 /// The newest events that the filter lets through, the newest first, `limit` at most.

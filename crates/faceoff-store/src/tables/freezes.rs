@@ -22,6 +22,20 @@ pub(crate) async fn find(
     }))
 }
 
+/// All stages whose boards stand still.
+pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<(StageId, Ruling)>> {
+    let rows = sqlx::query!(
+        r#"SELECT stage_id AS "stage: Text<StageId>", frozen_at AS "at: Instant", reason FROM frozen_boards"#
+    )
+    .fetch_all(connection)
+    .await?;
+    let ruling = |at, reason| Ruling { at, reason };
+    Ok(rows
+        .into_iter()
+        .map(|row| (row.stage.0, ruling(row.at.0, row.reason)))
+        .collect())
+}
+
 pub(crate) async fn insert(
     connection: &mut SqliteConnection,
     stage: StageId,

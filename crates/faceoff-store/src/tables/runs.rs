@@ -9,6 +9,16 @@ use faceoff_types::{
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
+/// A run that is over and may be cleared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Clearable {
+    /// Which.
+    pub run: RunId,
+    /// Every shard was played, and no episode summary of the version that was asked for is kept: it has to be made
+    /// from the outcomes before they go.
+    pub wants_summary: bool,
+}
+
 /// Contestants, a profile and episodes, cut into shards.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
@@ -195,4 +205,62 @@ pub(crate) async fn set_recordings_removed(
     .execute(connection)
     .await?;
     Ok(())
+}
+
+/// The runs that have their shards although their owner was over at `before` or earlier, the oldest first.
+pub(crate) async fn clearable(
+    connection: &mut SqliteConnection,
+    summary_version: u32,
+    before: Timestamp,
+) -> Result<Vec<Clearable>> {
+    let before = Instant(before);
+    let rows = sqlx::query!(
+        r#"SELECT r.id AS "run!: Text<RunId>",
+                  r.state = 'played'
+                      AND NOT EXISTS (SELECT 1 FROM episode_summaries s WHERE s.run_id = r.id AND s.version = ?)
+                      AS "wants_summary!: bool"
+           FROM runs r LEFT JOIN evaluations e ON e.run_id = r.id LEFT JOIN drafts d ON d.run_id = r.id
+           LEFT JOIN ablation_runs p ON p.run_id = r.id LEFT JOIN ablations a ON a.id = p.ablation_id
+           WHERE r.cleared_at IS NULL AND COALESCE(e.finished_at, d.finished_at, a.finished_at) <= ?
+           ORDER BY COALESCE(e.finished_at, d.finished_at, a.finished_at), r.id"#,
+        summary_version,
+        before,
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows
+        .into_iter()
+        .map(|row| Clearable {
+            run: row.run.0,
+            wants_summary: row.wants_summary,
+        })
+        .collect())
+}
+
+pub(crate) async fn set_cleared(
+    connection: &mut SqliteConnection,
+    id: RunId,
+    now: Timestamp,
+) -> Result<()> {
+    let (id, now) = (Text(id), Instant(now));
+    sqlx::query!("UPDATE runs SET cleared_at = ? WHERE id = ?", now, id)
+        .execute(connection)
+        .await?;
+    Ok(())
+}
+
+/// When its shards were removed, if they were.
+pub(crate) async fn cleared_at(
+    connection: &mut SqliteConnection,
+    id: RunId,
+) -> Result<Option<Timestamp>> {
+    let id = Text(id);
+    let row = sqlx::query!(
+        r#"SELECT cleared_at AS "at: Instant" FROM runs WHERE id = ?"#,
+        id
+    )
+    .fetch_optional(connection)
+    .await?
+    .ok_or(StoreError::NotFound("run"))?;
+    Ok(row.at.map(|at| at.0))
 }

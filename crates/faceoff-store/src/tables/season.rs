@@ -12,7 +12,8 @@ use sqlx::SqliteConnection;
 pub struct Season {
     /// As shown to teams.
     pub name: String,
-    /// All seeds derive from it; published when the season closes.
+    /// All seeds derive from it; published when the season closes. Of one that is an archive's and was not closed:
+    /// zeros, from which nothing derives.
     pub secret: Seed,
     /// BLAKE3 of the secret's 32 bytes, 64 hexadecimal digits; published before the season opens, so
     /// that nobody can choose the episodes afterwards.
@@ -31,7 +32,8 @@ pub(crate) async fn read(connection: &mut SqliteConnection) -> Result<Season> {
     let row = sqlx::query!(
         r#"SELECT name, secret AS "secret: Bytes32", created_at AS "created_at: Instant",
                   closed_at AS "closed_at: Instant", paused_at AS "paused_at: Instant", paused_for,
-                  takes_registrations AS "takes_registrations: bool"
+                  takes_registrations AS "takes_registrations: bool",
+                  (SELECT commitment FROM archived) AS "archived_commitment?: String"
            FROM season"#
     )
     .fetch_optional(connection)
@@ -40,7 +42,11 @@ pub(crate) async fn read(connection: &mut SqliteConnection) -> Result<Season> {
     Ok(Season {
         name: row.name,
         secret: Seed::from_bytes(row.secret.0),
-        commitment: blake3::hash(&row.secret.0).to_string(),
+        commitment: match (row.archived_commitment, row.closed_at) {
+            // the secret is not here
+            (Some(commitment), None) => commitment,
+            _ => blake3::hash(&row.secret.0).to_string(),
+        },
         created_at: row.created_at.0,
         closed_at: row.closed_at.map(|at| at.0),
         paused: Ruling::of(row.paused_at, row.paused_for),

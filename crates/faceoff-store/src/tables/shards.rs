@@ -263,3 +263,23 @@ pub(crate) async fn faulty(connection: &mut SqliteConnection, run: RunId) -> Res
     .fetch_all(connection)
     .await?)
 }
+
+/// Removes a run's shards in which the agent broke nothing, committed or not, with their units of work.
+pub(crate) async fn remove_faultless(connection: &mut SqliteConnection, run: RunId) -> Result<()> {
+    let run = Text(run);
+    let units = sqlx::query_scalar!(
+        r#"DELETE FROM shards WHERE run_id = ? AND COALESCE(agent_faults, 0) = 0
+           RETURNING unit_id AS "unit: Text<Uuid>""#,
+        run,
+    )
+    .fetch_all(&mut *connection)
+    .await?;
+    let units = Json(units.iter().map(|unit| unit.0).collect::<Vec<_>>());
+    sqlx::query!(
+        "DELETE FROM units WHERE id IN (SELECT value FROM json_each(?))",
+        units
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}

@@ -379,6 +379,7 @@ mod tests {
                 number: 1,
                 since: at("2026-03-02T10:00:00Z"),
                 rules: StageRules {
+                    runtimes: None,
                     ruleset: Ruleset::CURRENT,
                     profile: Profile::Evaluation,
                     tasks: Task::ALL.to_vec(),

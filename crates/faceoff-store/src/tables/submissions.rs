@@ -1,6 +1,8 @@
 use crate::{
     column::{Instant, Json},
     error::{Result, StoreError},
+    event::Actor,
+    tables::rulings::Ruling,
 };
 use faceoff_types::{BundleRef, SmokeTiming, SubmissionId, TeamId};
 use jiff::Timestamp;
@@ -19,6 +21,8 @@ pub struct Submission {
     pub created_at: Timestamp,
     /// The agent's own name; known once the bundle was unpacked.
     pub agent_name: Option<String>,
+    /// The runtime that it names; known likewise, but not of what was checked by older programs.
+    pub runtime: Option<String>,
     /// How far its smoke run is.
     pub state: SubmissionState,
     /// How long its answers took in the smoke run, for each task that was played.
@@ -29,8 +33,23 @@ pub struct Submission {
     pub withdrawn_at: Option<Timestamp>,
     /// What its team calls it.
     pub label: Option<String>,
+    /// What its team writes about it.
+    pub note: Option<String>,
     /// The team's first submission of the same archive, if this is another.
     pub same_as: Option<SubmissionId>,
+    /// Its archive was removed, if it was: nobody plays it any more.
+    pub archive_removed: Option<Ruling>,
+    /// Who wished that, if somebody did.
+    pub deleted: Option<Deletion>,
+}
+
+/// Somebody has had the archive of a submission removed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Deletion {
+    /// When.
+    pub at: Timestamp,
+    /// Who.
+    pub by: Actor,
 }
 
 /// A submission's way through its smoke run. The agent's log is read by itself
@@ -61,6 +80,9 @@ impl SubmissionState {
     }
 }
 
+/// Why the archive of a refused upload has gone.
+pub(crate) const REFUSED: &str = "since its smoke run refused it";
+
 struct SubmissionRow {
     id: Text<SubmissionId>,
     team_id: Text<TeamId>,
@@ -70,13 +92,19 @@ struct SubmissionRow {
     bundle_file_name: String,
     created_at: Instant,
     agent_name: Option<String>,
+    runtime: Option<String>,
     state: String,
     reason: Option<String>,
     timing: Option<Json<Vec<SmokeTiming>>>,
     active: bool,
     withdrawn_at: Option<Instant>,
     label: Option<String>,
+    note: Option<String>,
     same_as: Option<Text<SubmissionId>>,
+    removed_at: Option<Instant>,
+    removed_for: Option<String>,
+    deleted_at: Option<Instant>,
+    deleted_by: Option<Text<Actor>>,
 }
 
 impl TryFrom<SubmissionRow> for Submission {
@@ -106,12 +134,22 @@ impl TryFrom<SubmissionRow> for Submission {
             },
             created_at: row.created_at.0,
             agent_name: row.agent_name,
+            runtime: row.runtime,
             state,
             timing: row.timing.map_or_else(Vec::new, |timing| timing.0),
             active: row.active,
             withdrawn_at: row.withdrawn_at.map(|at| at.0),
             label: row.label,
+            note: row.note,
             same_as: row.same_as.map(|id| id.0),
+            archive_removed: row.removed_at.map(|at| Ruling {
+                at: at.0,
+                reason: row.removed_for.unwrap_or_else(|| REFUSED.to_owned()),
+            }),
+            deleted: row
+                .deleted_at
+                .zip(row.deleted_by)
+                .map(|(at, by)| Deletion { at: at.0, by: by.0 }),
         })
     }
 }
@@ -124,16 +162,18 @@ macro_rules! select_submissions {
             r#"SELECT s.id AS "id: Text<SubmissionId>", s.team_id AS "team_id: Text<TeamId>",
                       s.bundle_key, s.bundle_bytes AS "bundle_bytes: u64", s.bundle_blake3,
                       s.bundle_file_name, s.created_at AS "created_at: Instant",
-                      s.agent_name, s.state, s.reason,
+                      s.agent_name, s.runtime, s.state, s.reason,
                       s.timing AS "timing: Json<Vec<SmokeTiming>>",
                       EXISTS (SELECT 1 FROM active_submissions a
                               WHERE a.team_id = s.team_id AND a.submission_id = s.id)
                       AS "active!: bool",
-                      s.withdrawn_at AS "withdrawn_at: Instant", s.label,
+                      s.withdrawn_at AS "withdrawn_at: Instant", s.label, s.note,
                       (SELECT o.id FROM submissions o
                        WHERE o.team_id = s.team_id AND o.bundle_blake3 = s.bundle_blake3
                          AND (o.created_at, o.id) < (s.created_at, s.id)
-                       ORDER BY o.created_at, o.id LIMIT 1) AS "same_as: Text<SubmissionId>"
+                       ORDER BY o.created_at, o.id LIMIT 1) AS "same_as: Text<SubmissionId>",
+                      s.bundle_removed_at AS "removed_at: Instant", s.bundle_removed_for AS removed_for,
+                      s.deleted_at AS "deleted_at: Instant", s.deleted_by AS "deleted_by: Text<Actor>"
                FROM submissions s "# + $tail
             $(, $argument)*
         )
@@ -227,14 +267,15 @@ pub(crate) async fn insert(
 pub(crate) async fn set_valid(
     connection: &mut SqliteConnection,
     id: SubmissionId,
-    agent_name: &str,
+    (agent_name, runtime): (&str, &str),
     timing: &[SmokeTiming],
     log: &str,
 ) -> Result<()> {
     let (id, timing) = (Text(id), Json(timing));
     sqlx::query!(
-        "UPDATE submissions SET state = 'valid', agent_name = ?, timing = ?, log = ? WHERE id = ?",
+        "UPDATE submissions SET state = 'valid', agent_name = ?, runtime = ?, timing = ?, log = ? WHERE id = ?",
         agent_name,
+        runtime,
         timing,
         log,
         id,
@@ -247,16 +288,17 @@ pub(crate) async fn set_valid(
 pub(crate) async fn set_invalid(
     connection: &mut SqliteConnection,
     id: SubmissionId,
-    agent_name: Option<&str>,
+    (agent_name, runtime): (Option<&str>, Option<&str>),
     reason: &str,
     timing: &[SmokeTiming],
     log: &str,
 ) -> Result<()> {
     let (id, timing) = (Text(id), Json(timing));
     sqlx::query!(
-        "UPDATE submissions SET state = 'invalid', agent_name = ?, reason = ?, timing = ?, log = ?
+        "UPDATE submissions SET state = 'invalid', agent_name = ?, runtime = ?, reason = ?, timing = ?, log = ?
          WHERE id = ?",
         agent_name,
+        runtime,
         reason,
         timing,
         log,
@@ -307,6 +349,18 @@ pub(crate) async fn set_label(
 ) -> Result<()> {
     let id = Text(id);
     sqlx::query!("UPDATE submissions SET label = ? WHERE id = ?", label, id)
+        .execute(connection)
+        .await?;
+    Ok(())
+}
+
+pub(crate) async fn set_note(
+    connection: &mut SqliteConnection,
+    id: SubmissionId,
+    note: Option<&str>,
+) -> Result<()> {
+    let id = Text(id);
+    sqlx::query!("UPDATE submissions SET note = ? WHERE id = ?", note, id)
         .execute(connection)
         .await?;
     Ok(())

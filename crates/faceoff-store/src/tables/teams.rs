@@ -148,17 +148,54 @@ pub(crate) async fn set_profile(
     Ok(())
 }
 
-/// Retires a team, or lets it play again.
+/// Retires a team, by an organiser's doing or its own, or lets it play again.
 pub(crate) async fn set_retired(
     connection: &mut SqliteConnection,
     id: TeamId,
     at: Option<Timestamp>,
+    by_organiser: bool,
 ) -> Result<()> {
-    let (id, at) = (Text(id), at.map(Instant));
-    sqlx::query!("UPDATE teams SET retired_at = ? WHERE id = ?", at, id)
-        .execute(connection)
-        .await?;
+    let (id, by_organiser) = (Text(id), by_organiser && at.is_some());
+    let at = at.map(Instant);
+    sqlx::query!(
+        "UPDATE teams SET retired_at = ?, retired_by_organiser = ? WHERE id = ?",
+        at,
+        by_organiser,
+        id
+    )
+    .execute(connection)
+    .await?;
     Ok(())
+}
+
+/// Why what a team has uploaded and played is kept, whatever else would have it go.
+#[derive(Debug)]
+pub(crate) enum Evidence {
+    /// As long as it is.
+    Disqualified(Ruling),
+    /// By an organiser, then.
+    Retired(Timestamp),
+}
+
+pub(crate) async fn evidence(
+    connection: &mut SqliteConnection,
+    id: TeamId,
+) -> Result<Option<Evidence>> {
+    let id = Text(id);
+    let row = sqlx::query!(
+        r#"SELECT disqualified_at AS "disqualified_at: Instant", disqualified_for,
+                  retired_at AS "retired_at: Instant", retired_by_organiser AS "by_organiser: bool"
+           FROM teams WHERE id = ?"#,
+        id
+    )
+    .fetch_optional(connection)
+    .await?
+    .ok_or(StoreError::NotFound("team"))?;
+    if let Some(ruling) = Ruling::of(row.disqualified_at, row.disqualified_for) {
+        return Ok(Some(Evidence::Disqualified(ruling)));
+    }
+    let retired_at = row.retired_at.filter(|_| row.by_organiser);
+    Ok(retired_at.map(|at| Evidence::Retired(at.0)))
 }
 
 /// Disqualifies a team, or reinstates it.

@@ -34,6 +34,7 @@ async fn is_kept(f: &Fixture, submission: &Submission) -> bool {
 async fn refuse(f: &Fixture) {
     let (claim, _) = f.claim_smoke().await;
     let outcome = SmokeOutcome::Invalid {
+        runtime: None,
         agent_name: None,
         reason: "there is no agent.toml".into(),
         timing: Vec::new(),

@@ -145,6 +145,7 @@ async fn an_upload_takes_its_place_when_it_is_valid_unless_a_newer_one_or_a_choi
     let quick = f.validate().await;
     assert!(quick.active);
     let valid = || SmokeOutcome::Valid {
+        runtime: "native".into(),
         agent_name: "late".into(),
         timing: Vec::new(),
         log: String::new(),
@@ -246,6 +247,7 @@ async fn the_cut_takes_the_newest_valid_submission_of_each_team() {
     f.upload(&broken).await;
     let (claim, _) = f.claim_smoke().await;
     let outcome = SmokeOutcome::Invalid {
+        runtime: None,
         agent_name: None,
         reason: "no agent.toml".into(),
         timing: Vec::new(),
@@ -449,8 +451,28 @@ async fn what_a_team_withdraws_enters_no_further_day_until_it_is_chosen_again() 
         .activate_submission(Actor::Team(team.id), first.id, f.now);
     let chosen = chosen.await.unwrap();
     assert_eq!((chosen.active, chosen.withdrawn_at), (true, None));
-    let labelled =
-        f.store
-            .label_submission(Actor::Team(team.id), first.id, Some("baseline"), f.now);
-    assert_eq!(labelled.await.unwrap().label.as_deref(), Some("baseline"));
+    let says = async |words| {
+        let said = f
+            .store
+            .describe_submission(Actor::Team(team.id), first.id, words, f.now);
+        let said = said.await.unwrap();
+        (said.label, said.note)
+    };
+    let label = Some("baseline".to_owned());
+    let note = Some("before the fix".to_owned());
+    let labelled = SubmissionWords {
+        label: Some(Some("baseline")),
+        note: None,
+    };
+    assert_eq!(says(labelled).await, (label.clone(), None));
+    let noted = SubmissionWords {
+        label: None,
+        note: Some(Some("before the fix")),
+    };
+    assert_eq!(says(noted).await, (label, note.clone()));
+    let unnamed = SubmissionWords {
+        label: Some(None),
+        note: None,
+    };
+    assert_eq!(says(unnamed).await, (None, note));
 }

@@ -78,6 +78,7 @@ impl Fixture {
     pub async fn validate(&self) -> Submission {
         let (claim, submission) = self.claim_smoke().await;
         let outcome = SmokeOutcome::Valid {
+            runtime: "native".into(),
             agent_name: "striker".into(),
             timing: Vec::new(),
             log: "hello\n".into(),
@@ -256,6 +257,7 @@ pub async fn stage_of(store: &Store, plan: &RunPlan, now: Timestamp) -> StageId 
 /// What a stage that plays by this plan is told.
 pub fn rules_of(plan: &RunPlan) -> (StageRules, StageSettings) {
     let rules = StageRules {
+        runtimes: None,
         ruleset: Ruleset::CURRENT,
         profile: plan.profile,
         tasks: plan.tasks.clone(),

@@ -12,6 +12,8 @@ use std::{
 };
 
 const FOLDER: &str = "FACEOFF_STORE_TEST_FOLDER";
+/// Set: every round ends with clearing away, and is without the organiser's acts upon results, which last long.
+const CLEARS: &str = "FACEOFF_STORE_TEST_CLEARS";
 
 /// Writes until it is killed, telling of every acknowledged write. Started by the test below.
 #[tokio::test]
@@ -21,6 +23,7 @@ async fn child() {
         return;
     };
     let folder = Path::new(&folder);
+    let clears = std::env::var_os(CLEARS).is_some();
     let store = Store::open(folder).await.unwrap();
     // a day of its own for each round, and leases of earlier lives are over
     let mut now: jiff::Timestamp = "2026-03-01T10:00:00Z".parse().unwrap();
@@ -94,6 +97,7 @@ async fn child() {
             match work {
                 Work::Smoke { submission, .. } => {
                     let outcome = SmokeOutcome::Valid {
+                        runtime: "native".into(),
                         agent_name: "a".into(),
                         timing: Vec::new(),
                         log: String::new(),
@@ -121,12 +125,17 @@ async fn child() {
                     tell(format!("shard {}", shard.id));
                 }
                 Work::Finalise { evaluation, .. } => {
+                    let key = format!("datasets/{evaluation}/{}.zip", claim.nonce);
+                    store.artifacts().put_file(&key, file.path()).await.unwrap();
                     let finished = store
-                        .finish_evaluation(&claim, &result(1.0), "d", &blake3_of("d"), now)
+                        .finish_evaluation(&claim, &result(1.0), &key, &blake3_of("d"), now)
                         .await
                         .unwrap();
                     assert_eq!(finished, Committed::Now);
                     tell(format!("finished {evaluation}"));
+                    if clears {
+                        continue;
+                    }
                     // The organiser's acts: each is done or not done.
                     let Ok(played) = store.evaluation(evaluation).await else {
                         // Of a trial or a proposal.
@@ -162,6 +171,9 @@ async fn child() {
                     organise(&store, stage, played.of, now, &tell).await;
                 }
             }
+        }
+        if clears {
+            clear_away(&store, stage, team.id, now, &tell).await;
         }
     }
 }
@@ -207,6 +219,64 @@ async fn organise(
         Err(StoreError::DayHasCut { .. } | StoreError::Conflict(_)) => {}
         Err(error) => panic!("{error}"),
     }
+}
+
+/// Keeps the last dataset of each team, and deletes the first submission of one.
+async fn clear_away(
+    store: &Store,
+    stage: StageId,
+    team: TeamId,
+    now: jiff::Timestamp,
+    tell: &impl Fn(String),
+) {
+    let retention = Some(Retention {
+        last: Some(1),
+        ..Retention::default()
+    });
+    let change = StageChange {
+        retention,
+        ..StageChange::default()
+    };
+    let changed = store.change_stage(Actor::Organiser, stage, change, now);
+    changed.await.unwrap();
+    tell(format!("keeps {stage}"));
+    store.apply_retentions(now).await.unwrap();
+    for team in store.teams().await.unwrap() {
+        for evaluation in store.evaluations_of(team.id).await.unwrap() {
+            if evaluation.dataset_removed.is_some() {
+                tell(format!("removed {}", evaluation.id));
+            }
+        }
+    }
+    // Another one takes the place of the first.
+    let quota = UploadQuota::default();
+    let uploaded = store.create_submission(Actor::Organiser, team, bundle(), &quota, now);
+    uploaded.await.unwrap();
+    while let Some(Claimed { claim, work }) = store.claim("child", LEASE_S, now).await.unwrap() {
+        let Work::Smoke { .. } = work else {
+            panic!("expected a smoke run, claimed {work:?}")
+        };
+        let outcome = SmokeOutcome::Valid {
+            runtime: "native".into(),
+            agent_name: "b".into(),
+            timing: Vec::new(),
+            log: String::new(),
+        };
+        store.commit_smoke(&claim, outcome, now).await.unwrap();
+    }
+    let submissions = store.submissions_of(team).await.unwrap();
+    let first = submissions.last().unwrap().id;
+    match store
+        .delete_submission(Actor::Organiser, first, "by an organiser: why", now)
+        .await
+    {
+        Ok(_) => tell(format!("deleted {first}")),
+        // A life that was killed has left something to be decided.
+        Err(StoreError::Conflict(_)) => {}
+        Err(error) => panic!("{error}"),
+    }
+    let later = now + FILES_KEPT;
+    store.remove_files_of_removed(later).await.unwrap();
 }
 
 /// Has proposals that are played count, and replaces what counts then by an extra turn.
@@ -265,25 +335,42 @@ async fn sign_off(store: &Store, name: &str, now: jiff::Timestamp, tell: &impl F
 
 #[tokio::test]
 async fn survives_kill_9() {
-    survive(&[1, 3, 5, 8, 2, 13, 4, 21, 7, 17, 6, 30]).await;
+    survive(&[1, 3, 5, 8, 2, 13, 4, 21, 7, 17, 6, 30], false).await;
 }
 
 #[tokio::test]
 async fn what_the_organiser_does_survives_kill_9() {
-    let acknowledged = survive(&[60, 31, 47, 80]).await;
+    let acknowledged = survive(&[60, 31, 47, 80], false).await;
     for what in ["disqualified", "voided", "proposal", "dropped", "applied"] {
         let told = |write: &String| write.starts_with(what);
         assert!(acknowledged.iter().any(told), "no life came to {what}");
     }
 }
 
+#[tokio::test]
+async fn what_is_cleared_away_survives_kill_9() {
+    let mut acknowledged = HashSet::new();
+    // The first rounds of a folder are short: these kills come in the middle of clearing away.
+    for first in [13, 14, 37, 38, 67] {
+        acknowledged.extend(survive(&[first, 25], true).await);
+    }
+    for what in ["keeps", "removed", "deleted"] {
+        let told = |write: &String| write.starts_with(what);
+        assert!(acknowledged.iter().any(told), "no life came to {what}");
+    }
+}
+
 /// Lives that are killed after so many lines, on the same folder; all that they told.
-async fn survive(lives: &[usize]) -> HashSet<String> {
+async fn survive(lives: &[usize], clears: bool) -> HashSet<String> {
     let folder = tempfile::tempdir().unwrap();
     let mut acknowledged = HashSet::new();
     // the kill comes while the child writes on; where, differs from life to life
     for lines_to_live in lives.iter().copied() {
-        let mut child = Command::new(std::env::current_exe().unwrap())
+        let mut command = Command::new(std::env::current_exe().unwrap());
+        if clears {
+            command.env(CLEARS, "1");
+        }
+        let mut child = command
             .args(["--exact", "kill::child", "--ignored", "--nocapture"])
             .env(FOLDER, folder.path())
             .stdout(Stdio::piped())
@@ -310,6 +397,9 @@ async fn survive(lives: &[usize]) -> HashSet<String> {
                         "proposal",
                         "dropped",
                         "applied",
+                        "keeps",
+                        "removed",
+                        "deleted",
                     ]
                     .contains(&what)
             })
@@ -348,6 +438,9 @@ async fn stored(folder: &Path) -> HashSet<String> {
          UNION SELECT 'finalised ' || id FROM stages WHERE finalised_at IS NOT NULL
          UNION SELECT 'voided ' || id FROM evaluations WHERE voided_at IS NOT NULL
          UNION SELECT 'joined ' || id FROM people
+         UNION SELECT 'keeps ' || stage_id FROM stage_retentions
+         UNION SELECT 'removed ' || id FROM evaluations WHERE dataset_removed_at IS NOT NULL
+         UNION SELECT 'deleted ' || id FROM submissions WHERE deleted_at IS NOT NULL
          UNION SELECT 'left ' || id FROM people WHERE left_at IS NOT NULL
          UNION SELECT 'disqualified ' || subject_id FROM events WHERE kind = 'team_disqualified'",
     )
@@ -438,6 +531,12 @@ async fn check_consistency(folder: &Path, store: &Store) {
                - (SELECT COUNT(*) FROM events WHERE kind IN ('extra_turn_given', 'missed_day_started', 'proposal_made',
                                                              'proposal_applied', 'proposal_dropped', 'boards_frozen'))
                + (SELECT COUNT(*) FROM events WHERE kind = 'boards_unfrozen')"),
+        ("what was removed without its event",
+         "SELECT (SELECT COUNT(*) FROM submissions WHERE bundle_removed_for IS NOT NULL)
+               + (SELECT COUNT(*) FROM evaluations WHERE dataset_removed_at IS NOT NULL)
+               + (SELECT COUNT(*) FROM stage_retentions)
+               - (SELECT COUNT(*) FROM events WHERE kind IN ('submission_deleted', 'archive_removed', 'dataset_removed',
+                                                             'stage_retention_changed'))"),
         ("a signature without its event",
          "SELECT (SELECT COUNT(*) FROM stages WHERE finalised_at IS NOT NULL)
                - (SELECT COUNT(*) FROM events WHERE kind = 'stage_finalised')"),
@@ -454,6 +553,17 @@ async fn check_consistency(folder: &Path, store: &Store) {
             .await
             .unwrap();
         assert_eq!(count, 0, "{breach}");
+    }
+    let datasets: Vec<(String, bool, bool)> = sqlx::query_as(
+        "SELECT dataset, dataset_removed_at IS NULL, dataset_gone FROM evaluations WHERE state = 'finished'",
+    )
+    .fetch_all(&mut connection)
+    .await
+    .unwrap();
+    for (dataset, is_promised, is_gone) in datasets {
+        let is_there = store.artifacts().read(&dataset).await.is_ok();
+        assert!(is_there || !is_promised, "{dataset} is promised and gone");
+        assert!(!is_there || !is_gone, "{dataset} has gone and is there");
     }
     let recordings: Vec<String> =
         sqlx::query_scalar("SELECT recording FROM shards WHERE recording IS NOT NULL")

@@ -3,8 +3,10 @@
 
 mod ablations;
 mod acts;
+mod archives;
 mod artifacts;
 mod bundles;
+mod clearing;
 mod competition;
 mod days;
 mod deadlines;
@@ -25,9 +27,11 @@ mod queries;
 mod queue;
 mod registrations;
 mod releases;
+mod retention;
 mod retries;
 mod rulesets;
 mod rulings;
+mod runtimes;
 mod shares;
 mod sign_off;
 mod stages;

@@ -658,6 +658,7 @@ async fn work_goes_on_where_the_old_program_left_it() {
                 smoke += 1;
                 assert!([id(1), id(2)].contains(&submission.id));
                 let outcome = SmokeOutcome::Valid {
+                    runtime: "native".into(),
                     agent_name: "a".into(),
                     timing: Vec::new(),
                     log: String::new(),

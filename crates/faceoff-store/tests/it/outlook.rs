@@ -24,6 +24,7 @@ async fn work(f: &mut Fixture) -> bool {
         Work::Smoke { .. } => {
             f.later(20);
             let outcome = SmokeOutcome::Valid {
+                runtime: "native".into(),
                 agent_name: "striker".into(),
                 timing: Vec::new(),
                 log: String::new(),

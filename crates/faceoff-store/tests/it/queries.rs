@@ -16,7 +16,13 @@ const LARGE: [&str; 7] = [
 ];
 
 /// Indexes of what is open or still kept: a scan of one reads nothing that is over.
-const SMALL_INDEXES: [&str; 3] = ["units_open", "evaluations_open", "runs_with_recordings"];
+const SMALL_INDEXES: [&str; 5] = [
+    "units_open",
+    "evaluations_open",
+    "runs_with_recordings",
+    "datasets_going",
+    "datasets_unmeasured",
+];
 
 /// Queries that may read a whole index or table, by words of theirs, each with its reason.
 const MAY_SCAN: [(&str, &str); 1] = [("substr(worker, 1", "once at a worker's start")];

@@ -157,6 +157,7 @@ impl Slots {
         let committed = match work {
             Work::Smoke { .. } => {
                 let refused = faceoff_types::SmokeOutcome::Invalid {
+                    runtime: None,
                     agent_name: None,
                     reason: "it sleeps".into(),
                     timing: Vec::new(),

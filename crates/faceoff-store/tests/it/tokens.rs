@@ -120,6 +120,21 @@ async fn the_hosts_token_follows_its_file_and_stays_revoked() {
     assert_eq!(refusal(&f, 1).await, Some(Refusal::Revoked(f.now)));
     assert_eq!(refusal(&f, 2).await, None);
     assert_eq!(refusal(&f, 9).await, None, "named by hand, it is no file's");
+    // Rotated, the file's would be worth something again at the next start, which reads the file.
+    let tokens = f.store.tokens().await.unwrap();
+    let of_file = tokens
+        .iter()
+        .find(|token| token.name == "admin-token" && token.revoked_at.is_none());
+    let rotate = async |id, hash| {
+        f.store
+            .rotate_token(Actor::Organiser, id, [hash; 32], f.now)
+            .await
+    };
+    let refused = rotate(of_file.unwrap().id, 3).await.unwrap_err();
+    assert!(refused.to_string().contains("revoke it"), "{refused}");
+    assert_eq!(refusal(&f, 2).await, None, "nothing is done");
+    rotate(other.id, 8).await.unwrap();
+    rotate(other.id, 9).await.unwrap();
     assert!(!f.store.set_host_token([1; 32], f.now).await.unwrap());
     f.store
         .revoke_token(Actor::Organiser, other.id, f.now)

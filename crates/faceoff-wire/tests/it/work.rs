@@ -83,6 +83,10 @@ fn every_order_round_trips() {
             seed: Seed::from_number(3),
             mismatch_seed: Seed::from_number(4),
         },
+        runtimes: vec![StageRuntimes {
+            stage: "Qualifying".parse().unwrap(),
+            runtimes: ["native".to_owned()].into_iter().collect(),
+        }],
     };
     for assignment in [smoke, shard(Some("recordings/a")), shard(None), finalise] {
         travels(&order(assignment));
@@ -123,11 +127,13 @@ fn every_report_round_trips() {
     };
     let reports = [
         WorkReport::Smoke(SmokeOutcome::Valid {
+            runtime: "native".into(),
             agent_name: "striker".into(),
             timing: Vec::new(),
             log: "begun\n".into(),
         }),
         WorkReport::Smoke(SmokeOutcome::Invalid {
+            runtime: None,
             agent_name: None,
             reason: "agent.toml is missing".into(),
             timing: Vec::new(),

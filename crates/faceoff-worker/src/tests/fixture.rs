@@ -279,6 +279,7 @@ impl Server {
         let claimed = self.store.claim("test", LEASE_S, self.now()).await.unwrap();
         let claim = claimed.expect("a smoke run is queued").claim;
         let outcome = SmokeOutcome::Valid {
+            runtime: "native".into(),
             agent_name: "scripted".into(),
             timing: Vec::new(),
             log: String::new(),
@@ -417,6 +418,7 @@ pub(super) async fn stage_by(
     now: Timestamp,
 ) -> StageId {
     let rules = StageRules {
+        runtimes: None,
         ruleset: Ruleset::CURRENT,
         profile: plan.profile,
         tasks: plan.tasks.clone(),

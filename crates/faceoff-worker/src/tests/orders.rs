@@ -27,6 +27,7 @@ async fn commit(server: &Server, order: &WorkOrder, report: WorkReport) -> Holdi
 async fn report(server: &Server, order: &WorkOrder) -> WorkReport {
     match &order.assignment {
         Assignment::Smoke { .. } => WorkReport::Smoke(SmokeOutcome::Valid {
+            runtime: "native".into(),
             agent_name: "scripted".into(),
             timing: Vec::new(),
             log: String::new(),

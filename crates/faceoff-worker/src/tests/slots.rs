@@ -151,6 +151,7 @@ async fn the_schedule_starts_a_missed_day_once() {
         .unwrap()
         .unwrap();
     let outcome = SmokeOutcome::Valid {
+        runtime: "native".into(),
         agent_name: "a".into(),
         timing: Vec::new(),
         log: String::new(),

@@ -207,6 +207,7 @@ fn write_bundle(archive: &Path, env: &str) {
 /// The season's first stage, which plays by this plan from now on.
 pub async fn stage_by(store: &Store, plan: &RunPlan, now: Timestamp) -> StageId {
     let rules = StageRules {
+        runtimes: None,
         ruleset: Ruleset::CURRENT,
         profile: plan.profile,
         tasks: plan.tasks.clone(),

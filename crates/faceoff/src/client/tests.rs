@@ -3,6 +3,7 @@
 use super::*;
 use faceoff_http::{
     Capacity, ConnectionLimits, HttpConfig, HttpLimits,
+    requests::DeleteSubmission,
     token::hash_token,
     views::{evaluation::EvaluationStatus, submission::SubmissionStatus},
 };
@@ -37,6 +38,7 @@ async fn site(max_bundle_bytes: u64) -> Site {
             .unwrap()
     );
     let rules = StageRules {
+        runtimes: None,
         ruleset: Ruleset::CURRENT,
         profile: Profile::Evaluation,
         tasks: vec![Task::Hit],
@@ -58,6 +60,7 @@ async fn site(max_bundle_bytes: u64) -> Site {
         capacity: Capacity {
             slots: 1,
             time: TimeLimits::default(),
+            runtimes: ["native", "python3"].map(str::to_owned).to_vec(),
         },
     };
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
@@ -117,6 +120,7 @@ async fn a_folder_is_packed_uploaded_and_followed() {
     let Claimed { claim, work } = claimed.await.unwrap().expect("the smoke run is queued");
     assert!(matches!(work, Work::Smoke { .. }), "{work:?}");
     let outcome = SmokeOutcome::Valid {
+        runtime: "native".into(),
         agent_name: "mine".into(),
         timing: Vec::new(),
         log: "hello".into(),
@@ -167,6 +171,35 @@ async fn a_folder_is_packed_uploaded_and_followed() {
     assert!(again.to_string().contains("2026-03-02"), "{again}");
     let rerun = site.organiser.rerun(id).await.unwrap();
     assert_eq!((rerun.rerun_of, rerun.submission), (Some(id), uploaded.id));
+
+    // What arrived can be had again, takes room, and is not deleted while it plays.
+    let again = site.folder.path().join("again.tar.gz");
+    let bytes = client.download_submission(uploaded.id, &again).await;
+    assert_eq!(bytes.unwrap(), uploaded.bytes);
+    assert_eq!(
+        std::fs::read(&again).unwrap(),
+        std::fs::read(&archive).unwrap()
+    );
+    let storage = client.team_storage(team.team.id).await.unwrap();
+    assert_eq!(
+        (storage.archives, storage.archive_bytes),
+        (1, uploaded.bytes)
+    );
+    let all = site.organiser.storage().await.unwrap();
+    assert_eq!(all[0].proposal_bytes, Some(0));
+    let wanted = DeleteSubmission::default();
+    let refused = client.delete_submission(uploaded.id, &wanted).await;
+    let refused = refused.unwrap_err().to_string();
+    assert!(refused.contains("it is active"), "{refused}");
+    let withdrawn = client.withdraw(uploaded.id).await.unwrap();
+    assert!(!withdrawn.active);
+    site.organiser.cancel(rerun.id, "enough").await.unwrap();
+    let wanted = DeleteSubmission {
+        confirm: Some(uploaded.file_name),
+        ..DeleteSubmission::default()
+    };
+    let deleted = client.delete_submission(uploaded.id, &wanted).await;
+    assert!(deleted.unwrap().deleted.is_some());
 }
 
 #[tokio::test]
@@ -233,6 +266,7 @@ async fn a_stage_is_changed_by_what_is_said_and_by_nothing_else() {
         weights: Some("0.5,0.5,0".parse().unwrap()),
         tier_bounds: None,
         perturbations: None,
+        runtimes: None,
         limits: None,
         uploads: None,
         schedule: Some(faceoff_types::Schedule::cron("0 6 * * 1-5").unwrap()),
@@ -242,6 +276,7 @@ async fn a_stage_is_changed_by_what_is_said_and_by_nothing_else() {
         blind: Some(true),
         publishes: None,
         standings: Some(Standings::MeanOfLast(3)),
+        retention: serde_json::from_str(r#"{"last":3}"#).unwrap(),
     };
     let made = site.organiser.create_stage(&new).await.unwrap();
     assert_eq!(made.settings.schedule, new.schedule);

@@ -1,6 +1,7 @@
 //! `faceoff admin`: organises a running competition through its API.
 
 mod day;
+mod export;
 mod find;
 mod lines;
 mod news;
@@ -8,6 +9,7 @@ mod people;
 mod proposal;
 mod season;
 mod stage;
+mod storage;
 mod teams;
 
 use super::{
@@ -110,6 +112,8 @@ enum Action {
     },
     #[command(flatten)]
     Day(day::DayAction),
+    #[command(flatten)]
+    Storage(storage::StorageAction),
     /// Try a day without counting, or have results evaluated again, and apply or drop that
     Proposal {
         #[command(subcommand)]
@@ -162,6 +166,14 @@ enum Action {
     },
     /// Let a paused queue go on
     Resume,
+    /// Take the season along as one archive, which `faceoff import` shows read-only on another server
+    Export {
+        /// The file to write, e.g. season.tar.zst; one that exists is left as it is
+        file: PathBuf,
+        /// Only what everybody may know and have: no submissions, no people, nothing that is hidden
+        #[arg(long)]
+        public: bool,
+    },
     /// Show the season, or close it
     Season {
         #[command(subcommand)]
@@ -222,6 +234,7 @@ impl AdminCommand {
         let client = Client::new(&self.server, Some(token.trim()))?;
         match self.action {
             Action::Team(action) => teams::act(&client, self.json, action).await,
+            Action::Storage(action) => storage::act(&client, self.json, action).await,
             Action::People { action } => people::people(&client, self.json, action).await,
             Action::Registration { action } => {
                 people::registrations(&client, self.json, action).await
@@ -253,6 +266,10 @@ impl AdminCommand {
                         day.without_submission
                             .iter()
                             .map(|team| format!("{:<40} no valid submission", team.name)),
+                    );
+                    let not_taken = day.not_taken.iter();
+                    lines.extend(
+                        not_taken.map(|one| format!("{:<40} {}", one.team_name, one.reason)),
                     );
                     lines.join("\n")
                 })
@@ -302,6 +319,9 @@ impl AdminCommand {
                 client.resume().await?;
                 let season = client.season().await?;
                 print(self.json, &season, || of_season(&season))
+            }
+            Action::Export { file, public } => {
+                export::export(&client, self.json, &file, public).await
             }
             Action::Season {
                 action: SeasonAction::Show,

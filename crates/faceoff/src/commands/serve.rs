@@ -1,34 +1,25 @@
 //! `faceoff serve`: API, pages, worker slots and the daily schedule in one process.
 
+mod answering;
+mod archived;
+mod folder;
+
+pub use folder::ADMIN_TOKEN_FILE;
+
 use crate::{config::Config, descriptors::Descriptors, log::LogFormat};
+use answering::{answer, signalled};
 use anyhow::{Context, bail};
 use clap::Args;
-use faceoff_http::{
-    Capacity, ConnectionLimits, HttpConfig,
-    token::{Secret, SecretKind, hash_token},
-};
+use faceoff_http::{Capacity, CapacityWatch, ConnectionLimits, HttpConfig};
 use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime, affinity, probe_host};
 use faceoff_store::{Actor, Room, Store};
 use faceoff_types::Clock;
 use faceoff_worker::{CpuLayout, SlotThreads, WorkerConfig};
+use folder::{empty_folder, private_folder, set_admin_token};
 use jiff::Timestamp;
-use std::{
-    collections::BTreeMap,
-    fs::{self, OpenOptions},
-    io::Write as _,
-    net::SocketAddr,
-    os::unix::fs::{DirBuilderExt, OpenOptionsExt},
-    path::{Path, PathBuf},
-    thread,
-    time::Duration,
-};
-use tokio::{net::TcpListener, signal::unix::SignalKind, task::JoinSet};
+use std::{collections::BTreeMap, io::Write as _, net::SocketAddr, path::PathBuf, thread};
+use tokio::{net::TcpListener, task::JoinSet};
 use tokio_util::sync::CancellationToken;
-
-/// The file in the data folder that holds the organiser's token.
-pub const ADMIN_TOKEN_FILE: &str = "admin-token";
-/// How long open connections may go on after the signal to end.
-const GRACE: Duration = Duration::from_secs(10);
 
 /// Starts the competition server.
 #[derive(Debug, Args)]
@@ -61,8 +52,15 @@ impl ServeCommand {
         if let Some(data_dir) = self.data_dir {
             config.server.data_dir = data_dir;
         }
-        // Before anything is opened: a host that cannot hold agents must not look as if it could.
-        check_sandbox(&probe_host(), &config.sandbox.given_up)?;
+        let archived = super::block_on(async {
+            let data_dir = &config.server.data_dir;
+            let found = Store::archived_in(data_dir).await;
+            found.with_context(|| format!("looking into the data folder {}", data_dir.display()))
+        })?;
+        if archived.is_none() {
+            // Before anything is opened: a host that cannot hold agents must not look as if it could.
+            check_sandbox(&probe_host(), &config.sandbox.given_up)?;
+        }
         let connections = config.connections.limits();
         let descriptors = Descriptors::divide(Descriptors::raise(), config.slots(), &connections)?;
         tracing::info!(
@@ -79,6 +77,14 @@ impl ServeCommand {
             );
         }
         let connections = descriptors.limits(connections);
+        if let Some(archived) = archived {
+            // Without agents nothing needs CPUs of its own.
+            return tokio::runtime::Builder::new_multi_thread()
+                .enable_all()
+                .build()
+                .context("starting the async runtime")?
+                .block_on(archived::serve(config, connections, archived));
+        }
         let cpus = CpuLayout::of_a_server(config.slots(), &config.workers.agent_cpus);
         let (threads, starter) = SlotThreads::of_another();
         let service = thread::Builder::new()
@@ -149,12 +155,7 @@ async fn serve(
         .with_context(|| format!("opening the data folder {}", data_dir.display()))?
         .with_room(Room::new(watched, config.server.min_free_bytes));
     let now = Timestamp::now();
-    if !store.set_host_token(admin_token(&data_dir)?, now).await? {
-        let file = data_dir.join(ADMIN_TOKEN_FILE);
-        tracing::warn!(file = %file.display(), "the token in the file was revoked; making another one");
-        fs::remove_file(&file).with_context(|| format!("removing {}", file.display()))?;
-        store.set_host_token(admin_token(&data_dir)?, now).await?;
-    }
+    set_admin_token(&store, &data_dir, now).await?;
     if let Some(name) = &config.season.name {
         store
             .name_season(Actor::Organiser, name, now)
@@ -186,6 +187,13 @@ async fn serve(
         )
         .await
         .context("evaluation: giving the season's first stage its rules")?;
+    let mut agent = config.agent_environment();
+    let capacity = Capacity {
+        slots: u32::try_from(cpus.slots.len()).unwrap_or(u32::MAX),
+        time: config.time.clone(),
+        runtimes: agent.runtimes.keys().cloned().collect(),
+    };
+    let watch = CapacityWatch::new(store.clone(), clock.clone(), capacity.clone());
     let router = faceoff_http::router(
         store.clone(),
         HttpConfig {
@@ -194,13 +202,9 @@ async fn serve(
             upload_dir,
             clock: clock.clone(),
             limits: config.uploads.limits(),
-            capacity: Capacity {
-                slots: u32::try_from(cpus.slots.len()).unwrap_or(u32::MAX),
-                time: config.time.clone(),
-            },
+            capacity,
         },
     );
-    let mut agent = config.agent_environment();
     // For as long as agents run.
     let _image = in_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
     let workers = WorkerConfig {
@@ -232,6 +236,11 @@ async fn serve(
         clock,
         shutdown.clone(),
     ));
+    let asked_to_end = shutdown.clone();
+    parts.spawn(async move {
+        watch.run(asked_to_end.cancelled_owned()).await;
+        Ok(())
+    });
     parts.spawn(answer(listener, router, connections, shutdown.clone()));
     // For the program that started this one, whatever is logged: from now on a connection is answered,
     // and a port that the system chose is known. That nobody listens is no fault.
@@ -273,42 +282,6 @@ fn ended_early(part: Result<anyhow::Result<()>, tokio::task::JoinError>) -> anyh
         Ok(Err(error)) => Err(error),
         Err(panic) => Err(panic).context("a part of the server panicked"),
     }
-}
-
-async fn answer(
-    listener: TcpListener,
-    router: faceoff_http::Router,
-    connections: ConnectionLimits,
-    shutdown: CancellationToken,
-) -> anyhow::Result<()> {
-    let asked = shutdown.clone();
-    let serving = faceoff_http::serve(listener, router, connections, async move {
-        asked.cancelled().await;
-    });
-    let late = async {
-        shutdown.cancelled().await;
-        tokio::time::sleep(GRACE).await;
-    };
-    tokio::select! {
-        () = serving => Ok(()),
-        () = late => {
-            tracing::warn!("connections still open after {} s are cut", GRACE.as_secs());
-            Ok(())
-        }
-    }
-}
-
-/// The future ends with the name of the signal that asks the server to end.
-fn signalled() -> anyhow::Result<impl Future<Output = &'static str>> {
-    let listen = |kind| tokio::signal::unix::signal(kind).context("listening for signals");
-    let mut interrupt = listen(SignalKind::interrupt())?;
-    let mut terminate = listen(SignalKind::terminate())?;
-    Ok(async move {
-        tokio::select! {
-            _ = interrupt.recv() => "SIGINT",
-            _ = terminate.recv() => "SIGTERM",
-        }
-    })
 }
 
 /// Refuses a host that lacks a layer which the organiser has not given up by name.
@@ -367,61 +340,9 @@ fn name(layer: Layer) -> String {
         .unwrap_or_else(|| format!("{layer:?}"))
 }
 
-/// Makes a folder that only its owner can read: it holds the season's secret and the teams' agents.
-fn private_folder(folder: &Path) -> anyhow::Result<()> {
-    fs::DirBuilder::new()
-        .recursive(true)
-        .mode(0o700)
-        .create(folder)
-        .with_context(|| format!("making the folder {}", folder.display()))
-}
-
-fn empty_folder(folder: &Path) -> anyhow::Result<()> {
-    match fs::remove_dir_all(folder) {
-        Ok(()) => {}
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-        Err(error) => {
-            return Err(error).with_context(|| format!("emptying {}", folder.display()));
-        }
-    }
-    private_folder(folder)
-}
-
-/// Hash of the organiser's token; makes the token at the first start.
-fn admin_token(data_dir: &Path) -> anyhow::Result<[u8; 32]> {
-    let file = data_dir.join(ADMIN_TOKEN_FILE);
-    match fs::read_to_string(&file) {
-        Ok(token) if token.trim().is_empty() => bail!(
-            "{} is empty; remove it, then the next start makes a new token",
-            file.display()
-        ),
-        Ok(token) => return Ok(hash_token(token.trim())),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-        Err(error) => return Err(error).with_context(|| format!("reading {}", file.display())),
-    }
-    let token = Secret::generate(SecretKind::Admin).context("drawing the organiser's token")?;
-    // Written beside and renamed, so that a crash cannot leave half a token behind.
-    let fresh = data_dir.join(format!("{ADMIN_TOKEN_FILE}.new"));
-    let write = || -> std::io::Result<()> {
-        let mut writer = OpenOptions::new()
-            .write(true)
-            .create(true)
-            .truncate(true)
-            .mode(0o600)
-            .open(&fresh)?;
-        writeln!(writer, "{}", token.as_str())?;
-        writer.sync_all()?;
-        fs::rename(&fresh, &file)
-    };
-    write().with_context(|| format!("writing {}", file.display()))?;
-    tracing::info!(file = %file.display(), "made the organiser's token; keep the file secret");
-    Ok(token.hash())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::os::unix::fs::PermissionsExt;
 
     fn feature(layer: Layer, available: bool) -> HostFeature {
         HostFeature {
@@ -451,22 +372,5 @@ mod tests {
         assert!(!error.contains("seccomp"));
         assert!(check_sandbox(&features, &[Layer::Seccomp]).is_err());
         check_sandbox(&features, &[Layer::CgroupMemory]).unwrap();
-    }
-
-    #[test]
-    fn the_organisers_token_is_made_once_and_is_private() {
-        let folder = tempfile::tempdir().unwrap();
-        let first = admin_token(folder.path()).unwrap();
-        assert_eq!(admin_token(folder.path()).unwrap(), first);
-        let file = folder.path().join(ADMIN_TOKEN_FILE);
-        assert_eq!(file.metadata().unwrap().permissions().mode() & 0o777, 0o600);
-        let token = fs::read_to_string(&file).unwrap();
-        assert!(token.starts_with("fo_admin_"));
-        assert_eq!(hash_token(token.trim()), first);
-        fs::write(&file, "\n").unwrap();
-        assert!(
-            admin_token(folder.path()).is_err(),
-            "an empty token lets nobody in, or everybody"
-        );
     }
 }

@@ -5,13 +5,17 @@ use super::{
     team_server::{TeamServer, in_queue},
 };
 use clap::{Args, Subcommand};
-use faceoff_http::views::{
-    me::MeView,
-    submission::{SubmissionStatus, SubmissionView},
+use faceoff_http::{
+    requests::{DeleteSubmission, SubmissionChange},
+    views::{
+        me::MeView,
+        submission::{SubmissionStatus, SubmissionView},
+    },
 };
 use faceoff_types::SubmissionId;
+use std::path::PathBuf;
 
-/// Lists the team's submissions, names them, or takes one back.
+/// Lists the team's submissions, names them, takes one back, downloads or deletes one.
 #[derive(Debug, Args)]
 pub struct SubmissionsCommand {
     #[command(subcommand)]
@@ -36,6 +40,38 @@ enum Action {
         submission: SubmissionId,
         /// 1 to 80 characters; left out, it has none
         label: Option<String>,
+        #[command(flatten)]
+        server: TeamServer,
+    },
+    /// Write about one what only the team and the organiser read
+    Note {
+        /// The submission's id
+        submission: SubmissionId,
+        /// 1 to 2000 characters; left out, there is none
+        note: Option<String>,
+        #[command(flatten)]
+        server: TeamServer,
+    },
+    /// Download the archive of one, as it was uploaded
+    Download {
+        /// The submission's id
+        submission: SubmissionId,
+        /// Where to
+        file: PathBuf,
+        #[command(flatten)]
+        server: TeamServer,
+    },
+    /// Have the archive of one removed for good: nobody plays it again, its results stay; without --confirm, say what
+    /// that would do
+    Delete {
+        /// The submission's id
+        submission: SubmissionId,
+        /// Why; 1 to 500 characters
+        #[arg(long)]
+        reason: Option<String>,
+        /// The name of its archive
+        #[arg(long, value_name = "FILE_NAME")]
+        confirm: Option<String>,
         #[command(flatten)]
         server: TeamServer,
     },
@@ -79,10 +115,46 @@ impl SubmissionsCommand {
                 submission,
                 label,
                 server,
-            } => println!(
-                "{}",
-                line(&server.client()?.label(submission, label).await?)
-            ),
+            } => {
+                let change = SubmissionChange {
+                    label: Some(label),
+                    ..SubmissionChange::default()
+                };
+                let described = server.client()?.describe(submission, &change).await?;
+                println!("{}", line(&described));
+            }
+            Action::Note {
+                submission,
+                note,
+                server,
+            } => {
+                let change = SubmissionChange {
+                    note: Some(note),
+                    ..SubmissionChange::default()
+                };
+                let described = server.client()?.describe(submission, &change).await?;
+                println!("{}", line(&described));
+            }
+            Action::Download {
+                submission,
+                file,
+                server,
+            } => {
+                let client = server.client()?;
+                let bytes = client.download_submission(submission, &file).await?;
+                println!("{}: {bytes} bytes", file.display());
+            }
+            Action::Delete {
+                submission,
+                reason,
+                confirm,
+                server,
+            } => {
+                let wanted = DeleteSubmission { confirm, reason };
+                let client = server.client()?;
+                let deleted = client.delete_submission(submission, &wanted).await?;
+                println!("{}", line(&deleted));
+            }
             Action::Withdraw { submission, server } => {
                 let client = server.client()?;
                 let withdrawn = client.withdraw(submission).await?;
@@ -155,11 +227,29 @@ fn line(submission: &SubmissionView) -> String {
     if submission.withdrawn_at.is_some() {
         line.push_str(", withdrawn");
     }
+    match (&submission.deleted, &submission.archive_removed) {
+        (Some(deleted), Some(removed)) => line.push_str(&format!(
+            ", deleted on {} {}",
+            deleted.at.strftime("%Y-%m-%d %H:%M UTC"),
+            removed.reason
+        )),
+        (None, Some(removed)) if matches!(submission.status, SubmissionStatus::Valid { .. }) => {
+            line.push_str(&format!(
+                ", its archive removed on {} {}",
+                removed.at.strftime("%Y-%m-%d %H:%M UTC"),
+                removed.reason
+            ));
+        }
+        _ => {}
+    }
     if let Some(label) = &submission.label {
         line.push_str(&format!(" “{label}”"));
     }
     if let Some(same) = submission.same_as {
         line.push_str(&format!(", the same archive as {same}"));
+    }
+    for written in submission.note.iter().flat_map(|note| note.lines()) {
+        line.push_str(&format!("\n    {written}"));
     }
     line
 }

@@ -3,6 +3,7 @@
 use super::{
     output::{or_none, print},
     people::{invitation_line, invitation_lines, invited, person_line},
+    storage::storage_line,
     team_server::TeamServer,
 };
 use crate::client::Client;
@@ -43,6 +44,8 @@ enum Action {
         #[arg(long, value_name = "URL")]
         link: Option<String>,
     },
+    /// Show how much room its submissions and datasets take
+    Storage,
     /// List its members
     Members,
     /// Make a link by which one person joins, and print it, this once
@@ -130,6 +133,10 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
             };
             let team = client.change_team(own_team(client).await?, &change).await?;
             print(json, &team, || team_text(&team))
+        }
+        Action::Storage => {
+            let storage = client.team_storage(own_team(client).await?).await?;
+            print(json, &storage, || storage_line(&storage))
         }
         Action::Members => {
             let people = client.people().await?;

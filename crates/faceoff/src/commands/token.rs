@@ -42,11 +42,13 @@ pub(super) enum TokenAction {
     /// Give a token another secret and print it, this once; the old one is worth nothing from then on
     Rotate {
         /// The token's id
+        #[arg(id = "id", value_name = "ID")]
         token: TokenId,
     },
     /// End a token or a session at once
     Revoke {
         /// The token's id
+        #[arg(id = "id", value_name = "ID")]
         token: TokenId,
     },
 }

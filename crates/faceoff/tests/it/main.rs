@@ -1,6 +1,7 @@
 //! The program as a team calls it.
 #![expect(clippy::unwrap_used, reason = "a helper's failure is its test's")]
 
+mod archive;
 mod compare;
 mod dataset;
 mod eval;

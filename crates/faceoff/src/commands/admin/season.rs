@@ -8,7 +8,18 @@ pub(super) fn of_season(season: &SeasonView) -> String {
             let closed_at = closed_at.strftime("%Y-%m-%d %H:%M UTC");
             format!("closed     {closed_at}\nsecret     {secret}")
         }
+        _ if season.archived.is_some() => {
+            "open       it was, so that its secret is not here".to_owned()
+        }
         _ => "open       its secret is published when it is closed".to_owned(),
+    };
+    let archived = match &season.archived {
+        Some(archived) => format!(
+            "\narchived   as it was on {}, the {} edition: nothing changes any more",
+            archived.made_at.strftime("%Y-%m-%d %H:%M UTC"),
+            archived.edition
+        ),
+        None => String::new(),
     };
     let queue = match &season.paused {
         Some(ruling) => {
@@ -18,7 +29,7 @@ pub(super) fn of_season(season: &SeasonView) -> String {
         None => String::new(),
     };
     format!(
-        "{} ({}), {} days played\ncommitment {}\n{state}{queue}",
+        "{} ({}), {} days played\ncommitment {}\n{state}{queue}{archived}",
         season.name,
         season.ruleset,
         season.days.len(),

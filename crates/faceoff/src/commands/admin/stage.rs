@@ -8,11 +8,14 @@ use anyhow::{Context, bail, ensure};
 use clap::{Args, Subcommand};
 use faceoff_http::{
     requests::{NewStage, StageChange},
-    views::stage::{PhaseView, StageView},
+    views::{
+        capacity::Fit,
+        stage::{PhaseView, StageView},
+    },
 };
 use faceoff_types::{
-    DayDeadline, PerturbationSettings, Profile, Publishes, Schedule, StageId, StageLimits,
-    StageUploads, Standings, Task, TaskWeights, TierBounds, Zone,
+    DayDeadline, PerturbationSettings, Profile, Publishes, Retention, Runtimes, Schedule, StageId,
+    StageLimits, StageUploads, Standings, Task, TaskWeights, TierBounds, Zone,
 };
 use jiff::{
     Timestamp, Zoned,
@@ -52,7 +55,8 @@ pub(super) enum StageAction {
         /// The organiser starts the days
         #[arg(long, conflicts_with_all = ["daily", "cron"])]
         no_schedule: bool,
-        /// The stage's name, if it is open and gets other rules or standings: its board begins anew then
+        /// The stage's name, if it is open and gets other rules or standings (its board begins anew then), or if
+        /// --retention removes something
         #[arg(long, value_name = "NAME")]
         confirm: Option<String>,
     },
@@ -106,6 +110,9 @@ pub(super) struct Wanted {
     /// Limits of agents in place of the server's, e.g. '{"memory_bytes":4294967296,"step_s":0.5}'; {} gives them up
     #[arg(long, value_name = "JSON", value_parser = json::<StageLimits>)]
     limits: Option<StageLimits>,
+    /// The runtimes that its agents may use, e.g. native,python3; `all`: all that the server offers
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    runtimes: Option<Vec<String>>,
     /// What each team may upload in place of the server's, e.g. '{"waiting":2,"day_bytes":1073741824}'
     #[arg(long, value_name = "JSON", value_parser = json::<StageUploads>)]
     uploads: Option<StageUploads>,
@@ -133,6 +140,10 @@ pub(super) struct Wanted {
     /// When its datasets are there for everybody: never, at_close or at_release
     #[arg(long, value_name = "WHEN")]
     publishes: Option<Publishes>,
+    /// What is kept of datasets and archives, e.g. '{"last":5,"days_after_sign_off":90}' or '{"until":"2027-06-01T00:00:00Z"}';
+    /// {} keeps everything
+    #[arg(long, value_name = "JSON", value_parser = json::<Retention>)]
+    retention: Option<Retention>,
     /// What a team's row on its board is: latest, best, mean_of_last:N, or final
     #[arg(long, value_name = "HOW")]
     standings: Option<Standings>,
@@ -153,6 +164,16 @@ impl Wanted {
         };
         let settings = read().with_context(|| format!("--perturbations {}", path.display()))?;
         Ok(Some(settings))
+    }
+
+    #[expect(
+        clippy::option_option,
+        reason = "all and left out are told apart, as the request does"
+    )]
+    fn runtimes(&self) -> Option<Option<Runtimes>> {
+        let names = self.runtimes.as_ref()?;
+        let is_all = names.iter().any(|name| name == "all");
+        Some((!is_all).then(|| names.iter().cloned().collect()))
     }
 
     fn schedule(&self) -> anyhow::Result<Option<Schedule>> {
@@ -240,6 +261,7 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
             let new = NewStage {
                 name,
                 perturbations: wanted.perturbations()?,
+                runtimes: wanted.runtimes(),
                 opens_at: at(&wanted.opens)?,
                 closes_at: at(&wanted.closes)?,
                 schedule: wanted.schedule()?,
@@ -258,6 +280,7 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 blind: wanted.blind,
                 publishes: wanted.publishes,
                 standings: wanted.standings,
+                retention: wanted.retention,
             };
             let made = client.create_stage(&new).await?;
             print(json, &made, || told(&made))
@@ -280,6 +303,7 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
             let change = StageChange {
                 name: rename,
                 perturbations: wanted.perturbations()?,
+                runtimes: wanted.runtimes(),
                 opens_at: at(&wanted.opens)?,
                 closes_at: at(&wanted.closes)?.map(Some).or(open_end.then_some(None)),
                 schedule,
@@ -298,6 +322,7 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
                 blind: wanted.blind,
                 publishes: wanted.publishes,
                 standings: wanted.standings,
+                retention: wanted.retention,
                 confirm,
             };
             let changed = client.change_stage(stage.id, &change).await?;
@@ -324,6 +349,13 @@ async fn like(client: &Client) -> anyhow::Result<Zone> {
     let open = stages.iter().rfind(|stage| stage.phase == PhaseView::Open);
     let like = open.or(stages.last());
     Ok(like.map_or(Zone::UTC, |stage| stage.zone.clone()))
+}
+
+/// The days that do not fit into their time.
+fn warnings(stage: &StageView) -> impl Iterator<Item = String> {
+    let loads = stage.capacity.iter().flatten();
+    let overflows = loads.filter(|load| load.fit == Fit::Not);
+    overflows.map(|load| format!("\n  warning  {}", load.summary))
 }
 
 fn told(stage: &StageView) -> String {
@@ -364,12 +396,19 @@ fn told(stage: &StageView) -> String {
         .into_iter()
         .filter(|(_, is_own, _)| *is_own)
         .filter_map(|(name, _, json)| Some(format!("\n  {name}  {}", json.ok()?)))
+        .chain(
+            rules
+                .runtimes
+                .iter()
+                .map(|runtimes| format!("\n  agents   of the runtime {runtimes} only")),
+        )
+        .chain(warnings(stage))
         .collect();
     let blind = if settings.blind { ", blind" } else { "" };
     format!(
         "{} ({phase}{blind})\n  id       {}\n  times    {} to {closes}, {}\n  next day {next}\n  deadline {}\n  rules    revision {} since {}: {}, {} \
          episodes of each of {}, at most {} faults\n  score    weights {}, tiers up to {} \
-         points per episode, perturbations {}{limits}\n  board    by {}, {result}\n  datasets public {}",
+         points per episode, perturbations {}{limits}\n  board    by {}, {result}\n  datasets public {}\n  kept     {}",
         stage.name,
         stage.id,
         there(stage.opens_at),
@@ -394,6 +433,7 @@ fn told(stage: &StageView) -> String {
             Publishes::AtClose => "at the close",
             Publishes::AtRelease => "when their day is released",
         },
+        stage.retention,
     )
 }
 

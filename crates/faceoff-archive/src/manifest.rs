@@ -1,0 +1,191 @@
+//! What is in an archive.
+
+use crate::{error::ArchiveError, format::FORMAT};
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+use std::{collections::BTreeSet, fmt};
+
+/// The first file of an archive.
+pub const MANIFEST_NAME: &str = "manifest.json";
+
+/// Longest manifest, in bytes: it is held in memory.
+pub(crate) const MANIFEST_MAX_BYTES: u64 = 64 << 20;
+/// Most files of an archive.
+const MAX_FILES: usize = 500_000;
+/// Longest path: what a plain tar header holds whatever its parts are.
+const PATH_MAX_BYTES: usize = 155;
+const PART_MAX_BYTES: usize = 100;
+
+/// For whom an archive is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Edition {
+    /// For everybody: what a visitor without a token gets.
+    Public,
+    /// For the organiser: all but secrets.
+    Organiser,
+}
+
+impl fmt::Display for Edition {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Public => "public",
+            Self::Organiser => "organiser",
+        })
+    }
+}
+
+/// The manifest of an archive.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// [`FORMAT`] of the program that made it.
+    pub format: u32,
+    /// Name and version of that program.
+    pub program: String,
+    /// The season's name.
+    pub season: String,
+    /// The moment that the archive shows.
+    pub made_at: Timestamp,
+    /// For whom it is.
+    pub edition: Edition,
+    /// What somebody might look for in vain, in words.
+    pub left_out: Vec<String>,
+    /// All other files, in their order.
+    pub files: Vec<Entry>,
+}
+
+/// A file of an archive.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Entry {
+    /// Relative, of ASCII letters, digits and `. _ -`, the parts separated by slashes.
+    pub path: String,
+    /// Its length.
+    pub bytes: u64,
+    /// BLAKE3 of its content, 64 hexadecimal digits.
+    pub blake3: String,
+}
+
+impl Manifest {
+    /// All files together, in bytes; at most `u64::MAX`.
+    #[must_use]
+    pub fn total_bytes(&self) -> u64 {
+        let bytes = self.files.iter().map(|file| file.bytes);
+        bytes.fold(0, u64::saturating_add)
+    }
+
+    /// Reads a manifest that a stranger may have written.
+    pub(crate) fn parse(bytes: &[u8]) -> Result<Self, ArchiveError> {
+        // A later format may have another layout: of that, this is all that must stay.
+        #[derive(Deserialize)]
+        struct Head {
+            format: u64,
+            #[serde(default)]
+            program: String,
+        }
+        let broken = |error: serde_json::Error| {
+            ArchiveError::Refused(format!(
+                "{MANIFEST_NAME} is not the manifest of a season's archive: {error}"
+            ))
+        };
+        let Head { format, program } = serde_json::from_slice(bytes).map_err(broken)?;
+        if format > u64::from(FORMAT) {
+            let program = program.chars().take(100).collect();
+            return Err(ArchiveError::Newer { format, program });
+        }
+        let manifest: Self = serde_json::from_slice(bytes).map_err(broken)?;
+        manifest.check()?;
+        Ok(manifest)
+    }
+
+    /// Refuses paths that could lead anywhere else, and what no hash is.
+    ///
+    /// # Errors
+    /// [`ArchiveError::Refused`].
+    pub fn check(&self) -> Result<(), ArchiveError> {
+        if self.files.len() > MAX_FILES {
+            return Err(ArchiveError::Refused(format!(
+                "{MANIFEST_NAME} names {} files; at most {MAX_FILES} are allowed",
+                self.files.len()
+            )));
+        }
+        let mut seen = BTreeSet::new();
+        for file in &self.files {
+            let refuse = |why: &str| {
+                let shown: String = file.path.chars().take(200).collect();
+                Err(ArchiveError::Refused(format!(
+                    "{MANIFEST_NAME} names the file {shown:?}: {why}"
+                )))
+            };
+            if file.path == MANIFEST_NAME {
+                return refuse("the manifest does not name itself");
+            }
+            if let Err(why) = check_path(&file.path) {
+                return refuse(why);
+            }
+            if blake3::Hash::from_hex(&file.blake3).is_err() {
+                return refuse("its hash is not of 64 hexadecimal digits");
+            }
+            if !seen.insert(file.path.as_str()) {
+                return refuse("it does so twice");
+            }
+        }
+        Ok(())
+    }
+}
+
+fn check_path(path: &str) -> Result<(), &'static str> {
+    if path.len() > PATH_MAX_BYTES {
+        return Err("a path has at most 155 bytes");
+    }
+    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'.' | b'_' | b'-');
+    for part in path.split('/') {
+        if part.is_empty() {
+            return Err("expected a relative path without empty parts");
+        }
+        if matches!(part, "." | "..") {
+            return Err("expected a path without “.” and “..”");
+        }
+        if part.len() > PART_MAX_BYTES {
+            return Err("a part of a path has at most 100 bytes");
+        }
+        if !part.bytes().all(is_plain) {
+            return Err("expected ASCII letters, digits, dots, underscores, hyphens and slashes");
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_plain_relative_paths_are_taken() {
+        let deep = format!("{}/x", "a".repeat(101));
+        let long = "ab/".repeat(60) + "x";
+        for good in [
+            "a",
+            "results/1-qualifying/board.json",
+            "artifacts/d/A_b-9.zip",
+        ] {
+            assert_eq!(check_path(good), Ok(()), "{good}");
+        }
+        for bad in [
+            "",
+            "/etc/passwd",
+            "../x",
+            "a/../../x",
+            "a/./b",
+            "a//b",
+            "a/",
+            "a b",
+            "a\\b",
+            "a\0b",
+            "ä",
+            &deep,
+            &long,
+        ] {
+            assert!(check_path(bad).is_err(), "{bad:?}");
+        }
+    }
+}

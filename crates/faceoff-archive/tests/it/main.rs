@@ -1,0 +1,62 @@
+//! Archives as they are made, and as strangers make them.
+#![expect(
+    clippy::unwrap_used,
+    reason = "helpers of tests fail as tests do: by panicking"
+)]
+
+mod hostile;
+mod round_trip;
+
+use faceoff_archive::{Edition, Entry, FORMAT, Manifest, Writer};
+use std::path::{Path, PathBuf};
+
+/// The entry of a file with this content.
+fn entry(path: &str, content: &[u8]) -> Entry {
+    Entry {
+        path: path.to_owned(),
+        bytes: content.len() as u64,
+        blake3: blake3::hash(content).to_string(),
+    }
+}
+
+fn manifest(files: Vec<Entry>) -> Manifest {
+    Manifest {
+        format: FORMAT,
+        program: "faceoff 0.1.0".into(),
+        season: "Season 1".into(),
+        made_at: "2026-03-01T10:00:00Z".parse().unwrap(),
+        edition: Edition::Public,
+        left_out: vec!["nothing".into()],
+        files,
+    }
+}
+
+/// What an honest archive holds.
+fn contents() -> Vec<(&'static str, Vec<u8>)> {
+    vec![
+        ("README.txt", b"read me\n".to_vec()),
+        ("results/1-qualifying/board.json", b"{}".to_vec()),
+        ("empty", Vec::new()),
+        // more than a piece, and no multiple of a block
+        (
+            "artifacts/datasets/a.zip",
+            (0..700_001_u32).map(|n| (n % 251) as u8).collect(),
+        ),
+    ]
+}
+
+/// An archive of these files, as the program makes it.
+fn honest(folder: &Path) -> (PathBuf, Manifest) {
+    let contents = contents();
+    let files = contents.iter().map(|(path, content)| entry(path, content));
+    let manifest = manifest(files.collect());
+    let mut writer = Writer::begin(Vec::new(), &manifest).unwrap();
+    let find = |entry: &Entry| {
+        let found = contents.iter().find(|(path, _)| *path == entry.path);
+        Ok(found.unwrap().1.as_slice())
+    };
+    while writer.next(find).unwrap() {}
+    let archive = folder.join("season.tar.zst");
+    std::fs::write(&archive, writer.finish().unwrap()).unwrap();
+    (archive, manifest)
+}

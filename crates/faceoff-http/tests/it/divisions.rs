@@ -1,0 +1,197 @@
+//! Divisions on boards: shown, and ranked among themselves where they are asked for.
+
+use crate::site::{ADMIN, Site, result};
+use reqwest::Method;
+use scraper::{Html, Selector};
+use serde_json::{Value, json};
+
+async fn patch(site: &Site, path: &str, body: &Value) -> Value {
+    let request = site.request(Method::PATCH, &format!("/api/v1{path}"), Some(ADMIN));
+    crate::site::Answer::of(request.json(body).send().await.unwrap())
+        .await
+        .json(200)
+}
+
+/// Four teams of the board order A, B, C, D; A and C are students, B is open, D is in no division.
+async fn season_with_divisions() -> Site {
+    let site = Site::start().await;
+    let teams = [
+        ("A", result([0.9, 0.9, 0.9], 10.0)),
+        ("B", result([0.6, 0.6, 0.6], 20.0)),
+        ("C", result([0.3, 0.3, 0.3], 30.0)),
+        ("D", result([0.1, 0.1, 0.1], 40.0)),
+    ];
+    site.ranked_teams(&teams).await;
+    let divisions = json!({ "divisions": ["Open", "Bachelor students"] });
+    patch(&site, "/season", &divisions).await;
+    for (name, division) in [
+        ("A", "Bachelor students"),
+        ("B", "Open"),
+        ("C", "Bachelor students"),
+    ] {
+        let id = team_id(&site, name).await;
+        patch(
+            &site,
+            &format!("/teams/{id}"),
+            &json!({ "division": division }),
+        )
+        .await;
+    }
+    site
+}
+
+async fn team_id(site: &Site, name: &str) -> String {
+    let teams = site.get("/api/v1/teams", Some(ADMIN)).await.json(200);
+    let teams = teams.as_array().unwrap();
+    let team = teams.iter().find(|team| team["name"] == name).unwrap();
+    team["id"].as_str().unwrap().to_owned()
+}
+
+/// Rank, rank group and team of each row.
+fn places(board: &Value) -> Vec<(u64, u64, String)> {
+    let rows = board["rows"].as_array().unwrap().iter();
+    rows.map(|row| {
+        let number = |key: &str| row[key].as_u64().unwrap();
+        let team = row["team"].as_str().unwrap().to_owned();
+        (number("rank"), number("rank_group"), team)
+    })
+    .collect()
+}
+
+fn teams(places: &[(u64, u64, String)]) -> Vec<&str> {
+    places.iter().map(|(_, _, team)| team.as_str()).collect()
+}
+
+#[tokio::test]
+async fn a_season_without_divisions_has_the_boards_that_it_had() {
+    let site = Site::start().await;
+    let alpha = [("Alpha", result([0.9, 0.9, 0.9], 10.0))];
+    site.ranked_teams(&alpha).await;
+    let board = site.get("/api/v1/board", None).await.json(200);
+    assert_eq!(places(&board), [(1, 1, "Alpha".to_owned())]);
+    assert!(!board.to_string().contains("division"), "{board}");
+    assert!(!site.get("/", None).await.body.contains("ivision"));
+    for path in ["/api/v1/board", "/api/v1/board/hit"] {
+        let refused = site.get(&format!("{path}?division=Open"), None).await;
+        let problem = refused.problem(404, "not-found", &["no divisions", "leave out “Open”"]);
+        assert_eq!(problem["divisions"], json!([]));
+    }
+}
+
+#[tokio::test]
+async fn a_board_shows_divisions_and_ranks_one_by_itself() {
+    let site = season_with_divisions().await;
+    let whole = site.get("/api/v1/board", None).await.json(200);
+    assert_eq!(teams(&places(&whole)), ["A", "B", "C", "D"]);
+    assert!(whole.get("division").is_none());
+    let divisions: Vec<_> = whole["rows"].as_array().unwrap().iter().collect();
+    let divisions: Vec<_> = divisions.iter().map(|row| row.get("division")).collect();
+    let (open, students) = (json!("Open"), json!("Bachelor students"));
+    assert_eq!(
+        divisions,
+        [Some(&students), Some(&open), Some(&students), None]
+    );
+
+    // Whatever the case of its letters, overall and by task, of the stage and revision that are asked for.
+    let stage = site.stage().await;
+    for path in [
+        "/api/v1/board?division=Bachelor%20students",
+        "/api/v1/board/hit?division=bachelor+STUDENTS",
+        &format!("/api/v1/board?stage={stage}&revision=1&division=Bachelor%20students"),
+    ] {
+        let board = site.get(path, None).await.json(200);
+        assert_eq!(board["division"], "Bachelor students", "{path}");
+        let places = places(&board);
+        assert_eq!(teams(&places), ["A", "C"], "{path}");
+        let ranks: Vec<_> = places.iter().map(|(rank, ..)| *rank).collect();
+        assert_eq!(ranks, [1, 2], "{path}");
+        assert_eq!(places[0].1, 1, "{path}: groups are counted among them, too");
+    }
+
+    let open = site.get("/api/v1/board?division=open", None).await;
+    assert_eq!(places(&open.json(200)), [(1, 1, "B".to_owned())]);
+
+    for path in ["/api/v1/board", "/api/v1/board/prepare"] {
+        let refused = site.get(&format!("{path}?division=Pupils"), None).await;
+        let words = ["expected “Open” or “Bachelor students”, got “Pupils”"];
+        let problem = refused.problem(404, "not-found", &words);
+        assert_eq!(problem["divisions"], json!(["Open", "Bachelor students"]));
+        for wrong in ["", "%3Cb%3E", "%20Open"] {
+            let refused = site.get(&format!("{path}?division={wrong}"), None).await;
+            refused.problem(400, "invalid-request", &["division"]);
+        }
+    }
+
+    // Who is disqualified leaves the division's board, and is named on no other division's.
+    let id = team_id(&site, "C").await;
+    let ruling = json!({ "reason": "two bundles", "confirm": "C" });
+    let path = format!("/api/v1/teams/{id}/disqualify");
+    site.post(&path, Some(ADMIN), &ruling).await.json(200);
+    for (division, left, disqualified) in [
+        ("Bachelor%20students", &["A"][..], 1),
+        ("Open", &["B"][..], 0),
+    ] {
+        let path = format!("/api/v1/board?division={division}");
+        let board = site.get(&path, None).await.json(200);
+        assert_eq!(teams(&places(&board)), left);
+        let named = board["disqualified"].as_array().unwrap();
+        assert_eq!(named.len(), disqualified, "{division}");
+    }
+}
+
+#[tokio::test]
+async fn the_boards_pages_lead_to_the_divisions() {
+    let site = season_with_divisions().await;
+    let page = async |path: &str| {
+        let answer = site.get(path, None).await;
+        assert_eq!(answer.status, 200, "{}", answer.body);
+        let html = Html::parse_document(&answer.body);
+        assert!(html.errors.is_empty(), "{path}: {:?}", html.errors);
+        html
+    };
+    let texts = |html: &Html, selector: &str| -> Vec<String> {
+        let selector = Selector::parse(selector).unwrap();
+        let texts = html
+            .select(&selector)
+            .map(|element| element.text().collect());
+        texts.collect()
+    };
+    for path in ["/", "/tasks/hit"] {
+        let whole = page(path).await;
+        assert_eq!(texts(&whole, ".board th.team a"), ["A", "B", "C", "D"]);
+        let notes = texts(&whole, ".board th.team .note");
+        for (note, division) in notes.iter().zip(["Bachelor students", "Open"]) {
+            assert!(note.starts_with(&format!("{division} · ")), "{note}");
+        }
+        let links = Selector::parse(".lead a").unwrap();
+        let links: Vec<_> = whole.select(&links).collect();
+        let leads_to = |name: &str| {
+            let link = links.iter().find(|link| link.text().eq([name]));
+            let link = link.unwrap_or_else(|| panic!("no link {name:?}"));
+            format!("{path}{}", link.attr("href").unwrap())
+        };
+        let students = page(&leads_to("Bachelor students")).await;
+        assert_eq!(texts(&students, ".board th.team a"), ["A", "C"]);
+        assert_eq!(texts(&students, ".board td.rank"), ["1", "2"]);
+        let lead = texts(&students, ".lead").join(" ");
+        assert!(lead.contains("Division Bachelor students"), "{lead}");
+        let unknown = site.get(&format!("{path}?division=Pupils"), None).await;
+        assert_eq!(unknown.status, 404);
+        assert!(unknown.body.contains("“Bachelor students”"));
+    }
+    patch(
+        &site,
+        "/season",
+        &json!({ "divisions": ["Open", "Bachelor students", "Pupils"] }),
+    )
+    .await;
+    site.next_day();
+    let started = site.post("/api/v1/days", Some(ADMIN), &json!({})).await;
+    started.json(200);
+    let under_way = texts(&page("/?division=open").await, "table.plain tbody th");
+    assert_eq!(under_way, ["B"]);
+    assert_eq!(texts(&page("/").await, "table.plain tbody th").len(), 4);
+    let empty = page("/?division=pupils").await;
+    let empty = texts(&empty, "#empty").join(" ");
+    assert_eq!(empty, "No team of the division has a result yet");
+}

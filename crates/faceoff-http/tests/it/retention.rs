@@ -1,0 +1,353 @@
+//! What is kept: said by the organiser, asked for when it has gone, deleted by teams, and how much room it takes.
+
+use crate::site::{ADMIN, Answer, GZIP, Site, TestTeam, result, text};
+use reqwest::Method;
+use serde_json::{Value, json};
+
+async fn change(site: &Site, body: Value) -> Answer {
+    let path = format!("/api/v1/stages/{}", site.stage().await);
+    let request = site.request(Method::PATCH, &path, Some(ADMIN)).json(&body);
+    Answer::of(request.send().await.unwrap()).await
+}
+
+async fn stage(site: &Site) -> Value {
+    let path = format!("/api/v1/stages/{}", site.stage().await);
+    site.get(&path, None).await.json(200)
+}
+
+/// Plays a day by a submission; the path of its evaluation.
+async fn play(site: &Site, team: &TestTeam, submission: &str, rates: [f64; 3]) -> String {
+    let evaluation = site.evaluate(team, submission).await;
+    site.finish(&result(rates, 10.0)).await;
+    site.next_day();
+    evaluation
+}
+
+async fn delete(site: &Site, submission: &str, token: Option<&str>, body: Value) -> Answer {
+    let request = site.request(Method::DELETE, submission, token).json(&body);
+    Answer::of(request.send().await.unwrap()).await
+}
+
+#[tokio::test]
+async fn a_retention_is_confirmed_applied_and_told() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let submission = site.valid_submission(&team, "a").await;
+    let mut played = Vec::new();
+    for rate in [0.9, 0.1, 0.2] {
+        played.push(play(&site, &team, &submission, [rate; 3]).await);
+    }
+    let before = stage(&site).await;
+    assert_eq!(before["retention"], json!({}));
+    let wanted = json!({ "retention": { "last": 1 } });
+    let told = change(&site, wanted).await;
+    let problem = told.problem(
+        409,
+        "not-confirmed",
+        &[
+            "nothing is done yet",
+            "the last 1 and the best of each team",
+            "1 datasets of 1 teams and 0 archives",
+            "23 bytes",
+        ],
+    );
+    assert_eq!(problem["confirm"], "Qualifying");
+    assert_eq!(stage(&site).await, before);
+    let confirmed = json!({ "retention": { "last": 1 }, "confirm": "Qualifying" });
+    let changed = change(&site, confirmed).await.json(200);
+    assert_eq!(changed["retention"], json!({ "last": 1 }));
+    assert_eq!(
+        changed["revision"], before["revision"],
+        "no rule is another"
+    );
+    let dataset = format!("{}/dataset", played[1]);
+    site.get(&dataset, Some(&team.token)).await;
+    let removed = site.store.apply_retentions(site.now()).await.unwrap();
+    assert_eq!(removed.datasets, 1);
+
+    let violations = format!("{}/violations", played[1]);
+    for path in [&dataset, &violations] {
+        for token in [&team.token, ADMIN] {
+            let problem = site.get(path, Some(token)).await.problem(
+                410,
+                "removed",
+                &[
+                    "was removed on 2026-03-04",
+                    "the retention of the stage \"Qualifying\"",
+                    "the last 1 and the best of each team",
+                ],
+            );
+            assert!(text(&problem["removed_at"]).starts_with("2026-03-04"));
+        }
+    }
+    for kept in [&played[0], &played[2]] {
+        let path = format!("{kept}/dataset");
+        let answer = site.get(&path, Some(&team.token)).await;
+        assert_eq!(answer.status, 200, "{}", answer.body);
+    }
+    // Whoever may not have it does not learn that it was there.
+    site.get(&dataset, None)
+        .await
+        .problem(401, "unauthenticated", &[]);
+    let view = site.get(&played[1], Some(&team.token)).await.json(200);
+    assert_eq!(view["state"], "finished");
+    assert_eq!(view["dataset"], Value::Null);
+    assert!(view["result"]["score"].is_number(), "its result stays");
+    assert!(text(&view["dataset_removed"]["reason"]).contains("the last 1"));
+    assert!(text(&view["next"]).contains("its dataset was removed"));
+    let page = played[1].replace("/api/v1", "");
+    let page = site.get(&page, None).await;
+    assert_eq!(page.status, 200);
+    assert!(page.body.contains("removed on 2026-03-04"), "{}", page.body);
+    assert!(!page.body.contains("/dataset\""), "no link to nothing");
+
+    // Nothing goes by keeping more: nothing is to be confirmed.
+    let all = change(&site, json!({ "retention": {} })).await.json(200);
+    assert_eq!(all["retention"], json!({}));
+}
+
+#[tokio::test]
+async fn a_retention_is_a_stages_from_its_making_until_after_its_sign_off() {
+    let site = Site::start().await;
+    let made = site
+        .post(
+            "/api/v1/stages",
+            Some(ADMIN),
+            &json!({ "name": "Warm-up", "retention": { "last": 2 } }),
+        )
+        .await
+        .json(201);
+    assert_eq!(made["retention"], json!({ "last": 2 }));
+    let team = site.team("Alpha").await;
+    let submission = site.valid_submission(&team, "a").await;
+    let evaluation = play(&site, &team, &submission, [0.5; 3]).await;
+    let closes_at = site.now() + jiff::SignedDuration::from_hours(1);
+    change(&site, json!({ "closes_at": closes_at }))
+        .await
+        .json(200);
+    site.later(3600);
+    let path = format!("/api/v1/stages/{}/finalise", site.stage().await);
+    site.post(&path, Some(ADMIN), &json!({ "confirm": "Qualifying" }))
+        .await
+        .json(200);
+    let wanted = json!({ "retention": { "days_after_sign_off": 2 } });
+    let signed_off = change(&site, wanted).await.json(200);
+    assert_eq!(signed_off["retention"], json!({ "days_after_sign_off": 2 }));
+    change(&site, json!({ "name": "Other", "retention": {} }))
+        .await
+        .problem(409, "conflict", &["signed off"]);
+    assert_eq!(stage(&site).await["retention"], signed_off["retention"]);
+    site.next_day();
+    site.next_day();
+    let removed = site.store.apply_retentions(site.now()).await.unwrap();
+    assert_eq!(removed.datasets, 1);
+    site.get(&format!("{evaluation}/dataset"), Some(&team.token))
+        .await
+        .problem(410, "removed", &["2 days after the sign-off"]);
+    let board = format!("/api/v1/board?stage={}", site.stage().await);
+    let board = site.get(&board, None).await.json(200);
+    assert_eq!(board["rows"][0]["team"], "Alpha", "its result stays");
+}
+
+#[tokio::test]
+async fn what_is_no_retention_is_refused_with_what_is_one() {
+    let site = Site::start().await;
+    for (wrong, words) in [
+        (json!({ "last": 0 }), "expected 1 to 1000, got 0"),
+        (json!({ "last": 1001 }), "expected 1 to 1000, got 1001"),
+        (json!({ "last": -1 }), "retention.last"),
+        (json!({ "last": 4_294_967_296_u64 }), "retention.last"),
+        (json!({ "last": "five" }), "retention.last"),
+        (json!({ "last": 1.5 }), "retention.last"),
+        (json!({ "days_after_sign_off": 0 }), "expected 1 to 3650"),
+        (json!({ "days_after_sign_off": 3651 }), "expected 1 to 3650"),
+        (json!({ "until": "soon" }), "retention.until"),
+        (json!({ "newest": 5 }), "newest"),
+        (json!("all"), "retention"),
+        (
+            json!({ "until": "2027-01-01T00:00:00Z", "days_after_sign_off": 3 }),
+            "one of them at most",
+        ),
+    ] {
+        let changed = change(&site, json!({ "retention": wrong })).await;
+        changed.problem(422, "invalid-content", &[words]);
+        let new = json!({ "name": "Other", "retention": wrong });
+        let made = site.post("/api/v1/stages", Some(ADMIN), &new).await;
+        made.problem(422, "invalid-content", &[words]);
+    }
+    assert_eq!(stage(&site).await["retention"], json!({}));
+    let stages = site.get("/api/v1/stages", None).await.json(200);
+    assert_eq!(stages.as_array().unwrap().len(), 1);
+}
+
+#[tokio::test]
+async fn a_team_deletes_a_submission_and_its_results_stay() {
+    let site = Site::start().await;
+    let (team, other) = (site.team("Alpha").await, site.team("Beta").await);
+    let submission = site.valid_submission(&team, "a").await;
+    let evaluation = play(&site, &team, &submission, [0.5; 3]).await;
+    let own = Some(team.token.as_str());
+    let archive = format!("{submission}/archive");
+    let downloaded = site.get(&archive, own).await;
+    assert_eq!(downloaded.status, 200);
+    assert_eq!(downloaded.body.len(), String::from_utf8_lossy(&GZIP).len());
+    let named = downloaded.header("content-disposition");
+    assert!(named.ends_with(".tar.gz\""), "{named}");
+
+    delete(&site, &submission, own, json!({})).await.problem(
+        409,
+        "conflict",
+        &["active", "withdraw"],
+    );
+    site.valid_submission(&team, "b").await;
+    for (wrong, status, slug, words) in [
+        (
+            json!({}),
+            409,
+            "not-confirmed",
+            ["nothing is done yet", "for good"],
+        ),
+        (
+            json!({ "confirm": "Alpha" }),
+            409,
+            "not-confirmed",
+            ["striker.tar.gz", "all that it has played"],
+        ),
+        (
+            json!({ "confirm": 7 }),
+            422,
+            "invalid-content",
+            ["confirm", "string"],
+        ),
+        (
+            json!({ "reason": "", "confirm": "striker.tar.gz" }),
+            422,
+            "invalid-content",
+            ["reason", "1 to 500"],
+        ),
+        (
+            json!({ "confirmed": "striker.tar.gz" }),
+            422,
+            "invalid-content",
+            ["confirmed", "unknown field"],
+        ),
+    ] {
+        let refused = delete(&site, &submission, own, wrong).await;
+        refused.problem(status, slug, &words);
+    }
+    let confirm = json!({ "confirm": "striker.tar.gz" });
+    delete(&site, &submission, Some(&other.token), confirm.clone())
+        .await
+        .problem(404, "not-found", &[]);
+    delete(&site, &submission, Some(ADMIN), confirm.clone())
+        .await
+        .problem(422, "invalid-content", &["reason", "1 to 500"]);
+    assert_eq!(site.get(&archive, own).await.status, 200);
+
+    let deleted = delete(&site, &submission, own, confirm.clone())
+        .await
+        .json(200);
+    assert_eq!(deleted["state"], "valid");
+    assert_eq!(deleted["deleted"]["by"], format!("team:{}", team.id));
+    assert_eq!(deleted["archive_removed"]["reason"], "by its team");
+    assert_eq!(deleted["log"], "ready\n");
+    assert!(text(&deleted["blake3"]).len() == 64);
+    assert!(text(&deleted["next"]).contains("upload it again"));
+    assert_eq!(site.get(&submission, own).await.json(200), deleted);
+    site.get(&archive, own).await.problem(
+        410,
+        "removed",
+        &[
+            "the archive of the submission was removed on",
+            "by its team",
+        ],
+    );
+    delete(&site, &submission, own, confirm)
+        .await
+        .problem(409, "conflict", &["was deleted on"]);
+    site.post(&format!("{submission}/activate"), own, &json!({}))
+        .await
+        .problem(409, "conflict", &["was removed", "cannot be played"]);
+    let view = site.get(&evaluation, own).await.json(200);
+    assert_eq!(view["state"], "finished");
+    let board = site.get("/api/v1/board", None).await.json(200);
+    assert_eq!(board["rows"][0]["team"], "Alpha");
+    let dataset = format!("{evaluation}/dataset");
+    assert_eq!(site.get(&dataset, own).await.status, 200);
+}
+
+#[tokio::test]
+async fn an_organiser_deletes_with_a_reason_and_evidence_is_deleted_by_nobody() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let own = Some(team.token.as_str());
+    let first = site.valid_submission(&team, "a").await;
+    let second = site.valid_submission(&team, "b").await;
+    site.valid_submission(&team, "c").await;
+    let wanted = json!({ "confirm": "striker.tar.gz", "reason": "it holds a virus" });
+    let deleted = delete(&site, &first, Some(ADMIN), wanted.clone())
+        .await
+        .json(200);
+    let reason = &deleted["archive_removed"]["reason"];
+    assert_eq!(reason, "by an organiser: it holds a virus");
+    assert_eq!(deleted["deleted"]["by"], "organiser");
+
+    let disqualify = format!("/api/v1/teams/{}/disqualify", team.id);
+    let why = json!({ "reason": "it spied", "confirm": "Alpha" });
+    site.post(&disqualify, Some(ADMIN), &why).await.json(200);
+    for token in [own, Some(ADMIN)] {
+        delete(&site, &second, token, wanted.clone()).await.problem(
+            409,
+            "conflict",
+            &["it spied", "kept as evidence"],
+        );
+    }
+    // An organiser gets at what was deleted just before; the team does not.
+    let archive = format!("{first}/archive");
+    site.get(&archive, own).await.problem(410, "removed", &[]);
+    for path in [archive, format!("{second}/archive")] {
+        assert_eq!(site.get(&path, Some(ADMIN)).await.status, 200);
+    }
+    let log = site
+        .get("/api/v1/events?kind=submission_deleted", Some(ADMIN))
+        .await
+        .json(200);
+    assert_eq!(
+        log["events"][0]["details"]["reason"],
+        "by an organiser: it holds a virus"
+    );
+}
+
+#[tokio::test]
+async fn storage_is_told_to_the_team_and_of_all_teams_to_the_organiser() {
+    let site = Site::start().await;
+    let (team, other) = (site.team("Alpha").await, site.team("Beta").await);
+    let submission = site.valid_submission(&team, "a").await;
+    play(&site, &team, &submission, [0.5; 3]).await;
+    let path = format!("/api/v1/teams/{}/storage", team.id);
+    let own = site.get(&path, Some(&team.token)).await.json(200);
+    assert_eq!(own["team_name"], "Alpha");
+    assert_eq!(own["archives"], 1);
+    assert_eq!(own["archive_bytes"], GZIP.len());
+    assert_eq!(own["datasets"], 1);
+    assert_eq!(own["dataset_bytes"], 23);
+    assert_eq!(own["unmeasured_datasets"], 0);
+    assert_eq!(own["proposal_bytes"], Value::Null);
+    assert!(own["quota_bytes"].as_u64().unwrap() > 0);
+    site.get(&path, Some(&other.token))
+        .await
+        .problem(404, "not-found", &[]);
+    site.get(&path, None)
+        .await
+        .problem(401, "unauthenticated", &[]);
+    let all = site.get("/api/v1/storage", Some(ADMIN)).await.json(200);
+    assert_eq!(all[0]["dataset_bytes"], 23);
+    assert_eq!(all[0]["proposal_bytes"], 0);
+    assert_eq!(all[1]["archives"], 0);
+    // The stage's own quota is what counts.
+    change(&site, json!({ "uploads": { "stored_bytes": 5 } }))
+        .await
+        .json(200);
+    let own = site.get(&path, Some(&team.token)).await.json(200);
+    assert_eq!(own["quota_bytes"], 5);
+}

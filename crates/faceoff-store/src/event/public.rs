@@ -1,0 +1,91 @@
+//! What of the log everybody may read.
+
+use super::Event;
+
+impl Event {
+    /// May everybody know of it, with all of its fields? So they do already: from boards, pages of evaluations,
+    /// announcements and the season's page. What is about a single evaluation is public only where that is.
+    pub(crate) const fn is_public(&self) -> bool {
+        match self {
+            Self::TeamCreated { .. }
+            | Self::TeamRenamed { .. }
+            | Self::TeamDescribed { .. }
+            | Self::TeamRetired
+            | Self::TeamReturned
+            | Self::TeamDisqualified { .. }
+            | Self::TermsPublished { .. }
+            | Self::DivisionsSet { .. }
+            | Self::RegistrationOpened
+            | Self::RegistrationClosed
+            | Self::Announced { .. }
+            | Self::EvaluationFinished { .. }
+            | Self::EvaluationAgentFailed
+            | Self::EvaluationPlatformFailed { .. }
+            | Self::EvaluationCancelled { .. }
+            | Self::EvaluationNotPlayed { .. }
+            | Self::EvaluationVoided { .. }
+            | Self::EvaluationPublished
+            | Self::ExtraTurnGiven { .. }
+            | Self::DayStarted { .. }
+            | Self::DayOverdue { .. }
+            | Self::DayReleased
+            | Self::DayVoided { .. }
+            | Self::MissedDayStarted { .. }
+            | Self::BoardsFrozen { .. }
+            | Self::BoardsUnfrozen
+            | Self::StageCreated { .. }
+            | Self::StageChanged { .. }
+            | Self::StageRulesChanged { .. }
+            | Self::StageFinalStarted { .. }
+            | Self::StageFinalised
+            | Self::StageRetentionChanged { .. }
+            | Self::DatasetRemoved { .. }
+            | Self::QueuePaused { .. }
+            | Self::QueueResumed
+            | Self::SeasonNamed { .. }
+            | Self::SeasonClosed => true,
+            Self::TokenReplaced
+            | Self::TokenCreated { .. }
+            | Self::TokenRotated { .. }
+            | Self::TokenRevoked { .. }
+            | Self::Invited { .. }
+            | Self::InvitationRevoked { .. }
+            | Self::PersonJoined { .. }
+            | Self::PersonLeft { .. }
+            | Self::SignedIn
+            | Self::PasswordSet
+            | Self::TermsAccepted { .. }
+            | Self::TeamRegistered { .. }
+            | Self::RegistrationApproved { .. }
+            | Self::RegistrationRefused { .. }
+            | Self::TeamReinstated { .. }
+            | Self::Asked { .. }
+            | Self::Answered { .. }
+            | Self::SubmissionUploaded { .. }
+            | Self::SubmissionValid { .. }
+            | Self::SubmissionInvalid { .. }
+            | Self::SubmissionNotValidated { .. }
+            | Self::SubmissionActivated
+            | Self::SubmissionWithdrawn
+            | Self::SubmissionLabelled { .. }
+            | Self::SubmissionNoted
+            | Self::SubmissionNotTaken { .. }
+            | Self::SubmissionDeleted { .. }
+            | Self::ArchiveRemoved { .. }
+            | Self::EvaluationQueued { .. }
+            | Self::EvaluationBegun
+            | Self::EvaluationFinalising
+            | Self::EvaluationApplied { .. }
+            | Self::AblationOrdered { .. }
+            | Self::AblationFinished
+            | Self::AblationFailed { .. }
+            | Self::ProposalMade { .. }
+            | Self::ProposalPlayed
+            | Self::ProposalApplied
+            | Self::ProposalDropped
+            | Self::ShardCommitted { .. }
+            | Self::UnitGivenBack { .. }
+            | Self::SeasonExported { .. } => false,
+        }
+    }
+}

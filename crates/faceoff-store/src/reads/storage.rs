@@ -1,0 +1,104 @@
+use crate::{
+    error::{Result, StoreError},
+    store::Store,
+};
+use faceoff_types::{TeamId, TeamName};
+use sqlx::types::Text;
+
+/// How much room the files of a team take.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TeamStorage {
+    /// Whose.
+    pub team: TeamId,
+    /// Its name.
+    pub name: TeamName,
+    /// Archives of submissions that are kept; they count towards the quota.
+    pub archives: u32,
+    /// Of these.
+    pub archive_bytes: u64,
+    /// Datasets of evaluations that are kept.
+    pub datasets: u32,
+    /// Of these, as far as they were measured.
+    pub dataset_bytes: u64,
+    /// Datasets among them that nobody has measured yet.
+    pub unmeasured: u32,
+    /// Datasets of trials and proposals with its submissions.
+    pub draft_bytes: u64,
+}
+
+/// Which datasets are counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Counted {
+    /// All of them.
+    All,
+    /// Those that their team may have: of released days, and of no blind stage. How large others are would tell of
+    /// their episodes.
+    Released,
+}
+
+struct Row {
+    team: Text<TeamId>,
+    name: Text<TeamName>,
+    archives: u32,
+    archive_bytes: i64,
+    datasets: u32,
+    dataset_bytes: i64,
+    unmeasured: u32,
+    draft_bytes: i64,
+}
+
+impl TryFrom<Row> for TeamStorage {
+    type Error = StoreError;
+    fn try_from(row: Row) -> Result<Self> {
+        let bytes = |sum: i64| {
+            u64::try_from(sum).map_err(|_| StoreError::Damaged(format!("files of {sum} bytes")))
+        };
+        Ok(Self {
+            team: row.team.0,
+            name: row.name.0,
+            archives: row.archives,
+            archive_bytes: bytes(row.archive_bytes)?,
+            datasets: row.datasets,
+            dataset_bytes: bytes(row.dataset_bytes)?,
+            unmeasured: row.unmeasured,
+            draft_bytes: bytes(row.draft_bytes)?,
+        })
+    }
+}
+
+impl Store {
+    /// How much room the files of a team take, or of all teams by name. No file is looked at.
+    pub async fn storage(
+        &self,
+        team: Option<TeamId>,
+        counted: Counted,
+    ) -> Result<Vec<TeamStorage>> {
+        let (team, all) = (team.map(Text), counted == Counted::All);
+        let rows = sqlx::query_as!(
+            Row,
+            r#"SELECT t.id AS "team: Text<TeamId>", t.name AS "name: Text<TeamName>",
+                      (SELECT COUNT(*) FROM submissions s WHERE s.team_id = t.id AND s.bundle_removed_at IS NULL)
+                      AS "archives!: u32",
+                      (SELECT COALESCE(SUM(s.bundle_bytes), 0) FROM submissions s
+                       WHERE s.team_id = t.id AND s.bundle_removed_at IS NULL) AS "archive_bytes!: i64",
+                      COUNT(e.id) AS "datasets!: u32", COALESCE(SUM(e.dataset_bytes), 0) AS "dataset_bytes!: i64",
+                      COUNT(e.id) - COUNT(e.dataset_bytes) AS "unmeasured!: u32",
+                      (SELECT COALESCE(SUM(f.dataset_bytes), 0) FROM drafts f
+                       WHERE f.team_id = t.id AND f.dataset_removed_at IS NULL
+                         AND NOT EXISTS (SELECT 1 FROM evaluations x WHERE x.id = f.id)) AS "draft_bytes!: i64"
+               FROM teams t
+               LEFT JOIN evaluations e
+                   ON e.team_id = t.id AND e.state = 'finished' AND e.dataset_removed_at IS NULL
+                  AND (?2 OR EXISTS (SELECT 1 FROM days d JOIN stages g ON g.id = d.stage_id
+                                     WHERE d.stage_id = e.stage_id AND d.day = e.day AND d.released_at IS NOT NULL
+                                       AND json_extract(g.settings, '$.blind') IS NOT 1))
+               WHERE ?1 IS NULL OR t.id = ?1
+               GROUP BY t.id ORDER BY t.name"#,
+            team,
+            all,
+        )
+        .fetch_all(&self.database.read)
+        .await?;
+        rows.into_iter().map(TeamStorage::try_from).collect()
+    }
+}

@@ -1,0 +1,178 @@
+//! What an archive's database says of itself.
+
+use crate::{
+    column::{Bytes32, Instant},
+    error::Result,
+};
+use faceoff_types::{EvaluationId, Seed, StageDay, StageId, SubmissionId};
+use jiff::{Timestamp, civil::Date};
+use sqlx::{SqliteConnection, types::Text};
+use std::{collections::BTreeMap, fmt, str::FromStr};
+
+/// For whom an archive is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Edition {
+    /// For everybody: what a visitor without a token gets.
+    Public,
+    /// For the organiser: all but secrets.
+    Organiser,
+}
+
+impl fmt::Display for Edition {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Public => "public",
+            Self::Organiser => "organiser",
+        })
+    }
+}
+
+/// A text that is no edition.
+#[derive(Debug, thiserror::Error)]
+#[error("no edition of an archive: expected “public” or “organiser”")]
+pub struct ParseEditionError;
+
+impl FromStr for Edition {
+    type Err = ParseEditionError;
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        match s {
+            "public" => Ok(Self::Public),
+            "organiser" => Ok(Self::Organiser),
+            _ => Err(ParseEditionError),
+        }
+    }
+}
+
+/// A season that stands still: the database is an archive's.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Archived {
+    /// What of the season is here.
+    pub edition: Edition,
+    /// The moment that it shows.
+    pub made_at: Timestamp,
+    /// What made the archive, with its version.
+    pub program: String,
+    /// BLAKE3 of the season's secret, 64 hexadecimal digits.
+    pub commitment: String,
+    /// When it was taken in here; `None` in the archive.
+    pub imported_at: Option<Timestamp>,
+}
+
+/// `None` of a season that runs.
+pub(crate) async fn read(connection: &mut SqliteConnection) -> Result<Option<Archived>> {
+    let row = sqlx::query!(
+        r#"SELECT edition AS "edition: Text<Edition>", made_at AS "made_at: Instant", program, commitment,
+                  imported_at AS "imported_at: Instant"
+           FROM archived"#
+    )
+    .fetch_optional(connection)
+    .await?;
+    Ok(row.map(|row| Archived {
+        edition: row.edition.0,
+        made_at: row.made_at.0,
+        program: row.program,
+        commitment: row.commitment,
+        imported_at: row.imported_at.map(|at| at.0),
+    }))
+}
+
+/// Says what the database is from now on.
+pub(crate) async fn put(connection: &mut SqliteConnection, archived: &Archived) -> Result<()> {
+    let (edition, made_at) = (Text(archived.edition), Instant(archived.made_at));
+    let imported_at = archived.imported_at.map(Instant);
+    sqlx::query!(
+        "INSERT OR REPLACE INTO archived (id, edition, made_at, program, commitment, imported_at)
+         VALUES (1, ?, ?, ?, ?, ?)",
+        edition,
+        made_at,
+        archived.program,
+        archived.commitment,
+        imported_at
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// The seeds of days that are public without the season's secret being here.
+pub(crate) async fn seeds(connection: &mut SqliteConnection) -> Result<BTreeMap<StageDay, Seed>> {
+    let rows = sqlx::query!(
+        r#"SELECT stage_id AS "stage: Text<StageId>", day AS "day: Text<Date>", seed AS "seed: Bytes32"
+           FROM archived_seeds"#
+    )
+    .fetch_all(connection)
+    .await?;
+    let of = |stage: Text<StageId>, day: Text<Date>| StageDay {
+        stage: stage.0,
+        date: day.0,
+    };
+    Ok(rows
+        .into_iter()
+        .map(|row| (of(row.stage, row.day), Seed::from_bytes(row.seed.0)))
+        .collect())
+}
+
+pub(crate) async fn put_seed(
+    connection: &mut SqliteConnection,
+    of: StageDay,
+    seed: &Seed,
+) -> Result<()> {
+    let (stage, day, seed) = (Text(of.stage), Text(of.date), Bytes32(*seed.as_bytes()));
+    sqlx::query!(
+        "INSERT OR REPLACE INTO archived_seeds (stage_id, day, seed) VALUES (?, ?, ?)",
+        stage,
+        day,
+        seed
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// An artifact that an archive for the organiser takes along.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct KeptArtifact {
+    /// Among the artifacts.
+    pub key: String,
+    /// BLAKE3, 64 hexadecimal digits.
+    pub blake3: String,
+    /// What it is.
+    pub of: KeptOf,
+}
+
+/// What an artifact is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum KeptOf {
+    /// The archive that a team uploaded.
+    Bundle(SubmissionId),
+    /// The recording of what was played as a part of a proposal.
+    Draft(EvaluationId),
+}
+
+/// What there is beside the datasets of evaluations.
+pub(crate) async fn kept_artifacts(connection: &mut SqliteConnection) -> Result<Vec<KeptArtifact>> {
+    let bundles = sqlx::query!(
+        r#"SELECT id AS "id: Text<SubmissionId>", bundle_key, bundle_blake3 FROM submissions
+           WHERE bundle_removed_at IS NULL ORDER BY created_at, id"#
+    )
+    .fetch_all(&mut *connection)
+    .await?;
+    let drafts = sqlx::query!(
+        r#"SELECT id AS "id: Text<EvaluationId>", dataset AS "dataset!", dataset_blake3 AS "dataset_blake3!"
+           FROM drafts WHERE dataset IS NOT NULL AND dataset_removed_at IS NULL
+             AND id NOT IN (SELECT id FROM evaluations) ORDER BY created_at, id"#
+    )
+    .fetch_all(connection)
+    .await?;
+    let bundles = bundles.into_iter().map(|row| KeptArtifact {
+        key: row.bundle_key,
+        blake3: row.bundle_blake3,
+        of: KeptOf::Bundle(row.id.0),
+    });
+    let drafts = drafts.into_iter().map(|row| KeptArtifact {
+        key: row.dataset,
+        blake3: row.dataset_blake3,
+        of: KeptOf::Draft(row.id.0),
+    });
+    Ok(bundles.chain(drafts).collect())
+}

@@ -1,0 +1,289 @@
+//! What is kept of a stage's large files, and what of them has gone.
+
+use crate::{
+    column::{Instant, Json},
+    error::{Result, StoreError},
+};
+use faceoff_types::{EvaluationId, Retention, StageId, SubmissionId, TeamId, Tier};
+use jiff::Timestamp;
+use serde::Deserialize;
+use sqlx::{SqliteConnection, types::Text};
+use std::cmp::Ordering;
+
+/// What a stage keeps; everything, if nobody has said so.
+pub(crate) async fn of_stage(
+    connection: &mut SqliteConnection,
+    stage: StageId,
+) -> Result<Retention> {
+    let stage = Text(stage);
+    let found = sqlx::query_scalar!(
+        r#"SELECT retention AS "retention: Json<Retention>" FROM stage_retentions WHERE stage_id = ?"#,
+        stage
+    )
+    .fetch_optional(connection)
+    .await?;
+    Ok(found.map_or_else(Retention::default, |found| found.0))
+}
+
+/// The stages that do not keep everything for ever.
+pub(crate) async fn bounded(connection: &mut SqliteConnection) -> Result<Vec<StageId>> {
+    let stages = sqlx::query_scalar!(
+        r#"SELECT stage_id AS "stage: Text<StageId>" FROM stage_retentions WHERE retention <> '{}'"#
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(stages.into_iter().map(|stage| stage.0).collect())
+}
+
+pub(crate) async fn set(
+    connection: &mut SqliteConnection,
+    stage: StageId,
+    retention: &Retention,
+) -> Result<()> {
+    let (stage, retention) = (Text(stage), Json(retention));
+    sqlx::query!(
+        "INSERT OR REPLACE INTO stage_retentions (stage_id, retention) VALUES (?, ?)",
+        stage,
+        retention
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// What of a result decides how a board ranks it.
+#[derive(Debug, Clone, Deserialize)]
+pub(crate) struct Rank {
+    tier: Tier,
+    score: f64,
+    penalty_points: f64,
+}
+
+/// A finished evaluation, as retention sees it.
+#[derive(Debug, Clone)]
+pub(crate) struct Scored {
+    pub(crate) id: EvaluationId,
+    pub(crate) team: TeamId,
+    /// Of its stage's rules: no board mixes two.
+    pub(crate) revision: u32,
+    /// It was not voided.
+    pub(crate) counts: bool,
+    /// Its dataset is there.
+    pub(crate) is_kept: bool,
+    /// All of its team's is kept, for the organisers.
+    pub(crate) is_evidence: bool,
+    /// Of the dataset; `None`: not measured yet.
+    pub(crate) bytes: Option<u64>,
+    submitted_at: Timestamp,
+    rank: Rank,
+}
+
+impl Scored {
+    /// The better one first, as boards have them: by tier, score, penalty points, and the time of the upload.
+    pub(crate) fn board_order(&self, other: &Self) -> Ordering {
+        let (a, b) = (&self.rank, &other.rank);
+        a.tier
+            .cmp(&b.tier)
+            .then_with(|| b.score.total_cmp(&a.score))
+            .then_with(|| a.penalty_points.total_cmp(&b.penalty_points))
+            .then_with(|| self.submitted_at.cmp(&other.submitted_at))
+    }
+}
+
+/// The finished evaluations of a stage, team by team, the newest day first.
+pub(crate) async fn scored(
+    connection: &mut SqliteConnection,
+    stage: StageId,
+) -> Result<Vec<Scored>> {
+    let stage = Text(stage);
+    let rows = sqlx::query!(
+        r#"SELECT e.id AS "id: Text<EvaluationId>", e.team_id AS "team: Text<TeamId>", e.revision AS "revision: u32",
+                  e.voided_at IS NULL AS "counts!: bool", e.dataset_removed_at IS NULL AS "is_kept!: bool",
+                  t.disqualified_at IS NOT NULL OR t.retired_by_organiser = 1 AS "is_evidence!: bool",
+                  e.dataset_bytes AS "bytes: u64", s.created_at AS "submitted_at: Instant",
+                  e.result AS "rank!: Json<Rank>"
+           FROM evaluations e JOIN teams t ON t.id = e.team_id JOIN submissions s ON s.id = e.submission_id
+           WHERE e.stage_id = ? AND e.state = 'finished'
+           ORDER BY e.team_id, e.day DESC, e.created_at DESC, e.id DESC"#,
+        stage
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows
+        .into_iter()
+        .map(|row| Scored {
+            id: row.id.0,
+            team: row.team.0,
+            revision: row.revision,
+            counts: row.counts,
+            is_kept: row.is_kept,
+            is_evidence: row.is_evidence,
+            bytes: row.bytes,
+            submitted_at: row.submitted_at.0,
+            rank: row.rank.0,
+        })
+        .collect())
+}
+
+/// How many trials and proposals of a stage are neither applied nor dropped.
+pub(crate) async fn count_proposals(
+    connection: &mut SqliteConnection,
+    stage: StageId,
+) -> Result<u32> {
+    let stage = Text(stage);
+    Ok(sqlx::query_scalar!(
+        r#"SELECT COUNT(*) AS "count!: u32" FROM proposals WHERE stage_id = ? AND outcome IS NULL"#,
+        stage
+    )
+    .fetch_one(connection)
+    .await?)
+}
+
+/// The archives of submissions that have played a stage, that nobody enters or plays, and all of whose datasets have
+/// gone or are `going`; with their bytes.
+pub(crate) async fn idle_archives(
+    connection: &mut SqliteConnection,
+    stage: StageId,
+    going: &[EvaluationId],
+) -> Result<Vec<(SubmissionId, u64)>> {
+    let (stage, going) = (Text(stage), Json(going));
+    let rows = sqlx::query!(
+        r#"SELECT s.id AS "id: Text<SubmissionId>", s.bundle_bytes AS "bytes: u64"
+           FROM submissions s JOIN teams t ON t.id = s.team_id
+           WHERE s.state = 'valid' AND s.bundle_removed_at IS NULL
+             AND t.disqualified_at IS NULL AND t.retired_by_organiser = 0
+             AND s.id IN (SELECT e.submission_id FROM evaluations e WHERE e.stage_id = ?1 AND e.state = 'finished')
+             AND NOT EXISTS (SELECT 1 FROM active_submissions a WHERE a.submission_id = s.id)
+             AND NOT EXISTS (SELECT 1 FROM evaluations e JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
+                             WHERE e.submission_id = s.id
+                               AND (e.state = 'open' OR d.released_at IS NULL
+                                    OR e.state = 'finished' AND e.dataset_removed_at IS NULL
+                                       AND e.id NOT IN (SELECT value FROM json_each(?2))))
+             AND NOT EXISTS (SELECT 1 FROM drafts d JOIN proposals p ON p.id = d.proposal_id
+                             WHERE d.submission_id = s.id AND p.outcome IS NULL)
+             AND NOT EXISTS (SELECT 1 FROM ablations a WHERE a.submission_id = s.id AND a.finished_at IS NULL)"#,
+        stage,
+        going,
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows.into_iter().map(|row| (row.id.0, row.bytes)).collect())
+}
+
+/// From now on nobody is promised an evaluation's dataset, nor that of the draft that it was.
+pub(crate) async fn set_dataset_removed(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+    reason: &str,
+    now: Timestamp,
+) -> Result<()> {
+    let (id, now) = (Text(id), Instant(now));
+    sqlx::query!(
+        "UPDATE evaluations SET dataset_removed_at = ?, dataset_removed_for = ? WHERE id = ?",
+        now,
+        reason,
+        id,
+    )
+    .execute(&mut *connection)
+    .await?;
+    sqlx::query!(
+        "UPDATE drafts SET dataset_removed_at = ? WHERE id = ? AND dataset IS NOT NULL",
+        now,
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// The datasets whose files are there although nobody is promised them since `before`, with their keys.
+pub(crate) async fn datasets_going(
+    connection: &mut SqliteConnection,
+    before: Timestamp,
+) -> Result<Vec<(EvaluationId, String)>> {
+    let before = Instant(before);
+    let rows = sqlx::query!(
+        r#"SELECT id AS "id: Text<EvaluationId>", dataset AS "dataset!" FROM evaluations
+           WHERE dataset_removed_at IS NOT NULL AND dataset_removed_at <= ? AND dataset_gone = 0"#,
+        before
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows
+        .into_iter()
+        .map(|row| (row.id.0, row.dataset))
+        .collect())
+}
+
+/// The file of a removed dataset has gone.
+pub(crate) async fn set_dataset_gone(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+) -> Result<()> {
+    let id = Text(id);
+    sqlx::query!("UPDATE evaluations SET dataset_gone = 1 WHERE id = ?", id)
+        .execute(connection)
+        .await?;
+    Ok(())
+}
+
+/// Datasets that nobody has measured, with their keys; those of drafts that became evaluations are these's.
+pub(crate) async fn unmeasured(
+    connection: &mut SqliteConnection,
+) -> Result<Vec<(EvaluationId, String)>> {
+    let rows = sqlx::query!(
+        r#"SELECT id AS "id!: Text<EvaluationId>", dataset AS "dataset!: String" FROM evaluations
+           WHERE state = 'finished' AND dataset_bytes IS NULL AND dataset_removed_at IS NULL
+           UNION
+           SELECT id, dataset FROM drafts
+           WHERE state = 'finished' AND dataset_bytes IS NULL AND dataset_removed_at IS NULL"#
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows
+        .into_iter()
+        .map(|row| (row.id.0, row.dataset))
+        .collect())
+}
+
+/// Notes how large the dataset of an evaluation, or of the draft of this id, is.
+pub(crate) async fn set_measured(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+    bytes: u64,
+) -> Result<()> {
+    let bytes = i64::try_from(bytes)
+        .map_err(|_| StoreError::Damaged(format!("a dataset of {bytes} bytes")))?;
+    let id = Text(id);
+    sqlx::query!(
+        "UPDATE evaluations SET dataset_bytes = ? WHERE id = ? AND state = 'finished'",
+        bytes,
+        id
+    )
+    .execute(&mut *connection)
+    .await?;
+    sqlx::query!(
+        "UPDATE drafts SET dataset_bytes = ? WHERE id = ? AND state = 'finished'",
+        bytes,
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// The dataset of a draft is as large as the evaluation's that it has become.
+pub(crate) async fn follow_draft(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+) -> Result<()> {
+    let id = Text(id);
+    sqlx::query!(
+        "UPDATE evaluations SET dataset_bytes = (SELECT d.dataset_bytes FROM drafts d WHERE d.id = evaluations.id)
+         WHERE id = ?",
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}

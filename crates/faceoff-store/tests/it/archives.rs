@@ -1,0 +1,353 @@
+//! The database on its way into an archive and out of it.
+
+use crate::fixture::*;
+use faceoff_store::*;
+use faceoff_types::*;
+use sqlx::{AssertSqlSafe, Connection, SqliteConnection};
+use std::{collections::BTreeMap, path::Path};
+
+/// What the public archive's tables are made of. Whoever adds a column decides in `scrub.rs` whether everybody may
+/// read it, and then names it here; a table that is not on the list is emptied there.
+const PUBLIC_COLUMNS: &[(&str, &str)] = &[
+    ("ablation_runs", "ablation_id run_id"),
+    (
+        "ablations",
+        "created_at finished_at id reason submission_id",
+    ),
+    ("announcements", "at id text title"),
+    (
+        "archived",
+        "commitment edition id imported_at made_at program",
+    ),
+    ("archived_seeds", "day seed stage_id"),
+    ("contestants", "run_id side submission_id"),
+    (
+        "days",
+        "cut_at day deadline_at is_final missed_for released_at stage_id",
+    ),
+    ("divisions", "name position"),
+    ("episode_summaries", "run_id summary version"),
+    (
+        "evaluations",
+        "created_at dataset dataset_blake3 dataset_bytes dataset_gone dataset_removed_at dataset_removed_for day extra_for finished_at id published_at reason rerun_of result revision \
+         run_id slot_ms stage_id state submission_id team_id unplayed voided_at voided_for",
+    ),
+    ("events", "actor at id kind payload subject_id subject_kind"),
+    ("frozen_boards", "frozen_at reason stage_id"),
+    ("lanes", "lane rank served_ms urgency"),
+    (
+        "runs",
+        "cleared_at episodes_per_shard episodes_per_task id keeps_recordings limits max_faults profile recordings_removed_at ruleset \
+         seed state tasks variation",
+    ),
+    (
+        "season",
+        "closed_at created_at id name paused_at paused_for secret takes_registrations",
+    ),
+    (
+        "shards",
+        "agent_faults committed_at end_episode first_episode id log outcomes position recording run_id task unit_id",
+    ),
+    ("stage_retentions", "retention stage_id"),
+    ("stage_revisions", "revision rules since stage_id"),
+    (
+        "stages",
+        "closes_at configured created_at finalised_at finalised_by finalised_without id name names_seeds opens_at \
+         settings zone",
+    ),
+    (
+        "submissions",
+        "agent_name bundle_blake3 bundle_bytes bundle_file_name bundle_gone bundle_key bundle_removed_at \
+         bundle_removed_for created_at deleted_at deleted_by id label log note reason runtime state team_id timing withdrawn_at",
+    ),
+    (
+        "teams",
+        "affiliation created_at disqualified_at disqualified_for division id link name retired_at retired_by_organiser",
+    ),
+    ("terms", "since text version"),
+    (
+        "units",
+        "account_no attempts batch charged_ms claimable_at failures id kind nonce progress queue_no state without_room \
+         worker",
+    ),
+];
+
+async fn open(file: &Path) -> SqliteConnection {
+    let url = format!("sqlite://{}", file.display());
+    SqliteConnection::connect(&url).await.unwrap()
+}
+
+async fn exec(file: &Path, sql: &str) {
+    let mut connection = open(file).await;
+    sqlx::raw_sql(AssertSqlSafe(sql.to_owned()))
+        .execute(&mut connection)
+        .await
+        .unwrap_or_else(|error| panic!("{sql}: {error}"));
+    connection.close().await.unwrap();
+}
+
+async fn count(file: &Path, table: &str) -> i64 {
+    let sql = format!("SELECT COUNT(*) FROM {table}");
+    let found = sqlx::query_scalar(AssertSqlSafe(sql));
+    found.fetch_one(&mut open(file).await).await.unwrap()
+}
+
+/// The database of an archive as it lies in a folder of its own.
+async fn archived(f: &Fixture, edition: Edition) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let snapshot = f
+        .store
+        .snapshot(folder.path(), edition, "a test", f.now)
+        .await
+        .unwrap();
+    let file = folder.path().join("faceoff.sqlite3");
+    snapshot.finish(&file).await.unwrap();
+    let left = std::fs::read_dir(folder.path()).unwrap().count();
+    assert_eq!(left, 1, "the copy is gone");
+    folder
+}
+
+fn database(folder: &tempfile::TempDir) -> std::path::PathBuf {
+    folder.path().join("faceoff.sqlite3")
+}
+
+/// A day that is over, a person, a proposal and work that waits.
+async fn season() -> (Fixture, EvaluationId) {
+    let mut f = Fixture::new().await;
+    let alpha = f.ready_team("Alpha").await;
+    let played = f.evaluate(alpha.id, &small()).await.id;
+    f.play_to(1.0).await;
+    let invitation = NewInvitation {
+        code_hash: [7; 32],
+        invited_as: InvitedAs::Member(alpha.team),
+        note: "Ada".into(),
+        expires_at: f.now + jiff::SignedDuration::from_hours(1),
+    };
+    f.store
+        .invite(Actor::Organiser, invitation, f.now)
+        .await
+        .unwrap();
+    f.store.join(joining([7; 32], "Ada"), f.now).await.unwrap();
+    f.later(24 * 3600);
+    f.ready_team("Beta").await;
+    f.evaluate(alpha.id, &small()).await;
+    (f, played)
+}
+
+#[tokio::test]
+async fn every_column_that_everybody_gets_was_decided_on() {
+    let (f, _) = season().await;
+    let folder = archived(&f, Edition::Public).await;
+    let mut connection = open(&database(&folder)).await;
+    let tables: Vec<String> = sqlx::query_scalar(
+        "SELECT name FROM sqlite_master WHERE type = 'table' AND name NOT LIKE 'sqlite%' ORDER BY name",
+    )
+    .fetch_all(&mut connection)
+    .await
+    .unwrap();
+    let known: BTreeMap<&str, &str> = PUBLIC_COLUMNS.iter().copied().collect();
+    for table in tables {
+        if table == "_sqlx_migrations" {
+            continue;
+        }
+        let Some(expected) = known.get(table.as_str()) else {
+            assert_eq!(count(&database(&folder), &table).await, 0, "{table}");
+            continue;
+        };
+        let sql = format!("SELECT name FROM pragma_table_info('{table}') ORDER BY name");
+        let columns: Vec<String> = sqlx::query_scalar(AssertSqlSafe(sql))
+            .fetch_all(&mut connection)
+            .await
+            .unwrap();
+        assert_eq!(columns.join(" "), *expected, "{table}");
+    }
+}
+
+#[tokio::test]
+async fn what_is_open_is_no_result_and_no_key_goes_along() {
+    let (f, played) = season().await;
+    assert_eq!(
+        count(&f.folder.path().join("faceoff.sqlite3"), "evaluations").await,
+        3
+    );
+    for edition in [Edition::Organiser, Edition::Public] {
+        let folder = archived(&f, edition).await;
+        let file = database(&folder);
+        for (table, rows) in [
+            ("evaluations", 1),
+            ("tokens", 0),
+            ("invitations", 0),
+            ("days", 2),
+        ] {
+            assert_eq!(count(&file, table).await, rows, "{edition}: {table}");
+        }
+        let mut connection = open(&file).await;
+        let waiting: i64 =
+            sqlx::query_scalar("SELECT COUNT(*) FROM units WHERE state IN ('queued', 'leased')")
+                .fetch_one(&mut connection)
+                .await
+                .unwrap();
+        assert_eq!(waiting, 0);
+        let secret: Vec<u8> = sqlx::query_scalar("SELECT secret FROM season")
+            .fetch_one(&mut connection)
+            .await
+            .unwrap();
+        assert_eq!(secret, [0; 32]);
+        connection.close().await.unwrap();
+
+        Store::import(folder.path(), f.now).await.unwrap();
+        let shown = Store::open(folder.path()).await.unwrap();
+        let (was, is) = (
+            f.store.season().await.unwrap(),
+            shown.season().await.unwrap(),
+        );
+        assert_eq!(is.commitment, was.commitment, "the promise stays");
+        let (stages, days) = (shown.stages().await.unwrap(), shown.days().await.unwrap());
+        let days: Vec<StageDay> = days.into_iter().map(|(day, _)| day.of).collect();
+        let seeds = shown
+            .day_seeds(&is, &stages, days.iter().copied())
+            .await
+            .unwrap();
+        let first = days[1];
+        let expected =
+            BTreeMap::from([(first, stages[0].seed_label(first.date).seed(&was.secret))]);
+        assert_eq!(seeds, expected, "of the released day, and of no other");
+        assert_eq!(
+            shown.evaluation(played).await.unwrap(),
+            f.store.evaluation(played).await.unwrap()
+        );
+    }
+}
+
+#[tokio::test]
+async fn a_running_server_goes_on_and_the_archive_does_not() {
+    let (f, played) = season().await;
+    let folder = tempfile::tempdir().unwrap();
+    let snapshot = f
+        .store
+        .snapshot(folder.path(), Edition::Organiser, "a test", f.now)
+        .await
+        .unwrap();
+    assert_eq!(snapshot.under_way, 2);
+    let before = snapshot.store().evaluation(played).await.unwrap();
+    f.store
+        .void_evaluation(Actor::Organiser, played, "a mistake", f.now)
+        .await
+        .unwrap();
+    assert_eq!(snapshot.store().evaluation(played).await.unwrap(), before);
+    assert_eq!(before.voided, None);
+    let name = snapshot
+        .store()
+        .name_season(Actor::Server, "x", f.now)
+        .await;
+    assert!(matches!(name, Err(StoreError::Archived { .. })), "{name:?}");
+    let kept = snapshot.kept_artifacts().await.unwrap();
+    assert_eq!(kept.len(), 2, "two bundles: {kept:?}");
+}
+
+#[tokio::test]
+async fn of_a_public_archive_nothing_becomes_the_organisers() {
+    let (f, _) = season().await;
+    let folder = archived(&f, Edition::Public).await;
+    Store::import(folder.path(), f.now).await.unwrap();
+    let shown = Store::open(folder.path()).await.unwrap();
+    let other = tempfile::tempdir().unwrap();
+    let asked = shown.snapshot(other.path(), Edition::Organiser, "a test", f.now);
+    let error = asked.await.unwrap_err();
+    assert!(error.to_string().contains("public archive"), "{error}");
+    assert!(
+        shown
+            .snapshot(other.path(), Edition::Public, "a test", f.now)
+            .await
+            .is_ok()
+    );
+    assert!(shown.people().await.unwrap().is_empty());
+}
+
+#[tokio::test]
+async fn whether_a_folder_holds_an_archive_is_asked_without_changing_it() {
+    let empty = tempfile::tempdir().unwrap();
+    assert_eq!(Store::archived_in(empty.path()).await.unwrap(), None);
+    assert_eq!(std::fs::read_dir(empty.path()).unwrap().count(), 0);
+    let (f, _) = season().await;
+    assert_eq!(Store::archived_in(f.folder.path()).await.unwrap(), None);
+    let folder = archived(&f, Edition::Public).await;
+    let found = Store::archived_in(folder.path()).await.unwrap().unwrap();
+    assert_eq!(
+        (found.edition, found.made_at, found.imported_at),
+        (Edition::Public, f.now, None)
+    );
+    // From before there were archives.
+    exec(&database(&folder), "DROP TABLE archived").await;
+    assert_eq!(Store::archived_in(folder.path()).await.unwrap(), None);
+}
+
+#[tokio::test]
+async fn a_database_that_a_stranger_made_is_refused() {
+    let (f, _) = season().await;
+    let planted = "CREATE TRIGGER help AFTER UPDATE ON archived BEGIN
+        INSERT INTO tokens (id, hash, kind, owner, name, created_at)
+        VALUES ('0', zeroblob(32), 'key', 'host', 'mine', 0); END";
+    for (sql, words) in [
+        (planted, "its trigger \"help\" is not as this program makes it"),
+        ("CREATE VIEW notes AS SELECT 1", "its view \"notes\""),
+        ("CREATE TABLE more (a)", "its table \"more\""),
+        ("DROP TRIGGER a_closed_season_stays_closed", "its trigger \"a_closed_season_stays_closed\""),
+        ("DROP TABLE archived", "not that of an archived season"),
+        ("DELETE FROM archived", "does not say what it is an archive of"),
+        ("PRAGMA foreign_keys = OFF; DELETE FROM teams", "refer to what is not there"),
+        (
+            "INSERT INTO _sqlx_migrations SELECT 9999, 'later', installed_on, success, checksum, execution_time
+             FROM _sqlx_migrations LIMIT 1",
+            "a later version of Faceoff made it (its migration 9999",
+        ),
+        ("UPDATE _sqlx_migrations SET checksum = zeroblob(48) WHERE version = 1", "migration 1"),
+    ] {
+        let folder = archived(&f, Edition::Organiser).await;
+        exec(&database(&folder), sql).await;
+        let error = Store::import(folder.path(), f.now).await.unwrap_err();
+        let StoreError::Conflict(why) = error else {
+            panic!("{sql}: {error}");
+        };
+        assert!(why.contains(words), "{words:?} is not in {why:?}");
+    }
+    for content in [&b"no database at all"[..], b""] {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(database(&folder), content).unwrap();
+        let error = Store::import(folder.path(), f.now).await.unwrap_err();
+        assert!(error.to_string().contains("database is refused"), "{error}");
+    }
+    // Pages that are none.
+    let folder = archived(&f, Edition::Organiser).await;
+    let mut bytes = std::fs::read(database(&folder)).unwrap();
+    let length = bytes.len();
+    bytes[4096..length.min(40_960)].fill(0xff);
+    std::fs::write(database(&folder), bytes).unwrap();
+    let error = Store::import(folder.path(), f.now).await.unwrap_err();
+    assert!(error.to_string().contains("refused"), "{error}");
+}
+
+#[tokio::test]
+async fn keys_that_somebody_has_put_into_an_archive_open_nothing() {
+    let (f, _) = season().await;
+    let folder = archived(&f, Edition::Organiser).await;
+    let key = "INSERT INTO tokens (id, hash, kind, owner, name, created_at)
+               VALUES ('00000000-0000-7000-8000-000000000000', zeroblob(32), 'key', 'host', 'mine', 0);
+               UPDATE people SET password = '$argon2id$v=19$m=19456,t=2,p=1$AAAA$AAAA'";
+    exec(&database(&folder), key).await;
+    Store::import(folder.path(), f.now).await.unwrap();
+    let shown = Store::open(folder.path()).await.unwrap();
+    assert!(shown.tokens().await.unwrap().is_empty());
+    let holder = shown.holder([0; 32], TokenKind::Key, f.now).await.unwrap();
+    assert!(holder.is_err(), "{holder:?}");
+    let passwords = "SELECT COUNT(*) FROM people WHERE password IS NOT NULL";
+    let left: i64 = sqlx::query_scalar(passwords)
+        .fetch_one(&mut open(&database(&folder)).await)
+        .await
+        .unwrap();
+    assert_eq!(left, 0);
+    // The new server's own key does.
+    assert!(shown.set_host_token([9; 32], f.now).await.unwrap());
+    let holder = shown.holder([9; 32], TokenKind::Key, f.now).await.unwrap();
+    assert!(matches!(holder.unwrap().who, Who::Host));
+}

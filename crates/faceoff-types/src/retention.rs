@@ -1,0 +1,137 @@
+use jiff::Timestamp;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// The most evaluations of a team whose datasets are kept by number.
+pub const MAX_LAST: u32 = 1000;
+
+/// The longest that everything of a stage is kept after it was signed off, days.
+pub const MAX_DAYS_AFTER_SIGN_OFF: u32 = 3650;
+
+/// What is kept of a stage's large files: the datasets of its evaluations, and the archives of submissions that
+/// nobody plays any more. Results, boards and the log always stay. Without any field everything is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[serde(default, deny_unknown_fields)]
+pub struct Retention {
+    /// Of each team the last so many evaluations that count, and its best by each of the stage's rules; absent: all.
+    /// 1 to 1000.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub last: Option<u32>,
+    /// Until then; from then on nothing, once the stage has closed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub until: Option<Timestamp>,
+    /// Until so many days after the stage was signed off; from then on nothing. 1 to 3650, and not beside `until`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub days_after_sign_off: Option<u32>,
+}
+
+/// A retention that there cannot be.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum InvalidRetention {
+    /// None, which `until` says, or more than are counted.
+    #[error("last: expected 1 to {MAX_LAST}, got {0}; to keep nothing, say `until` when")]
+    Last(u32),
+    /// Too soon for anybody to object, or later than anybody plans.
+    #[error("days_after_sign_off: expected 1 to {MAX_DAYS_AFTER_SIGN_OFF}, got {0}")]
+    Days(u32),
+    /// Two ends.
+    #[error("until and days_after_sign_off: expected one of them at most, got both")]
+    TwoEnds,
+}
+
+impl Retention {
+    /// Is everything kept?
+    #[must_use]
+    pub fn keeps_all(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Can a stage have it?
+    ///
+    /// # Errors
+    /// What is out of bounds.
+    pub fn check(&self) -> Result<(), InvalidRetention> {
+        match (self.last, self.until, self.days_after_sign_off) {
+            (Some(last), _, _) if !(1..=MAX_LAST).contains(&last) => {
+                Err(InvalidRetention::Last(last))
+            }
+            (_, Some(_), Some(_)) => Err(InvalidRetention::TwoEnds),
+            (_, _, Some(days)) if !(1..=MAX_DAYS_AFTER_SIGN_OFF).contains(&days) => {
+                Err(InvalidRetention::Days(days))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl fmt::Display for Retention {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.last {
+            Some(last) => write!(f, "the last {last} and the best of each team")?,
+            None => f.write_str("everything")?,
+        }
+        match (self.until, self.days_after_sign_off) {
+            (Some(until), _) => write!(f, " until {until}"),
+            (None, Some(days)) => write!(f, " until {days} days after the sign-off"),
+            (None, None) => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_retention_reads_back_and_says_what_is_kept() {
+        for (json, words) in [
+            ("{}", "everything"),
+            (r#"{"last":5}"#, "the last 5 and the best of each team"),
+            (
+                r#"{"until":"2027-01-01T00:00:00Z"}"#,
+                "everything until 2027-01-01T00:00:00Z",
+            ),
+            (
+                r#"{"last":1,"days_after_sign_off":30}"#,
+                "the last 1 and the best of each team until 30 days after the sign-off",
+            ),
+        ] {
+            let retention: Retention = serde_json::from_str(json).unwrap();
+            assert_eq!(retention.check(), Ok(()));
+            assert_eq!(serde_json::to_string(&retention).unwrap(), json);
+            assert_eq!(retention.to_string(), words);
+            assert_eq!(retention.keeps_all(), json == "{}");
+        }
+    }
+
+    #[test]
+    fn what_no_stage_can_have_is_named() {
+        for (json, words) in [
+            (r#"{"last":0}"#, "last: expected 1 to 1000, got 0"),
+            (r#"{"last":1001}"#, "got 1001"),
+            (
+                r#"{"days_after_sign_off":0}"#,
+                "days_after_sign_off: expected 1 to 3650, got 0",
+            ),
+            (r#"{"days_after_sign_off":4294967295}"#, "got 4294967295"),
+            (
+                r#"{"until":"2027-01-01T00:00:00Z","days_after_sign_off":3}"#,
+                "expected one of them at most",
+            ),
+        ] {
+            let retention: Retention = serde_json::from_str(json).unwrap();
+            let error = retention.check().unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+        }
+        for unreadable in [
+            r#"{"last":-1}"#,
+            r#"{"last":"five"}"#,
+            r#"{"newest":5}"#,
+            r#"{"until":"soon"}"#,
+            r#""all""#,
+        ] {
+            assert!(serde_json::from_str::<Retention>(unreadable).is_err());
+        }
+    }
+}

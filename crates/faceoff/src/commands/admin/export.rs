@@ -1,0 +1,45 @@
+use crate::{client::Client, commands::output::print};
+use faceoff_archive::Edition;
+use serde_json::json;
+use std::path::Path;
+
+/// Downloads the season's archive and tells what is in it.
+pub(super) async fn export(
+    client: &Client,
+    as_json: bool,
+    file: &Path,
+    public: bool,
+) -> anyhow::Result<()> {
+    let edition = match public {
+        true => Edition::Public,
+        false => Edition::Organiser,
+    };
+    let (manifest, bytes) = client.season_archive(edition, file).await?;
+    let told = json!({
+        "file": file,
+        "bytes": bytes,
+        "season": manifest.season,
+        "edition": edition,
+        "made_at": manifest.made_at,
+        "files": manifest.files.len(),
+        "unpacked_bytes": manifest.total_bytes(),
+        "left_out": manifest.left_out,
+    });
+    print(as_json, &told, || {
+        let mut lines = vec![format!(
+            "{}: {bytes} bytes, the {edition} archive of {:?} as it was at {}; {} files of {} bytes",
+            file.display(),
+            manifest.season,
+            manifest.made_at.strftime("%Y-%m-%d %H:%M:%S UTC"),
+            manifest.files.len(),
+            manifest.total_bytes(),
+        )];
+        lines.extend(
+            manifest
+                .left_out
+                .iter()
+                .map(|what| format!("left out: {what}")),
+        );
+        lines.join("\n")
+    })
+}

@@ -1,0 +1,61 @@
+//! How much room a team's files take, in words.
+
+use faceoff_http::views::storage::StorageView;
+
+/// Bytes as people read them; powers of 1000.
+fn bytes(bytes: u64) -> String {
+    #[expect(clippy::cast_precision_loss, reason = "one decimal of it is shown")]
+    let mut shown = bytes as f64;
+    for unit in ["bytes", "kB", "MB", "GB"] {
+        if shown < 1000.0 {
+            return match unit {
+                "bytes" => format!("{bytes} bytes"),
+                unit => format!("{shown:.1} {unit}"),
+            };
+        }
+        shown /= 1000.0;
+    }
+    format!("{shown:.1} TB")
+}
+
+/// A team in a line.
+pub(super) fn storage_line(storage: &StorageView) -> String {
+    let mut line = format!(
+        "{:<40} {} archives, {} of {}; {} datasets, {}",
+        storage.team_name,
+        storage.archives,
+        bytes(storage.archive_bytes),
+        bytes(storage.quota_bytes),
+        storage.datasets,
+        bytes(storage.dataset_bytes)
+    );
+    if storage.unmeasured_datasets > 0 {
+        line.push_str(&format!(
+            ", {} of them not measured yet",
+            storage.unmeasured_datasets
+        ));
+    }
+    if let Some(proposed) = storage.proposal_bytes.filter(|bytes| *bytes > 0) {
+        line.push_str(&format!("; trials and proposals, {}", bytes(proposed)));
+    }
+    line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_are_read_in_their_units() {
+        for (count, words) in [
+            (0, "0 bytes"),
+            (999, "999 bytes"),
+            (1500, "1.5 kB"),
+            (2_000_000, "2.0 MB"),
+            (34_359_738_368, "34.4 GB"),
+            (5_000_000_000_000, "5.0 TB"),
+        ] {
+            assert_eq!(bytes(count), words);
+        }
+    }
+}

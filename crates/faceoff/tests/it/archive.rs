@@ -1,0 +1,574 @@
+//! The season's archive as an organiser takes it along: exported from a site, imported, and served by the program.
+
+use faceoff_archive::{Edition, Entry, FORMAT, Manifest, Writer};
+use faceoff_http::{Capacity, ConnectionLimits, HttpConfig, HttpLimits, token::hash_token};
+use faceoff_store::{Actor, Claimed, Store, UploadQuota, Work};
+use faceoff_types::{
+    BundleRef, Clock, EvaluationId, EvaluationResult, Profile, Ruleset, SmokeOutcome, StageRules,
+    StageSettings, Task, TimeLimits, Zone,
+};
+use jiff::Timestamp;
+use serde_json::Value;
+use std::{
+    collections::BTreeMap,
+    fs,
+    io::{BufRead, BufReader, Read},
+    path::{Path, PathBuf},
+    process::{Child, Command, Output, Stdio},
+};
+use tempfile::TempDir;
+
+const ADMIN: &str = "fo_admin_test";
+
+fn now() -> Timestamp {
+    "2026-03-01T10:00:00Z".parse().unwrap()
+}
+
+fn faceoff(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_faceoff"));
+    let done = command.args(arguments).current_dir(folder).output();
+    done.expect("the program can be started")
+}
+
+#[track_caller]
+fn done(output: &Output) -> String {
+    assert!(output.status.success(), "{output:?}");
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+#[track_caller]
+fn refused(output: &Output, words: &[&str]) {
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    let told = String::from_utf8_lossy(&output.stderr);
+    for word in words {
+        assert!(told.contains(word), "{word:?} is not in {told:?}");
+    }
+}
+
+/// A season with one evaluation, whose dataset is a real one.
+struct Site {
+    url: String,
+    store: Store,
+    folder: TempDir,
+    evaluation: EvaluationId,
+}
+
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../tests/fixtures")
+        .join(name)
+}
+
+async fn site() -> Site {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).await.unwrap();
+    assert!(
+        store
+            .set_host_token(hash_token(ADMIN), now())
+            .await
+            .unwrap()
+    );
+    let rules = StageRules {
+        ruleset: Ruleset::CURRENT,
+        profile: Profile::Evaluation,
+        tasks: vec![Task::Hit],
+        episodes_per_task: 1,
+        max_faults: 0,
+        variation: Default::default(),
+        limits: Default::default(),
+        runtimes: Default::default(),
+    };
+    let settings = StageSettings {
+        publishes: faceoff_types::Publishes::AtRelease,
+        ..StageSettings::default()
+    };
+    store
+        .configure_stage(rules, settings, Zone::UTC, now())
+        .await
+        .unwrap();
+    let evaluation = played(&store).await;
+    let config = HttpConfig {
+        max_bundle_bytes: 64,
+        public_url: None,
+        upload_dir: folder.path().to_owned(),
+        clock: Clock::new(now),
+        limits: HttpLimits::default(),
+        capacity: Capacity {
+            runtimes: Vec::new(),
+            slots: 1,
+            time: TimeLimits::default(),
+        },
+    };
+    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
+    let url = format!("http://{}", listener.local_addr().unwrap());
+    let router = faceoff_http::router(store.clone(), config);
+    tokio::spawn(faceoff_http::serve(
+        listener,
+        router,
+        ConnectionLimits::default(),
+        std::future::pending(),
+    ));
+    Site {
+        url,
+        store,
+        folder,
+        evaluation,
+    }
+}
+
+/// Plays a day of one team.
+async fn played(store: &Store) -> EvaluationId {
+    let host = Actor::Organiser;
+    let name = "Alpha".parse().unwrap();
+    let team = store
+        .create_team(host.clone(), &name, [1; 32], now())
+        .await
+        .unwrap();
+    let bundle = BundleRef {
+        key: "bundles/abc".into(),
+        bytes: 3,
+        blake3: blake3::hash(b"abc").to_string(),
+        file_name: "agent.tar.gz".into(),
+    };
+    let here = tempfile::NamedTempFile::new().unwrap();
+    fs::write(here.path(), "abc").unwrap();
+    store
+        .artifacts()
+        .put_file(&bundle.key, here.path())
+        .await
+        .unwrap();
+    store
+        .create_submission(
+            host.clone(),
+            team.id,
+            bundle,
+            &UploadQuota::default(),
+            now(),
+        )
+        .await
+        .unwrap();
+    let mut stage = Some(store.stages().await.unwrap()[0].id);
+    loop {
+        let Some(Claimed { claim, work }) = store.claim("slot 0", 60, now()).await.unwrap() else {
+            panic!("the day is not over");
+        };
+        match work {
+            Work::Smoke { .. } => {
+                let outcome = SmokeOutcome::Valid {
+                    runtime: "native".into(),
+                    agent_name: "striker".into(),
+                    timing: Vec::new(),
+                    log: String::new(),
+                };
+                store.commit_smoke(&claim, outcome, now()).await.unwrap();
+                let stage = stage.take().unwrap();
+                store.start_day(host.clone(), stage, now()).await.unwrap();
+            }
+            Work::Shard { run, shard, .. } => {
+                let outcome = serde_json::from_value(serde_json::json!({
+                    "task": "hit", "episode": 0, "steps": 17, "end": "left_table", "success": true,
+                    "violations": { "ee": false, "link": false, "joint_pos": false, "joint_vel": false },
+                    "computation_time": { "mean_s": 1e-4, "max_s": 1e-3 }, "fault": null,
+                }));
+                let commit = faceoff_store::ShardCommit {
+                    outcomes: vec![outcome.unwrap()],
+                    log: String::new(),
+                    stopped_by_faults: false,
+                    recording: Some(claim.recording_key(run.id)),
+                };
+                assert_eq!(shard.episodes(), 1);
+                store.commit_shard(&claim, commit, now()).await.unwrap();
+            }
+            Work::Finalise {
+                evaluation,
+                run,
+                seeds,
+                ..
+            } => {
+                let outcomes = store.outcomes(run.id).await.unwrap();
+                let bounds = run.plan.variation.tier_bounds;
+                let task = faceoff_scoring::score_task(&outcomes, &Default::default(), &bounds);
+                let result: EvaluationResult = faceoff_scoring::score_evaluation(
+                    run.ruleset,
+                    run.plan.profile,
+                    seeds.episodes,
+                    &run.plan.variation,
+                    BTreeMap::from([(Task::Hit, task)]),
+                );
+                let dataset = fixture("dataset-layout-3.zip");
+                let key = format!("datasets/{evaluation}.zip");
+                store.artifacts().put_file(&key, &dataset).await.unwrap();
+                let hash = blake3::hash(&fs::read(&dataset).unwrap()).to_string();
+                store
+                    .finish_evaluation(&claim, &result, &key, &hash, now())
+                    .await
+                    .unwrap();
+                return evaluation;
+            }
+        }
+    }
+}
+
+/// Off the runtime, on which the site answers.
+async fn at_once<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> T {
+    tokio::task::spawn_blocking(work).await.unwrap()
+}
+
+/// `faceoff serve` until it is dropped.
+struct Served {
+    child: Child,
+    url: String,
+}
+
+impl Served {
+    fn start(folder: &Path, data: &str) -> Self {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_faceoff"))
+            .args(["serve", "--data-dir", data, "--listen", "127.0.0.1:0"])
+            .current_dir(folder)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut url = String::new();
+        BufReader::new(child.stdout.take().unwrap())
+            .read_line(&mut url)
+            .unwrap();
+        Self {
+            child,
+            url: url.trim().to_owned(),
+        }
+    }
+
+    /// Ends it, as a service manager would; its log.
+    fn end(mut self) -> String {
+        let pid = self.child.id().to_string();
+        assert!(
+            Command::new("kill")
+                .args(["-TERM", &pid])
+                .status()
+                .unwrap()
+                .success()
+        );
+        let mut log = String::new();
+        self.child
+            .stderr
+            .take()
+            .unwrap()
+            .read_to_string(&mut log)
+            .unwrap();
+        assert!(self.child.wait().unwrap().success(), "{log}");
+        log
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+async fn text(url: String, token: Option<&str>) -> (u16, String) {
+    let client = reqwest::Client::builder().no_proxy().build().unwrap();
+    let request = client.get(url);
+    let request = match token {
+        Some(token) => request.bearer_auth(token),
+        None => request,
+    };
+    let answer = request.send().await.unwrap();
+    (answer.status().as_u16(), answer.text().await.unwrap())
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_season_is_taken_along_and_shown_on_another_host() {
+    let site = site().await;
+    let elsewhere = tempfile::tempdir().unwrap();
+    let folder = elsewhere.path().to_owned();
+    let url = site.url.clone();
+    at_once(move || {
+        let export = |arguments: &[&str]| {
+            let always = ["admin", "--server", &url, "--token", ADMIN, "export"];
+            faceoff(&folder, &[&always[..], arguments].concat())
+        };
+        let told = done(&export(&["public.tar.zst", "--public"]));
+        assert!(
+            told.contains("the public archive of \"Season 1\" as it was at 2026-03-01 10:00:00"),
+            "{told}"
+        );
+        refused(
+            &export(&["public.tar.zst"]),
+            &["exists and was left as it is"],
+        );
+        let told: Value = serde_json::from_str(&done(&export(&["--json", "all.tar.zst"]))).unwrap();
+        assert_eq!(told["edition"], "organiser");
+        let mut left: Vec<_> = fs::read_dir(&folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name())
+            .collect();
+        left.sort();
+        assert_eq!(left, ["all.tar.zst", "public.tar.zst"]);
+        for name in ["public", "all"] {
+            let archive = format!("{name}.tar.zst");
+            let told = done(&faceoff(&folder, &["import", &archive, "--data", name]));
+            let manifest = fs::read(folder.join(name).join("archive/manifest.json")).unwrap();
+            let manifest: Value = serde_json::from_slice(&manifest).unwrap();
+            assert_eq!(manifest["season"], "Season 1");
+            assert!(
+                told.contains(&format!("faceoff serve --data-dir {name}")),
+                "{told}"
+            );
+        }
+        refused(
+            &faceoff(&folder, &["import", "all.tar.zst", "--data", "all"]),
+            &["all is not empty", "folder of its own"],
+        );
+        // Outsiders check what came.
+        let dataset = fs::read_dir(folder.join("public/artifacts/datasets"))
+            .unwrap()
+            .next();
+        let dataset = dataset.unwrap().unwrap().path();
+        assert_eq!(
+            fs::read(&dataset).unwrap(),
+            fs::read(fixture("dataset-layout-3.zip")).unwrap()
+        );
+        let verified = faceoff(&folder, &["verify", dataset.to_str().unwrap()]);
+        let there = faceoff(
+            &folder,
+            &["verify", fixture("dataset-layout-3.zip").to_str().unwrap()],
+        );
+        assert_eq!(verified.status, there.status, "{verified:?}");
+        assert!(verified.status.success(), "{verified:?}");
+    })
+    .await;
+
+    let board = text(format!("{}/api/v1/board", site.url), None).await;
+    assert!(board.1.contains("Alpha"), "{board:?}");
+    for name in ["public", "all"] {
+        let folder = elsewhere.path().to_owned();
+        // What a kill in the middle of an export leaves is gone with the next start.
+        let left = folder.join(name).join("uploads/archive-left");
+        fs::create_dir_all(&left).unwrap();
+        fs::write(left.join("snapshot.sqlite3"), "with secrets").unwrap();
+        let served = at_once(move || Served::start(&folder, name)).await;
+        assert!(!left.exists());
+        assert_eq!(
+            text(format!("{}/api/v1/board", served.url), None).await,
+            board
+        );
+        let path = format!("/api/v1/evaluations/{}", site.evaluation);
+        let (status, _) = text(format!("{}{path}/dataset", served.url), None).await;
+        assert_eq!(status, 200, "{name}");
+        let (_, page) = text(served.url.clone(), None).await;
+        assert!(page.contains("Archived season"), "{page}");
+        let token = fs::read_to_string(elsewhere.path().join(name).join("admin-token")).unwrap();
+        let (status, events) =
+            text(format!("{}/api/v1/events", served.url), Some(token.trim())).await;
+        assert_eq!(status, 200, "{events}");
+        let (status, _) = text(format!("{}/api/v1/events", served.url), Some(ADMIN)).await;
+        assert_eq!(status, 401, "the old server's key is worth nothing here");
+        let log = at_once(move || served.end()).await;
+        assert!(
+            log.contains("showing an archived season, read-only"),
+            "{log}"
+        );
+        assert!(
+            !log.contains("the runtimes' files"),
+            "nothing is made ready for agents: {log}"
+        );
+    }
+    drop(site.folder);
+    site.store.close().await;
+}
+
+/// An archive that is whole, and of which one thing is wrong.
+fn written(folder: &Path, name: &str, files: &[(&str, &[u8])], edition: Edition) {
+    let entries = files.iter().map(|(path, content)| Entry {
+        path: (*path).to_owned(),
+        bytes: content.len() as u64,
+        blake3: blake3::hash(content).to_string(),
+    });
+    let manifest = Manifest {
+        format: FORMAT,
+        program: "a test".into(),
+        season: "Season 1".into(),
+        made_at: now(),
+        edition,
+        left_out: Vec::new(),
+        files: entries.collect(),
+    };
+    let mut writer = Writer::begin(Vec::new(), &manifest).unwrap();
+    let find = |entry: &Entry| {
+        let found = files.iter().find(|(path, _)| *path == entry.path);
+        Ok(found.unwrap().1)
+    };
+    while writer.next(find).unwrap() {}
+    fs::write(folder.join(name), writer.finish().unwrap()).unwrap();
+}
+
+#[tokio::test]
+async fn what_is_not_imported_leaves_nothing() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
+    let store = Store::open(&folder.join("running")).await.unwrap();
+    let snapshot = store
+        .snapshot(folder, faceoff_store::Edition::Public, "a test", now())
+        .await
+        .unwrap();
+    let database = folder.join("database");
+    snapshot.finish(&database).await.unwrap();
+    let database = fs::read(database).unwrap();
+    let running = {
+        store.checkpoint().await.unwrap();
+        store.close().await;
+        fs::read(folder.join("running/faceoff.sqlite3")).unwrap()
+    };
+    fs::write(folder.join("text"), "no archive").unwrap();
+    written(folder, "bare", &[("README.txt", b"")], Edition::Public);
+    written(
+        folder,
+        "running.tar.zst",
+        &[("database.sqlite3", &running)],
+        Edition::Public,
+    );
+    written(
+        folder,
+        "other",
+        &[("database.sqlite3", &database)],
+        Edition::Organiser,
+    );
+    written(
+        folder,
+        "good",
+        &[("database.sqlite3", &database)],
+        Edition::Public,
+    );
+    fs::create_dir(folder.join("empty")).unwrap();
+    let import = |archive: &str, data: &str| faceoff(folder, &["import", archive, "--data", data]);
+    for (archive, words) in [
+        ("none", &["none is not imported", "No such file"][..]),
+        ("text", &["expected a .tar.zst"]),
+        ("bare", &["there is no database.sqlite3 in it"]),
+        ("running.tar.zst", &["database is refused", "an archive"]),
+        (
+            "other",
+            &[
+                "its manifest tells of the organiser edition",
+                "its database of the public one",
+            ],
+        ),
+    ] {
+        for data in ["new", "empty"] {
+            refused(&import(archive, data), words);
+        }
+        assert!(!folder.join("new").exists());
+        assert!(!folder.join("new.importing").exists());
+        assert_eq!(fs::read_dir(folder.join("empty")).unwrap().count(), 0);
+    }
+    refused(&import("good", "/"), &["not empty"]);
+
+    // Somebody's own folder in the way stays, that of a killed import goes.
+    fs::create_dir(folder.join("new.importing")).unwrap();
+    refused(&import("good", "new"), &["new.importing is in the way"]);
+    fs::write(folder.join("new.importing/faceoff-import.lock"), "").unwrap();
+    fs::create_dir(folder.join("new.importing/data")).unwrap();
+    for data in ["new", "empty"] {
+        let told = done(&import("good", data));
+        assert!(told.contains("imported the public archive"), "{told}");
+        let found = Store::archived_in(&folder.join(data))
+            .await
+            .unwrap()
+            .unwrap();
+        assert!(found.imported_at.is_some());
+    }
+    assert!(!folder.join("new.importing").exists());
+}
+
+#[tokio::test]
+async fn a_folder_of_an_earlier_version_becomes_an_archive_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = fs::File::open(fixture("data-folder-e67a08c.tar.gz")).unwrap();
+    tar::Archive::new(flate2::read::GzDecoder::new(file))
+        .unpack(folder.path())
+        .unwrap();
+    let store = Store::open(&folder.path().join("data")).await.unwrap();
+    for edition in [
+        faceoff_store::Edition::Public,
+        faceoff_store::Edition::Organiser,
+    ] {
+        let into = tempfile::tempdir().unwrap();
+        let snapshot = store
+            .snapshot(into.path(), edition, "a test", now())
+            .await
+            .unwrap();
+        let file = into.path().join("faceoff.sqlite3");
+        snapshot.finish(&file).await.unwrap();
+        let archived = Store::import(into.path(), now()).await.unwrap();
+        assert_eq!(archived.imported_at, Some(now()));
+        let shown = Store::open(into.path()).await.unwrap();
+        let stage = store.stages().await.unwrap().remove(0);
+        let revision = store.board_revision(&stage).await.unwrap();
+        let rows = shown.board(stage.id, revision).await.unwrap();
+        // Of its second day some is under way: the archive shows the first.
+        assert_eq!(rows.len(), 1, "{rows:?}");
+        for row in rows {
+            let was = store.evaluation(row.evaluation).await.unwrap();
+            assert!(was.released_at.is_some());
+            assert_eq!(shown.evaluation(row.evaluation).await.unwrap(), was);
+        }
+    }
+}
+
+#[tokio::test]
+async fn a_killed_import_has_made_all_of_the_folder_or_none() {
+    let scratch = tempfile::tempdir().unwrap();
+    let folder = scratch.path();
+    let store = Store::open(&folder.join("running")).await.unwrap();
+    let edition = faceoff_store::Edition::Public;
+    let snapshot = store.snapshot(folder, edition, "a test", now()).await;
+    let database = folder.join("database");
+    snapshot.unwrap().finish(&database).await.unwrap();
+    let database = fs::read(database).unwrap();
+    // As many files as take a while, each of which is flushed.
+    let names: Vec<String> = (0..60)
+        .map(|number| format!("artifacts/datasets/{number}.zip"))
+        .collect();
+    let mut files: Vec<(&str, &[u8])> = vec![("database.sqlite3", &database)];
+    files.extend(names.iter().map(|name| (name.as_str(), &b"PK"[..])));
+    written(folder, "season.tar.zst", &files, Edition::Public);
+    let (mut killed, mut whole) = (0, 0);
+    for round in 0_u64.. {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_faceoff"))
+            .args(["import", "season.tar.zst", "--data", "shown"])
+            .current_dir(folder)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        // Ever later, until it is done before.
+        std::thread::sleep(std::time::Duration::from_millis(20 * round * round));
+        child.kill().unwrap();
+        let ended = child.wait().unwrap();
+        let shown = folder.join("shown");
+        if shown.exists() {
+            let found = Store::archived_in(&shown).await.unwrap().unwrap();
+            assert!(found.imported_at.is_some());
+            let brought = fs::read_dir(shown.join("artifacts/datasets")).unwrap();
+            assert_eq!(brought.count(), names.len());
+            fs::remove_dir_all(&shown).unwrap();
+            whole += 1;
+        } else {
+            assert!(!ended.success(), "{ended}");
+            killed += 1;
+        }
+        if whole > 1 {
+            break;
+        }
+    }
+    assert!(killed > 0, "it was never killed in time");
+    // What the killed ones have left is gone after one that was not.
+    done(&faceoff(
+        folder,
+        &["import", "season.tar.zst", "--data", "shown"],
+    ));
+    assert!(!folder.join("shown.importing").exists());
+}
