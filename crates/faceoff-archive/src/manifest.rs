@@ -108,6 +108,17 @@ impl Manifest {
                 self.files.len()
             )));
         }
+        // as it is written
+        let bytes = serde_json::to_vec_pretty(self).map_err(|error| {
+            ArchiveError::Refused(format!("{MANIFEST_NAME} cannot be written: {error}"))
+        })?;
+        if bytes.len() as u64 > MANIFEST_MAX_BYTES {
+            return Err(ArchiveError::Refused(format!(
+                "{MANIFEST_NAME} has {} bytes for {} files; at most {MANIFEST_MAX_BYTES} are allowed",
+                bytes.len(),
+                self.files.len()
+            )));
+        }
         let mut seen = BTreeSet::new();
         for file in &self.files {
             let refuse = |why: &str| {

@@ -427,11 +427,6 @@ pub enum Event {
     },
     /// The secret is public and nothing more is evaluated.
     SeasonClosed,
-    /// Somebody began to take an archive of the season with them.
-    SeasonExported {
-        /// `public` or `organiser`.
-        edition: String,
-    },
 }
 
 /// An event as it is stored.

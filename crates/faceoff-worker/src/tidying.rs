@@ -1,6 +1,5 @@
 //! What is done now and then, so that the data folder holds what is asked for and little else.
 
-use anyhow::Context as _;
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::{Clearable, Store};
 use jiff::{SignedDuration, Timestamp};
@@ -65,23 +64,28 @@ pub(crate) async fn remove_refused(store: &Store, now: Timestamp) {
     }
 }
 
-/// Clears the runs that are over, each in a transaction of its own; what their episodes come to is kept first.
+/// Clears the runs that are over, each in a transaction of its own. One that cannot be keeps no other from it.
 async fn clear_runs(store: &Store, now: Timestamp) -> anyhow::Result<()> {
-    let clearable = store.clearable_runs(EpisodeSummary::VERSION, now).await?;
-    for Clearable { run, wants_summary } in clearable {
-        if wants_summary {
-            let outcomes = store.outcomes(run).await?;
-            let bounds = store.run_variation(run).await?.tier_bounds;
-            let summary =
-                tokio::task::spawn_blocking(move || EpisodeSummary::of(&outcomes, &bounds))
-                    .await?
-                    .with_context(|| format!("run {run}"))?;
-            let json = serde_json::to_string(&summary)?;
-            store
-                .keep_episode_summary(run, EpisodeSummary::VERSION, &json, now)
-                .await?;
+    for clearable in store.clearable_runs(EpisodeSummary::VERSION, now).await? {
+        let run = clearable.run;
+        if let Err(error) = clear_run(store, clearable, now).await {
+            tracing::warn!(%run, error = format!("{error:#}"), "a run that is over could not be cleared");
         }
-        store.clear_run(run, now).await?;
     }
     Ok(())
+}
+
+/// Keeps first what its episodes come to.
+async fn clear_run(store: &Store, clearable: Clearable, now: Timestamp) -> anyhow::Result<()> {
+    let Clearable { run, wants_summary } = clearable;
+    if wants_summary {
+        let outcomes = store.outcomes(run).await?;
+        let bounds = store.run_variation(run).await?.tier_bounds;
+        let summary = tokio::task::spawn_blocking(move || EpisodeSummary::of(&outcomes, &bounds));
+        let json = serde_json::to_string(&summary.await??)?;
+        store
+            .keep_episode_summary(run, EpisodeSummary::VERSION, &json, now)
+            .await?;
+    }
+    Ok(store.clear_run(run, now).await?)
 }

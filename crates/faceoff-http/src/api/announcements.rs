@@ -63,7 +63,8 @@ pub(crate) async fn list_questions(
         let is_theirs = caller
             .0
             .as_ref()
-            .is_some_and(|caller| caller.may_see(question.team));
+            .zip(question.team)
+            .is_some_and(|(caller, team)| caller.may_see(team));
         let is_public = question
             .answer
             .as_ref()

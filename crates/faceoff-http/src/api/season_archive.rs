@@ -41,12 +41,8 @@ pub(crate) async fn season_archive(
         return Err(one_at_a_time());
     };
     let prepared = archive::prepare(&app, edition).await?;
-    if app.store.archived().is_none() {
-        let now = app.config.clock.now();
-        let noted = archive::of_store(edition);
-        app.store.note_export(organiser.actor(), noted, now).await?;
-    }
     tracing::info!(
+        actor = %organiser.actor(),
         %edition,
         files = prepared.manifest.files.len(),
         bytes = prepared.manifest.total_bytes(),

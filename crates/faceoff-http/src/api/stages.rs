@@ -241,16 +241,17 @@ pub(crate) async fn change_stage(
     if rules.variation.perturbations != is.variation.perturbations {
         check_robot(&app, &rules).await?;
     }
+    let mut told = Vec::new();
     if stage.phase(now) == StagePhase::Open {
         let other_rules = (rules != *is).then(|| begins_anew(&stage));
         let other_order = (settings.standings != stage.settings.standings)
             .then(|| ordered_anew(&stage, settings.standings));
-        let told: Vec<String> = other_rules.into_iter().chain(other_order).collect();
-        check_confirmed(&stage, &told, change.confirm.as_deref())?;
+        told.extend(other_rules.into_iter().chain(other_order));
     }
     if let Some(retention) = &retention {
-        check_removal(&app, &stage, retention, change.confirm.as_deref()).await?;
+        told.extend(removal(&app, &stage, retention).await?);
     }
+    check_confirmed(&stage, &told, change.confirm.as_deref())?;
     let wanted = faceoff_store::StageChange {
         name: change.name.as_deref().map(name).transpose()?,
         opens_at: change.opens_at,
@@ -277,36 +278,41 @@ fn checked_retention(retention: Option<Retention>) -> Result<Option<Retention>, 
     Ok(retention)
 }
 
-/// Refuses a retention by which something would go unless the stage is named.
-async fn check_removal(
+/// What would go by another retention, in words.
+async fn removal(
     app: &App,
     stage: &Stage,
     retention: &Retention,
-    confirm: Option<&str>,
-) -> Result<(), Problem> {
+) -> Result<Option<String>, Problem> {
     if app.store.stage_retention(stage.id).await? == *retention {
-        return Ok(());
+        return Ok(None);
     }
     let now = app.config.clock.now();
     let removed = app.store.would_remove(stage.id, retention, now).await?;
     if removed.is_nothing() {
-        return Ok(());
+        return Ok(None);
     }
     let unmeasured = match removed.unmeasured {
         0 => String::new(),
         unmeasured => format!(", and {unmeasured} datasets that are not measured yet"),
     };
-    let what = format!(
+    let when = match removed.not_before {
+        None => "at once".to_owned(),
+        Some(at) => format!(
+            "some of it not before {}",
+            at.strftime("%Y-%m-%d at %H:%M UTC")
+        ),
+    };
+    Ok(Some(format!(
         "of the stage {:?} {retention} would be kept; {} datasets of {} teams and {} archives of submissions that nobody \
-         plays any more ({} bytes{unmeasured}) would be removed for good, at once or when nothing of the stage is under way, \
+         plays any more ({} bytes{unmeasured}) would be removed for good, {when} or when nothing of the stage is under way, \
          to be decided, or blind; results stay",
         stage.name.as_str(),
         removed.datasets,
         removed.teams,
         removed.archives,
         removed.bytes
-    );
-    Problem::check_confirmed(confirm, stage.name.as_str(), &what)
+    )))
 }
 
 fn begins_anew(stage: &Stage) -> String {

@@ -3,6 +3,7 @@
 use super::{downloads::download, rulings::checked_reason};
 use crate::{
     app::App,
+    archived,
     auth::Caller,
     extract::{OptionalJson, PathParam},
     problem::Problem,
@@ -35,6 +36,7 @@ pub(crate) async fn submission_archive(
         check_kept(&submission)?;
     }
     let key = &submission.bundle.key;
+    archived::check_kept(&app, key, "submission").await?;
     let stored_as = key.rsplit('/').next().unwrap_or_default();
     let format = stored_as.split_once('.').map_or("bundle", |(_, end)| end);
     let name = format!("faceoff-submission-{id}.{format}");

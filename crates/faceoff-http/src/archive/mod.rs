@@ -17,6 +17,7 @@ use crate::{
     viewer::Viewer,
 };
 use faceoff_archive::{Edition, FORMAT, Manifest};
+use faceoff_scoring::EpisodeSummary;
 use faceoff_store::{KeptOf, Snapshot};
 use faceoff_types::Clock;
 use files::Files;
@@ -71,6 +72,9 @@ pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<Prepared, Pro
         .tempdir_in(&app.config.upload_dir)
         .map_err(room::unwritten)?;
     let now = app.config.clock.now();
+    if edition == Edition::Public {
+        sum_up(app).await?;
+    }
     let snapshot = app
         .store
         .snapshot(folder.path(), of_store(edition), PROGRAM, now)
@@ -93,7 +97,7 @@ pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<Prepared, Pro
         Edition::Organiser => Viewer::Organiser,
     };
     let mut recorded = results::gather(&of, viewer, &mut files).await?;
-    results::put_questions(app, edition, &mut files).await?;
+    results::put_questions(&of, edition, &mut files).await?;
     events::put(&of, &mut files).await?;
     drop(of);
 
@@ -135,6 +139,14 @@ pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<Prepared, Pro
         places,
         _folder: folder,
     })
+}
+
+/// Keeps what the episodes of all results come to: the public edition has nothing else of them.
+async fn sum_up(app: &App) -> Result<(), Problem> {
+    for run in app.store.unsummed_runs(EpisodeSummary::VERSION).await? {
+        app.summaries.of_run(run).await?;
+    }
+    Ok(())
 }
 
 /// A site that shows the snapshot at its moment, as a server that takes the archive in will.

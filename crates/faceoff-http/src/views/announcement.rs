@@ -55,7 +55,7 @@ impl QuestionView {
     pub(crate) fn of(question: Question, tells_team: bool) -> Self {
         Self {
             id: question.id,
-            team: tells_team.then_some(question.team),
+            team: question.team.filter(|_| tells_team),
             at: question.at,
             text: question.text,
             answered_at: question.answer.as_ref().map(|answer| answer.at),

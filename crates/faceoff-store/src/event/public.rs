@@ -84,8 +84,7 @@ impl Event {
             | Self::ProposalApplied
             | Self::ProposalDropped
             | Self::ShardCommitted { .. }
-            | Self::UnitGivenBack { .. }
-            | Self::SeasonExported { .. } => false,
+            | Self::UnitGivenBack { .. } => false,
         }
     }
 }

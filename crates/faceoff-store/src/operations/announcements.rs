@@ -61,7 +61,7 @@ impl Store {
             }
             let question = Question {
                 id: QuestionId::new(),
-                team,
+                team: Some(team),
                 at: now,
                 text: text.to_owned(),
                 answer: None,

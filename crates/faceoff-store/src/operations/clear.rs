@@ -29,6 +29,14 @@ impl Store {
         runs::clearable(&mut connection, summary_version, before).await
     }
 
+    /// The runs whose owners are over and whose episodes nobody has summed up, the oldest first.
+    pub async fn unsummed_runs(&self, summary_version: u32) -> Result<Vec<RunId>> {
+        let mut connection = self.database.read.acquire().await?;
+        let over = runs::clearable(&mut connection, summary_version, Timestamp::MAX).await?;
+        let unsummed = over.into_iter().filter(|one| one.wants_summary);
+        Ok(unsummed.map(|one| one.run).collect())
+    }
+
     /// Removes the shards of a run without agent faults, their units of work, and the events that told of them. Those
     /// with faults stay: they tell what the agent did wrong. From then on [`Store::outcomes`] refuses.
     pub async fn clear_run(&self, run: RunId, now: Timestamp) -> Result<()> {

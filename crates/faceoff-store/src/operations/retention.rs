@@ -35,6 +35,8 @@ pub struct Removed {
     pub bytes: u64,
     /// Datasets among them whose size nobody has measured yet.
     pub unmeasured: u32,
+    /// When all of it goes at the latest, if some of it not yet.
+    pub not_before: Option<Timestamp>,
 }
 
 impl Removed {
@@ -54,17 +56,17 @@ struct Plan {
     removed: Removed,
 }
 
+/// Until when a stage that was signed off is kept by that, where its retention goes by it.
+fn kept_after_sign_off(retention: &Retention, stage: &Stage) -> Option<Timestamp> {
+    let at = stage.finalised.as_ref()?.at;
+    let kept = SignedDuration::from_hours(24 * i64::from(retention.days_after_sign_off?));
+    at.saturating_add(kept).ok()
+}
+
 /// Has the time come from which on nothing of a stage is kept?
 fn has_ended(retention: &Retention, stage: &Stage, is_over: bool, now: Timestamp) -> bool {
     let by_date = retention.until.is_some_and(|until| until <= now);
-    let signed_off_at = stage.finalised.as_ref().map(|finalised| finalised.at);
-    let by_sign_off = match (signed_off_at, retention.days_after_sign_off) {
-        (Some(at), Some(days)) => {
-            let kept = SignedDuration::from_hours(24 * i64::from(days));
-            at.saturating_add(kept).is_ok_and(|until| until <= now)
-        }
-        _ => false,
-    };
+    let by_sign_off = kept_after_sign_off(retention, stage).is_some_and(|until| until <= now);
     by_date && is_over || by_sign_off
 }
 
@@ -143,6 +145,7 @@ async fn plan(
             archives: count(archives.len()),
             bytes: going.iter().filter_map(|one| one.bytes).sum::<u64>() + bytes_of_archives,
             unmeasured: count(going.iter().filter(|one| one.bytes.is_none()).count()),
+            not_before: None,
         },
         datasets,
         archives: archives.into_iter().map(|(id, _)| id).collect(),
@@ -171,8 +174,8 @@ impl Store {
         retentions::of_stage(&mut *self.database.read.acquire().await?, stage).await
     }
 
-    /// What would go of a stage at `now` if it had this retention, or as soon as nothing of it is under way, to be decided,
-    /// or blind.
+    /// What would go of a stage if it had this retention, of what is there at `now`: at once or as soon as nothing of it is
+    /// under way, to be decided, or blind; and what goes later by a date that is known.
     pub async fn would_remove(
         &self,
         stage: StageId,
@@ -181,8 +184,17 @@ impl Store {
     ) -> Result<Removed> {
         let mut connection = self.database.read.acquire().await?;
         let stage = stages::find(&mut connection, stage).await?;
-        let plan = plan(&mut connection, &stage, retention, now).await?;
-        Ok(plan.removed)
+        let at_once = plan(&mut connection, &stage, retention, now).await?.removed;
+        let dates = [retention.until, kept_after_sign_off(retention, &stage)];
+        let Some(later) = dates.into_iter().flatten().filter(|at| *at > now).min() else {
+            return Ok(at_once);
+        };
+        let in_all = plan(&mut connection, &stage, retention, later).await?;
+        let not_before = (in_all.removed != at_once).then_some(later);
+        Ok(Removed {
+            not_before,
+            ..in_all.removed
+        })
     }
 
     /// Has go what the stages' retentions do not keep: first nobody is promised it any more, with the reason, and
@@ -220,7 +232,7 @@ impl Store {
     }
 
     /// Removes the files that nobody has been promised for [`FILES_KEPT`]: datasets that a retention took, archives that
-    /// it or somebody's wish took, unless they have become evidence meanwhile. How many.
+    /// it or somebody's wish took; none that have become evidence meanwhile. How many.
     pub async fn remove_files_of_removed(&self, now: Timestamp) -> Result<usize> {
         let before = now.saturating_sub(FILES_KEPT).unwrap_or(Timestamp::MIN);
         let mut connection = self.database.read.acquire().await?;

@@ -2,18 +2,16 @@
 //! checked at the end.
 
 use crate::{
-    column::Json,
     error::{Result, StoreError},
     event::Event,
     tables::archived::Edition,
 };
-use faceoff_types::{EpisodeEnd, EpisodeOutcome};
 use serde_json::Value;
 use sqlx::{AssertSqlSafe, SqliteConnection};
 
 /// Tables of which the public archive holds anything. All others are emptied for it: a new one is, until somebody has
 /// decided what of it is public.
-const PUBLIC_TABLES: [&str; 24] = [
+const PUBLIC_TABLES: [&str; 23] = [
     "_sqlx_migrations",
     "ablation_runs",
     "ablations",
@@ -28,16 +26,15 @@ const PUBLIC_TABLES: [&str; 24] = [
     "events",
     "frozen_boards",
     "lanes",
+    "questions",
     "runs",
     "season",
-    "shards",
     "stage_retentions",
     "stage_revisions",
     "stages",
     "submissions",
     "teams",
     "terms",
-    "units",
 ];
 
 /// For whom a step is.
@@ -75,12 +72,9 @@ const STEPS: &[(For, &str)] = &[
     (For::Both, "DELETE FROM contestants WHERE run_id NOT IN (SELECT id FROM runs)"),
     (For::Both, "DELETE FROM episode_summaries WHERE run_id NOT IN (SELECT id FROM runs)"),
     (For::Both, "DELETE FROM shards WHERE run_id NOT IN (SELECT id FROM runs)"),
-    // What an agent did wrong is its team's: of what has no score no episode is told.
-    (For::Public, "DELETE FROM shards WHERE run_id IN
-        (SELECT run_id FROM evaluations WHERE state <> 'finished')"),
-    (For::Public, "DELETE FROM shards WHERE run_id IN (SELECT r.run_id FROM ablation_runs r
-        JOIN ablations a ON a.id = r.ablation_id WHERE a.reason IS NOT NULL)"),
-    (For::Public, "UPDATE shards SET log = '' WHERE log IS NOT NULL"),
+    // Single episodes are the datasets' to tell, to those who may have them: everybody gets what they come to.
+    (For::Public, "DELETE FROM shards"),
+    (For::Public, "UPDATE runs SET cleared_at = COALESCE(cleared_at, (SELECT made_at FROM archived))"),
     // Recordings of shards are not taken along.
     (For::Both, "UPDATE shards SET recording = NULL"),
     (For::Both, "UPDATE runs SET recordings_removed_at = COALESCE(recordings_removed_at,
@@ -91,12 +85,14 @@ const STEPS: &[(For, &str)] = &[
     (For::Public, "DELETE FROM submissions WHERE id NOT IN (SELECT submission_id FROM evaluations)
         AND id NOT IN (SELECT submission_id FROM ablations) AND id NOT IN (SELECT submission_id FROM contestants)"),
     (For::Public, "UPDATE submissions SET bundle_key = '', bundle_bytes = 0, bundle_blake3 = '', bundle_file_name = '',
-        label = NULL, note = NULL, timing = NULL, withdrawn_at = NULL, deleted_at = NULL, deleted_by = NULL,
-        bundle_removed_for = CASE WHEN bundle_removed_for IS NOT NULL THEN '' END, log = CASE WHEN log IS NOT NULL THEN '' END,
+        label = NULL, note = NULL, timing = NULL, runtime = NULL, withdrawn_at = NULL, deleted_at = NULL, deleted_by = NULL,
+        bundle_removed_at = NULL, bundle_removed_for = NULL, bundle_gone = 0, log = CASE WHEN log IS NOT NULL THEN '' END,
         reason = CASE WHEN reason IS NOT NULL THEN '' END"),
     (For::Both, "DELETE FROM smoke_runs WHERE submission_id NOT IN (SELECT id FROM submissions)"),
     (For::Public, "DELETE FROM smoke_runs"),
     (For::Public, "DELETE FROM finalisations"),
+    (For::Public, "DELETE FROM questions WHERE public = 0"),
+    (For::Public, "UPDATE questions SET team_id = NULL"),
     // Who has played or stands on a board; who only wanted to is nobody's business.
     (For::Public, "DELETE FROM teams WHERE disqualified_at IS NULL AND id NOT IN (SELECT team_id FROM evaluations)
         AND id NOT IN (SELECT team_id FROM submissions)
@@ -108,7 +104,6 @@ const STEPS: &[(For, &str)] = &[
         AND id NOT IN (SELECT unit_id FROM draft_finalisations)"),
     (For::Both, "UPDATE units SET state = 'dropped', nonce = NULL WHERE state IN ('queued', 'leased')"),
     (For::Both, "UPDATE units SET nonce = '' WHERE nonce IS NOT NULL"),
-    (For::Public, "UPDATE units SET worker = '' WHERE worker IS NOT NULL"),
     // The log for everybody: what is public (its kinds are sorted out before), by whom as far as that is.
     (For::Public, "DELETE FROM events WHERE subject_kind = 'evaluation'
         AND subject_id NOT IN (SELECT id FROM evaluations)"),
@@ -116,6 +111,8 @@ const STEPS: &[(For, &str)] = &[
     (For::Public, "UPDATE events SET actor = COALESCE((SELECT 'team:' || p.team_id FROM people p
         WHERE p.team_id IS NOT NULL AND events.actor = 'person:' || p.id), 'organiser')
         WHERE actor LIKE 'person:%'"),
+    // Who has taken a team out of the season is between it and the organisers.
+    (For::Public, "UPDATE events SET actor = 'team:' || subject_id WHERE kind IN ('team_retired', 'team_returned')"),
     (For::Public, "UPDATE events SET actor = 'server' WHERE actor LIKE 'worker:%'"),
     (For::Public, "UPDATE stages SET finalised_by = 'organiser' WHERE finalised_by IS NOT NULL"),
     // Keys of every kind.
@@ -137,8 +134,9 @@ pub(crate) async fn scrub(connection: &mut SqliteConnection, edition: Edition) -
         run(connection, format!("DROP TRIGGER {name}")).await?;
     }
     if edition == Edition::Public {
+        check_summed_up(connection).await?;
+        forget_lifted_rulings(connection).await?;
         keep_public_events(connection).await?;
-        forget_faults(connection).await?;
     }
     for (whose, sql) in STEPS {
         if *whose == For::Both || edition == Edition::Public {
@@ -195,27 +193,36 @@ async fn keep_public_events(connection: &mut SqliteConnection) -> Result<()> {
     Ok(())
 }
 
-/// Of an episode that ended by a fault only that is public, and not what the agent wrote.
-async fn forget_faults(connection: &mut SqliteConnection) -> Result<()> {
-    let faulty = sqlx::query!(
-        r#"SELECT id, outcomes AS "outcomes!: Json<Vec<EpisodeOutcome>>" FROM shards WHERE agent_faults > 0"#
+/// Refuses to take out the episodes of a result whose boards could not be shown without.
+async fn check_summed_up(connection: &mut SqliteConnection) -> Result<()> {
+    let unsummed: u32 = sqlx::query_scalar(
+        "SELECT COUNT(*) FROM runs r
+           WHERE r.state = 'played' AND r.cleared_at IS NULL
+             AND NOT EXISTS (SELECT 1 FROM episode_summaries s WHERE s.run_id = r.id)
+             AND (EXISTS (SELECT 1 FROM evaluations e WHERE e.run_id = r.id AND e.state = 'finished')
+                  OR EXISTS (SELECT 1 FROM ablation_runs p JOIN ablations a ON a.id = p.ablation_id
+                             WHERE p.run_id = r.id AND a.finished_at IS NOT NULL))",
     )
-    .fetch_all(&mut *connection)
+    .fetch_one(connection)
     .await?;
-    for mut shard in faulty {
-        for outcome in &mut shard.outcomes.0 {
-            if outcome.fault.take().is_some() {
-                outcome.end = EpisodeEnd::AgentFault;
-            }
-        }
-        sqlx::query!(
-            "UPDATE shards SET outcomes = ? WHERE id = ?",
-            shard.outcomes,
-            shard.id
-        )
-        .execute(&mut *connection)
-        .await?;
+    if unsummed > 0 {
+        return Err(StoreError::Conflict(format!(
+            "{unsummed} results came in while the season was copied, and their episodes are not summed up yet: try again"
+        )));
     }
+    Ok(())
+}
+
+/// Removes the disqualifications that were lifted: everybody knew of them while they held, and that they do no more is no
+/// event for everybody.
+async fn forget_lifted_rulings(connection: &mut SqliteConnection) -> Result<()> {
+    sqlx::query(
+        "DELETE FROM events WHERE kind = 'team_disqualified' AND EXISTS
+           (SELECT 1 FROM events r WHERE r.kind = 'team_reinstated' AND r.subject_kind = events.subject_kind
+              AND r.subject_id = events.subject_id AND r.id > events.id)"
+    )
+    .execute(connection)
+    .await?;
     Ok(())
 }
 

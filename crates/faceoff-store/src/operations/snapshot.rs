@@ -3,7 +3,6 @@
 use crate::{
     database::Database,
     error::{Result, StoreError},
-    event::{Actor, Event, Subject},
     operations::scrub::scrub,
     pulse::Pulse,
     room::Room,
@@ -88,16 +87,6 @@ impl Store {
             file,
             under_way,
         })
-    }
-
-    /// Notes that somebody has begun to take an archive of the season with them.
-    pub async fn note_export(&self, actor: Actor, edition: Edition, now: Timestamp) -> Result<()> {
-        self.write(actor, now, async |tx| {
-            let edition = edition.to_string();
-            tx.record(Subject::Season, Event::SeasonExported { edition });
-            Ok(())
-        })
-        .await
     }
 }
 

@@ -52,11 +52,14 @@ impl Store {
         Ok(old.len())
     }
 
-    /// Removes the datasets of proposals that were dropped; their results stay to be read. Returns how many. A kill half
-    /// way is made up for by the next call.
+    /// Removes the datasets of proposals that were dropped [`RECORDINGS_KEPT`] ago; their results stay to be read. Returns
+    /// how many. A kill half way is made up for by the next call.
     pub async fn remove_dropped_datasets(&self, now: Timestamp) -> Result<usize> {
+        let before = now
+            .saturating_sub(RECORDINGS_KEPT)
+            .unwrap_or(Timestamp::MIN);
         let mut connection = self.database.read.acquire().await?;
-        let dropped = drafts::with_dropped_datasets(&mut connection).await?;
+        let dropped = drafts::with_dropped_datasets(&mut connection, before).await?;
         drop(connection);
         for (id, key) in &dropped {
             self.artifacts().delete(key).await?;

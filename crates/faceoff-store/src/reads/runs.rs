@@ -36,9 +36,10 @@ impl Store {
     /// The outcomes of a run's committed shards in (task, episode) order: all that scoring needs,
     /// without opening a recording. Of a run that was cleared they are gone.
     pub async fn outcomes(&self, run: RunId) -> Result<Vec<EpisodeOutcome>> {
-        let mut connection = self.database.read.acquire().await?;
-        match run_rows::cleared_at(&mut connection, run).await? {
-            None => shards::outcomes(&mut connection, run).await,
+        // In one look: between two it may be cleared, and would seem to have had none.
+        let mut look = self.database.read.begin().await?;
+        match run_rows::cleared_at(&mut look, run).await? {
+            None => shards::outcomes(&mut look, run).await,
             Some(at) => Err(StoreError::Cleared { at }),
         }
     }

@@ -153,14 +153,18 @@ pub enum KeptOf {
 pub(crate) async fn kept_artifacts(connection: &mut SqliteConnection) -> Result<Vec<KeptArtifact>> {
     let bundles = sqlx::query!(
         r#"SELECT id AS "id: Text<SubmissionId>", bundle_key, bundle_blake3 FROM submissions
-           WHERE bundle_removed_at IS NULL ORDER BY created_at, id"#
+           WHERE bundle_removed_at IS NULL
+             AND (state = 'valid'
+                  OR team_id IN (SELECT id FROM teams WHERE disqualified_at IS NOT NULL OR retired_by_organiser = 1))
+           ORDER BY created_at, id"#
     )
     .fetch_all(&mut *connection)
     .await?;
     let drafts = sqlx::query!(
         r#"SELECT id AS "id: Text<EvaluationId>", dataset AS "dataset!", dataset_blake3 AS "dataset_blake3!"
            FROM drafts WHERE dataset IS NOT NULL AND dataset_removed_at IS NULL
-             AND id NOT IN (SELECT id FROM evaluations) ORDER BY created_at, id"#
+             AND id NOT IN (SELECT id FROM evaluations)
+             AND proposal_id NOT IN (SELECT id FROM proposals WHERE outcome = 'dropped') ORDER BY created_at, id"#
     )
     .fetch_all(connection)
     .await?;

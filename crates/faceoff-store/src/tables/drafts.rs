@@ -283,14 +283,17 @@ pub(crate) async fn count_open(
     .await?)
 }
 
-/// The drafts whose datasets are kept although nobody will apply them.
+/// The drafts whose datasets are kept although since `before` nobody will apply them.
 pub(crate) async fn with_dropped_datasets(
     connection: &mut SqliteConnection,
+    before: Timestamp,
 ) -> Result<Vec<(EvaluationId, String)>> {
+    let before = Instant(before);
     let rows = sqlx::query!(
         r#"SELECT d.id AS "id: Text<EvaluationId>", d.dataset AS "dataset!"
            FROM proposals p JOIN drafts d ON d.proposal_id = p.id
-           WHERE p.outcome = 'dropped' AND d.dataset IS NOT NULL AND d.dataset_removed_at IS NULL"#
+           WHERE p.outcome = 'dropped' AND p.settled_at <= ? AND d.dataset IS NOT NULL AND d.dataset_removed_at IS NULL"#,
+        before
     )
     .fetch_all(connection)
     .await?;

@@ -377,10 +377,12 @@ pub(crate) async fn set_finished(
     now: Timestamp,
 ) -> Result<()> {
     let (id, result, now) = (Text(id), Json(result), Instant(now));
+    // Of a proposal that was looked at for days the run was cleared: what is left is no measurement.
     sqlx::query!(
         "UPDATE evaluations SET state = 'finished', finished_at = ?, result = ?, dataset = ?, dataset_blake3 = ?,
                                 slot_ms = (SELECT SUM(u.charged_ms) FROM shards s JOIN units u ON u.id = s.unit_id
-                                           WHERE s.run_id = evaluations.run_id)
+                                           JOIN runs r ON r.id = s.run_id
+                                           WHERE s.run_id = evaluations.run_id AND r.cleared_at IS NULL)
          WHERE id = ?",
         now,
         result,

@@ -22,8 +22,8 @@ pub struct Reply {
 pub struct Question {
     /// Names it.
     pub id: QuestionId,
-    /// Who asks.
-    pub team: TeamId,
+    /// Who asks; a public archive does not tell.
+    pub team: Option<TeamId>,
     /// When.
     pub at: Timestamp,
     /// Plain text.
@@ -34,7 +34,7 @@ pub struct Question {
 
 struct Row {
     id: Text<QuestionId>,
-    team_id: Text<TeamId>,
+    team_id: Option<Text<TeamId>>,
     asked_at: Instant,
     text: String,
     answer: Option<String>,
@@ -48,7 +48,7 @@ impl From<Row> for Question {
         let answer = row.answer.zip(row.answered_at);
         Self {
             id: row.id.0,
-            team: row.team_id.0,
+            team: row.team_id.map(|team| team.0),
             at: row.asked_at.0,
             text: row.text,
             answer: answer.map(|(text, at)| Reply {
@@ -91,7 +91,11 @@ pub(crate) async fn count_open(connection: &mut SqliteConnection, team: TeamId) 
 }
 
 pub(crate) async fn insert(connection: &mut SqliteConnection, question: &Question) -> Result<()> {
-    let (id, team, at) = (Text(question.id), Text(question.team), Instant(question.at));
+    let (id, team, at) = (
+        Text(question.id),
+        question.team.map(Text),
+        Instant(question.at),
+    );
     sqlx::query!(
         "INSERT INTO questions (id, team_id, asked_at, text) VALUES (?, ?, ?, ?)",
         id,

@@ -139,8 +139,8 @@ pub(crate) async fn count_proposals(
     .await?)
 }
 
-/// The archives of submissions that have played a stage, that nobody enters or plays, and all of whose datasets have
-/// gone or are `going`; with their bytes.
+/// The archives of submissions that have played a stage, that nobody enters or plays, all of whose datasets have gone or
+/// are `going`, and of which nothing is to be played again: their stages are signed off. With their bytes.
 pub(crate) async fn idle_archives(
     connection: &mut SqliteConnection,
     stage: StageId,
@@ -159,6 +159,9 @@ pub(crate) async fn idle_archives(
                                AND (e.state = 'open' OR d.released_at IS NULL
                                     OR e.state = 'finished' AND e.dataset_removed_at IS NULL
                                        AND e.id NOT IN (SELECT value FROM json_each(?2))))
+             AND ((SELECT closed_at FROM season) IS NOT NULL
+                  OR NOT EXISTS (SELECT 1 FROM evaluations e JOIN stages st ON st.id = e.stage_id
+                                 WHERE e.submission_id = s.id AND st.finalised_at IS NULL))
              AND NOT EXISTS (SELECT 1 FROM drafts d JOIN proposals p ON p.id = d.proposal_id
                              WHERE d.submission_id = s.id AND p.outcome IS NULL)
              AND NOT EXISTS (SELECT 1 FROM ablations a WHERE a.submission_id = s.id AND a.finished_at IS NULL)"#,
@@ -196,15 +199,18 @@ pub(crate) async fn set_dataset_removed(
     Ok(())
 }
 
-/// The datasets whose files are there although nobody is promised them since `before`, with their keys.
+/// The datasets whose files are there although nobody is promised them since `before`, with their keys; none that has
+/// become evidence.
 pub(crate) async fn datasets_going(
     connection: &mut SqliteConnection,
     before: Timestamp,
 ) -> Result<Vec<(EvaluationId, String)>> {
     let before = Instant(before);
     let rows = sqlx::query!(
-        r#"SELECT id AS "id: Text<EvaluationId>", dataset AS "dataset!" FROM evaluations
-           WHERE dataset_removed_at IS NOT NULL AND dataset_removed_at <= ? AND dataset_gone = 0"#,
+        r#"SELECT e.id AS "id: Text<EvaluationId>", e.dataset AS "dataset!" FROM evaluations e
+           JOIN teams t ON t.id = e.team_id
+           WHERE e.dataset_removed_at IS NOT NULL AND e.dataset_removed_at <= ? AND e.dataset_gone = 0
+             AND t.disqualified_at IS NULL AND t.retired_by_organiser = 0"#,
         before
     )
     .fetch_all(connection)

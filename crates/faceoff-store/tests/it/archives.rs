@@ -36,6 +36,10 @@ const PUBLIC_COLUMNS: &[(&str, &str)] = &[
     ("frozen_boards", "frozen_at reason stage_id"),
     ("lanes", "lane rank served_ms urgency"),
     (
+        "questions",
+        "answer answered_at asked_at id public team_id text",
+    ),
+    (
         "runs",
         "cleared_at episodes_per_shard episodes_per_task id keeps_recordings limits max_faults profile recordings_removed_at ruleset \
          seed state tasks variation",
@@ -43,10 +47,6 @@ const PUBLIC_COLUMNS: &[(&str, &str)] = &[
     (
         "season",
         "closed_at created_at id name paused_at paused_for secret takes_registrations",
-    ),
-    (
-        "shards",
-        "agent_faults committed_at end_episode first_episode id log outcomes position recording run_id task unit_id",
     ),
     ("stage_retentions", "retention stage_id"),
     ("stage_revisions", "revision rules since stage_id"),
@@ -65,11 +65,6 @@ const PUBLIC_COLUMNS: &[(&str, &str)] = &[
         "affiliation created_at disqualified_at disqualified_for division id link name retired_at retired_by_organiser",
     ),
     ("terms", "since text version"),
-    (
-        "units",
-        "account_no attempts batch charged_ms claimable_at failures id kind nonce progress queue_no state without_room \
-         worker",
-    ),
 ];
 
 async fn open(file: &Path) -> SqliteConnection {
@@ -94,6 +89,10 @@ async fn count(file: &Path, table: &str) -> i64 {
 
 /// The database of an archive as it lies in a folder of its own.
 async fn archived(f: &Fixture, edition: Edition) -> tempfile::TempDir {
+    for run in f.store.unsummed_runs(1).await.unwrap() {
+        let kept = f.store.keep_episode_summary(run, 1, "{}", f.now);
+        kept.await.unwrap();
+    }
     let folder = tempfile::tempdir().unwrap();
     let snapshot = f
         .store
@@ -217,6 +216,81 @@ async fn what_is_open_is_no_result_and_no_key_goes_along() {
             f.store.evaluation(played).await.unwrap()
         );
     }
+}
+
+#[tokio::test]
+async fn everybody_gets_results_and_no_episodes() {
+    let mut f = Fixture::new().await;
+    let alpha = f.ready_team("Alpha").await;
+    let evaluation = f.evaluate(alpha.id, &small()).await;
+    f.play_to(1.0).await;
+    let public = f
+        .store
+        .snapshot(f.folder.path(), Edition::Public, "a test", f.now);
+    let error = public.await.unwrap_err();
+    assert!(
+        matches!(&error, StoreError::Conflict(why) if why.contains("1 results came in")),
+        "{error}"
+    );
+
+    let folder = archived(&f, Edition::Public).await;
+    for table in ["shards", "units"] {
+        assert_eq!(count(&database(&folder), table).await, 0, "{table}");
+    }
+    Store::import(folder.path(), f.now).await.unwrap();
+    let shown = Store::open(folder.path()).await.unwrap();
+    let summaries = shown.episode_summaries(&[evaluation.run], 1).await.unwrap();
+    assert_eq!(summaries.len(), 1);
+    let outcomes = shown.outcomes(evaluation.run).await;
+    assert!(
+        matches!(outcomes, Err(StoreError::Cleared { at }) if at == f.now),
+        "{outcomes:?}"
+    );
+    let submission = shown.submission(alpha.id).await.unwrap();
+    assert_eq!(submission.runtime, None, "no board tells it");
+}
+
+#[tokio::test]
+async fn a_ruling_that_was_lifted_is_told_to_nobody_and_a_public_answer_to_everybody() {
+    let mut f = Fixture::new().await;
+    let (alpha, beta) = (f.ready_team("Alpha").await, f.ready_team("Beta").await);
+    f.evaluate(alpha.id, &small()).await;
+    f.play_to(1.0).await;
+    for (team, why) in [(alpha.team, "it spied"), (beta.team, "it slept")] {
+        let ruling = f.store.disqualify_team(Actor::Organiser, team, why, f.now);
+        ruling.await.unwrap();
+    }
+    let lifted = f
+        .store
+        .reinstate_team(Actor::Organiser, alpha.team, "it did not", f.now);
+    lifted.await.unwrap();
+    for public in [true, false] {
+        let asked = f
+            .store
+            .ask(Actor::Team(beta.team), beta.team, "how?", f.now)
+            .await
+            .unwrap();
+        let answered = f
+            .store
+            .answer(Actor::Organiser, asked.id, "so", public, f.now);
+        answered.await.unwrap();
+    }
+    let folder = archived(&f, Edition::Public).await;
+    Store::import(folder.path(), f.now).await.unwrap();
+    let shown = Store::open(folder.path()).await.unwrap();
+    let mut connection = open(&database(&folder)).await;
+    let told: Vec<(String, String)> = sqlx::query_as(
+        "SELECT subject_id, payload FROM events WHERE kind LIKE 'team_%' AND kind <> 'team_created'",
+    )
+    .fetch_all(&mut connection)
+    .await
+    .unwrap();
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert_eq!(told[0].0, beta.team.to_string());
+    assert!(told[0].1.contains("it slept"));
+    let questions = shown.questions().await.unwrap();
+    assert_eq!(questions.len(), 1);
+    assert_eq!((&*questions[0].text, questions[0].team), ("how?", None));
 }
 
 #[tokio::test]

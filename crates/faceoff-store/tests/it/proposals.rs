@@ -108,10 +108,11 @@ async fn a_trial_takes_no_turn_reaches_no_board_and_waits_behind_what_counts() {
     refused(apply(&f, tried.id).await, &["nothing to apply"]);
     drop_it(&f, tried.id).await.unwrap();
     refused(drop_it(&f, tried.id).await, &["was dropped at"]);
+    // Its datasets and its recordings go as those of evaluations do: a day later.
+    assert_eq!(f.store.remove_dropped_datasets(f.now).await.unwrap(), 0);
+    f.later(25 * 3600);
     assert_eq!(f.store.remove_dropped_datasets(f.now).await.unwrap(), 2);
     assert_eq!(f.store.remove_dropped_datasets(f.now).await.unwrap(), 0);
-    // Its recordings go as those of evaluations do.
-    f.later(25 * 3600);
     assert_eq!(f.store.remove_old_recordings(f.now).await.unwrap(), 4);
 }
 

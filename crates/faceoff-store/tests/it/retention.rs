@@ -36,6 +36,23 @@ async fn play_day(f: &Fixture, scores: &[(&Submission, f64)], bytes: usize) -> V
     played
 }
 
+/// Has a stage close in an hour, and signs it off then.
+async fn sign_off(f: &mut Fixture, stage: StageId) {
+    let closes = StageChange {
+        closes_at: Some(Some(f.now + SignedDuration::from_hours(1))),
+        ..StageChange::default()
+    };
+    f.store
+        .change_stage(Actor::Organiser, stage, closes, f.now)
+        .await
+        .unwrap();
+    f.later(3600);
+    f.store
+        .finalise_stage(Actor::Organiser, stage, f.now)
+        .await
+        .unwrap();
+}
+
 async fn store_file(f: &Fixture, key: &str, bytes: usize) {
     let file = f.folder.path().join("file");
     std::fs::write(&file, vec![7; bytes]).unwrap();
@@ -142,6 +159,7 @@ async fn each_teams_last_evaluations_and_its_best_are_kept() {
         archives: 0,
         bytes: 3000,
         unmeasured: 0,
+        not_before: None,
     };
     assert_eq!(would, expected);
     assert!(f.store.apply_retentions(f.now).await.unwrap().is_nothing());
@@ -421,8 +439,15 @@ async fn an_archive_goes_with_its_last_dataset_unless_somebody_enters_it() {
     let stage = stage_of_season(&f).await;
     keep(&f, stage, last(1)).await.unwrap();
     let removed = f.store.apply_retentions(f.now).await.unwrap();
-    assert_eq!((removed.datasets, removed.archives), (2, 1));
-    assert_eq!(removed.bytes, 30, "two datasets and an archive");
+    assert_eq!(
+        (removed.datasets, removed.archives, removed.bytes),
+        (2, 0, 20),
+        "until the sign-off it may have to play again"
+    );
+    sign_off(&mut f, stage).await;
+    let removed = f.store.apply_retentions(f.now).await.unwrap();
+    assert_eq!((removed.datasets, removed.archives), (0, 1));
+    assert_eq!(removed.bytes, 10);
     let gone = f.store.submission(old.id).await.unwrap();
     let reason = gone.archive_removed.unwrap().reason;
     assert!(reason.contains("the last 1 and the best"), "{reason}");
@@ -447,10 +472,6 @@ async fn an_archive_goes_with_its_last_dataset_unless_somebody_enters_it() {
         .store
         .create_ablation(Actor::Organiser, old.id, &plan, f.now);
     refused(taken_apart.await, &["was removed"]);
-    let tried = f
-        .store
-        .propose_trial(Actor::Organiser, stage, Some(old.id), "why", f.now);
-    refused(tried.await, &["was removed"]);
     assert!(f.claim().await.is_none(), "nothing half done is queued");
 }
 
@@ -488,12 +509,15 @@ async fn a_team_deletes_what_it_needs_no_more() {
         .await
         .unwrap();
 
+    refused(delete(&f, first.id).await, &["not signed off"]);
+    sign_off(&mut f, evaluation.of.stage).await;
+
     let used = f.store.upload_usage(team.id, f.now).await.unwrap();
     assert_eq!(used.stored_bytes, 20);
     f.store.check_deletable(first.id, f.now).await.unwrap();
     let deleted = delete(&f, first.id).await.unwrap();
     let by = deleted.deleted.unwrap();
-    assert_eq!((by.at, by.by), (f.now, actor));
+    assert_eq!((by.at, by.by), (f.now, actor.clone()));
     assert_eq!(deleted.archive_removed.unwrap().reason, "by its team");
     assert_eq!(deleted.bundle.blake3, first.bundle.blake3);
     assert_eq!(deleted.agent_name.as_deref(), Some("striker"));
@@ -516,20 +540,9 @@ async fn a_team_deletes_what_it_needs_no_more() {
     assert_eq!(f.store.remove_files_of_removed(f.now).await.unwrap(), 1);
     assert!(!has_file(&f, &first.bundle.key).await);
     assert!(has_file(&f, &second.bundle.key).await);
-    // What it played is not played again.
-    let voided = f
-        .store
-        .void_evaluation(Actor::Organiser, evaluation.id, "why", f.now);
-    voided.await.unwrap();
-    let rerun = f
-        .store
-        .rerun_evaluation(Actor::Organiser, evaluation.id, f.now);
-    refused(rerun.await, &["was removed", "by its team"]);
-    let again = Reevaluation::Evaluation(evaluation.id);
-    let proposed = f
-        .store
-        .propose_reevaluation(Actor::Organiser, again, "why", f.now);
-    assert!(proposed.await.is_err());
+    // It plays nothing again.
+    let chosen = f.store.activate_submission(actor, first.id, f.now);
+    refused(chosen.await, &["was removed", "by its team"]);
 }
 
 #[tokio::test]
@@ -585,10 +598,11 @@ async fn what_a_day_may_have_to_play_again_is_not_deleted() {
         .await;
     refused(refusal, &["a day that is not released"]);
     f.play_to(2.0).await;
-    f.store
+    let refusal = f
+        .store
         .delete_submission(Actor::Organiser, played, "why", f.now)
-        .await
-        .unwrap();
+        .await;
+    refused(refusal, &["not signed off", "play it again"]);
 }
 
 #[tokio::test]
@@ -629,9 +643,26 @@ async fn evidence_is_kept_whatever_the_retention_or_the_team_says() {
         delete(&f, alpha.id).await,
         &["disqualified", "it spied", "evidence"],
     );
+    // So becomes what nobody is promised any more, as long as it is there.
+    let ruling = async |f: &Fixture| {
+        f.store
+            .disqualify_team(Actor::Organiser, beta.team, "it slept", f.now)
+            .await
+    };
+    ruling(&f).await.unwrap();
+    let EvaluationState::Finished { dataset, .. } = f.state(first[1]).await else {
+        panic!("it was finished")
+    };
     f.later(2 * DAY_S);
     f.store.remove_files_of_removed(f.now).await.unwrap();
     assert!(has_file(&f, &cleared.bundle.key).await, "it is evidence");
+    assert!(has_file(&f, &dataset).await);
+    f.store
+        .reinstate_team(Actor::Organiser, beta.team, "it did not", f.now)
+        .await
+        .unwrap();
+    f.store.remove_files_of_removed(f.now).await.unwrap();
+    assert!(!has_file(&f, &dataset).await);
 
     // Reinstated it is a team like any other.
     f.store

@@ -7,6 +7,7 @@ use faceoff_http::requests::ArchiveQuery;
 use futures::StreamExt;
 use reqwest::Method;
 use std::{
+    io::ErrorKind,
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -68,7 +69,21 @@ impl Client {
 /// Writes the body of an answer to a file; its length.
 async fn fetch(response: reqwest::Response, partial: &Path) -> anyhow::Result<u64> {
     let writing = || format!("writing {}", partial.display());
-    let mut writer = File::create(partial).await.with_context(writing)?;
+    // what a download that was killed has left
+    match fs::remove_file(partial).await {
+        Err(error) if error.kind() != ErrorKind::NotFound => {
+            return Err(error).with_context(writing);
+        }
+        _ => {}
+    }
+    // It may hold all that the organiser knows.
+    let mut writer = File::options()
+        .write(true)
+        .create_new(true)
+        .mode(0o600)
+        .open(partial)
+        .await
+        .with_context(writing)?;
     let mut bytes = 0;
     let mut stream = response.bytes_stream();
     while let Some(piece) = stream.next().await {
