@@ -304,7 +304,7 @@ async fn removal(
         ),
     };
     Ok(Some(format!(
-        "of the stage {:?} {retention} would be kept; {} datasets of {} teams and {} archives of submissions that nobody \
+        "of the stage {:?}, {retention} would be kept; {} datasets of {} teams and {} archives of submissions that nobody \
          plays any more ({} bytes{unmeasured}) would be removed for good, {when} or when nothing of the stage is under way, \
          to be decided, or blind; results stay",
         stage.name.as_str(),
@@ -331,15 +331,10 @@ fn ordered_anew(stage: &Stage, standings: Standings) -> String {
     )
 }
 
-/// Refuses what would change an open stage's boards unless the stage is named.
+/// Refuses what would change an open stage's boards, or remove something, unless the stage is named.
 fn check_confirmed(stage: &Stage, told: &[String], confirm: Option<&str>) -> Result<(), Problem> {
-    let name = stage.name.as_str();
-    if told.is_empty() || confirm == Some(name) {
+    if told.is_empty() {
         return Ok(());
     }
-    let detail = format!(
-        "the stage {name:?} is open: {}. To do it, send “confirm” with the stage's name",
-        told.join("; ")
-    );
-    Err(Problem::new(ProblemKind::NotConfirmed, detail).with("confirm", name))
+    Problem::check_confirmed(confirm, stage.name.as_str(), &told.join("; "))
 }

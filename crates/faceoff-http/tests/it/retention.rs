@@ -130,7 +130,13 @@ async fn a_retention_is_a_stages_from_its_making_until_after_its_sign_off() {
     site.post(&path, Some(ADMIN), &json!({ "confirm": "Qualifying" }))
         .await
         .json(200);
-    let wanted = json!({ "retention": { "days_after_sign_off": 2 } });
+    let mut wanted = json!({ "retention": { "days_after_sign_off": 2 } });
+    change(&site, wanted.clone()).await.problem(
+        409,
+        "not-confirmed",
+        &["1 datasets", "not before 2026-03-04 at 11:00 UTC"],
+    );
+    wanted["confirm"] = json!("Qualifying");
     let signed_off = change(&site, wanted).await.json(200);
     assert_eq!(signed_off["retention"], json!({ "days_after_sign_off": 2 }));
     change(&site, json!({ "name": "Other", "retention": {} }))

@@ -87,11 +87,6 @@ async fn check_idle(tx: &mut Tx, submission: &Submission) -> Result<()> {
             "the organisers still need it for something that is not decided yet: try again later",
         );
     }
-    if needs.is_unsigned {
-        return conflict(
-            "it has played a stage that is not signed off, and may have to play it again: wait until it is",
-        );
-    }
     Ok(())
 }
 

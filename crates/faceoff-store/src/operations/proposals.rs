@@ -112,11 +112,11 @@ async fn again(
         .collect();
     let mut played = Vec::new();
     for entry in all.into_iter().filter(|entry| !done.contains(&entry.team)) {
-        if let Some(stage) = newest {
-            let submission = submissions::find(tx, entry.submission).await?;
-            if stage.check_takes(&submission).is_err() {
-                continue;
-            }
+        let submission = submissions::find(tx, entry.submission).await?;
+        // One team's deleted archive keeps no other from its turn. Asked for alone, it is refused with the reason.
+        let is_gone = ids.len() > 1 && submission.archive_removed.is_some();
+        if is_gone || newest.is_some_and(|stage| stage.check_takes(&submission).is_err()) {
+            continue;
         }
         let run = run_rows::find(tx, entry.run).await?;
         let (revision, ruleset, plan) = match newest {
@@ -242,9 +242,9 @@ impl Store {
             let played = again(tx, &counting, newest).await?;
             let Some(revision) = played.iter().map(|(revision, _)| *revision).max() else {
                 return conflict(if newest.is_some() && !counting.is_empty() {
-                    "all that counts of that day was played by the stage's newest rules, or by agents that these do not take"
+                    "all that counts of that day was played by the stage's newest rules, or by agents that these do not take or that were deleted"
                 } else {
-                    "nothing of that counts, so there is nothing to play again; `rerun` plays what was voided or cancelled"
+                    "nothing of that counts or has its archive, so there is nothing to play again; `rerun` plays what was voided or cancelled"
                 });
             };
             let kind = match what {

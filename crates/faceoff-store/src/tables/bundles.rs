@@ -252,8 +252,6 @@ pub(crate) struct Needs {
     pub(crate) open: u32,
     /// Its evaluations of days that are not released.
     pub(crate) unreleased: u32,
-    /// It has played a stage that is not signed off, in a season that is not closed.
-    pub(crate) is_unsigned: bool,
     /// Trials and proposals with it that are neither applied nor dropped.
     pub(crate) proposed: u32,
 }
@@ -268,9 +266,6 @@ pub(crate) async fn needs(connection: &mut SqliteConnection, id: SubmissionId) -
                   AS "open!: u32",
                   (SELECT COUNT(*) FROM evaluations e JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
                    WHERE e.submission_id = ?1 AND d.released_at IS NULL) AS "unreleased!: u32",
-                  (SELECT closed_at FROM season) IS NULL
-                  AND EXISTS (SELECT 1 FROM evaluations e JOIN stages st ON st.id = e.stage_id
-                              WHERE e.submission_id = ?1 AND st.finalised_at IS NULL) AS "is_unsigned!: bool",
                   (SELECT COUNT(DISTINCT p.id) FROM drafts d JOIN proposals p ON p.id = d.proposal_id
                    WHERE d.submission_id = ?1 AND p.outcome IS NULL) AS "proposed!: u32""#,
         id

@@ -509,9 +509,6 @@ async fn a_team_deletes_what_it_needs_no_more() {
         .await
         .unwrap();
 
-    refused(delete(&f, first.id).await, &["not signed off"]);
-    sign_off(&mut f, evaluation.of.stage).await;
-
     let used = f.store.upload_usage(team.id, f.now).await.unwrap();
     assert_eq!(used.stored_bytes, 20);
     f.store.check_deletable(first.id, f.now).await.unwrap();
@@ -543,6 +540,14 @@ async fn a_team_deletes_what_it_needs_no_more() {
     // It plays nothing again.
     let chosen = f.store.activate_submission(actor, first.id, f.now);
     refused(chosen.await, &["was removed", "by its team"]);
+    let voided = f
+        .store
+        .void_evaluation(Actor::Organiser, evaluation.id, "why", f.now);
+    voided.await.unwrap();
+    let rerun = f
+        .store
+        .rerun_evaluation(Actor::Organiser, evaluation.id, f.now);
+    refused(rerun.await, &["was removed", "by its team"]);
 }
 
 #[tokio::test]
@@ -598,11 +603,25 @@ async fn what_a_day_may_have_to_play_again_is_not_deleted() {
         .await;
     refused(refusal, &["a day that is not released"]);
     f.play_to(2.0).await;
-    let refusal = f
-        .store
+    f.store
         .delete_submission(Actor::Organiser, played, "why", f.now)
-        .await;
-    refused(refusal, &["not signed off", "play it again"]);
+        .await
+        .unwrap();
+    // The other one's turn is not this one's to keep from it.
+    let stage = stage_of_season(&f).await;
+    let of = f.store.evaluation(done).await.unwrap().of;
+    assert_eq!(of.stage, stage);
+    let again = async |what| {
+        f.store
+            .propose_reevaluation(Actor::Organiser, what, "why", f.now)
+            .await
+    };
+    let proposal = again(Reevaluation::Day(of)).await.unwrap();
+    let drafts = f.store.proposal(proposal.id).await.unwrap().1;
+    assert_eq!(drafts.len(), 1);
+    assert_ne!(drafts[0].submission, played);
+    let alone = again(Reevaluation::Evaluation(done)).await;
+    refused(alone, &["was removed", "cannot be played again"]);
 }
 
 #[tokio::test]

@@ -491,6 +491,10 @@ async fn a_folder_of_an_earlier_version_becomes_an_archive_too() {
         .unpack(folder.path())
         .unwrap();
     let store = Store::open(&folder.path().join("data")).await.unwrap();
+    for run in store.unsummed_runs(0).await.unwrap() {
+        let kept = store.keep_episode_summary(run, 0, "{}", now());
+        kept.await.unwrap();
+    }
     for edition in [
         faceoff_store::Edition::Public,
         faceoff_store::Edition::Organiser,
