@@ -4,7 +4,7 @@ use crate::{
     app::App,
     auth::Organiser,
     extract::{Json as Body, PathParam},
-    problem::{Problem, ProblemKind},
+    problem::Problem,
     requests::{NewStage, StageChange},
     viewer::Viewer,
     views::stage::{self, StageView},

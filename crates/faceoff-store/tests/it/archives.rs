@@ -220,7 +220,7 @@ async fn what_is_open_is_no_result_and_no_key_goes_along() {
 
 #[tokio::test]
 async fn everybody_gets_results_and_no_episodes() {
-    let mut f = Fixture::new().await;
+    let f = Fixture::new().await;
     let alpha = f.ready_team("Alpha").await;
     let evaluation = f.evaluate(alpha.id, &small()).await;
     f.play_to(1.0).await;
