@@ -252,7 +252,7 @@ async fn everybody_gets_results_and_no_episodes() {
 
 #[tokio::test]
 async fn a_ruling_that_was_lifted_is_told_to_nobody_and_a_public_answer_to_everybody() {
-    let mut f = Fixture::new().await;
+    let f = Fixture::new().await;
     let (alpha, beta) = (f.ready_team("Alpha").await, f.ready_team("Beta").await);
     f.evaluate(alpha.id, &small()).await;
     f.play_to(1.0).await;
