@@ -66,6 +66,8 @@ pub struct GameStep {
     pub window: Option<[Violations; 2]>,
     /// The true state after this step, before a new rally.
     pub state: GameState,
+    /// How the world diverged, if that ended the rally.
+    pub divergence: Option<Divergence>,
 }
 
 impl Game {
@@ -121,7 +123,8 @@ impl Game {
         for (values, violations) in constraints.iter().zip(&mut self.violations) {
             values.mark(violations);
         }
-        let rally_end = match world.divergence() {
+        let divergence = world.divergence();
+        let rally_end = match divergence {
             Some(Divergence { by, .. }) => {
                 let end = RallyEnd::Diverged { by };
                 self.referee.ends_by(end);
@@ -142,6 +145,7 @@ impl Game {
             constraints,
             window,
             state,
+            divergence,
         }
     }
 
