@@ -11,6 +11,7 @@ mod head_to_head;
 mod result;
 mod round_number;
 mod rules;
+mod score;
 mod side;
 mod standings;
 mod submission_label;
@@ -19,12 +20,13 @@ pub use bye::{Bye, POINTS_BYE};
 pub use departures::{Departure, Departures, LeavesTwice, LeftAs};
 pub use game::{GameEntry, InvalidGame, PlayedGame, ScoredGame};
 pub use head_to_head::{HeadToHead, head_to_head};
-pub use result::{DrawnBy, Forfeit, GameResult, WonBy};
+pub use result::{DrawnBy, Forfeit, GameResult, Why, WonBy};
 pub use round_number::{InvalidRoundNumber, RoundNumber};
 pub use rules::{
     FORFEIT_GOALS, GameFacts, POINTS_DRAW, POINTS_LOSS, POINTS_WIN, final_score, forfeit_score,
     judge, winner,
 };
+pub use score::{GameScore, PlayedAs, SideScore, score_game, window_penalty};
 pub use side::Side;
 pub use standings::{
     RepeatedPairing, Standing, Tournament, score_tournament, score_tournament_with,

@@ -36,7 +36,7 @@ pub enum WonBy {
 }
 
 /// Why nobody won.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DrawnBy {
     /// Both sides were safe enough, and their final scores equal.
@@ -110,14 +110,23 @@ impl fmt::Display for GameResult {
 }
 
 /// The fields of a game's JSON that say why.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(super) struct Why {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    won_by: Option<&'static str>,
-    #[serde(skip_serializing_if = "Option::is_none")]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Why {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    won_by: Option<WonByWord>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     winner_led: Option<bool>,
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     drawn_by: Option<DrawnBy>,
+}
+
+/// [`WonBy`] in a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum WonByWord {
+    Score,
+    Tier,
+    Forfeit,
 }
 
 impl From<GameResult> for Why {
@@ -126,9 +135,9 @@ impl From<GameResult> for Why {
             GameResult::Drawn(by) => (None, Some(by)),
             GameResult::Won { by, .. } => {
                 let by = match by {
-                    WonBy::Score => "score",
-                    WonBy::Tier { .. } => "tier",
-                    WonBy::Forfeit { .. } => "forfeit",
+                    WonBy::Score => WonByWord::Score,
+                    WonBy::Tier { .. } => WonByWord::Tier,
+                    WonBy::Forfeit { .. } => WonByWord::Forfeit,
                 };
                 (Some(by), None)
             }
