@@ -68,7 +68,7 @@ struct RallyUnderWay {
 
 /// What a game has come to.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PlayedGame<S> {
+pub struct FinishedGame<S> {
     /// All that scoring needs but the times.
     pub outcome: GameOutcome,
     /// Computation times of each side's answers, in order of play, in seconds.
@@ -301,13 +301,13 @@ impl<S: GameSink> GameCourse<S> {
     ///
     /// # Panics
     /// If it has not.
-    pub fn finish(self) -> PlayedGame<S> {
+    pub fn finish(self) -> FinishedGame<S> {
         let end = self.end.expect("a game is finished once it has ended");
         let referee = self.game.referee();
         let [first, second] = self.sides;
         let (first, first_times) = first.finish(referee.goals[0], referee.fouls[0]);
         let (second, second_times) = second.finish(referee.goals[1], referee.fouls[1]);
-        PlayedGame {
+        FinishedGame {
             outcome: GameOutcome {
                 steps: self.game.steps(),
                 rallies: self.rallies,

@@ -13,7 +13,7 @@ mod time_sum;
 
 pub use arena::Arena;
 pub use course::{Course, NotFinite, Question};
-pub use game_course::{GameCourse, PlayedGame};
+pub use game_course::{FinishedGame, GameCourse};
 pub use game_record::{
     Effect, Entry, GameSink, GameStepRow, RallyEnding, RallyRow, RallyStart, Response, SideFault,
     SideStep,
