@@ -59,6 +59,28 @@ pub struct GameScore {
     pub end: String,
 }
 
+impl GameScore {
+    /// Who won, and why.
+    #[must_use]
+    pub fn result(&self) -> GameResult {
+        let [first, second] = &self.sides;
+        judge(&GameFacts {
+            score: final_score([first.goals, second.goals], [first.fouls, second.fouls]),
+            penalty_points: [first.penalty_points, second.penalty_points],
+            windows: self.windows,
+            forfeits: [first.forfeit, second.forfeit].map(by),
+        })
+    }
+}
+
+/// What was used up, without the numbers.
+fn by(cause: Option<ForfeitCause>) -> Option<Forfeit> {
+    cause.map(|cause| match cause {
+        ForfeitCause::Faults { .. } => Forfeit::Faults,
+        ForfeitCause::Time { .. } => Forfeit::Time,
+    })
+}
+
 /// What one side of a game scored.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SideScore {
@@ -118,13 +140,8 @@ pub fn score_game(
     let played_score = final_score([first.goals, second.goals], [first.fouls, second.fouls]);
     let penalty_points = [points(first), points(second)];
     let causes = outcome.end.forfeits();
-    let forfeits = causes.map(|cause| {
-        cause.map(|cause| match cause {
-            ForfeitCause::Faults { .. } => Forfeit::Faults,
-            ForfeitCause::Time { .. } => Forfeit::Time,
-        })
-    });
-    let result: GameResult = judge(&GameFacts {
+    let forfeits = causes.map(by);
+    let result = judge(&GameFacts {
         score: played_score,
         penalty_points,
         windows,
@@ -294,6 +311,7 @@ mod tests {
         );
         assert_eq!(json["sides"][0]["violations"]["ee"], 3);
         assert_eq!(json["sides"][0]["computation_time_s"]["max"], 0.3);
+        assert_eq!(score.result().winner(), score.winner);
         assert_eq!(serde_json::from_value::<GameScore>(json).unwrap(), score);
     }
 
