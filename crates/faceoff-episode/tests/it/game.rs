@@ -4,7 +4,7 @@ use faceoff_episode::{
     Answered, Arena, Effect, Entry, FinishedGame, GameCourse, GameSink, GameStepRow, RallyEnding,
     RallyRow, RallyStart, RecordError, Response, SideFault,
 };
-use faceoff_sim::RallyEnd;
+use faceoff_sim::{Bounds, RallyEnd};
 use faceoff_types::{
     AgentFaultKind, Contest, ForfeitCause, GameEnd, GameLimits, Interpolation, Profile, Seed, Side,
 };
@@ -13,6 +13,12 @@ fn arena() -> Arena {
     let seed = Seed::from_number(3);
     Arena::new(Profile::Ideal, seed, seed.model_mismatch())
 }
+
+/// Less than what a joint is pushed to by commands at the bound.
+const NARROW: Bounds = Bounds {
+    joint_rad_s: 20.0,
+    ..Bounds::WIDE
+};
 
 fn took(computation_time_s: f64) -> Answered {
     Answered {
@@ -82,7 +88,11 @@ fn enters(course: &GameCourse<Told>, side: Side) -> Entry {
 }
 
 fn play(steps: u32, limits: GameLimits, does: [Does; 2]) -> FinishedGame<Told> {
-    let mut course = GameCourse::begin(&arena(), steps, limits, Told::default());
+    play_in(&arena(), steps, limits, does)
+}
+
+fn play_in(arena: &Arena, steps: u32, limits: GameLimits, does: [Does; 2]) -> FinishedGame<Told> {
+    let mut course = GameCourse::begin(arena, steps, limits, Told::default());
     let mut speeds = [[0.0; 7]; 2];
     while course.end().is_none() {
         course
@@ -272,7 +282,8 @@ fn a_world_that_diverges_is_the_fault_of_the_side_that_made_it() {
     fn explodes(_: u32, _: u32) -> Does1 {
         Does1::Explodes
     }
-    let game = play(3000, GameLimits::default(), [holds, explodes]);
+    let narrow = arena().within(NARROW);
+    let game = play_in(&narrow, 1000, GameLimits::default(), [holds, explodes]);
     let [good, bad] = &game.outcome.sides;
     assert_eq!(good.faults, []);
     assert!(!bad.faults.is_empty());
