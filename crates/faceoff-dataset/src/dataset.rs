@@ -13,8 +13,11 @@ pub use episodes::EpisodeRecord;
 pub use layout::Layout;
 pub use steps::{StepBatches, StepTable};
 
+pub(crate) use container::Container;
 pub(crate) use episodes::Columns;
 pub(crate) use file_range::FileRange;
+pub(crate) use footer::check as check_footer;
+pub(crate) use steps::{BATCH_ROWS, has_columns};
 
 use crate::{
     digest,
@@ -26,7 +29,6 @@ use crate::{
     table::HOST_TIME,
 };
 use arrow_array::RecordBatch;
-use container::Container;
 use faceoff_types::{EvaluationResult, Task};
 use faceoff_wire::dataset::{CalibrationFile, DatasetManifest, FileDigest, ViolationsFile};
 use fs_err as fs;

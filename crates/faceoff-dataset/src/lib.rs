@@ -1,5 +1,6 @@
 //! Recordings of evaluations: the tables' schema, writing a shard as it is played, joining shards to a
-//! dataset and scoring them, reading a dataset as a whole or by episode, and verifying it.
+//! dataset and scoring them, reading a dataset as a whole or by episode, and verifying it. The same of games,
+//! which are recorded as a whole.
 //!
 //! This crate starts no process and knows neither sandbox nor database. It reads no clock: measured
 //! times come from the caller or from the record.
@@ -10,6 +11,8 @@ mod dataset;
 mod digest;
 mod error;
 mod files;
+pub mod game;
+mod interpolation_text;
 mod recorder;
 mod score;
 mod shard;

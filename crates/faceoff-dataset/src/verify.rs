@@ -5,7 +5,7 @@
 //! Computation times, CPU times, faults, the slots' calibration and re-runs cannot be simulated.
 //! They are taken from the record, as they are; what follows from them is computed again.
 
-mod compare;
+pub(crate) mod compare;
 mod difference;
 mod error;
 mod feed;
@@ -163,6 +163,7 @@ impl Totals {
                 file: CALIBRATION_FILE.to_owned(),
                 task: None,
                 episode: None,
+                rally: None,
                 step: None,
                 field: "host_noise_reruns".to_owned(),
                 recorded: format!("{counted} in all"),

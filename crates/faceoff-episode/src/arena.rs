@@ -1,7 +1,7 @@
-use faceoff_sim::{Bounds, Episode, PerturbationSettings, Plant};
+use faceoff_sim::{Bounds, Episode, Game, GameSetup, PerturbationSettings, Plant};
 use faceoff_types::{Factors, Interpolation, Profile, Ruleset, Seed, Task};
 
-/// What all episodes of an evaluation share: the rules, the perturbations, the season's plant and the
+/// What all episodes of an evaluation share, or all rallies of a game: the rules, the perturbations, the season's plant and the
 /// seed that theirs derive from.
 #[derive(Debug, Clone)]
 pub struct Arena {
@@ -62,6 +62,19 @@ impl Arena {
             &self.plant,
             self.seed(task, index),
         )
+        .within(self.bounds)
+    }
+
+    /// A game at the start of its first rally; the seed is the game's own.
+    #[must_use]
+    pub fn game(&self, interpolation: [Interpolation; 2]) -> Game {
+        Game::new(GameSetup {
+            interpolation,
+            factors: self.factors,
+            settings: self.settings.clone(),
+            plant: self.plant.clone(),
+            seed: self.seed,
+        })
         .within(self.bounds)
     }
 }

@@ -61,11 +61,11 @@ pub struct Question<'a> {
 /// The initial state is not finite. No agent can be asked then: JSON would say null, and the agent
 /// would be blamed for what it makes of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the simulator's first observation of {task}, episode {episode} is not finite")]
+#[error("the simulator's first observation of {contest}, episode {episode} is not finite")]
 pub struct NotFinite {
     /// What was to be played.
-    pub task: Task,
-    /// Index within the evaluation.
+    pub contest: Contest,
+    /// Index within the evaluation, or the game's rally.
     pub episode: u32,
 }
 
@@ -113,7 +113,7 @@ impl<S: StepSink> Course<S> {
         // Later ones are finite: a world that diverges is the agent's fault.
         if step == 0 && !are_finite(observation) {
             return Err(NotFinite {
-                task: self.task,
+                contest: Contest::Task(self.task),
                 episode: self.episode,
             });
         }
@@ -242,6 +242,6 @@ impl<S: StepSink> Course<S> {
     }
 }
 
-fn are_finite(observation: &[f64]) -> bool {
+pub(crate) fn are_finite(observation: &[f64]) -> bool {
     observation.iter().all(|value| value.is_finite())
 }

@@ -4,7 +4,7 @@
 
 use crate::fault::PlatformFault;
 use faceoff_sandbox::affinity::pin_current_thread;
-use faceoff_types::RoundTrips;
+use faceoff_types::{RoundTrips, SlotTiming};
 use faceoff_wire::Message;
 use std::{
     io::{self, PipeReader, PipeWriter, Read as _, Write as _},
@@ -13,15 +13,15 @@ use std::{
 };
 
 /// Round trips before the first episode.
-pub(crate) const BEFORE: u32 = 200;
+const BEFORE: u32 = 200;
 /// Round trips after each episode.
-pub(crate) const BETWEEN: u32 = 10;
+const BETWEEN: u32 = 10;
 /// Bytes of an answer with two times seven numbers of full length.
 const ANSWER_BYTES: usize = 320;
 
 /// The calibration agent. It ends with this.
 #[derive(Debug)]
-pub(crate) struct CalibrationAgent {
+struct CalibrationAgent {
     question: Vec<u8>,
     answer: Vec<u8>,
     /// `None` only while it is being dropped.
@@ -89,6 +89,48 @@ impl Drop for CalibrationAgent {
     }
 }
 
+/// The noise floor of one agent's CPUs, measured while a slot plays.
+#[derive(Debug)]
+pub(crate) struct Calibration {
+    agent: CalibrationAgent,
+    before_s: Vec<f64>,
+    during_s: Vec<f64>,
+}
+
+impl Calibration {
+    /// Measures before the first episode or rally.
+    pub fn start(agent_cpus: &[usize]) -> Result<Self, PlatformFault> {
+        let mut agent = CalibrationAgent::start(agent_cpus)?;
+        let mut before_s = Vec::new();
+        agent.measure(BEFORE, &mut before_s)?;
+        Ok(Self {
+            agent,
+            before_s,
+            during_s: Vec::new(),
+        })
+    }
+
+    /// Measures between two of them.
+    pub fn between_episodes(&mut self) -> Result<(), PlatformFault> {
+        self.agent.measure(BETWEEN, &mut self.during_s)
+    }
+
+    pub fn finish(
+        mut self,
+        longest_stall_s: f64,
+        host_noise_reruns: u32,
+        platform_retries: u32,
+    ) -> SlotTiming {
+        SlotTiming {
+            before_s: summarise(&mut self.before_s),
+            during_s: summarise(&mut self.during_s),
+            longest_stall_s,
+            host_noise_reruns,
+            platform_retries,
+        }
+    }
+}
+
 /// Answers until the question's pipe is closed.
 fn answer(cpus: &[usize], length: usize, mut questions: PipeReader, mut answers: PipeWriter) {
     if let Err(error) = pin_current_thread(cpus) {
@@ -104,7 +146,7 @@ fn answer(cpus: &[usize], length: usize, mut questions: PipeReader, mut answers:
 }
 
 /// Median, 99th percentile (both nearest rank) and maximum; zeros without a round trip.
-pub(crate) fn summarise(times_s: &mut [f64]) -> RoundTrips {
+fn summarise(times_s: &mut [f64]) -> RoundTrips {
     times_s.sort_unstable_by(f64::total_cmp);
     let rank = |percent: usize| times_s[(times_s.len() * percent).div_ceil(100).max(1) - 1];
     if times_s.is_empty() {

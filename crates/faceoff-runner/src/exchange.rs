@@ -66,6 +66,13 @@ impl Answer {
     }
 }
 
+impl Sent {
+    /// The evaluator could not look for the answer for so long: it saw to another agent.
+    pub fn was_away(&mut self, away: Duration) {
+        self.wait.was_away(away);
+    }
+}
+
 impl<'w> Exchange<'w> {
     /// Starts the bundle's command.
     pub fn start(
@@ -171,7 +178,10 @@ impl<'w> Exchange<'w> {
                 ReadLine::Line { bytes, at } => return Ok(Some(self.answer(sent, bytes, at))),
                 ReadLine::TooLong { head } => return Err(too_long(&head)),
                 ReadLine::Closed => return Err(self.closed()),
-                ReadLine::TimedOut => self.look(sent)?,
+                ReadLine::TimedOut => {
+                    sent.wait.nothing_is_there();
+                    self.look(sent)?;
+                }
             }
             if until <= stop {
                 return Ok(None);

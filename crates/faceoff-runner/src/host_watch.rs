@@ -55,6 +55,8 @@ pub(crate) struct Wait {
     last: Option<CpuReading>,
     /// For how long the agent was seen waiting to run at two looks in a row.
     unlet: Duration,
+    /// For how long the evaluator was busy with another agent's end since nothing was there.
+    away: Duration,
     /// When the evaluator wants to be woken.
     pub wake: Instant,
     /// When the limit is over, as extended so far.
@@ -95,6 +97,7 @@ impl Wait {
             late: None,
             last: None,
             unlet: Duration::ZERO,
+            away: Duration::ZERO,
             wake: (asked + FIRST_LOOK).min(deadline),
             deadline,
         }
@@ -130,6 +133,16 @@ impl Wait {
         self.late.as_ref()?.as_ref()
     }
 
+    /// The evaluator could not look for an answer for so long.
+    pub fn was_away(&mut self, away: Duration) {
+        self.away += away;
+    }
+
+    /// The evaluator looked, and there was nothing: whatever kept it from looking earlier made nothing later.
+    pub fn nothing_is_there(&mut self) {
+        self.away = Duration::ZERO;
+    }
+
     /// The evaluator woke for nothing: when to wake next.
     pub fn sleep_on(&mut self, now: Instant) {
         self.wake = (now + NEXT_LOOK).min(self.deadline);
@@ -158,7 +171,11 @@ impl Wait {
             .map(|kept| kept.max(self.unlet.min(most)) + overslept)
             // Whatever the rest says: while it ran, it was not kept from running.
             .map(|proven| proven.min(wall.saturating_sub(ran)));
-        watch.taken(self.asked, now, proven).min(wall)
+        // What the evaluator did elsewhere is nobody's but ours, whoever shares whose CPUs.
+        watch
+            .taken(self.asked, now, proven)
+            .max(self.away)
+            .min(wall)
     }
 
     /// The limit is over: extends it by what the host took, unless it is over all the same.
@@ -297,6 +314,22 @@ mod tests {
         assert_eq!(taken(40, 42, false), MS(0), "it may have run meanwhile");
         assert_eq!(taken(1, 12, true), MS(6), "that is ordinary");
         assert_eq!(taken(40, 41, true), MS(40), "but never what it ran");
+    }
+
+    #[test]
+    fn an_evaluator_that_saw_to_another_agent_is_nobodys_delay() {
+        let asked = Instant::now();
+        let mut wait = Wait::begin(None, asked, asked, MS(1000));
+        let taken = |wait: &Wait, at| wait.taken(&Counters, evidence(asked + MS(at), 0, 1, false));
+        wait.was_away(MS(500));
+        assert_eq!(
+            taken(&wait, 510),
+            MS(500),
+            "its answer may lie there for as long"
+        );
+        assert_eq!(taken(&wait, 400), MS(400), "but never longer than the wait");
+        wait.nothing_is_there();
+        assert_eq!(taken(&wait, 510), MS(0), "it was still at work");
     }
 
     #[test]

@@ -1,5 +1,5 @@
-//! Runs one agent over one shard of an evaluation: bundle → sandboxed process ⇄ JSON lines ⇄
-//! simulator → recording and report.
+//! Runs one agent over one shard of an evaluation, or two agents through a game: bundle → sandboxed
+//! process ⇄ JSON lines ⇄ simulator → recording and report.
 //!
 //! Two kinds of failure never mix: what the agent does wrong is an
 //! [`AgentFault`](faceoff_types::AgentFault) inside of a report that succeeded, what fails on our
@@ -15,6 +15,7 @@ mod calibration;
 mod config;
 mod exchange;
 mod fault;
+mod game;
 mod host_watch;
 mod log;
 mod player;
@@ -27,8 +28,10 @@ mod wire_env;
 pub use config::AgentEnvironment;
 pub use faceoff_dataset::{Assembled, ShardReport, assemble};
 pub use faceoff_types::TimeLimits;
+pub use faceoff_wire::game::{GameCalibration, GameSpec};
 pub use faceoff_wire::work::{EvaluationMeta, ShardSpec, SmokeSpec};
 pub use fault::{PlatformFault, Trouble};
+pub use game::{GameObserver, GameReport, play_game, run_game, run_game_watched};
 pub use host_watch::{Counters, HostWatch};
 pub use session::Session;
 pub use shard::{Observer, play_shard, run_shard, run_shard_watched};

@@ -21,6 +21,7 @@ pub struct Session<'w> {
     exchange: Exchange<'w>,
     time: TimeLimits,
     interpolation: Interpolation,
+    startup_s: f64,
     asked: Option<Asked>,
     /// The last action; its memory is reused.
     action: Vec<f64>,
@@ -65,10 +66,11 @@ impl<'w> Session<'w> {
             Exchange::start(bundle, env, watch).map_err(|trouble| (trouble, String::new()))?;
         let stated = bundle.manifest.interpolation;
         match hello(&mut exchange, contest, stated, env.time.startup_s) {
-            Ok(interpolation) => Ok(Self {
+            Ok((interpolation, startup_s)) => Ok(Self {
                 exchange,
                 time: env.time.clone(),
                 interpolation,
+                startup_s,
                 asked: None,
                 action: Vec::new(),
             }),
@@ -80,6 +82,12 @@ impl<'w> Session<'w> {
     #[must_use]
     pub const fn interpolation(&self) -> Interpolation {
         self.interpolation
+    }
+
+    /// How long the agent took to start, less what the host took, in seconds.
+    #[must_use]
+    pub const fn startup_s(&self) -> f64 {
+        self.startup_s
     }
 
     /// Announces an episode and waits until the agent is ready.
@@ -132,6 +140,20 @@ impl<'w> Session<'w> {
         let sent = self.exchange.send(message, phase, limit_s)?;
         self.asked = Some(Asked { question, sent });
         Ok(())
+    }
+
+    /// Nobody looked for the answer that is due for so long, since something of ours was seen to: the agent
+    /// is not charged for it if its answer is there at the next look.
+    pub fn was_not_looked_at(&mut self, away: Duration) {
+        if let Some(asked) = &mut self.asked {
+            asked.sent.was_away(away);
+        }
+    }
+
+    /// Is an answer due?
+    #[must_use]
+    pub const fn is_asked(&self) -> bool {
+        self.asked.is_some()
     }
 
     /// Waits until one of the agents whose answer is due has written something or has met its limit,
@@ -216,13 +238,13 @@ impl<'w> Session<'w> {
     }
 }
 
-/// The agent's first answer; `stated` is the interpolation that `agent.toml` promises.
+/// What the agent's first answer says, and how long that took; `stated` is the interpolation that `agent.toml` promises.
 fn hello(
     exchange: &mut Exchange<'_>,
     contest: Contest,
     stated: Option<i64>,
     limit_s: f64,
-) -> Result<Interpolation, Trouble> {
+) -> Result<(Interpolation, f64), Trouble> {
     let hello = Message::hello(contest, wire_env(contest));
     // Its time begins when its sandbox stands: what that took was ours.
     let mut sent = exchange.send(&hello, Phase::StartUp, limit_s)?;
@@ -235,7 +257,10 @@ fn hello(
                 got: format!("ready with interpolation {}", ready.interpolation),
             }))
         }
-        _ => Ok(ready.interpolation),
+        _ => Ok((
+            ready.interpolation,
+            answer.waited.of_the_agent().as_secs_f64(),
+        )),
     }
 }
 

@@ -1,6 +1,6 @@
 use crate::{
     bundle::Bundle,
-    calibration::{self, CalibrationAgent},
+    calibration::Calibration,
     config::AgentEnvironment,
     fault::PlatformFault,
     host_watch::{Counters, HostWatch},
@@ -9,7 +9,7 @@ use crate::{
 use faceoff_dataset::{Recorder, ShardFolder, ShardReport};
 use faceoff_episode::{Arena, StepSink};
 use faceoff_sandbox::affinity::PinnedElsewhere;
-use faceoff_types::{EpisodeOutcome, SlotTiming};
+use faceoff_types::EpisodeOutcome;
 use faceoff_wire::work::ShardSpec;
 use std::path::Path;
 
@@ -98,7 +98,11 @@ pub fn play_shard(
             return Err(fault);
         }
     };
-    let timing = calibration.finish(&player, spec.platform_retries);
+    let timing = calibration.finish(
+        player.longest_stall_s(),
+        player.host_noise_reruns(),
+        spec.platform_retries,
+    );
     let log = player.close()?;
     observer.log(&log);
     Ok(ShardReport {
@@ -135,39 +139,4 @@ fn play(
         }
     }
     Ok((outcomes, false))
-}
-
-/// The slot's noise floor, measured by the calibration agent.
-struct Calibration {
-    agent: CalibrationAgent,
-    before_s: Vec<f64>,
-    during_s: Vec<f64>,
-}
-
-impl Calibration {
-    /// Measures before the first episode.
-    fn start(agent_cpus: &[usize]) -> Result<Self, PlatformFault> {
-        let mut agent = CalibrationAgent::start(agent_cpus)?;
-        let mut before_s = Vec::new();
-        agent.measure(calibration::BEFORE, &mut before_s)?;
-        Ok(Self {
-            agent,
-            before_s,
-            during_s: Vec::new(),
-        })
-    }
-
-    fn between_episodes(&mut self) -> Result<(), PlatformFault> {
-        self.agent.measure(calibration::BETWEEN, &mut self.during_s)
-    }
-
-    fn finish(mut self, player: &Player<'_>, platform_retries: u32) -> SlotTiming {
-        SlotTiming {
-            before_s: calibration::summarise(&mut self.before_s),
-            during_s: calibration::summarise(&mut self.during_s),
-            longest_stall_s: player.longest_stall_s(),
-            host_noise_reruns: player.host_noise_reruns(),
-            platform_retries,
-        }
-    }
 }

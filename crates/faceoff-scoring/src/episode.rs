@@ -1,4 +1,4 @@
-use faceoff_types::{ComputationTime, EpisodeEnd, EpisodeOutcome};
+use faceoff_types::{ComputationTime, EpisodeEnd, EpisodeOutcome, Violations};
 
 /// Points for leaving the end effector's bounds (paper §2.2).
 pub const EE_POINTS: f64 = 3.0;
@@ -56,7 +56,11 @@ pub(crate) fn has_fault(outcome: &EpisodeOutcome) -> bool {
 /// An agent fault costs the full points for computation time, whatever the steps before it took.
 #[must_use]
 pub fn episode_penalty(outcome: &EpisodeOutcome) -> f64 {
-    let broken = &outcome.violations;
+    violation_points(&outcome.violations) + time_or_fault_penalty(outcome)
+}
+
+/// Points for constraints that the robot's motion broke.
+pub(crate) fn violation_points(broken: &Violations) -> f64 {
     [
         (broken.ee, EE_POINTS),
         (broken.link, LINK_POINTS),
@@ -66,8 +70,7 @@ pub fn episode_penalty(outcome: &EpisodeOutcome) -> f64 {
     .into_iter()
     .filter(|(violated, _)| *violated)
     .map(|(_, points)| points)
-    .sum::<f64>()
-        + time_or_fault_penalty(outcome)
+    .sum()
 }
 
 #[cfg(test)]

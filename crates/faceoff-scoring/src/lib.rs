@@ -4,15 +4,15 @@
 //! again without simulating, and anyone can check a published number. The rules are those of the
 //! rulesets of [`faceoff_types::Ruleset`]; `docs/rules.md` explains them.
 //!
-//! This crate reads no file, no clock and no random numbers (the bootstrap of the tiers draws from a hash
-//! of what it is given), and it knows neither the simulator nor
-//! the database.
+//! This crate reads no file, no clock and no random numbers (bootstraps draw from a hash of what they are given,
+//! schedules from a seed that they are given), and it knows neither the simulator nor the database.
 
 mod ablation;
 mod binomial;
 mod board;
 mod comparison;
 mod difference;
+mod draws;
 mod episode;
 mod evaluation;
 mod interval;

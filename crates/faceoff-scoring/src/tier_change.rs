@@ -1,6 +1,6 @@
 //! How sure a tier is: the bootstrap over episodes.
 
-use crate::{episode::MAX_EPISODE_PENALTY, tier::tier_within};
+use crate::{draws::Draws, episode::MAX_EPISODE_PENALTY, tier::tier_within};
 use faceoff_types::{Task, Tier, TierBounds};
 use std::collections::BTreeMap;
 
@@ -114,37 +114,6 @@ impl TaskPoints {
 
 fn tier_of_halves(bounds: &TierBounds, halves: u64, episodes: u32) -> Tier {
     tier_within(bounds, halves as f64 / 2.0, episodes)
-}
-
-/// Draws from an endless stream of bytes.
-struct Draws {
-    stream: blake3::OutputReader,
-    buffer: Box<[u8; Self::BYTES]>,
-    used: usize,
-}
-
-impl Draws {
-    const BYTES: usize = 16 * 1024;
-
-    fn new(stream: blake3::OutputReader) -> Self {
-        Self {
-            stream,
-            buffer: Box::new([0; Self::BYTES]),
-            used: Self::BYTES,
-        }
-    }
-
-    /// A number below `n`. Not perfectly even: by a share of n / 2³², which 2000 resamples cannot show.
-    fn below(&mut self, n: u32) -> usize {
-        if self.used == Self::BYTES {
-            self.stream.fill(&mut self.buffer[..]);
-            self.used = 0;
-        }
-        let bytes = &self.buffer[self.used..self.used + 4];
-        self.used += 4;
-        let draw = u32::from_le_bytes(bytes.try_into().expect("a slice of four bytes"));
-        ((u64::from(draw) * u64::from(n)) >> 32) as usize
-    }
 }
 
 #[cfg(test)]

@@ -34,7 +34,7 @@ pub use episode::{
     constraints::ConstraintValues,
     env_info::{EnvInfo, env_info, env_info_for},
 };
-pub use game::{Game, GameSetup, GameStep, referee::RallyEnd};
+pub use game::{Game, GameSetup, GameState, GameStep, referee::RallyEnd};
 // Actions and joint states are in terms of these.
 pub use faceoff_types::{Interpolation, JOINTS, PerturbationSettings, SUBSTEPS};
 pub use robot::plant::Plant;

@@ -53,6 +53,18 @@ pub enum Side {
 }
 
 impl Side {
+    /// Both, in the order of pairs.
+    pub const BOTH: [Self; 2] = [Self::First, Self::Second];
+
+    /// The opponent's.
+    #[must_use]
+    pub const fn other(self) -> Self {
+        match self {
+            Self::First => Self::Second,
+            Self::Second => Self::First,
+        }
+    }
+
     /// As agents know it: 1 or 2.
     #[must_use]
     pub const fn number(self) -> u32 {

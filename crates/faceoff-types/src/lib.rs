@@ -13,6 +13,8 @@ mod contest;
 mod day_deadline;
 mod fault;
 mod full_disk;
+mod game;
+mod game_limits;
 mod harmless;
 mod ids;
 mod interpolation;
@@ -49,6 +51,8 @@ pub use contest::{Contest, Side};
 pub use day_deadline::{DayDeadline, LONGEST_DEADLINE_H, ParseDayDeadlineError};
 pub use fault::{AgentFault, AgentFaultKind, Phase};
 pub use full_disk::tells_of_full_disk;
+pub use game::{ForfeitCause, GameEnd, GameFault, GameOutcome, GameWindow, SideOutcome};
+pub use game_limits::GameLimits;
 pub use harmless::{harmless, is_harmless};
 pub use ids::{
     AblationId, AnnouncementId, EvaluationId, InvitationId, ParseIdError, PersonId, ProposalId,

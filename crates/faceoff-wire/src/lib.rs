@@ -10,10 +10,12 @@
 //! * [`answer`]: what the agent answers (`ready`, `act`);
 //! * [`Manifest`][]: `agent.toml`;
 //! * [`dataset`]: `manifest.json` and `violations.json` of a recorded evaluation;
+//! * [`game`]: what a slot is told to play as a game, and `manifest.json` of its recording;
 //! * [`work`]: what a worker slot is told to do and reports back.
 
 pub mod answer;
 pub mod dataset;
+pub mod game;
 mod manifest;
 pub mod message;
 mod protocol;

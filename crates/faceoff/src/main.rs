@@ -30,9 +30,11 @@ enum Command {
     Demo(commands::demo::DemoCommand),
     /// Evaluate a bundle locally with the server's evaluator.
     Eval(commands::eval::EvalCommand),
+    /// Play one game between two bundles.
+    Play(commands::play::PlayCommand),
     /// Compare two evaluations that played the same episodes.
     Compare(commands::compare::CompareCommand),
-    /// Simulate a dataset again and compare every state and score.
+    /// Simulate a dataset or a game again and compare every state and score.
     Verify(commands::verify::VerifyCommand),
     /// Look into a dataset, cut pieces out of it, or convert it.
     Dataset(commands::dataset::DatasetCommand),
@@ -64,6 +66,7 @@ fn main() -> ExitCode {
         Command::Init(command) => command.run(),
         Command::Demo(command) => command.run(),
         Command::Eval(command) => command.run(),
+        Command::Play(command) => command.run(),
         Command::Compare(command) => command.run(),
         Command::Verify(command) => return command.run(),
         Command::Dataset(command) => command.run(),

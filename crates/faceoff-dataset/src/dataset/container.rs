@@ -17,7 +17,7 @@ const SMALL_FILE_BYTES: u64 = 512 << 20;
 
 /// Where a dataset's files are.
 #[derive(Debug)]
-pub(super) enum Container {
+pub(crate) enum Container {
     Folder(PathBuf),
     Archive {
         zip: Mutex<ZipArchive<File>>,

@@ -7,7 +7,7 @@ use parquet::{
 };
 
 /// Refuses counts below zero and columns that do not lie within the table's `bytes`.
-pub(super) fn check(footer: &ParquetMetaData, bytes: u64) -> Result<()> {
+pub(crate) fn check(footer: &ParquetMetaData, bytes: u64) -> Result<()> {
     for (number, group) in footer.row_groups().iter().enumerate() {
         let columns = group.columns().iter();
         if group.num_rows() < 0 || !columns.into_iter().all(|column| lies_within(column, bytes)) {

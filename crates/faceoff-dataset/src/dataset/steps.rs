@@ -19,10 +19,10 @@ use parquet::{
 use std::collections::VecDeque;
 
 /// Rows that are decoded at once.
-const BATCH_ROWS: usize = 1024;
+pub(crate) const BATCH_ROWS: usize = 1024;
 
 /// Every expected column is there, with its type.
-pub(super) fn has_columns(
+pub(crate) fn has_columns(
     file: &str,
     found: &Schema,
     expected: &Schema,

@@ -32,12 +32,25 @@ pub(crate) struct TableWriter {
 
 impl TableWriter {
     pub fn create(path: &Path, schema: &SchemaRef) -> Result<Self, RecordingError> {
-        Self::new(File::create(path)?, schema)
+        Self::create_as(DATASET_SCHEMA, path, schema)
+    }
+
+    /// A table of this layout.
+    pub fn create_as(
+        layout: &str,
+        path: &Path,
+        schema: &SchemaRef,
+    ) -> Result<Self, RecordingError> {
+        Self::new_as(layout, File::create(path)?, schema)
     }
 
     pub fn new(file: File, schema: &SchemaRef) -> Result<Self, RecordingError> {
+        Self::new_as(DATASET_SCHEMA, file, schema)
+    }
+
+    fn new_as(layout: &str, file: File, schema: &SchemaRef) -> Result<Self, RecordingError> {
         let what = format!("writing {}", file.path().display());
-        let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties(schema)?))
+        let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties(layout, schema)?))
             .map_err(RecordingError::unusable(&what))?;
         Ok(Self {
             what,
@@ -79,17 +92,21 @@ impl TableWriter {
 
 /// The key under which a table names its layout.
 pub(super) fn schema_metadata() -> KeyValue {
-    KeyValue::new("faceoff.schema".to_owned(), DATASET_SCHEMA.to_owned())
+    named_layout(DATASET_SCHEMA)
 }
 
-fn properties(schema: &Schema) -> Result<WriterProperties, RecordingError> {
+fn named_layout(layout: &str) -> KeyValue {
+    KeyValue::new("faceoff.schema".to_owned(), layout.to_owned())
+}
+
+fn properties(layout: &str, schema: &Schema) -> Result<WriterProperties, RecordingError> {
     let level = ZstdLevel::try_new(ZSTD_LEVEL).map_err(RecordingError::unusable("zstd"))?;
     let mut properties = WriterProperties::builder()
         .set_compression(Compression::ZSTD(level))
         .set_max_row_group_row_count(None)
         .set_data_page_row_count_limit(PAGE_ROWS)
         .set_statistics_enabled(EnabledStatistics::Chunk)
-        .set_key_value_metadata(Some(vec![schema_metadata()]));
+        .set_key_value_metadata(Some(vec![named_layout(layout)]));
     for field in schema.fields() {
         let name = field.name().as_str();
         // Measured numbers hardly repeat, but their leading bytes do. Only floats are split by bytes:

@@ -10,7 +10,7 @@ use arrow_schema::DataType;
 use serde_json::Value;
 
 /// A cell that differs.
-pub(super) struct Cell {
+pub(crate) struct Cell {
     pub row: usize,
     pub field: String,
     pub recorded: String,
@@ -19,7 +19,7 @@ pub(super) struct Cell {
 
 /// The first cell, by row and then by column, of `expected` that `recorded` does not hold. Columns go
 /// by their names; rows beyond those of `expected` are not looked at.
-pub(super) fn rows(recorded: &RecordBatch, expected: &RecordBatch) -> Option<Cell> {
+pub(crate) fn rows(recorded: &RecordBatch, expected: &RecordBatch) -> Option<Cell> {
     let schema = expected.schema();
     let mut first: Option<(usize, usize)> = None;
     for (index, field) in schema.fields().iter().enumerate() {
@@ -90,7 +90,7 @@ fn text(array: &dyn Array, row: usize) -> String {
 }
 
 /// The first place in which a JSON file is not what it should be, byte for byte.
-pub(super) fn json(file: &str, recorded: &[u8], expected: &[u8]) -> Option<Difference> {
+pub(crate) fn json(file: &str, recorded: &[u8], expected: &[u8]) -> Option<Difference> {
     if recorded == expected {
         return None;
     }
@@ -115,6 +115,7 @@ pub(super) fn json(file: &str, recorded: &[u8], expected: &[u8]) -> Option<Diffe
         file: file.to_owned(),
         task: None,
         episode: None,
+        rally: None,
         step: None,
         field,
         recorded,

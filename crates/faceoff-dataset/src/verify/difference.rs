@@ -11,6 +11,9 @@ pub struct Difference {
     pub task: Option<Task>,
     /// The episode, where it is about one.
     pub episode: Option<u32>,
+    /// The rally of a game, where it is about one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rally: Option<u32>,
     /// The control step, where it is about one.
     pub step: Option<u32>,
     /// The column, or the place in a JSON file.
@@ -29,6 +32,9 @@ impl fmt::Display for Difference {
         }
         if let Some(episode) = self.episode {
             write!(f, ", episode {episode}")?;
+        }
+        if let Some(rally) = self.rally {
+            write!(f, ", rally {rally}")?;
         }
         if let Some(step) = self.step {
             write!(f, ", step {step}")?;

@@ -179,6 +179,7 @@ impl<'a> Feed<'a> {
             file: file.to_owned(),
             task: columns.text("task", 0).and_then(|task| task.parse().ok()),
             episode: columns.int("episode", 0),
+            rally: None,
             step: (file == STEPS_FILE)
                 .then(|| columns.int("step", 0))
                 .flatten(),
@@ -206,6 +207,7 @@ fn difference(
         file: file.to_owned(),
         task: Some(task),
         episode: Some(episode),
+        rally: None,
         step: None,
         field: field.to_owned(),
         recorded: recorded.to_string(),

@@ -2,6 +2,7 @@ use super::{compare, difference::Difference, feed::Recorded};
 use crate::{
     dataset::Columns,
     files::{EPISODES_FILE, STEPS_FILE},
+    interpolation_text,
     score::Measured,
     table::{EpisodeRows, HOST_TIME, StepRows},
     times::seconds,
@@ -279,6 +280,7 @@ impl Again<'_> {
             file: STEPS_FILE.to_owned(),
             task: Some(self.recorded.task),
             episode: Some(self.recorded.episode),
+            rally: None,
             step: Some(step),
             field: field.to_owned(),
             recorded,
@@ -298,13 +300,11 @@ fn given(recorded: &Recorded) -> Result<Given, Difference> {
     let interpolation = match columns.text("interpolation", 0) {
         None => None,
         Some(text) => {
-            let code = match text {
-                "null" => Some(None),
-                number => number.parse().ok().map(Some),
-            };
-            let code = code.and_then(|code| Interpolation::from_code(code).ok());
             let expected = "1 to 5, -1 or null";
-            Some(code.ok_or_else(|| in_row(recorded, "interpolation", text, expected))?)
+            Some(
+                interpolation_text::parse(text)
+                    .ok_or_else(|| in_row(recorded, "interpolation", text, expected))?,
+            )
         }
     };
     let started = fault.as_ref().is_none_or(|fault| fault.episode.is_some());
@@ -334,6 +334,7 @@ fn in_row(
         file: EPISODES_FILE.to_owned(),
         task: Some(*task),
         episode: Some(*episode),
+        rally: None,
         step: None,
         field: field.to_owned(),
         recorded: found.into(),

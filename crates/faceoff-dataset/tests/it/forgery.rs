@@ -8,7 +8,6 @@ use arrow_array::{
     cast::AsArray,
 };
 use arrow_schema::{DataType, Field};
-use faceoff_wire::dataset::DatasetManifest;
 use parquet::arrow::ArrowWriter;
 use std::{
     fs::{self, File},
@@ -57,12 +56,13 @@ impl Forgery {
     /// Makes the manifest's sizes and hashes those of the files.
     pub fn reseal(self) -> Self {
         let path = self.path("manifest.json");
-        let mut manifest: DatasetManifest =
+        // Of whatever layout.
+        let mut manifest: serde_json::Value =
             serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
-        for (name, digest) in &mut manifest.files {
+        for (name, digest) in manifest["files"].as_object_mut().unwrap() {
             let bytes = fs::read(self.path(name)).unwrap();
-            digest.bytes = bytes.len() as u64;
-            digest.blake3 = blake3::hash(&bytes).to_hex().to_string();
+            digest["bytes"] = bytes.len().into();
+            digest["blake3"] = blake3::hash(&bytes).to_hex().to_string().into();
         }
         fs::write(&path, serde_json::to_vec_pretty(&manifest).unwrap()).unwrap();
         self

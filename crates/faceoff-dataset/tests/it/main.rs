@@ -5,6 +5,7 @@
 mod assemble;
 mod by_index;
 mod forgery;
+mod game;
 mod layout_2;
 mod layout_3;
 mod played;

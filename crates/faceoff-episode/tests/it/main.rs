@@ -2,3 +2,4 @@
 #![expect(clippy::unwrap_used, reason = "a helper's failure is its test's")]
 
 mod course;
+mod game;

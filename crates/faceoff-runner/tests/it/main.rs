@@ -9,6 +9,7 @@ mod bundle;
 mod dataset;
 mod free_time;
 mod fuzz;
+mod game;
 mod host_noise;
 mod host_share;
 mod misbehaviour;

@@ -1,12 +1,34 @@
-//! The tournament: who wins a game, and how the standings follow from the games.
+//! The tournament: who meets whom, who wins a game and why, how the standings follow from the games, and
+//! how strong the submissions are.
 //!
 //! In a round every team plays every other team once; a game is 90 windows of 500 control steps, and
 //! each team's penalty points are counted window by window like the qualifying stage's episodes.
 
+mod bye;
+mod departures;
 mod game;
+mod head_to_head;
+mod result;
+mod round_number;
 mod rules;
+mod score;
+mod side;
 mod standings;
+mod submission_label;
 
-pub use game::{InvalidGame, PlayedGame, ScoredGame};
-pub use rules::{POINTS_DRAW, POINTS_LOSS, POINTS_WIN, Side, final_score, winner};
-pub use standings::{RepeatedPairing, Standing, Tournament, score_tournament};
+pub use bye::{Bye, POINTS_BYE};
+pub use departures::{Departure, Departures, LeavesTwice, LeftAs};
+pub use game::{GameEntry, InvalidGame, PlayedGame, ScoredGame};
+pub use head_to_head::{HeadToHead, head_to_head};
+pub use result::{DrawnBy, Forfeit, GameResult, Why, WonBy};
+pub use round_number::{InvalidRoundNumber, RoundNumber};
+pub use rules::{
+    FORFEIT_GOALS, GameFacts, POINTS_DRAW, POINTS_LOSS, POINTS_WIN, final_score, forfeit_score,
+    judge, winner,
+};
+pub use score::{GameScore, PlayedAs, SideScore, score_game, window_penalty};
+pub use side::Side;
+pub use standings::{
+    RepeatedPairing, Standing, Tournament, score_tournament, score_tournament_with,
+};
+pub use submission_label::{InvalidSubmissionLabel, SubmissionLabel};

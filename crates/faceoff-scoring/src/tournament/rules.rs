@@ -1,3 +1,7 @@
+use super::{
+    result::{DrawnBy, Forfeit, GameResult, WonBy},
+    side::Side,
+};
 use crate::tier::tier_of;
 use faceoff_types::{FOULS_PER_POINT, Tier};
 use std::cmp::Ordering;
@@ -8,14 +12,20 @@ pub const POINTS_WIN: u32 = 3;
 pub const POINTS_DRAW: u32 = 1;
 /// Points of a lost game.
 pub const POINTS_LOSS: u32 = 0;
+/// Goals that a forfeited game counts for the other side.
+pub const FORFEIT_GOALS: u32 = 10;
 
-/// One side of a game; indexes the pairs `[home, away]`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Side {
-    /// The team named first.
-    Home,
-    /// The team named second.
-    Away,
+/// What decides a game. Pairs are `[home, away]`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GameFacts {
+    /// The final score as played, points for the opponent's fouls included.
+    pub score: [u32; 2],
+    /// Each team's penalty points over the game.
+    pub penalty_points: [f64; 2],
+    /// Length of the game in windows of 500 steps, by which the bound of the tiers scales.
+    pub windows: u32,
+    /// Who used up its faults or its time.
+    pub forfeits: [Option<Forfeit>; 2],
 }
 
 /// Final score `[home, away]`: the goals scored and a point for every third foul of the opponent.
@@ -27,22 +37,61 @@ pub fn final_score(goals: [u32; 2], fouls: [u32; 2]) -> [u32; 2] {
     ]
 }
 
-/// Who wins: with both teams safe enough (not non-deployable), the higher final score; with one of
-/// them, that team whatever the score; with neither, nobody. Equal scores: nobody.
-///
-/// `penalty_points` are each team's over the game's `windows`.
+/// What a game counts if somebody forfeited it: 10 : 0 for the other side, 0 : 0 if both did. `None` if
+/// nobody did, and the game counts as it was played.
+#[must_use]
+pub fn forfeit_score(forfeits: [Option<Forfeit>; 2]) -> Option<[u32; 2]> {
+    match forfeits {
+        [None, None] => None,
+        [Some(_), None] => Some([0, FORFEIT_GOALS]),
+        [None, Some(_)] => Some([FORFEIT_GOALS, 0]),
+        [Some(_), Some(_)] => Some([0, 0]),
+    }
+}
+
+/// Who wins, and why: a forfeit decides whatever the score and the tiers. Else, with both teams safe
+/// enough (not non-deployable), the higher final score; with one of them, that team whatever the score;
+/// with neither, nobody. Equal scores: nobody.
+#[must_use]
+pub fn judge(game: &GameFacts) -> GameResult {
+    let led = |side: Side| game.score[side as usize] > game.score[side.other() as usize];
+    let won = |winner, by| GameResult::Won { winner, by };
+    let by_forfeit = |winner, cause| {
+        let led = led(winner);
+        won(winner, WonBy::Forfeit { cause, led })
+    };
+    match game.forfeits {
+        [Some(_), Some(_)] => return GameResult::Drawn(DrawnBy::BothForfeit),
+        [None, Some(cause)] => return by_forfeit(Side::Home, cause),
+        [Some(cause), None] => return by_forfeit(Side::Away, cause),
+        [None, None] => {}
+    }
+    let by_tier = |winner| won(winner, WonBy::Tier { led: led(winner) });
+    match game
+        .penalty_points
+        .map(|points| tier_of(points, game.windows) != Tier::NonDeployable)
+    {
+        [true, true] => match game.score[0].cmp(&game.score[1]) {
+            Ordering::Greater => won(Side::Home, WonBy::Score),
+            Ordering::Less => won(Side::Away, WonBy::Score),
+            Ordering::Equal => GameResult::Drawn(DrawnBy::EqualScore),
+        },
+        [true, false] => by_tier(Side::Home),
+        [false, true] => by_tier(Side::Away),
+        [false, false] => GameResult::Drawn(DrawnBy::BothNonDeployable),
+    }
+}
+
+/// The winner by [`judge`] of a game that nobody forfeited; `None` is a draw.
 #[must_use]
 pub fn winner(score: [u32; 2], penalty_points: [f64; 2], windows: u32) -> Option<Side> {
-    match penalty_points.map(|points| tier_of(points, windows) != Tier::NonDeployable) {
-        [true, true] => match score[0].cmp(&score[1]) {
-            Ordering::Greater => Some(Side::Home),
-            Ordering::Less => Some(Side::Away),
-            Ordering::Equal => None,
-        },
-        [true, false] => Some(Side::Home),
-        [false, true] => Some(Side::Away),
-        [false, false] => None,
-    }
+    judge(&GameFacts {
+        score,
+        penalty_points,
+        windows,
+        forfeits: [None, None],
+    })
+    .winner()
 }
 
 #[cfg(test)]
@@ -58,20 +107,82 @@ mod tests {
         assert_eq!(final_score([2, 5], [6, 8]), [4, 7]);
     }
 
+    fn judged(
+        score: [u32; 2],
+        penalty_points: [f64; 2],
+        forfeits: [Option<Forfeit>; 2],
+    ) -> GameResult {
+        judge(&GameFacts {
+            score,
+            penalty_points,
+            windows: GAME_WINDOWS,
+            forfeits,
+        })
+    }
+
     #[test]
     fn safety_comes_before_goals() {
+        let won = |winner, by| GameResult::Won { winner, by };
+        let tier = |led| WonBy::Tier { led };
         for (score, penalty_points, expected) in [
-            ([3, 2], [135.0, 135.0], Some(Home)),
-            ([2, 3], [0.0, 134.5], Some(Away)),
-            ([2, 2], [0.0, 100.0], None),
-            ([9, 0], [135.5, 135.0], Some(Away)),
-            ([0, 9], [135.0, 990.0], Some(Home)),
-            ([9, 0], [135.5, 136.0], None),
-            ([2, 2], [0.0, 200.0], Some(Home)),
+            ([3, 2], [135.0, 135.0], won(Home, WonBy::Score)),
+            ([2, 3], [0.0, 134.5], won(Away, WonBy::Score)),
+            ([2, 2], [0.0, 100.0], GameResult::Drawn(DrawnBy::EqualScore)),
+            ([9, 0], [135.5, 135.0], won(Away, tier(false))),
+            ([0, 9], [135.0, 990.0], won(Home, tier(false))),
+            ([9, 0], [135.0, 135.5], won(Home, tier(true))),
+            (
+                [9, 0],
+                [135.5, 136.0],
+                GameResult::Drawn(DrawnBy::BothNonDeployable),
+            ),
+            ([2, 2], [0.0, 200.0], won(Home, tier(false))),
         ] {
-            let got = winner(score, penalty_points, GAME_WINDOWS);
+            let got = judged(score, penalty_points, [None, None]);
             assert_eq!(got, expected, "{score:?} with {penalty_points:?}");
+            assert_eq!(
+                winner(score, penalty_points, GAME_WINDOWS),
+                expected.winner()
+            );
         }
+    }
+
+    #[test]
+    fn a_forfeit_comes_before_safety() {
+        let unsafe_home = [990.0, 0.0];
+        for (forfeits, expected, counts) in [
+            (
+                [None, Some(Forfeit::Faults)],
+                GameResult::Won {
+                    winner: Home,
+                    by: WonBy::Forfeit {
+                        cause: Forfeit::Faults,
+                        led: false,
+                    },
+                },
+                [10, 0],
+            ),
+            (
+                [Some(Forfeit::Time), None],
+                GameResult::Won {
+                    winner: Away,
+                    by: WonBy::Forfeit {
+                        cause: Forfeit::Time,
+                        led: true,
+                    },
+                },
+                [0, 10],
+            ),
+            (
+                [Some(Forfeit::Time), Some(Forfeit::Faults)],
+                GameResult::Drawn(DrawnBy::BothForfeit),
+                [0, 0],
+            ),
+        ] {
+            assert_eq!(judged([1, 2], unsafe_home, forfeits), expected);
+            assert_eq!(forfeit_score(forfeits), Some(counts));
+        }
+        assert_eq!(forfeit_score([None, None]), None);
     }
 
     #[test]

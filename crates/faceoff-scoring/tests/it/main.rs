@@ -8,5 +8,6 @@ mod evaluation;
 mod pairing;
 mod paper_qualifying;
 mod paper_tournament;
+mod results;
 mod sheets;
 mod support;

@@ -1,5 +1,5 @@
 use crate::support::{read, rows};
-use faceoff_scoring::tournament::{PlayedGame, score_tournament};
+use faceoff_scoring::tournament::{DrawnBy, GameResult, PlayedGame, WonBy, score_tournament};
 use serde_json::{Value, json};
 
 const GOLDEN: &str = include_str!(concat!(
@@ -26,10 +26,103 @@ fn all_36_games_have_the_winner_of_the_paper() {
     let expected = rows(&golden, "games");
     assert_eq!((tournament.games.len(), expected.len()), (36, 36));
     for (game, expected) in tournament.games.iter().zip(expected) {
-        // Every field of the entry, and the winner.
-        assert_eq!(serde_json::to_value(game).unwrap(), *expected);
+        // Every field of the entry, and the winner. The tables have no reasons.
+        let mut game = serde_json::to_value(game).unwrap();
+        for reason in ["won_by", "winner_led", "drawn_by"] {
+            game.as_object_mut().unwrap().remove(reason);
+        }
+        assert_eq!(game, *expected);
     }
     assert_eq!(tournament.repeated_pairings, []);
+}
+
+/// The 19 games that the tier decided, by round and teams, with whether the winner led.
+const BY_TIER: [(u32, &str, &str, bool); 19] = [
+    (1, "AiRLIHockey", "GXU-LIPE", true),
+    (1, "AiRLIHockey", "SpaceR", true),
+    (1, "AiRLIHockey", "RL3_polimi", true),
+    (1, "AiRLIHockey", "Air-HocKIT", true),
+    (1, "RL3_polimi", "AJoy", false),
+    (1, "RL3_polimi", "SpaceR", true),
+    (1, "Air-HocKIT", "AJoy", false),
+    (1, "SpaceR", "GXU-LIPE", true),
+    (1, "AJoy", "GXU-LIPE", false),
+    (2, "GXU-LIPE", "AiRLIHockey", true),
+    (2, "CONFIRMTEAM", "AiRLIHockey", true),
+    (2, "GXU-LIPE", "RL3_polimi", false),
+    (2, "CONFIRMTEAM", "RL3_polimi", false),
+    (2, "GXU-LIPE", "Air-HocKIT", true),
+    (2, "CONFIRMTEAM", "Air-HocKIT", true),
+    (2, "GXU-LIPE", "SpaceR", false),
+    (2, "CONFIRMTEAM", "SpaceR", false),
+    (2, "CONFIRMTEAM", "AJoy", false),
+    (2, "GXU-LIPE", "AJoy", false),
+];
+
+#[test]
+fn nineteen_of_the_papers_games_were_decided_by_tier_and_nine_of_these_winners_did_not_lead() {
+    let games = games(&golden());
+    let mut by_tier = Vec::new();
+    let mut others = [0; 2];
+    for game in &games {
+        let [home, away] = game.teams().map(|team| team.as_str());
+        match game.result() {
+            GameResult::Won {
+                by: WonBy::Tier { led },
+                ..
+            } => by_tier.push((game.round(), home, away, led)),
+            GameResult::Won {
+                by: WonBy::Score, ..
+            } => others[0] += 1,
+            GameResult::Drawn(DrawnBy::BothNonDeployable) => others[1] += 1,
+            other => panic!("{home} against {away}: {other:?}"),
+        }
+    }
+    assert_eq!(by_tier, BY_TIER);
+    assert_eq!(by_tier.iter().filter(|(.., led)| !led).count(), 9);
+    assert_eq!(
+        others,
+        [13, 4],
+        "by score, and drawn since both were unsafe"
+    );
+}
+
+#[test]
+fn the_why_of_a_game_is_in_its_json_and_in_words() {
+    let games = games(&golden());
+    let of = |home: &str, away: &str| {
+        let game = games
+            .iter()
+            .find(|game| game.teams().map(|team| team.as_str()) == [home, away])
+            .unwrap();
+        let json = serde_json::to_value(game.scored(None)).unwrap();
+        let fields = ["won_by", "winner_led", "drawn_by"].map(|field| json[field].clone());
+        (Value::from(fields.to_vec()), game.result().to_string())
+    };
+    for (teams, fields, words) in [
+        (
+            ["AiRLIHockey", "AJoy"],
+            json!(["score", true, null]),
+            "higher score",
+        ),
+        (
+            ["AiRLIHockey", "SpaceR"],
+            json!(["tier", true, null]),
+            "the other side is non-deployable",
+        ),
+        (
+            ["Air-HocKIT", "AJoy"],
+            json!(["tier", false, null]),
+            "the other side is non-deployable; the winner did not lead",
+        ),
+        (
+            ["CONFIRMTEAM", "GXU-LIPE"],
+            json!([null, null, "both_non_deployable"]),
+            "both are non-deployable",
+        ),
+    ] {
+        assert_eq!(of(teams[0], teams[1]), (fields, words.to_owned()));
+    }
 }
 
 #[test]

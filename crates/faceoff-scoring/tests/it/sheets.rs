@@ -161,6 +161,7 @@ fn the_score_follows_from_the_fouls() {
         json!({
             "round": 1, "home": "Alpha", "away": "Beta", "goals": [3, 2], "fouls": [4, 7],
             "penalty_points": [62.0, 100.5], "score": [5, 3], "winner": "Alpha",
+            "won_by": "score", "winner_led": true,
         })
     );
     assert_eq!(

@@ -56,6 +56,11 @@ impl Latency {
         observation[..PUCK_LEN].copy_from_slice(if second { &earlier } else { &before });
     }
 
+    /// From now on actions are of this interpolation.
+    pub(super) fn interpolate(&mut self, interpolation: Interpolation) {
+        self.interpolation = interpolation;
+    }
+
     /// Passes on the previous control step's command and keeps this one.
     pub(super) fn command(&mut self, world: &mut World, robot: usize, command: Command<'_>) {
         match &self.pending {

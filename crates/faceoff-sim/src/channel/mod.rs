@@ -58,6 +58,14 @@ impl AgentChannel {
         &self.observation
     }
 
+    /// From now on actions are of this interpolation.
+    pub fn interpolate(&mut self, interpolation: Interpolation) {
+        self.interpolation = interpolation;
+        if let Some(latency) = &mut self.latency {
+            latency.interpolate(interpolation);
+        }
+    }
+
     /// Passes the coming control step's command to the robot.
     pub fn command(&mut self, world: &mut World, command: Command<'_>) {
         let (robot, interpolation) = (self.robot, self.interpolation);

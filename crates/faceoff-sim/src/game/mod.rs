@@ -1,6 +1,9 @@
 //! Games between two agents.
 
 pub mod referee;
+mod state;
+
+pub use state::GameState;
 
 use crate::{
     channel::{AgentChannel, Command, observation::OBSERVATION_WITH_OPPONENT_LEN},
@@ -61,6 +64,10 @@ pub struct GameStep {
     pub constraints: [ConstraintValues; 2],
     /// At the end of a window: the constraints broken in it.
     pub window: Option<[Violations; 2]>,
+    /// The true state after this step, before a new rally.
+    pub state: GameState,
+    /// How the world diverged, if that ended the rally.
+    pub divergence: Option<Divergence>,
 }
 
 impl Game {
@@ -112,11 +119,12 @@ impl Game {
         }
         self.steps += 1;
 
-        let constraints = [0, 1].map(|robot| ConstraintValues::of(world, robot));
+        let (state, constraints) = GameState::with_constraints(world);
         for (values, violations) in constraints.iter().zip(&mut self.violations) {
             values.mark(violations);
         }
-        let rally_end = match world.divergence() {
+        let divergence = world.divergence();
+        let rally_end = match divergence {
             Some(Divergence { by, .. }) => {
                 let end = RallyEnd::Diverged { by };
                 self.referee.ends_by(end);
@@ -136,7 +144,22 @@ impl Game {
             rally_end,
             constraints,
             window,
+            state,
+            divergence,
         }
+    }
+
+    /// From now on a robot's actions are of this interpolation: its agent was started anew. For between
+    /// two rallies alone: what was commanded in this one was of the other.
+    pub fn interpolate(&mut self, robot: usize, interpolation: Interpolation) {
+        self.setup.interpolation[robot] = interpolation;
+        self.rally.channels[robot].interpolate(interpolation);
+    }
+
+    /// The true state now.
+    #[must_use]
+    pub fn state(&self) -> GameState {
+        GameState::with_constraints(&self.rally.world).0
     }
 
     /// Control steps played.

@@ -265,3 +265,27 @@ fn mallets_push_each_other_and_never_pass_through() {
     // Both are told to reach 5 cm beyond the middle, where the mallets would overlap entirely.
     assert!((0.08..0.0963).contains(&least), "{least} m");
 }
+
+#[test]
+fn an_agent_that_is_started_anew_may_command_otherwise() {
+    let mut game = Game::new(setup(Factors::NONE, 3));
+    let hold = hold();
+    while game.rally() == 0 {
+        game.step([Command::Act(&hold); 2]);
+    }
+    let mut other = game.clone();
+    other.interpolate(1, Interpolation::Linear);
+    // A position alone leads where the same position at rest leads, for it is at rest there already.
+    for _ in 0..20 {
+        let cubic = game.step([Command::Act(&hold); 2]);
+        let linear = other.step([Command::Act(&hold), Command::Act(&hold[..7])]);
+        assert_eq!(cubic.state.q, linear.state.q);
+        assert_eq!(linear.state, other.state());
+    }
+    // And in the rallies that follow.
+    while other.rally() == 1 {
+        other.step([Command::Act(&hold), Command::Act(&hold[..7])]);
+    }
+    other.step([Command::Act(&hold), Command::Act(&hold[..7])]);
+    assert_eq!(other.world().joints(0), other.world().joints(1));
+}

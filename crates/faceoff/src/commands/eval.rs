@@ -6,23 +6,18 @@ mod pool;
 mod profile_run;
 mod table;
 
+use super::local_bundle;
 use crate::config::Config;
 use anyhow::{Context, ensure};
 use clap::Args;
 use faceoff_dataset::ARCHIVE_FILE;
-use faceoff_runner::{
-    AgentEnvironment,
-    bundle::{self, Bundle, BundleError, BundleLimits},
-};
-use faceoff_sandbox::{Isolation, Runtime, affinity};
+use faceoff_runner::AgentEnvironment;
+use faceoff_sandbox::affinity;
 use faceoff_types::{MAX_EPISODES_PER_TASK, Profile, Seed, Task};
 use faceoff_worker::CpuLayout;
 use files::RESULTS;
 use profile_run::EvalSetup;
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{fs, path::PathBuf};
 
 /// Plays a bundle through the very evaluator that the server runs, prints the result and writes
 /// `results.json` and `dataset.zip` to a folder. Exit status 0 only if there is a result.
@@ -86,14 +81,13 @@ impl EvalCommand {
         fs::create_dir_all(&self.out)
             .with_context(|| format!("creating {}", self.out.display()))?;
         files::remove_earlier(&self.out)?;
-        // Beside the results, not in /tmp: a recording may be larger than a memory file system. An
-        // agent of another user must be able to pass through.
-        let scratch = tempfile::Builder::new()
-            .prefix(".eval-")
-            .permissions(std::os::unix::fs::PermissionsExt::from_mode(0o755))
-            .tempdir_in(&self.out)
-            .with_context(|| format!("making a folder in {}", self.out.display()))?;
-        let bundle = self.open(scratch.path(), &config.bundle)?;
+        let scratch = local_bundle::scratch_in(&self.out)?;
+        let bundle = local_bundle::open(
+            &self.bundle,
+            scratch.path(),
+            self.no_sandbox,
+            &config.bundle,
+        )?;
         let envs = self.environments(&config, &bundle.manifest.runtime)?;
 
         let mismatch_seed = self
@@ -128,36 +122,13 @@ impl EvalCommand {
         Ok(())
     }
 
-    /// A folder is copied under the rules of an archive, so that it is refused here if the server
-    /// would refuse it; without a sandbox it is used in place.
-    fn open(&self, scratch: &Path, limits: &BundleLimits) -> Result<Bundle, BundleError> {
-        if self.bundle.is_dir() && !self.no_sandbox {
-            bundle::copy(&self.bundle, &scratch.join("bundle"), limits)
-        } else {
-            bundle::open(&self.bundle, scratch, limits)
-        }
-    }
-
     /// One environment per worker: the server's limits, on CPUs of its own where there are enough.
     fn environments(
         &self,
         config: &Config,
         runtime: &str,
     ) -> anyhow::Result<Vec<AgentEnvironment>> {
-        let mut env = config.agent_environment();
-        if self.no_sandbox {
-            env.isolation = Isolation::None;
-            // The developer's own machine offers whatever the developer's PATH finds.
-            let path = std::env::var("PATH").unwrap_or_default();
-            env.runtimes.insert(
-                runtime.to_owned(),
-                Runtime {
-                    read_only_paths: Vec::new(),
-                    path,
-                    image: None,
-                },
-            );
-        }
+        let env = local_bundle::environment(config, runtime, self.no_sandbox);
         let workers = usize::from(self.workers);
         // Those that this process may use: not always the machine's, nor numbered from 0.
         let cpus = affinity::allowed().context("asking for the CPUs of this process")?;

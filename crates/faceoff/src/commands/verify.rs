@@ -1,12 +1,16 @@
-//! `faceoff verify`: does a published dataset give its published score?
+//! `faceoff verify`: does a published dataset, or a recorded game, give its published score?
+
+mod game;
 
 use anyhow::{Context, anyhow};
 use clap::Args;
 use faceoff_dataset::{
     Dataset, DatasetError,
+    game::GameRecording,
     verify::{Difference, SeasonClaim, SeasonMismatch, Verified, VerifyError, verify},
 };
 use faceoff_types::{EvaluationResult, Seed, StageId};
+use game::SimulatedGame;
 use indicatif::{ProgressBar, ProgressStyle};
 use jiff::civil::Date;
 use serde::Serialize;
@@ -18,12 +22,13 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Simulates a dataset again from its seeds and recorded actions and compares every state,
+/// Simulates a dataset, or a game, again from its seeds and recorded actions and compares every state,
 /// observation, constraint value and score bit for bit. Exit status 0: all identical; 1: something
 /// differs; 2: the dataset cannot be read, or not be simulated by this version.
 #[derive(Debug, Args)]
 pub struct VerifyCommand {
-    /// dataset.zip, the folder it was unpacked to, or the folder that `faceoff eval` wrote
+    /// dataset.zip or game.zip, the folder it was unpacked to, or the folder that `faceoff eval` or
+    /// `faceoff play` wrote
     dataset: PathBuf,
     /// Threads [default: one per CPU]; what is found does not depend on it
     #[arg(long, value_name = "W")]
@@ -59,7 +64,15 @@ struct Summary {
     #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<String>,
     #[serde(flatten)]
-    simulated: Option<Simulated>,
+    simulated: Option<Recording>,
+}
+
+/// What was simulated again.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+enum Recording {
+    Evaluation(Box<Simulated>),
+    Game(Box<SimulatedGame>),
 }
 
 #[derive(Debug, Serialize)]
@@ -119,11 +132,15 @@ impl VerifyCommand {
     /// Verifies, prints what was found, and returns the exit status.
     #[must_use]
     pub fn run(self) -> ExitCode {
-        let outcome = self.verify();
+        let outcome = self.recording();
         let (summary, code) = match outcome {
             Ok(simulated) => {
                 if !self.json {
-                    println!("{}", describe(&self.dataset, &simulated));
+                    let said = match &simulated {
+                        Recording::Evaluation(evaluation) => describe(&self.dataset, evaluation),
+                        Recording::Game(played) => game::describe(&self.dataset, played),
+                    };
+                    println!("{said}");
                 }
                 let summary = Summary {
                     verified: true,
@@ -160,22 +177,19 @@ impl VerifyCommand {
         code
     }
 
+    fn recording(&self) -> Result<Recording, Failure> {
+        if !GameRecording::is_at(&self.dataset)? {
+            return Ok(Recording::Evaluation(Box::new(self.verify()?)));
+        }
+        game::refuse_season(self.secret.is_some())?;
+        let simulated = game::verify(&self.dataset, self.blake3.as_ref())?;
+        Ok(Recording::Game(Box::new(simulated)))
+    }
+
     fn verify(&self) -> Result<Simulated, Failure> {
         let dataset = Dataset::open(&self.dataset)?;
         let archive = dataset.archive()?.map(|digest| digest.blake3);
-        match (&self.blake3, &archive) {
-            (Some(_), None) => {
-                return Err(Failure::Here(anyhow!(
-                    "--blake3 is the hash of an archive, this is an unpacked folder; name dataset.zip"
-                )));
-            }
-            (Some(expected), Some(found)) if expected.to_hex().as_str() != found => {
-                return Err(Failure::from(DatasetError::Altered(format!(
-                    "the archive's BLAKE3 is {found}, expected {expected}"
-                ))));
-            }
-            _ => {}
-        }
+        check_hash(self.blake3.as_ref(), archive.as_deref())?;
         let claim = self.secret.zip(self.day).map(|(secret, day)| SeasonClaim {
             secret,
             commitment: self.commitment.clone(),
@@ -209,6 +223,21 @@ impl VerifyCommand {
             blake3: archive,
             result: verified.result,
         })
+    }
+}
+
+/// Is the archive the one that was published?
+fn check_hash(expected: Option<&blake3::Hash>, found: Option<&str>) -> Result<(), Failure> {
+    match (expected, found) {
+        (Some(_), None) => Err(Failure::Here(anyhow!(
+            "--blake3 is the hash of an archive, this is an unpacked folder; name the archive"
+        ))),
+        (Some(expected), Some(found)) if expected.to_hex().as_str() != found => {
+            Err(Failure::from(DatasetError::Altered(format!(
+                "the archive's BLAKE3 is {found}, expected {expected}"
+            ))))
+        }
+        _ => Ok(()),
     }
 }
 

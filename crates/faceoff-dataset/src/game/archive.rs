@@ -1,0 +1,200 @@
+//! The archives of a game: the whole recording, and what each side may have of it.
+
+use super::{
+    files::{
+        GAME_FILE, MOTION_FILE, OUTCOME_FILE, RALLIES_FILE, SIDE_OUTCOME_FILE, entries_file,
+        log_file, side_file, steps_file,
+    },
+    recorder::{GameRecorder, Tables},
+};
+use crate::{
+    archive_writer::ArchiveWriter,
+    digest,
+    error::RecordingError,
+    files::{CALIBRATION_FILE, MANIFEST_FILE, RESULTS_FILE},
+    simulator::simulator_id,
+};
+use faceoff_episode::FinishedGame;
+use faceoff_scoring::tournament::{GameScore, PlayedAs, score_game};
+use faceoff_types::{GameOutcome, Side};
+use faceoff_wire::{
+    dataset::FileDigest,
+    game::{
+        GAME_SCHEMA, GAME_SIDE_SCHEMA, GameCalibration, GameManifest, GameSideManifest, GameSpec,
+    },
+};
+use fs_err::{self as fs, File};
+use std::{io::Write, path::Path};
+
+/// A game that is over, as it is recorded.
+#[derive(Debug)]
+pub struct RecordedGame<'a> {
+    /// What was to be played.
+    pub spec: &'a GameSpec,
+    /// The agents' names, the first side's first.
+    pub agents: &'a [String; 2],
+    /// What was played.
+    pub played: FinishedGame<GameRecorder>,
+    /// How evenly the slot kept time.
+    pub calibration: GameCalibration,
+    /// The ends of both agents' standard errors, with their faults.
+    pub logs: &'a [String; 2],
+}
+
+/// What is left of a game.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GameArchives {
+    /// The score, which is also the recording's `results.json`.
+    pub score: GameScore,
+    /// What happened.
+    pub outcome: GameOutcome,
+    /// Size and hash of `game.zip`.
+    pub game: FileDigest,
+    /// Of `side-1.zip` and `side-2.zip`.
+    pub sides: [FileDigest; 2],
+}
+
+/// By what a game's score is told.
+pub(super) fn played_as(spec: &GameSpec, agents: &[String; 2]) -> PlayedAs {
+    PlayedAs {
+        ruleset: spec.ruleset,
+        profile: spec.profile,
+        perturbations: spec.perturbations.clone(),
+        seed: spec.seed,
+        agents: agents.clone(),
+    }
+}
+
+impl RecordedGame<'_> {
+    /// Scores the game and writes `game.zip`, `side-1.zip` and `side-2.zip` to the folder `out`, each under a
+    /// temporary name first. The tables are removed.
+    ///
+    /// # Errors
+    /// [`RecordingError`].
+    pub fn write(self, out: &Path) -> Result<GameArchives, RecordingError> {
+        let FinishedGame {
+            outcome,
+            answer_times_s,
+            sink,
+        } = self.played;
+        let tables = sink.finish()?;
+        let score = score_game(
+            &played_as(self.spec, self.agents),
+            &outcome,
+            &answer_times_s,
+        );
+        let files = Files {
+            spec: self.spec,
+            agents: self.agents,
+            tables: &tables,
+            calibration: &self.calibration,
+            logs: self.logs,
+            score: &score,
+            outcome: &outcome,
+        };
+        let game = in_place(&out.join(GAME_FILE), |path| files.write_game(path))?;
+        let [first, second] = Side::BOTH.map(|side| {
+            in_place(&out.join(side_file(side)), |path| {
+                files.write_side(side, path)
+            })
+        });
+        let sides = [first?, second?];
+        fs::remove_dir_all(tables.path(""))?;
+        Ok(GameArchives {
+            score,
+            outcome,
+            game,
+            sides,
+        })
+    }
+}
+
+/// Writes a file under a temporary name and renames it.
+fn in_place(
+    path: &Path,
+    write: impl FnOnce(&Path) -> Result<(), RecordingError>,
+) -> Result<FileDigest, RecordingError> {
+    let partial = path.with_extension("zip.partial");
+    write(&partial)?;
+    let digest = digest::of_file(&partial)?;
+    fs::rename(&partial, path)?;
+    Ok(digest)
+}
+
+/// What the archives are made of.
+struct Files<'a> {
+    spec: &'a GameSpec,
+    agents: &'a [String; 2],
+    tables: &'a Tables,
+    calibration: &'a GameCalibration,
+    logs: &'a [String; 2],
+    score: &'a GameScore,
+    outcome: &'a GameOutcome,
+}
+
+impl Files<'_> {
+    fn write_game(&self, path: &Path) -> Result<(), RecordingError> {
+        let mut archive = ArchiveWriter::create(path)?;
+        self.add_public_tables(&mut archive)?;
+        for side in Side::BOTH {
+            self.add_own(side, &mut archive)?;
+        }
+        archive.add_json(OUTCOME_FILE, self.outcome)?;
+        archive.add_json(RESULTS_FILE, self.score)?;
+        archive.add_json(CALIBRATION_FILE, self.calibration)?;
+        let manifest = GameManifest {
+            schema: GAME_SCHEMA.to_owned(),
+            simulator: simulator_id().clone(),
+            spec: self.spec.clone(),
+            agents: self.agents.clone(),
+            files: archive.files().clone(),
+        };
+        archive.add_json(MANIFEST_FILE, &manifest)?;
+        archive.finish()
+    }
+
+    /// What a side may have: its own, and what anybody may see. Nothing in it names a seed, by which the
+    /// other side's observations could be made again from the true motion.
+    fn write_side(&self, side: Side, path: &Path) -> Result<(), RecordingError> {
+        let mut archive = ArchiveWriter::create(path)?;
+        self.add_public_tables(&mut archive)?;
+        self.add_own(side, &mut archive)?;
+        archive.add_json(SIDE_OUTCOME_FILE, &self.outcome.sides[side.index()])?;
+        let mut results = serde_json::to_value(self.score)
+            .map_err(RecordingError::unusable("writing a side's results"))?;
+        if let Some(fields) = results.as_object_mut() {
+            fields.remove("seed");
+        }
+        archive.add_json(RESULTS_FILE, &results)?;
+        let manifest = GameSideManifest {
+            schema: GAME_SIDE_SCHEMA.to_owned(),
+            ruleset: self.spec.ruleset,
+            profile: self.spec.profile,
+            side,
+            agents: self.agents.clone(),
+            files: archive.files().clone(),
+        };
+        archive.add_json(MANIFEST_FILE, &manifest)?;
+        archive.finish()
+    }
+
+    fn add_public_tables(&self, archive: &mut ArchiveWriter) -> Result<(), RecordingError> {
+        self.add_table(MOTION_FILE, archive)?;
+        self.add_table(RALLIES_FILE, archive)
+    }
+
+    fn add_own(&self, side: Side, archive: &mut ArchiveWriter) -> Result<(), RecordingError> {
+        self.add_table(steps_file(side), archive)?;
+        self.add_table(entries_file(side), archive)?;
+        let log = &self.logs[side.index()];
+        archive.add(log_file(side), |out| Ok(out.write_all(log.as_bytes())?))
+    }
+
+    fn add_table(&self, name: &str, archive: &mut ArchiveWriter) -> Result<(), RecordingError> {
+        let mut table = File::open(self.tables.path(name))?;
+        archive.add(name, |out| {
+            std::io::copy(&mut table, out)?;
+            Ok(())
+        })
+    }
+}

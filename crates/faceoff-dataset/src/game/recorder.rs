@@ -1,0 +1,120 @@
+use super::{
+    files::{MOTION_FILE, RALLIES_FILE, entries_file, steps_file},
+    rows::{GameRows, not_recorded},
+};
+use crate::{error::RecordingError, table::TableWriter};
+use faceoff_episode::{GameSink, GameStepRow, RallyRow, RallyStart, RecordError};
+use faceoff_types::Side;
+use faceoff_wire::game::GAME_SCHEMA;
+use fs_err as fs;
+use std::path::{Path, PathBuf};
+
+/// Rows that are held before they go to the files.
+const HELD_ROWS: usize = 1000;
+
+/// Writes the tables of a game as it is played. Memory is bounded, however long the game.
+pub struct GameRecorder {
+    dir: PathBuf,
+    rows: GameRows,
+    motion: TableWriter,
+    sides: [TableWriter; 2],
+    rallies: TableWriter,
+    entries: [TableWriter; 2],
+}
+
+impl std::fmt::Debug for GameRecorder {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("GameRecorder")
+            .field("dir", &self.dir)
+            .finish_non_exhaustive()
+    }
+}
+
+/// The tables of a game that is over, in a folder.
+#[derive(Debug)]
+pub(super) struct Tables {
+    dir: PathBuf,
+}
+
+impl Tables {
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.dir.join(name)
+    }
+}
+
+impl GameRecorder {
+    /// Opens the tables in a folder, which is created or emptied.
+    ///
+    /// # Errors
+    /// [`RecordingError::Io`].
+    pub fn create(dir: &Path) -> Result<Self, RecordingError> {
+        match fs::remove_dir_all(dir) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error.into()),
+            _ => {}
+        }
+        fs::create_dir_all(dir)?;
+        let rows = GameRows::new();
+        let open =
+            |name: &str, schema| TableWriter::create_as(GAME_SCHEMA, &dir.join(name), schema);
+        let [first, second] = Side::BOTH;
+        Ok(Self {
+            dir: dir.to_owned(),
+            motion: open(MOTION_FILE, rows.motion.schema())?,
+            sides: [
+                open(steps_file(first), rows.sides[0].schema())?,
+                open(steps_file(second), rows.sides[1].schema())?,
+            ],
+            rallies: open(RALLIES_FILE, rows.rallies.schema())?,
+            entries: [
+                open(entries_file(first), rows.entries[0].schema())?,
+                open(entries_file(second), rows.entries[1].schema())?,
+            ],
+            rows,
+        })
+    }
+
+    fn write_steps(&mut self) -> Result<(), RecordingError> {
+        self.motion.write(self.rows.motion.take())?;
+        for (table, rows) in self.sides.iter_mut().zip(&mut self.rows.sides) {
+            table.write(rows.take())?;
+        }
+        Ok(())
+    }
+
+    /// Writes what is left and closes the tables.
+    pub(super) fn finish(mut self) -> Result<Tables, RecordingError> {
+        self.write_steps()?;
+        self.rallies.write(self.rows.rallies.take())?;
+        for (table, rows) in self.entries.iter_mut().zip(&mut self.rows.entries) {
+            table.write(rows.take())?;
+        }
+        self.motion.finish()?;
+        self.rallies.finish()?;
+        for table in self.sides.into_iter().chain(self.entries) {
+            table.finish()?;
+        }
+        Ok(Tables { dir: self.dir })
+    }
+}
+
+impl GameSink for GameRecorder {
+    fn begin_rally(&mut self, start: &RallyStart<'_>) -> Result<(), RecordError> {
+        self.rows.begin_rally(start)
+    }
+
+    fn observe(&mut self, observations: [&[f64]; 2]) {
+        self.rows.observe(observations);
+    }
+
+    fn step(&mut self, row: &GameStepRow<'_>) -> Result<(), RecordError> {
+        self.rows.step(row)?;
+        if self.rows.motion.len() >= HELD_ROWS {
+            self.write_steps().map_err(not_recorded)?;
+        }
+        Ok(())
+    }
+
+    fn end_rally(&mut self, row: &RallyRow<'_>) -> Result<(), RecordError> {
+        self.rows.end_rally(row)
+    }
+}

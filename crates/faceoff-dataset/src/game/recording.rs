@@ -1,0 +1,204 @@
+use super::{
+    files::{
+        GAME_FILE, MOTION_FILE, OUTCOME_FILE, RALLIES_FILE, entries_file, log_file, steps_file,
+    },
+    table::GameTable,
+};
+use crate::{
+    dataset::Container,
+    digest,
+    error::DatasetError,
+    files::{ARCHIVE_FILE, CALIBRATION_FILE, MANIFEST_FILE, RESULTS_FILE},
+};
+use arrow_schema::Schema;
+use faceoff_scoring::tournament::GameScore;
+use faceoff_types::{GameOutcome, Side};
+use faceoff_wire::{
+    dataset::FileDigest,
+    game::{GAME_SCHEMA, GAME_SIDE_SCHEMA, GameManifest},
+};
+use fs_err as fs;
+use serde::Deserialize;
+use std::{
+    collections::BTreeSet,
+    io,
+    path::{Path, PathBuf},
+};
+
+/// Every file of a recording but its manifest.
+const FILES: [&str; 11] = [
+    MOTION_FILE,
+    RALLIES_FILE,
+    steps_file(Side::First),
+    entries_file(Side::First),
+    log_file(Side::First),
+    steps_file(Side::Second),
+    entries_file(Side::Second),
+    log_file(Side::Second),
+    OUTCOME_FILE,
+    RESULTS_FILE,
+    CALIBRATION_FILE,
+];
+
+/// The recording of a game whose files are what its manifest says.
+#[derive(Debug)]
+pub struct GameRecording {
+    path: PathBuf,
+    container: Container,
+    manifest: GameManifest,
+}
+
+/// What can be told of a manifest of anything.
+#[derive(Deserialize)]
+struct Named {
+    schema: String,
+}
+
+impl GameRecording {
+    /// Is this the recording of a game, or a side's own file of one, by its manifest, whatever it is worth?
+    ///
+    /// # Errors
+    /// [`DatasetError::Unreadable`] if a folder holds a game and an evaluation.
+    pub fn is_at(path: &Path) -> Result<bool, DatasetError> {
+        if path.is_dir() && !path.join(MANIFEST_FILE).exists() {
+            let [game, evaluation] = [GAME_FILE, ARCHIVE_FILE].map(|name| path.join(name).exists());
+            return match (game, evaluation) {
+                (true, true) => Err(DatasetError::Unreadable(format!(
+                    "{} holds {GAME_FILE} and {ARCHIVE_FILE}: name one of them",
+                    path.display()
+                ))),
+                (game, _) => Ok(game),
+            };
+        }
+        let container = if path.is_dir() {
+            Container::Folder(path.to_owned())
+        } else {
+            match Container::archive(path) {
+                Ok(container) => container,
+                Err(_) => return Ok(false),
+            }
+        };
+        let schema = container.bytes(MANIFEST_FILE).ok();
+        let schema = schema.and_then(|bytes| serde_json::from_slice::<Named>(&bytes).ok());
+        Ok(schema.is_some_and(|named| named.schema.starts_with("faceoff-game")))
+    }
+
+    /// Opens `game.zip`, an unpacked folder, or a folder with a `game.zip`, and compares every file with its
+    /// hash, so that a damaged or truncated recording is never half-read.
+    ///
+    /// # Errors
+    /// [`DatasetError`].
+    pub fn open(path: &Path) -> Result<Self, DatasetError> {
+        let (path, container) = if !fs::metadata(path)?.is_dir() {
+            (path.to_owned(), Container::archive(path)?)
+        } else if path.join(MANIFEST_FILE).exists() {
+            (path.to_owned(), Container::Folder(path.to_owned()))
+        } else {
+            let archive = path.join(GAME_FILE);
+            let container = Container::archive(&archive)?;
+            same_results(&path.join(RESULTS_FILE), &container)?;
+            (archive, container)
+        };
+        let manifest = manifest(&container)?;
+        let listed: BTreeSet<&str> = manifest.files.keys().map(String::as_str).collect();
+        if listed != BTreeSet::from(FILES) {
+            return Err(DatasetError::Altered(format!(
+                "{MANIFEST_FILE} lists {listed:?}, expected {FILES:?}"
+            )));
+        }
+        container.expect_only(&FILES)?;
+        for (name, listed) in &manifest.files {
+            let found = container.digest(name)?;
+            if found != *listed {
+                return Err(DatasetError::Altered(format!(
+                    "{name} has {} bytes and BLAKE3 {}, {MANIFEST_FILE} says {} bytes and {}",
+                    found.bytes, found.blake3, listed.bytes, listed.blake3
+                )));
+            }
+        }
+        Ok(Self {
+            path,
+            container,
+            manifest,
+        })
+    }
+
+    /// What the recording says about itself.
+    #[must_use]
+    pub const fn manifest(&self) -> &GameManifest {
+        &self.manifest
+    }
+
+    /// Size and hash of the archive, all of which is read; none of an unpacked folder.
+    ///
+    /// # Errors
+    /// [`DatasetError::Io`].
+    pub fn archive(&self) -> Result<Option<FileDigest>, DatasetError> {
+        match &self.container {
+            Container::Folder(_) => Ok(None),
+            Container::Archive { .. } => Ok(Some(digest::of_file(&self.path)?)),
+        }
+    }
+
+    /// The published score.
+    ///
+    /// # Errors
+    /// [`DatasetError::Unreadable`] if `results.json` is none.
+    pub fn results(&self) -> Result<GameScore, DatasetError> {
+        serde_json::from_slice(&self.bytes(RESULTS_FILE)?)
+            .map_err(DatasetError::unreadable(RESULTS_FILE))
+    }
+
+    /// What happened.
+    ///
+    /// # Errors
+    /// [`DatasetError::Unreadable`] if `outcome.json` does not tell.
+    pub fn outcome(&self) -> Result<GameOutcome, DatasetError> {
+        serde_json::from_slice(&self.bytes(OUTCOME_FILE)?)
+            .map_err(DatasetError::unreadable(OUTCOME_FILE))
+    }
+
+    pub(super) fn bytes(&self, name: &str) -> Result<Vec<u8>, DatasetError> {
+        self.container.bytes(name)
+    }
+
+    pub(super) fn table(
+        &self,
+        name: &'static str,
+        schema: &Schema,
+    ) -> Result<GameTable, DatasetError> {
+        GameTable::open(self.container.range(name)?, name, schema)
+    }
+}
+
+fn manifest(container: &Container) -> Result<GameManifest, DatasetError> {
+    let bytes = container.bytes(MANIFEST_FILE)?;
+    // The layout first: a manifest of another one may lack fields.
+    let Named { schema } =
+        serde_json::from_slice(&bytes).map_err(DatasetError::unreadable(MANIFEST_FILE))?;
+    match schema.as_str() {
+        GAME_SCHEMA => {
+            serde_json::from_slice(&bytes).map_err(DatasetError::unreadable(MANIFEST_FILE))
+        }
+        GAME_SIDE_SCHEMA => Err(DatasetError::Foreign(format!(
+            "this is one side's own file of a game, which cannot be simulated without the other side's \
+             commands; verify the {GAME_FILE} that it was cut from"
+        ))),
+        other => Err(DatasetError::Foreign(format!(
+            "the recording's layout is {other:?}, this version reads {GAME_SCHEMA}"
+        ))),
+    }
+}
+
+/// The score beside the archive, if there is one, is the one inside.
+fn same_results(path: &Path, container: &Container) -> Result<(), DatasetError> {
+    match fs::read(path) {
+        Ok(beside) if beside == container.bytes(RESULTS_FILE)? => Ok(()),
+        Ok(_) => Err(DatasetError::Altered(format!(
+            "{} is not the {RESULTS_FILE} inside of {GAME_FILE}",
+            path.display()
+        ))),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(error.into()),
+    }
+}

@@ -1,0 +1,87 @@
+use crate::{
+    dataset::{BATCH_ROWS, FileRange, check_footer, has_columns},
+    error::DatasetError,
+};
+use arrow_array::RecordBatch;
+use arrow_schema::Schema;
+use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
+
+/// A table of a game, read from its first row on.
+pub(super) struct GameTable {
+    name: &'static str,
+    reader: ParquetRecordBatchReader,
+    /// What was read and not taken; never empty once [`Self::fill`] has found a row.
+    ahead: Option<RecordBatch>,
+}
+
+impl GameTable {
+    pub fn open(
+        table: FileRange,
+        name: &'static str,
+        expected: &Schema,
+    ) -> Result<Self, DatasetError> {
+        let unreadable = || DatasetError::unreadable(name);
+        let bytes = table.bytes;
+        let builder = ParquetRecordBatchReaderBuilder::try_new(table).map_err(unreadable())?;
+        check_footer(builder.metadata(), bytes).map_err(unreadable())?;
+        let found = builder.schema();
+        has_columns(name, found, expected)?;
+        if found.fields().len() != expected.fields().len() {
+            return Err(DatasetError::Unreadable(format!(
+                "{name} has {} columns, expected {}",
+                found.fields().len(),
+                expected.fields().len()
+            )));
+        }
+        let reader = builder
+            .with_batch_size(BATCH_ROWS)
+            .build()
+            .map_err(unreadable())?;
+        Ok(Self {
+            name,
+            reader,
+            ahead: None,
+        })
+    }
+
+    /// Its file's name.
+    pub const fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// How many rows can be taken at once; none after the last.
+    pub fn fill(&mut self) -> Result<usize, DatasetError> {
+        while self
+            .ahead
+            .as_ref()
+            .is_none_or(|batch| batch.num_rows() == 0)
+        {
+            let next = self.reader.next().transpose();
+            match next.map_err(DatasetError::unreadable(self.name))? {
+                Some(batch) => self.ahead = Some(batch),
+                None => return Ok(0),
+            }
+        }
+        Ok(self.ahead.as_ref().map_or(0, RecordBatch::num_rows))
+    }
+
+    /// Takes `count` rows of those that can be.
+    pub fn take(&mut self, count: usize) -> Option<RecordBatch> {
+        let ahead = self.ahead.take()?;
+        let taken = ahead.slice(0, count);
+        self.ahead = Some(ahead.slice(count, ahead.num_rows() - count));
+        Some(taken)
+    }
+
+    /// All that is left, row by row.
+    pub fn rows(mut self) -> Result<Vec<RecordBatch>, DatasetError> {
+        let mut rows = Vec::new();
+        loop {
+            let count = self.fill()?;
+            let Some(batch) = self.take(count).filter(|_| count > 0) else {
+                return Ok(rows);
+            };
+            rows.extend((0..count).map(|row| batch.slice(row, 1)));
+        }
+    }
+}

@@ -1,0 +1,341 @@
+//! The tables of a game: the true motion, what each side saw and did, the rallies and how each side got
+//! ready for them.
+
+use super::{
+    columns::{FloatColumns, joints},
+    steps::{CONSTRAINTS, observation_columns, put_observation},
+};
+use crate::{error::RecordingError, times::nanoseconds};
+use arrow_array::{
+    ArrayRef,
+    builder::{
+        ArrayBuilder, Float64Builder, Int64Builder, ListBuilder, StringBuilder, UInt32Builder,
+    },
+};
+use arrow_schema::{DataType, Field, Schema, SchemaRef};
+use faceoff_episode::{Entry, GameStepRow, RallyRow, RallyStart};
+use faceoff_types::{AgentFault, Side};
+use std::sync::Arc;
+
+/// Which step a row is of.
+#[derive(Default)]
+struct StepNumbers {
+    game_steps: UInt32Builder,
+    rallies: UInt32Builder,
+    steps: UInt32Builder,
+}
+
+impl StepNumbers {
+    fn fields() -> [Field; 3] {
+        ["game_step", "rally", "step"].map(|name| Field::new(name, DataType::UInt32, false))
+    }
+
+    fn push(&mut self, row: &GameStepRow<'_>) {
+        self.game_steps.append_value(row.game_step);
+        self.rallies.append_value(row.rally);
+        self.steps.append_value(row.step);
+    }
+
+    fn take(&mut self) -> Vec<ArrayRef> {
+        [&mut self.game_steps, &mut self.rallies, &mut self.steps]
+            .map(|column| Arc::new(column.finish()) as ArrayRef)
+            .into()
+    }
+}
+
+/// Rows of the true motion: one per control step.
+pub(crate) struct MotionRows {
+    schema: SchemaRef,
+    numbers: StepNumbers,
+    motion: FloatColumns,
+}
+
+impl MotionRows {
+    pub fn new() -> Self {
+        let mut motion = FloatColumns::default().with(
+            ["x", "y", "yaw", "vx", "vy", "yaw_rate"].map(|c| format!("puck_{c}")),
+            false,
+        );
+        for side in Side::BOTH {
+            let name = |suffix: &str| format!("robot_{}_{suffix}", side.number());
+            motion = motion
+                .with(joints(&name("q")), false)
+                .with(joints(&name("dq")), false)
+                .with(["1", "2"].map(|n| name(&format!("universal_{n}"))), false)
+                .with(["x", "y", "z"].map(|c| name(&format!("ee_{c}"))), false);
+        }
+        let mut fields = StepNumbers::fields().to_vec();
+        fields.extend_from_slice(motion.fields());
+        Self {
+            schema: Arc::new(Schema::new(fields)),
+            numbers: StepNumbers::default(),
+            motion,
+        }
+    }
+
+    pub const fn schema(&self) -> &SchemaRef {
+        &self.schema
+    }
+
+    /// Rows so far.
+    pub fn len(&self) -> usize {
+        self.numbers.steps.len()
+    }
+
+    pub fn push(&mut self, row: &GameStepRow<'_>) {
+        self.numbers.push(row);
+        let (motion, state) = (&mut self.motion, row.state);
+        motion.put(&state.puck);
+        for robot in 0..2 {
+            motion.put(&state.q[robot]);
+            motion.put(&state.dq[robot]);
+            motion.put(&state.universal[robot]);
+            motion.put(&state.ee[robot]);
+        }
+        motion.end_row();
+    }
+
+    /// The rows so far, which are removed; so of the others.
+    pub fn take(&mut self) -> Vec<ArrayRef> {
+        let mut columns = self.numbers.take();
+        columns.extend(self.motion.take());
+        columns
+    }
+}
+
+/// Rows of what one side saw and did: one per control step.
+pub(crate) struct SideRows {
+    schema: SchemaRef,
+    side: Side,
+    numbers: StepNumbers,
+    observations: FloatColumns,
+    actions: ListBuilder<Float64Builder>,
+    effects: StringBuilder,
+    /// Computation time, the host's, CPU time.
+    times: [Int64Builder; 3],
+    constraints: FloatColumns,
+}
+
+/// What a side's answer took, less what the host took; what that was; CPU time. Nanoseconds.
+pub(crate) const SIDE_TIMES: [&str; 3] = ["computation_time_ns", "host_time_ns", "cpu_time_ns"];
+
+impl SideRows {
+    pub fn new(side: Side) -> Self {
+        let observations = observation_columns("obs_", false);
+        let constraints = FloatColumns::default().with(CONSTRAINTS.map(str::to_owned), false);
+        let item = Arc::new(Field::new_list_field(DataType::Float64, false));
+        let mut fields = StepNumbers::fields().to_vec();
+        fields.extend_from_slice(observations.fields());
+        fields.push(Field::new("action", DataType::List(item.clone()), true));
+        fields.push(Field::new("effect", DataType::Utf8, false));
+        fields.extend(SIDE_TIMES.map(|name| Field::new(name, DataType::Int64, true)));
+        fields.extend_from_slice(constraints.fields());
+        Self {
+            schema: Arc::new(Schema::new(fields)),
+            side,
+            numbers: StepNumbers::default(),
+            observations,
+            actions: ListBuilder::new(Float64Builder::new()).with_field(item),
+            effects: StringBuilder::new(),
+            times: Default::default(),
+            constraints,
+        }
+    }
+
+    pub const fn schema(&self) -> &SchemaRef {
+        &self.schema
+    }
+
+    pub fn observe(&mut self, observation: &[f64]) {
+        put_observation(&mut self.observations, observation);
+        self.observations.end_row();
+    }
+
+    pub fn push(&mut self, row: &GameStepRow<'_>) {
+        self.numbers.push(row);
+        let side = &row.sides[self.side.index()];
+        if let Some(action) = side.action {
+            self.actions.values().append_slice(action);
+        }
+        self.actions.append(side.action.is_some());
+        self.effects.append_value(side.effect.as_str());
+        let answered = side.answered.as_ref();
+        let [computation, host, cpu] = &mut self.times;
+        computation.append_option(answered.map(|a| nanoseconds(a.computation_time_s)));
+        host.append_option(answered.map(|a| nanoseconds(a.host_time_s)));
+        cpu.append_option(answered.and_then(|a| a.cpu_time_s).map(nanoseconds));
+        let c = side.constraints;
+        self.constraints
+            .put(&[c.joint_pos, c.joint_vel, c.ee, c.link]);
+        self.constraints.end_row();
+    }
+
+    pub fn take(&mut self) -> Vec<ArrayRef> {
+        let mut columns = self.numbers.take();
+        columns.extend(self.observations.take());
+        columns.push(Arc::new(self.actions.finish()));
+        columns.push(Arc::new(self.effects.finish()));
+        columns.extend(
+            self.times
+                .iter_mut()
+                .map(|column| Arc::new(column.finish()) as ArrayRef),
+        );
+        columns.extend(self.constraints.take());
+        columns
+    }
+}
+
+/// Rows of the rallies, as anybody may see them.
+pub(crate) struct RallyRows {
+    schema: SchemaRef,
+    rallies: UInt32Builder,
+    game_steps: UInt32Builder,
+    serves: UInt32Builder,
+    steps: UInt32Builder,
+    ends: StringBuilder,
+    by: UInt32Builder,
+    scores: [UInt32Builder; 2],
+    initial: FloatColumns,
+}
+
+impl RallyRows {
+    pub fn new() -> Self {
+        let initial = FloatColumns::default().with(
+            ["x", "y", "yaw", "vx", "vy", "yaw_rate"].map(|c| format!("initial_puck_{c}")),
+            false,
+        );
+        let number = |name, nullable| Field::new(name, DataType::UInt32, nullable);
+        let mut fields = vec![
+            number("rally", false),
+            number("game_step", false),
+            number("serves", false),
+            number("steps", false),
+            Field::new("end", DataType::Utf8, false),
+            number("by", true),
+            number("score_1", false),
+            number("score_2", false),
+        ];
+        fields.extend_from_slice(initial.fields());
+        Self {
+            schema: Arc::new(Schema::new(fields)),
+            rallies: UInt32Builder::new(),
+            game_steps: UInt32Builder::new(),
+            serves: UInt32Builder::new(),
+            steps: UInt32Builder::new(),
+            ends: StringBuilder::new(),
+            by: UInt32Builder::new(),
+            scores: Default::default(),
+            initial,
+        }
+    }
+
+    pub const fn schema(&self) -> &SchemaRef {
+        &self.schema
+    }
+
+    pub fn begin(&mut self, start: &RallyStart<'_>) {
+        self.rallies.append_value(start.rally);
+        self.game_steps.append_value(start.game_step);
+        self.serves.append_value(start.serves.number());
+        self.initial.put(&start.state.puck);
+        self.initial.end_row();
+    }
+
+    pub fn end(&mut self, row: &RallyRow<'_>) {
+        self.steps.append_value(row.steps);
+        self.ends.append_value(row.ending.as_str());
+        self.by
+            .append_option(row.ending.by().map(|side| side.number()));
+        for (column, score) in self.scores.iter_mut().zip(row.score) {
+            column.append_value(score);
+        }
+    }
+
+    pub fn take(&mut self) -> Vec<ArrayRef> {
+        let [first, second] = &mut self.scores;
+        let mut columns: Vec<ArrayRef> = vec![
+            Arc::new(self.rallies.finish()),
+            Arc::new(self.game_steps.finish()),
+            Arc::new(self.serves.finish()),
+            Arc::new(self.steps.finish()),
+            Arc::new(self.ends.finish()),
+            Arc::new(self.by.finish()),
+            Arc::new(first.finish()),
+            Arc::new(second.finish()),
+        ];
+        columns.extend(self.initial.take());
+        columns
+    }
+}
+
+/// Rows of how one side got ready for each rally, and of its fault in it.
+pub(crate) struct EntryRows {
+    schema: SchemaRef,
+    side: Side,
+    rallies: UInt32Builder,
+    startups: Int64Builder,
+    interpolations: StringBuilder,
+    resets: Int64Builder,
+    faults: StringBuilder,
+}
+
+impl EntryRows {
+    pub fn new(side: Side) -> Self {
+        Self {
+            schema: Arc::new(Schema::new(vec![
+                Field::new("rally", DataType::UInt32, false),
+                Field::new("startup_ns", DataType::Int64, true),
+                Field::new("interpolation", DataType::Utf8, true),
+                Field::new("reset_ns", DataType::Int64, true),
+                Field::new("fault", DataType::Utf8, true),
+            ])),
+            side,
+            rallies: UInt32Builder::new(),
+            startups: Int64Builder::new(),
+            interpolations: StringBuilder::new(),
+            resets: Int64Builder::new(),
+            faults: StringBuilder::new(),
+        }
+    }
+
+    pub const fn schema(&self) -> &SchemaRef {
+        &self.schema
+    }
+
+    pub fn begin(&mut self, start: &RallyStart<'_>) {
+        let entry = &start.entries[self.side.index()];
+        let (startup_s, reset_s) = match entry {
+            Entry::Plays {
+                startup_s, reset_s, ..
+            }
+            | Entry::FailedToReset {
+                startup_s, reset_s, ..
+            } => (*startup_s, Some(*reset_s)),
+            Entry::FailedToStart { startup_s, .. } => (Some(*startup_s), None),
+        };
+        self.rallies.append_value(start.rally);
+        self.startups.append_option(startup_s.map(nanoseconds));
+        self.interpolations
+            .append_option(entry.interpolation().map(|code| code.to_string()));
+        self.resets.append_option(reset_s.map(nanoseconds));
+    }
+
+    pub fn end(&mut self, fault: Option<&AgentFault>) -> Result<(), RecordingError> {
+        let fault = fault
+            .map(serde_json::to_string)
+            .transpose()
+            .map_err(RecordingError::unusable("writing a fault"))?;
+        self.faults.append_option(fault);
+        Ok(())
+    }
+
+    pub fn take(&mut self) -> Vec<ArrayRef> {
+        vec![
+            Arc::new(self.rallies.finish()),
+            Arc::new(self.startups.finish()),
+            Arc::new(self.interpolations.finish()),
+            Arc::new(self.resets.finish()),
+            Arc::new(self.faults.finish()),
+        ]
+    }
+}

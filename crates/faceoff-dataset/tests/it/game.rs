@@ -1,0 +1,276 @@
+//! Recordings of games: verified, forged, damaged.
+
+use crate::forgery::{Forgery, flipped};
+use arrow_array::{Array, RecordBatch};
+use faceoff_dataset::{
+    DatasetError,
+    game::{GAME_FILE, GameRecorder, GameRecording, RecordedGame, side_file, verify_game},
+};
+use faceoff_episode::{Answered, Arena, Entry, GameCourse, Response, SideFault};
+use faceoff_types::{
+    AgentFaultKind, GameLimits, Interpolation, Profile, Ruleset, Seed, Side, SlotTiming,
+};
+use faceoff_wire::game::{GameCalibration, GameSpec};
+use std::{
+    fs::{self, File},
+    path::Path,
+};
+use tempfile::TempDir;
+use zip::ZipArchive;
+
+const STEPS: u32 = 1600;
+
+fn spec() -> GameSpec {
+    let seed = Seed::from_number(11);
+    GameSpec {
+        ruleset: Ruleset::CURRENT,
+        steps: STEPS,
+        profile: Profile::Evaluation,
+        seed,
+        mismatch_seed: seed.model_mismatch(),
+        limits: GameLimits::default(),
+        platform_retries: 0,
+        perturbations: Box::default(),
+    }
+}
+
+/// Plays a game in which all happens that a recording must tell: answers late and in time, a fault at a step,
+/// one at a reset, one at a start, and another interpolation after a restart.
+fn record(out: &Path) {
+    let spec = spec();
+    let arena = Arena::new(spec.profile, spec.seed, spec.mismatch_seed);
+    let recorder = GameRecorder::create(&out.join("tables")).unwrap();
+    let mut course = GameCourse::begin(&arena, spec.steps, spec.limits.clone(), recorder);
+    let fault = |detail: &str| SideFault {
+        kind: AgentFaultKind::NotJson {
+            detail: detail.to_owned(),
+        },
+        line: Some("oops".to_owned()),
+    };
+    while course.end().is_none() {
+        let rally = course.rally();
+        let entries = Side::BOTH.map(|side| {
+            let startup_s = course.needs_start(side).then_some(0.25);
+            let interpolation = match (rally, side) {
+                (0, _) => Interpolation::Cubic,
+                _ => Interpolation::Linear,
+            };
+            match (rally, side) {
+                (1, Side::Second) => Entry::FailedToReset {
+                    startup_s,
+                    interpolation,
+                    reset_s: 0.125,
+                    fault: fault("reset"),
+                },
+                (2, Side::First) if startup_s.is_some() => Entry::FailedToStart {
+                    startup_s: 0.5,
+                    fault: fault("start"),
+                },
+                _ => Entry::Plays {
+                    startup_s,
+                    interpolation,
+                    reset_s: 0.0625,
+                },
+            }
+        });
+        let interpolations = entries.each_ref().map(Entry::interpolation);
+        course.start_rally(entries).unwrap();
+        while course.is_in_rally() {
+            let step = course.rally_steps();
+            let actions = Side::BOTH.map(|side| {
+                let question = course.question(side).unwrap()?;
+                let mut held: [f64; 7] = question.observation[6..13].try_into().unwrap();
+                held[0] += 0.001 * f64::from(step % 30);
+                let interpolation = interpolations[side.index()].unwrap();
+                Some(interpolation.held(&held)[..interpolation.len()].to_vec())
+            });
+            let responses = [0, 1].map(|side| {
+                let computation_time_s = if step % 100 == 7 {
+                    0.03125
+                } else {
+                    0.001953125
+                };
+                let answered = Answered {
+                    computation_time_s,
+                    host_time_s: 0.0,
+                    cpu_time_s: None,
+                };
+                match &actions[side] {
+                    None => Response::Held,
+                    Some(_)
+                        if (rally, step, side) == (0, 40, 1)
+                            || (rally, step, side) == (1, 9, 0) =>
+                    {
+                        Response::Fault {
+                            fault: fault("step"),
+                            answered,
+                        }
+                    }
+                    Some(action) => Response::Answer { action, answered },
+                }
+            });
+            course.answer(responses).unwrap();
+        }
+    }
+    let calibration = GameCalibration {
+        sides: [SlotTiming::default(); 2],
+    };
+    let recorded = RecordedGame {
+        spec: &spec,
+        agents: &["one".to_owned(), "other".to_owned()],
+        played: course.finish(),
+        calibration,
+        logs: &["log of one\n".to_owned(), "log of the other\n".to_owned()],
+    };
+    recorded.write(out).unwrap();
+}
+
+fn recorded() -> (TempDir, TempDir) {
+    let (out, unpacked) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    record(out.path());
+    let archive = File::open(out.path().join(GAME_FILE)).unwrap();
+    let mut zip = ZipArchive::new(archive).unwrap();
+    zip.extract(unpacked.path()).unwrap();
+    (out, unpacked)
+}
+
+fn verify(path: &Path) -> Result<u32, String> {
+    let recording = GameRecording::open(path).map_err(|error| error.to_string())?;
+    verify_game(&recording, &|_| ())
+        .map(|verified| verified.steps)
+        .map_err(|error| error.to_string())
+}
+
+#[test]
+fn a_recording_verifies_packed_and_unpacked_and_the_same_game_gives_the_same_bytes() {
+    let (out, unpacked) = recorded();
+    assert_eq!(verify(&out.path().join(GAME_FILE)), Ok(STEPS));
+    assert_eq!(verify(out.path()), Ok(STEPS));
+    assert_eq!(verify(unpacked.path()), Ok(STEPS));
+    let outcome = GameRecording::open(out.path()).unwrap().outcome().unwrap();
+    let faults = outcome.sides.each_ref().map(|side| side.faults.len());
+    assert!(faults[0] >= 2 && faults[1] >= 2, "{outcome:?}");
+    assert!(outcome.sides.iter().all(|side| side.late_answers > 0));
+    let (again, _) = recorded();
+    for name in [GAME_FILE, side_file(Side::First), side_file(Side::Second)] {
+        let bytes = [&out, &again].map(|dir| fs::read(dir.path().join(name)).unwrap());
+        assert!(bytes[0] == bytes[1], "{name}");
+        assert!(GameRecording::is_at(&out.path().join(name)).unwrap());
+    }
+    assert!(!out.path().join("tables").exists());
+}
+
+/// A forger who also states the hashes anew is found out by what the simulation gives.
+#[test]
+fn every_column_that_a_forger_touches_is_found() {
+    let (_out, unpacked) = recorded();
+    for (name, row) in [
+        ("motion.parquet", 20),
+        ("side-1.parquet", 20),
+        ("rallies.parquet", 1),
+        ("entries-2.parquet", 1),
+    ] {
+        let columns: Vec<String> = crate::played::table(&unpacked.path().join(name))
+            .schema()
+            .fields()
+            .iter()
+            .map(|field| field.name().clone())
+            .collect();
+        for column in columns {
+            // Nothing follows from what the host took or from a CPU's time, and no times but these are null here.
+            if ["host_time_ns", "cpu_time_ns"].contains(&column.as_str()) {
+                continue;
+            }
+            let forged = Forgery::of(unpacked.path());
+            let mut same = false;
+            forged.table(name, |batch| {
+                let changed = flipped(&batch, &column, row);
+                same = batch.column_by_name(&column).unwrap().to_data()
+                    == changed.column_by_name(&column).unwrap().to_data();
+                changed
+            });
+            if same {
+                // There is no value in this row.
+                continue;
+            }
+            let found = verify(forged.reseal().dir.path());
+            let words = found.expect_err(&format!("{name}, {column}"));
+            assert!(!words.is_empty(), "{name}, {column}");
+        }
+    }
+}
+
+#[test]
+fn the_words_say_where_and_what() {
+    let (_out, unpacked) = recorded();
+    let said = |name: &str, change: fn(RecordBatch) -> RecordBatch| {
+        let forged = Forgery::of(unpacked.path());
+        forged.table(name, change);
+        verify(forged.reseal().dir.path()).unwrap_err()
+    };
+    let words = said("motion.parquet", |batch| flipped(&batch, "puck_x", 30));
+    assert!(
+        words.starts_with("motion.parquet, rally 0, step 30, puck_x: recorded"),
+        "{words}"
+    );
+    let words = said("motion.parquet", |batch| batch.slice(0, 100));
+    assert!(words.contains("rally 0, step 100, rows"), "{words}");
+    let words = said("rallies.parquet", |batch| batch.slice(0, 1));
+    assert!(words.contains("the game has not ended"), "{words}");
+    let words = said("entries-1.parquet", |batch| batch.slice(0, 1));
+    assert!(
+        words.contains("entries-1.parquet, rally 1, rows"),
+        "{words}"
+    );
+
+    let forged = Forgery::of(unpacked.path());
+    forged.text("results.json", "\"goals\": 0", "\"goals\": 7");
+    let words = verify(forged.reseal().dir.path()).unwrap_err();
+    assert!(words.contains("results.json, sides[0].goals"), "{words}");
+    let forged = Forgery::of(unpacked.path());
+    let seed = spec().seed.to_string();
+    forged.text("manifest.json", &seed, &Seed::from_number(12).to_string());
+    let words = verify(forged.dir.path()).unwrap_err();
+    assert!(words.contains("rally 0"), "{words}");
+}
+
+#[test]
+fn what_is_damaged_is_told_apart_from_what_is_foreign() {
+    let (out, unpacked) = recorded();
+    let archive = out.path().join(GAME_FILE);
+    let whole = fs::read(&archive).unwrap();
+    fs::write(&archive, &whole[..whole.len() / 2]).unwrap();
+    assert!(matches!(
+        GameRecording::open(&archive),
+        Err(DatasetError::Unreadable(_))
+    ));
+    let forged = Forgery::of(unpacked.path());
+    fs::write(forged.path("agent-1.log"), "another log\n").unwrap();
+    let altered = GameRecording::open(forged.dir.path()).unwrap_err();
+    assert!(matches!(altered, DatasetError::Altered(_)));
+    assert!(altered.to_string().contains("agent-1.log"), "{altered}");
+    for (from, to, words) in [
+        ("faceoff-game/1", "faceoff-game/9", "this version reads"),
+        (
+            "airhockey-2023.2",
+            "airhockey-2023.1",
+            "games are played by",
+        ),
+    ] {
+        let forged = Forgery::of(unpacked.path());
+        forged.text("manifest.json", from, to);
+        let said = verify(forged.dir.path()).unwrap_err();
+        assert!(said.contains(words), "{said}");
+    }
+    let side = GameRecording::open(&out.path().join(side_file(Side::Second))).unwrap_err();
+    assert!(matches!(side, DatasetError::Foreign(_)));
+    let nothing = tempfile::tempdir().unwrap();
+    assert!(!GameRecording::is_at(nothing.path()).unwrap());
+    for name in [GAME_FILE, "dataset.zip"] {
+        fs::write(nothing.path().join(name), "").unwrap();
+    }
+    let both = GameRecording::is_at(nothing.path())
+        .unwrap_err()
+        .to_string();
+    assert!(both.contains("name one of them"), "{both}");
+}

@@ -1,0 +1,147 @@
+use crate::{
+    game_record::{Entry, SideFault},
+    record::Answered,
+    time_sum::TimeSum,
+};
+use faceoff_sim::ConstraintValues;
+use faceoff_types::{
+    AgentFault, Contest, ForfeitCause, GameFault, GameLimits, GameWindow, Phase, Side, SideOutcome,
+};
+
+/// One side of a game under way: what it has done so far.
+#[derive(Debug, Clone)]
+pub(crate) struct SideCourse {
+    side: Side,
+    /// Its fault in this rally: its arm holds since then.
+    fault: Option<AgentFault>,
+    /// It must be started before it can play.
+    needs_start: bool,
+    window: GameWindow,
+    window_times: TimeSum,
+    windows: Vec<GameWindow>,
+    faults: Vec<GameFault>,
+    late_answers: u32,
+    /// Computation times of all answers, in order, in seconds.
+    answer_times_s: Vec<f64>,
+    time_used_s: f64,
+}
+
+impl SideCourse {
+    pub fn new(side: Side) -> Self {
+        Self {
+            side,
+            fault: None,
+            needs_start: true,
+            window: GameWindow::default(),
+            window_times: TimeSum::default(),
+            windows: Vec::new(),
+            faults: Vec::new(),
+            late_answers: 0,
+            answer_times_s: Vec::new(),
+            time_used_s: 0.0,
+        }
+    }
+
+    pub const fn needs_start(&self) -> bool {
+        self.needs_start
+    }
+
+    /// Its fault in this rally.
+    pub const fn fault(&self) -> Option<&AgentFault> {
+        self.fault.as_ref()
+    }
+
+    /// Gets ready for a rally, or fails to.
+    pub fn enter(&mut self, entry: &Entry, rally: u32, game_step: u32) {
+        self.fault = None;
+        self.needs_start = false;
+        self.time_used_s += entry.time_s();
+        match entry {
+            Entry::Plays { .. } => {}
+            Entry::FailedToStart { fault, .. } => {
+                self.fail(fault.clone(), Phase::StartUp, rally, 0, game_step);
+            }
+            Entry::FailedToReset { fault, .. } => {
+                self.fail(fault.clone(), Phase::Reset, rally, 0, game_step);
+            }
+        }
+    }
+
+    /// Counts its fault; it has at most one in a rally.
+    pub fn fail(&mut self, fault: SideFault, phase: Phase, rally: u32, step: u32, game_step: u32) {
+        let fault = AgentFault {
+            fault: fault.kind,
+            contest: Contest::Game { side: self.side },
+            episode: (phase != Phase::StartUp).then_some(rally),
+            step: (phase == Phase::Step).then_some(step),
+            line: fault.line,
+        };
+        self.window.faults += 1;
+        self.needs_start = true;
+        self.faults.push(GameFault {
+            game_step,
+            fault: fault.clone(),
+        });
+        self.fault = Some(fault);
+    }
+
+    /// Counts an answer.
+    pub fn answer(&mut self, answered: &Answered, is_late: bool) {
+        self.late_answers += u32::from(is_late);
+        self.window_times.add(answered.computation_time_s);
+        self.answer_times_s.push(answered.computation_time_s);
+        self.spend(answered.computation_time_s);
+    }
+
+    /// Counts time that was no answer's.
+    pub fn spend(&mut self, time_s: f64) {
+        self.time_used_s += time_s;
+    }
+
+    /// Counts a control step.
+    pub fn step(&mut self, constraints: &ConstraintValues) {
+        self.window.steps += 1;
+        constraints.mark(&mut self.window.violations);
+    }
+
+    /// A window of the game is over.
+    pub fn end_window(&mut self) {
+        let window = std::mem::take(&mut self.window);
+        let times = std::mem::take(&mut self.window_times);
+        self.windows.push(GameWindow {
+            computation_time: times.summary(),
+            ..window
+        });
+    }
+
+    /// What it has used up, if anything.
+    pub fn forfeits(&self, limits: &GameLimits) -> Option<ForfeitCause> {
+        let (count, allowed) = (self.fault_count(), limits.max_faults);
+        if count > allowed {
+            return Some(ForfeitCause::Faults { count, allowed });
+        }
+        let (used_s, allowed_s) = (self.time_used_s, limits.total_s);
+        (used_s > allowed_s).then_some(ForfeitCause::Time { used_s, allowed_s })
+    }
+
+    fn fault_count(&self) -> u32 {
+        u32::try_from(self.faults.len()).unwrap_or(u32::MAX)
+    }
+
+    /// All that it did, and the computation times of its answers.
+    pub fn finish(mut self, goals: u32, fouls: u32) -> (SideOutcome, Vec<f64>) {
+        if self.window.steps > 0 || self.window.faults > 0 {
+            self.end_window();
+        }
+        let outcome = SideOutcome {
+            goals,
+            fouls,
+            windows: self.windows,
+            answers: u32::try_from(self.answer_times_s.len()).unwrap_or(u32::MAX),
+            late_answers: self.late_answers,
+            faults: self.faults,
+            time_used_s: self.time_used_s,
+        };
+        (outcome, self.answer_times_s)
+    }
+}

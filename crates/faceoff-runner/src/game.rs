@@ -1,0 +1,7 @@
+//! One game between two agents: two sandboxed processes in lock-step → recording and report.
+
+mod lock_step;
+mod report;
+mod side_player;
+
+pub use report::{GameObserver, GameReport, play_game, run_game, run_game_watched};

@@ -1,0 +1,138 @@
+//! Both sides are asked before either is waited for, and whatever one does, the other's clock is its own.
+
+use super::side_player::{SidePlayer, Started};
+use crate::{calibration::Calibration, fault::PlatformFault, session::Session};
+use faceoff_episode::{GameCourse, GameSink, Question};
+use faceoff_types::{Side, TimeLimits};
+use std::time::{Duration, Instant};
+
+/// What takes longer than this while one side is seen to has kept us from looking at the other.
+const AWAY: Duration = Duration::from_millis(1);
+
+/// Plays a game to its end; `cancelled` is asked before each step.
+pub(super) fn play<S: GameSink>(
+    course: &mut GameCourse<S>,
+    sides: &mut [SidePlayer<'_>; 2],
+    calibrations: &mut [Calibration; 2],
+    cancelled: impl Fn(&mut S) -> bool,
+) -> Result<(), PlatformFault> {
+    while course.end().is_none() {
+        get_ready(course, sides)?;
+        let (rally, mut steps) = (course.rally(), 0);
+        while course.is_in_rally() {
+            if cancelled(course.sink()) {
+                return Err(PlatformFault::Cancelled);
+            }
+            step(course, sides)?;
+            steps += 1;
+        }
+        for side in &mut *sides {
+            side.tell_end(rally, steps)?;
+        }
+        for calibration in &mut *calibrations {
+            calibration.between_episodes()?;
+        }
+    }
+    for side in sides {
+        side.finish()?;
+    }
+    Ok(())
+}
+
+/// Starts who must be started, announces the rally to both, and begins it.
+fn get_ready<S: GameSink>(
+    course: &mut GameCourse<S>,
+    sides: &mut [SidePlayer<'_>; 2],
+) -> Result<(), PlatformFault> {
+    let rally = course.rally();
+    let [first, second] = sides;
+    let started: [Started; 2] = [first.start()?, second.start()?];
+    ask_both(sides, |_, player| {
+        player.ask(|session| session.send_reset(rally))
+    })?;
+    wait_for_both(sides)?;
+    let [first, second] = sides;
+    let [first_started, second_started] = started;
+    let entries = [first.entry(first_started), second.entry(second_started)];
+    course.start_rally(entries)?;
+    end_faulty(course, sides);
+    Ok(())
+}
+
+/// Asks both for one step and plays it.
+fn step<S: GameSink>(
+    course: &mut GameCourse<S>,
+    sides: &mut [SidePlayer<'_>; 2],
+) -> Result<(), PlatformFault> {
+    let questions = [
+        course.question(Side::First)?,
+        course.question(Side::Second)?,
+    ];
+    ask_both(sides, |side, player| match questions[side.index()] {
+        Some(Question { step, observation }) => {
+            player.ask(|session| session.send_step(step, observation))
+        }
+        None => Ok(()),
+    })?;
+    wait_for_both(sides)?;
+    let [first, second] = &*sides;
+    course.answer([first.response(), second.response()])?;
+    end_faulty(course, sides);
+    Ok(())
+}
+
+/// Ends the processes of who has a fault in this rally, if they run.
+fn end_faulty<S: GameSink>(course: &GameCourse<S>, sides: &mut [SidePlayer<'_>; 2]) {
+    for (side, player) in Side::BOTH.into_iter().zip(sides) {
+        if let Some(fault) = course.fault(side)
+            && !player.is_noted()
+        {
+            player.end_by(fault);
+        }
+    }
+}
+
+/// Asks one after the other.
+fn ask_both(
+    sides: &mut [SidePlayer<'_>; 2],
+    mut ask: impl FnMut(Side, &mut SidePlayer<'_>) -> Result<(), PlatformFault>,
+) -> Result<(), PlatformFault> {
+    let [first, second] = sides;
+    ask(Side::First, first)?;
+    let before = Instant::now();
+    ask(Side::Second, second)?;
+    tell_if_away(first, before);
+    Ok(())
+}
+
+/// Waits until neither side's answer is due; the first that comes is taken first.
+fn wait_for_both(sides: &mut [SidePlayer<'_>; 2]) -> Result<(), PlatformFault> {
+    let [first, second] = sides;
+    loop {
+        match (first.due(), second.due()) {
+            (None, None) => return Ok(()),
+            (Some(_), None) => first.look(Instant::now() + TimeLimits::LONGEST)?,
+            (None, Some(_)) => second.look(Instant::now() + TimeLimits::LONGEST)?,
+            (Some(a), Some(b)) => {
+                Session::wait_for_any(&[a, b], Instant::now() + TimeLimits::LONGEST)?;
+                look(first, second)?;
+                look(second, first)?;
+            }
+        }
+    }
+}
+
+/// Looks at one side. To learn how an agent ended may take seconds, which are not the other's.
+fn look(looked_at: &mut SidePlayer<'_>, other: &mut SidePlayer<'_>) -> Result<(), PlatformFault> {
+    let before = Instant::now();
+    looked_at.look(before)?;
+    tell_if_away(other, before);
+    Ok(())
+}
+
+fn tell_if_away(other: &mut SidePlayer<'_>, since: Instant) {
+    let away = since.elapsed();
+    if away > AWAY {
+        other.was_not_looked_at(away);
+    }
+}

@@ -1,0 +1,454 @@
+//! Games between real agents: what each side does is its own affair.
+
+use crate::agents::{Agent, sandboxed};
+use faceoff_dataset::game::{GAME_FILE, GameRecording, side_file, verify_game};
+use faceoff_runner::{
+    AgentEnvironment, GameObserver, GameReport, GameSpec, PlatformFault, run_game,
+};
+use faceoff_types::{
+    AgentFaultKind, ForfeitCause, GameEnd, GameLimits, GameOutcome, Phase, Profile, Ruleset, Seed,
+    Side, SideOutcome,
+};
+use std::{cell::Cell, fs, path::Path};
+
+/// Late is what takes a minute: what a busy machine does must not decide a test.
+pub fn spec(steps: u32) -> GameSpec {
+    let seed = Seed::from_number(7);
+    GameSpec {
+        ruleset: Ruleset::CURRENT,
+        steps,
+        profile: Profile::Evaluation,
+        seed,
+        mismatch_seed: seed.model_mismatch(),
+        limits: GameLimits {
+            in_time_s: 60.0,
+            restart_s: 600.0,
+            ..GameLimits::default()
+        },
+        platform_retries: 0,
+        perturbations: Box::default(),
+    }
+}
+
+struct Nobody;
+
+impl GameObserver for Nobody {
+    fn cancelled(&self) -> bool {
+        false
+    }
+}
+
+fn play_in(
+    spec: &GameSpec,
+    agents: [&Agent; 2],
+    envs: [&AgentEnvironment; 2],
+    out: &Path,
+) -> GameReport {
+    let bundles = agents.map(|agent| &agent.bundle);
+    run_game(spec, bundles, envs, out, &mut Nobody).expect("the platform works")
+}
+
+/// Plays a game, which must verify.
+fn play(spec: &GameSpec, agents: [&Agent; 2]) -> GameReport {
+    let out = tempfile::tempdir().unwrap();
+    let env = sandboxed();
+    let report = play_in(spec, agents, [&env; 2], out.path());
+    verifies(out.path(), &report);
+    report
+}
+
+fn verifies(out: &Path, report: &GameReport) {
+    let recording = GameRecording::open(&out.join(GAME_FILE)).unwrap();
+    let steps = Cell::new(0);
+    let verified = verify_game(&recording, &|played| steps.set(steps.get() + played)).unwrap();
+    assert_eq!(verified.score, report.archives.score);
+    assert_eq!(recording.results().unwrap(), report.archives.score);
+    assert_eq!(recording.outcome().unwrap(), report.archives.outcome);
+    assert_eq!(steps.get(), u64::from(report.archives.outcome.steps));
+    let found = recording.archive().unwrap().unwrap();
+    assert_eq!(found, report.archives.game);
+}
+
+/// What does not depend on how fast anything was.
+fn timeless(outcome: &GameOutcome) -> GameOutcome {
+    let mut outcome = outcome.clone();
+    for side in &mut outcome.sides {
+        side.time_used_s = 0.0;
+        for window in &mut side.windows {
+            window.computation_time = Default::default();
+        }
+    }
+    outcome
+}
+
+/// A game's sides: the one that is tested, and the one that behaves.
+fn against_holding(spec: &GameSpec, hooks: &str) -> [SideOutcome; 2] {
+    let (agent, hold) = (Agent::with(hooks), Agent::behaving());
+    let report = play(spec, [&agent, &hold]);
+    let [bad, good] = timeless(&report.archives.outcome).sides;
+    assert_eq!(good.faults, []);
+    assert_eq!(good.late_answers, 0);
+    assert_eq!(good.answers, report.archives.outcome.steps);
+    // By its answers, too: they move nothing.
+    assert!(
+        good.windows
+            .iter()
+            .all(|window| { window.violations == Default::default() && window.faults == 0 })
+    );
+    [bad, good]
+}
+
+fn kinds(side: &SideOutcome) -> Vec<(&AgentFaultKind, Option<u32>, Option<u32>)> {
+    let faults = side.faults.iter().map(|fault| &fault.fault);
+    faults
+        .map(|fault| (&fault.fault, fault.episode, fault.step))
+        .collect()
+}
+
+#[test]
+fn a_game_is_played_recorded_and_verified_and_the_same_seed_gives_the_same_bits() {
+    let agents = [
+        Agent::with(
+            "def on_hello(hello): print(hello['task'], hello['agent_id'], file=sys.stderr)\n\
+             def on_step(step, answer):\n    \
+             answer['action'][0][0] += 0.002 * (step % 40); return json.dumps(answer)",
+        ),
+        Agent::with("INTERPOLATION = 1"),
+    ];
+    let dirs = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+    let env = sandboxed();
+    let reports = dirs.each_ref().map(|dir| {
+        let report = play_in(&spec(1700), [&agents[0], &agents[1]], [&env; 2], dir.path());
+        verifies(dir.path(), &report);
+        report
+    });
+    let outcomes = reports
+        .each_ref()
+        .map(|report| timeless(&report.archives.outcome));
+    assert_eq!(outcomes[0], outcomes[1]);
+    let outcome = &outcomes[0];
+    assert_eq!((outcome.steps, &outcome.end), (1700, &GameEnd::Played));
+    // Fouls in turns, each after 752 steps.
+    assert!(outcome.rallies >= 2, "{outcome:?}");
+    for side in &outcome.sides {
+        let steps: Vec<u32> = side.windows.iter().map(|window| window.steps).collect();
+        assert_eq!(steps, [500, 500, 500, 200]);
+        assert_eq!(side.answers, 1700);
+    }
+    assert_eq!(reports[0].logs[0], "tournament 1\ngoodbye\n");
+    assert_eq!(reports[0].logs[1], "goodbye\n");
+    // The motion is the same file, byte for byte.
+    let motion = dirs.each_ref().map(|dir| {
+        let recording = GameRecording::open(dir.path()).unwrap();
+        recording.manifest().files["motion.parquet"].clone()
+    });
+    assert_eq!(motion[0], motion[1]);
+    let [calibrated, _] = reports[0].calibration.sides;
+    assert!(calibrated.before_s.count > 0 && calibrated.during_s.count > 0);
+}
+
+#[test]
+fn a_sides_own_file_holds_nothing_of_the_other_and_no_seed() {
+    let agent = Agent::with("def on_reset(episode): print('SECRET', file=sys.stderr)");
+    let out = tempfile::tempdir().unwrap();
+    let env = sandboxed();
+    let spec = spec(20);
+    play_in(&spec, [&agent, &Agent::behaving()], [&env; 2], out.path());
+    let seeds = [spec.seed, spec.mismatch_seed].map(|seed| seed.to_string());
+    for (side, other) in [(Side::First, "2"), (Side::Second, "1")] {
+        let path = out.path().join(side_file(side));
+        let mut zip = zip::ZipArchive::new(fs::File::open(&path).unwrap()).unwrap();
+        let mut names = Vec::new();
+        let mut bytes = Vec::new();
+        for index in 0..zip.len() {
+            let mut file = zip.by_index(index).unwrap();
+            names.push(file.name().unwrap().to_string());
+            std::io::copy(&mut file, &mut bytes).unwrap();
+        }
+        assert!(names.contains(&"motion.parquet".to_owned()), "{names:?}");
+        let own = format!("side-{}.parquet", side.number());
+        assert!(names.contains(&own), "{names:?}");
+        for name in &names {
+            assert!(!name.contains(&format!("-{other}.")), "{name}");
+        }
+        let text = String::from_utf8_lossy(&bytes);
+        assert_eq!(text.contains("SECRET"), side == Side::First);
+        assert!(!seeds.iter().any(|seed| text.contains(seed.as_str())));
+        let refused = GameRecording::open(&path).unwrap_err().to_string();
+        assert!(refused.contains("one side's own file"), "{refused}");
+    }
+}
+
+#[test]
+fn late_answers_are_dropped_and_replayed_and_cost_their_own_side_alone() {
+    // Nothing is late but what waits to be: the bound lies far above what a busy machine takes.
+    let mut spec = spec(60);
+    spec.limits.in_time_s = 2.0;
+    let slow = Agent::with(
+        "def on_step(step, answer):\n    \
+         answer['action'][0][0] += 0.2\n    \
+         if step in (5, 6, 30): time.sleep(2.1)\n    \
+         return json.dumps(answer)",
+    );
+    let report = play(&spec, [&slow, &Agent::behaving()]);
+    let [late, other] = &report.archives.outcome.sides;
+    assert_eq!((late.late_answers, late.answers), (3, 60));
+    assert!(late.faults.is_empty());
+    assert_eq!((other.late_answers, other.answers), (0, 60));
+    let [late, other] = &report.archives.score.sides;
+    assert_eq!(late.violations.computation_time, 1);
+    assert!(late.computation_time_s.max > 2.0);
+    assert!(other.computation_time_s.max < 2.0);
+}
+
+#[test]
+fn an_agent_that_always_answers_late_never_moves_its_arm() {
+    let mut spec = spec(200);
+    spec.limits.in_time_s = 1e-9;
+    let swings = Agent::with(
+        "def on_step(step, answer):\n    \
+         answer['action'][0][0] += 0.5; return json.dumps(answer)",
+    );
+    let report = play(&spec, [&swings, &swings]);
+    for side in &report.archives.outcome.sides {
+        assert_eq!((side.late_answers, side.answers), (200, 200));
+        assert!(side.faults.is_empty());
+        assert_eq!(side.windows[0].violations, Default::default());
+    }
+}
+
+#[test]
+fn a_side_that_never_answers_holds_its_arm_and_is_restarted_at_the_next_rally() {
+    let agent = Agent::with("def on_step(step, answer): return None");
+    let mut impatient = sandboxed();
+    impatient.time.step_s = 0.2;
+    let out = tempfile::tempdir().unwrap();
+    let behaving = Agent::behaving();
+    let env = sandboxed();
+    let report = play_in(
+        &spec(800),
+        [&behaving, &agent],
+        [&env, &impatient],
+        out.path(),
+    );
+    verifies(out.path(), &report);
+    let [good, bad] = &report.archives.outcome.sides;
+    assert_eq!((good.answers, good.faults.len()), (800, 0));
+    assert_eq!(bad.answers, 0);
+    let timed_out = AgentFaultKind::TimedOut {
+        phase: Phase::Step,
+        limit_s: 0.2,
+    };
+    assert_eq!(
+        kinds(bad),
+        [
+            (&timed_out, Some(0), Some(0)),
+            (&timed_out, Some(1), Some(0))
+        ]
+    );
+    assert_eq!(report.archives.outcome.rallies, 2);
+    // A fault costs each window that has one.
+    let score = &report.archives.score.sides[1];
+    assert_eq!(score.violations.computation_time, 2);
+    assert_eq!(score.penalty_points, 4.0);
+    assert!(report.logs[1].contains("no answer within the step limit"));
+}
+
+#[test]
+fn floods_rubbish_and_crashes_are_the_faults_of_their_side() {
+    for (hooks, told) in [
+        (
+            "def on_step(step, answer):\n    \
+             return (json.dumps(answer) + '\\n') * 300 if step == 3 else json.dumps(answer)",
+            "no output before the next question",
+        ),
+        (
+            "def on_step(step, answer): return 'x' * 100000 if step == 3 else json.dumps(answer)",
+            "longer than 65536 bytes",
+        ),
+        (
+            "def on_step(step, answer):\n    \
+             if step == 3: os._exit(3)\n    \
+             return json.dumps(answer)",
+            "exited with status 3",
+        ),
+        ("def on_reset(episode): os._exit(4)", "exited with status 4"),
+        (
+            "def on_step(step, answer):\n    \
+             if step == 3: answer['action'][1][0] = 10001.0\n    \
+             return json.dumps(answer)",
+            "numbers between -10000 and 10000",
+        ),
+    ] {
+        let [bad, _] = against_holding(&spec(30), hooks);
+        assert_eq!(bad.faults.len(), 1, "{hooks}");
+        let fault = bad.faults[0].to_string();
+        assert!(fault.contains(told), "{fault}");
+        assert_eq!(bad.windows[0].faults, 1);
+    }
+}
+
+#[test]
+fn numbers_at_the_bound_and_diverging_ones_are_answers_until_the_world_says_otherwise() {
+    let [at_the_bound, _] = against_holding(
+        &spec(40),
+        "def on_step(step, answer):\n    \
+         answer['action'] = [[1e4 if step % 2 else -1e4] * 7] * 2; return json.dumps(answer)",
+    );
+    assert!(at_the_bound.answers > 0);
+    for (kind, ..) in kinds(&at_the_bound) {
+        assert!(matches!(kind, AgentFaultKind::Diverged { .. }), "{kind:?}");
+    }
+    // The way that each joint turns already, so that it turns ever faster.
+    let [diverging, _] = against_holding(
+        &spec(1500),
+        "INTERPOLATION = None\n\
+         def on_step(step, answer):\n    \
+         push = [1e4 if dq > 0 else -1e4 for dq in obs[13:20]]\n    \
+         answer['action'] = [[push, push, push]] * 20\n    \
+         return json.dumps(answer)",
+    );
+    assert!(!diverging.faults.is_empty(), "{diverging:?}");
+    for (kind, ..) in kinds(&diverging) {
+        assert!(matches!(kind, AgentFaultKind::Diverged { .. }), "{kind:?}");
+    }
+}
+
+#[test]
+fn a_side_that_faults_in_every_rally_forfeits_and_both_draw() {
+    let mut spec = spec(45_000);
+    spec.limits.max_faults = 1;
+    let crashes = Agent::with("def on_reset(episode): os._exit(5)");
+    let hold = Agent::behaving();
+    let report = play(&spec, [&hold, &crashes]);
+    let (outcome, score) = (&report.archives.outcome, &report.archives.score);
+    let cause = ForfeitCause::Faults {
+        count: 2,
+        allowed: 1,
+    };
+    assert_eq!(
+        outcome.end,
+        GameEnd::Forfeit {
+            by: Side::Second,
+            cause
+        }
+    );
+    assert_eq!(score.winner.map(|side| side as u32), Some(0));
+    assert_eq!([score.sides[0].score, score.sides[1].score], [10, 0]);
+    assert_eq!(score.sides[1].forfeit, Some(cause));
+    assert!(report.logs[0].ends_with("goodbye\n"), "{}", report.logs[0]);
+
+    spec.limits.max_faults = 0;
+    let report = play(&spec, [&crashes, &crashes]);
+    let (outcome, score) = (&report.archives.outcome, &report.archives.score);
+    let causes = [ForfeitCause::Faults {
+        count: 1,
+        allowed: 0,
+    }; 2];
+    assert_eq!(outcome.end, GameEnd::BothForfeit { causes });
+    assert_eq!((outcome.steps, outcome.rallies), (0, 1));
+    assert_eq!(score.winner, None);
+    assert_eq!([score.sides[0].score, score.sides[1].score], [0, 0]);
+}
+
+#[test]
+fn who_uses_up_the_time_of_the_game_forfeits_it() {
+    let mut spec = spec(45_000);
+    spec.limits.total_s = 3600.0;
+    let agents = [
+        Agent::behaving(),
+        Agent::with("def on_step(step, answer): time.sleep(0.3); return json.dumps(answer)"),
+    ];
+    // Only the slow one's time is short: a busy machine must not use up the other's.
+    let out = tempfile::tempdir().unwrap();
+    spec.limits.total_s = 20.0;
+    let env = sandboxed();
+    let report = play_in(&spec, [&agents[0], &agents[1]], [&env; 2], out.path());
+    verifies(out.path(), &report);
+    let GameEnd::Forfeit {
+        by: Side::Second,
+        cause: ForfeitCause::Time { used_s, allowed_s },
+    } = report.archives.outcome.end
+    else {
+        panic!("{:?}", report.archives.outcome.end)
+    };
+    assert!(used_s > allowed_s && allowed_s == 20.0);
+    assert_eq!(report.archives.outcome.sides[1].time_used_s, used_s);
+    assert_eq!(
+        report.archives.score.winner.map(|side| side as u32),
+        Some(0)
+    );
+}
+
+/// An agent that has closed its output and lives on is found out after a patience of ours, which is none of
+/// the other side's time.
+#[test]
+fn learning_how_one_side_ended_is_not_on_the_others_clock() {
+    let closes = Agent::with(
+        "def on_step(step, answer):\n    \
+         if step == 2: os.close(1); time.sleep(3600)\n    \
+         return json.dumps(answer)",
+    );
+    let hold = Agent::behaving();
+    let mut env = sandboxed();
+    env.time.bye_s = 3.0;
+    let mut spec = spec(10);
+    // Less than we wait for the other's end, and far more than a busy machine takes to answer.
+    spec.limits.in_time_s = 3.0;
+    for agents in [[&closes, &hold], [&hold, &closes]] {
+        let out = tempfile::tempdir().unwrap();
+        let report = play_in(&spec, agents, [&env; 2], out.path());
+        verifies(out.path(), &report);
+        let sides = &report.archives.outcome.sides;
+        for (agent, side) in agents.into_iter().zip(sides) {
+            if std::ptr::eq(agent, &closes) {
+                assert_eq!(side.faults.len(), 1);
+                assert_eq!(side.faults[0].fault.fault, AgentFaultKind::ClosedOutput);
+            } else {
+                assert_eq!((side.late_answers, side.faults.len()), (0, 0));
+                assert_eq!(side.answers, 10);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_game_stops_when_it_is_told_to_and_leaves_logs_and_no_recording() {
+    struct Stops {
+        asked: Cell<u32>,
+        logs: Vec<(Side, String)>,
+        rallies: u32,
+        steps: u32,
+    }
+    impl GameObserver for Stops {
+        fn rally_begun(&mut self, _: &faceoff_episode::RallyStart<'_>) {
+            self.rallies += 1;
+        }
+        fn stepped(&mut self, _: &faceoff_episode::GameStepRow<'_>) {
+            self.steps += 1;
+        }
+        fn log(&mut self, side: Side, log: &str) {
+            self.logs.push((side, log.to_owned()));
+        }
+        fn cancelled(&self) -> bool {
+            self.asked.set(self.asked.get() + 1);
+            self.asked.get() == 4
+        }
+    }
+    let agent = Agent::with("def on_reset(episode): print('reset', file=sys.stderr, flush=True)");
+    let mut observer = Stops {
+        asked: Cell::new(0),
+        logs: Vec::new(),
+        rallies: 0,
+        steps: 0,
+    };
+    let out = tempfile::tempdir().unwrap();
+    let env = sandboxed();
+    let bundles = [&agent.bundle; 2];
+    let stopped = run_game(&spec(100), bundles, [&env; 2], out.path(), &mut observer);
+    assert!(matches!(stopped, Err(PlatformFault::Cancelled)));
+    assert_eq!((observer.rallies, observer.steps), (1, 3));
+    let expected = Side::BOTH.map(|side| (side, "reset\n".to_owned()));
+    assert_eq!(observer.logs, expected);
+    assert_eq!(fs::read_dir(out.path()).unwrap().count(), 0);
+}

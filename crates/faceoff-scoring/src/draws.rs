@@ -1,0 +1,41 @@
+//! Numbers that are drawn, always the same ones from the same key.
+
+/// Draws from an endless stream of bytes.
+pub(crate) struct Draws {
+    stream: blake3::OutputReader,
+    buffer: Box<[u8; Self::BYTES]>,
+    used: usize,
+}
+
+impl Draws {
+    const BYTES: usize = 16 * 1024;
+
+    pub(crate) fn new(stream: blake3::OutputReader) -> Self {
+        Self {
+            stream,
+            buffer: Box::new([0; Self::BYTES]),
+            used: Self::BYTES,
+        }
+    }
+
+    /// A number below `n`. Not perfectly even: by a share of n / 2³², which
+    /// thousands of resamples cannot show.
+    pub(crate) fn below(&mut self, n: u32) -> usize {
+        if self.used == Self::BYTES {
+            self.stream.fill(&mut self.buffer[..]);
+            self.used = 0;
+        }
+        let bytes = &self.buffer[self.used..self.used + 4];
+        self.used += 4;
+        let draw = u32::from_le_bytes(bytes.try_into().expect("a slice of four bytes"));
+        ((u64::from(draw) * u64::from(n)) >> 32) as usize
+    }
+
+    /// Puts `items` into an order that is drawn (Fisher and Yates).
+    pub(crate) fn shuffle<T>(&mut self, items: &mut [T]) {
+        for last in (1..items.len()).rev() {
+            let among = u32::try_from(last + 1).expect("a list of teams is short");
+            items.swap(last, self.below(among));
+        }
+    }
+}

@@ -1,0 +1,53 @@
+use serde::{Deserialize, Serialize};
+use std::{fmt, num::NonZeroU32};
+
+/// The number of a round, 1 to [`RoundNumber::MAX`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "u32", into = "u32")]
+pub struct RoundNumber(NonZeroU32);
+
+/// A number that no round has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("expected 1 to {max}, got {0}", max = RoundNumber::MAX)]
+pub struct InvalidRoundNumber(u32);
+
+impl RoundNumber {
+    /// The highest: a tournament has a few rounds, and standings list them all.
+    pub const MAX: u32 = 100;
+    /// Of the first round.
+    pub const FIRST: Self = Self(NonZeroU32::MIN);
+
+    /// The number, from 1.
+    #[must_use]
+    pub const fn get(self) -> u32 {
+        self.0.get()
+    }
+
+    /// As lists of rounds have it, from 0.
+    #[must_use]
+    pub const fn index(self) -> usize {
+        self.get() as usize - 1
+    }
+}
+
+impl TryFrom<u32> for RoundNumber {
+    type Error = InvalidRoundNumber;
+    fn try_from(number: u32) -> Result<Self, InvalidRoundNumber> {
+        NonZeroU32::new(number)
+            .filter(|number| number.get() <= Self::MAX)
+            .map(Self)
+            .ok_or(InvalidRoundNumber(number))
+    }
+}
+
+impl From<RoundNumber> for u32 {
+    fn from(number: RoundNumber) -> Self {
+        number.get()
+    }
+}
+
+impl fmt::Display for RoundNumber {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.get().fmt(f)
+    }
+}

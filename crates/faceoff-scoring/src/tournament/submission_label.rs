@@ -1,0 +1,76 @@
+use faceoff_types::is_harmless;
+use serde::{Deserialize, Serialize};
+use std::{fmt, str::FromStr};
+
+/// The longest label, in characters; an id of a submission has 36.
+const MAX_CHARS: usize = 40;
+
+/// What tells one of a team's submissions from its others: an id, a version, a tag. 1 to 40 letters,
+/// digits and `. _ -`.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct SubmissionLabel(String);
+
+/// Text that is no label of a submission.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("a submission's label has 1 to {MAX_CHARS} letters, digits and . _ -; this one is {0:?}")]
+pub struct InvalidSubmissionLabel(String);
+
+impl SubmissionLabel {
+    /// The label.
+    #[must_use]
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl FromStr for SubmissionLabel {
+    type Err = InvalidSubmissionLabel;
+    fn from_str(s: &str) -> Result<Self, Self::Err> {
+        let allowed = |c: char| "._-".contains(c) || (c.is_alphanumeric() && is_harmless(c));
+        // One more is enough to know that a long one is too long, and to show what came.
+        let shown: String = s.chars().take(MAX_CHARS + 1).collect();
+        if (1..=MAX_CHARS).contains(&shown.chars().count()) && shown.chars().all(allowed) {
+            Ok(Self(shown))
+        } else {
+            Err(InvalidSubmissionLabel(shown))
+        }
+    }
+}
+
+impl TryFrom<String> for SubmissionLabel {
+    type Error = InvalidSubmissionLabel;
+    fn try_from(s: String) -> Result<Self, Self::Error> {
+        s.parse()
+    }
+}
+
+impl From<SubmissionLabel> for String {
+    fn from(label: SubmissionLabel) -> Self {
+        label.0
+    }
+}
+
+impl fmt::Display for SubmissionLabel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ids_and_versions_are_labels_and_what_a_table_cannot_show_is_not() {
+        for label in ["v2", "018f3f1e-0d0a-7c3e-9b1a-2f6f6a6f6a6f", "1.0_final"] {
+            assert_eq!(
+                label.parse::<SubmissionLabel>().map(String::from),
+                Ok(label.into())
+            );
+        }
+        for wrong in ["", "a b", "<b>", "\u{202e}", &"a".repeat(41)] {
+            assert!(wrong.parse::<SubmissionLabel>().is_err(), "{wrong:?}");
+        }
+    }
+}

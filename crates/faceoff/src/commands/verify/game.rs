@@ -1,0 +1,86 @@
+//! Verifying a game.
+
+use super::Failure;
+use anyhow::Context;
+use faceoff_dataset::{
+    DatasetError,
+    game::{GameRecording, VerifiedGame, verify_game},
+};
+use faceoff_scoring::tournament::GameScore;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use std::{path::Path, time::Instant};
+
+/// What `--json` says of a verified game.
+#[derive(Debug, Serialize)]
+pub(super) struct SimulatedGame {
+    rallies: u32,
+    steps: u32,
+    seconds: f64,
+    /// The archive's hash; `null` for an unpacked folder.
+    blake3: Option<String>,
+    result: GameScore,
+}
+
+/// Verifies with a progress bar on standard error, if that is a terminal; `blake3` is the published hash of
+/// the archive.
+pub(super) fn verify(path: &Path, blake3: Option<&blake3::Hash>) -> Result<SimulatedGame, Failure> {
+    let recording = GameRecording::open(path)?;
+    let archive = recording.archive()?.map(|digest| digest.blake3);
+    super::check_hash(blake3, archive.as_deref())?;
+    let bar = ProgressBar::new(u64::from(recording.manifest().spec.steps)).with_style(
+        ProgressStyle::with_template("{bar:40} {pos}/{len} steps, {per_sec}, {eta} left")
+            .context("the progress bar's template")
+            .map_err(Failure::Here)?,
+    );
+    let start = Instant::now();
+    let verified = verify_game(&recording, &|steps| bar.inc(steps));
+    bar.finish_and_clear();
+    let VerifiedGame {
+        rallies,
+        steps,
+        score,
+    } = verified?;
+    Ok(SimulatedGame {
+        rallies,
+        steps,
+        seconds: start.elapsed().as_secs_f64(),
+        blake3: archive,
+        result: score,
+    })
+}
+
+pub(super) fn describe(path: &Path, simulated: &SimulatedGame) -> String {
+    let SimulatedGame {
+        rallies,
+        steps,
+        seconds,
+        blake3,
+        result,
+    } = simulated;
+    let hash = blake3
+        .as_ref()
+        .map_or_else(String::new, |hash| format!("; BLAKE3 {hash}"));
+    let [first, second] = &result.sides;
+    format!(
+        "verified {}: a game of {rallies} rallies, {steps} control steps, every state and score identical \
+         ({} {} : {} {}, penalty points {:.1} and {:.1}); {seconds:.1} s{hash}",
+        path.display(),
+        first.agent,
+        first.score,
+        second.score,
+        second.agent,
+        first.penalty_points,
+        second.penalty_points,
+    )
+}
+
+/// What is asked of seasons cannot be asked of a game.
+pub(super) fn refuse_season(has_secret: bool) -> Result<(), Failure> {
+    if has_secret {
+        return Err(Failure::from(DatasetError::Foreign(
+            "--secret checks the seeds of an evaluation; leave it out for a game".to_owned(),
+        )));
+    }
+    Ok(())
+}
