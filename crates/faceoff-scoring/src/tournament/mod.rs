@@ -8,6 +8,7 @@ mod bye;
 mod departures;
 mod game;
 mod head_to_head;
+pub mod rating;
 mod result;
 mod round_number;
 mod rules;
