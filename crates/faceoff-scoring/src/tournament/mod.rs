@@ -12,6 +12,7 @@ pub mod rating;
 mod result;
 mod round_number;
 mod rules;
+pub mod schedule;
 mod side;
 mod standings;
 mod submission_label;
