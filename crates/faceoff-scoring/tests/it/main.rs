@@ -11,5 +11,6 @@ mod paper_ratings;
 mod paper_tournament;
 mod ratings;
 mod results;
+mod schedule;
 mod sheets;
 mod support;
