@@ -184,7 +184,7 @@ mod tests {
         assert_eq!(words(6), "2 Ajax 0 0 0 1 2-0 140.5 0 + 0");
         assert_eq!(words(9), "Ajax Zed 0 0 1 2-0");
         assert_eq!(words(11), "ratings by results");
-        assert_eq!(words(13), "Zed 1637 unknown 1");
+        assert_eq!(words(13), "Zed 1630 unknown 1");
     }
 
     #[test]
