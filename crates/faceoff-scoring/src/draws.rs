@@ -1,5 +1,7 @@
 //! Numbers that are drawn, always the same ones from the same key.
 
+use faceoff_types::Seed;
+
 /// Draws from an endless stream of bytes.
 pub(crate) struct Draws {
     stream: blake3::OutputReader,
@@ -16,6 +18,11 @@ impl Draws {
             buffer: Box::new([0; Self::BYTES]),
             used: Self::BYTES,
         }
+    }
+
+    /// The draws of a seed.
+    pub(crate) fn from_seed(seed: &Seed) -> Self {
+        Self::new(blake3::Hasher::new_keyed(seed.as_bytes()).finalize_xof())
     }
 
     /// A number below `n`. Not perfectly even: by a share of n / 2³², which

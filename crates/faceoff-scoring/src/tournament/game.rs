@@ -112,6 +112,12 @@ impl ScoredGame {
         self.raw.goals
     }
 
+    /// Fouls of both teams, where the entry has them and not the score alone.
+    #[must_use]
+    pub const fn fouls(&self) -> Option<[u32; 2]> {
+        self.raw.fouls
+    }
+
     /// Penalty points of both teams over the game.
     #[must_use]
     pub const fn penalty_points(&self) -> [f64; 2] {

@@ -16,6 +16,8 @@ impl RoundNumber {
     pub const MAX: u32 = 100;
     /// Of the first round.
     pub const FIRST: Self = Self(NonZeroU32::MIN);
+    /// Of the second round.
+    pub const SECOND: Self = Self(NonZeroU32::MIN.saturating_add(1));
 
     /// The number, from 1.
     #[must_use]

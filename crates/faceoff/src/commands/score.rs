@@ -1,15 +1,19 @@
 //! `faceoff score`: scoring alone, for organisers who score again by hand.
 
+mod lines;
+mod scored;
+mod table;
+mod tournament;
+
 use crate::terminal;
 use anyhow::{Context as _, bail, ensure};
 use clap::{Args, Subcommand};
-use faceoff_scoring::{
-    QualifyingSheet,
-    tournament::{PlayedGame, score_tournament},
-};
+use faceoff_scoring::{QualifyingSheet, tournament::PlayedGame};
 use faceoff_types::{TaskWeights, TierBounds};
+use lines::write_line;
 use serde::de::DeserializeOwned;
 use std::io::{IsTerminal as _, Read, Write};
+use tournament::TournamentArgs;
 
 /// Far more than any competition's results; a limit so that a wrong file cannot fill the memory.
 const INPUT_LIMIT_BYTES: u64 = 64 << 20;
@@ -21,7 +25,7 @@ pub struct ScoreCommand {
     stage: Stage,
 }
 
-#[derive(Debug, Clone, Copy, Subcommand)]
+#[derive(Debug, Clone, Subcommand)]
 enum Stage {
     /// Read tasks.json from standard input and print the board, one JSON object per row, best first
     ///
@@ -36,12 +40,15 @@ enum Stage {
         #[arg(long, value_name = "BOUNDS")]
         tier_bounds: Option<TierBounds>,
     },
-    /// Read games.json from standard input and print winners and standings as one JSON object
+    /// Read games.json from standard input and print winners and why, standings, head-to-head records and
+    /// ratings, as one JSON object or as tables
     ///
     /// Input: [{"round": 1, "home": "A", "away": "B", "goals": [10, 0], "fouls": [0, 0],
     /// "penalty_points": [62.0, 384.0]}, …], or the final "score" in place of "fouls". "windows" is 90
-    /// unless given.
-    Tournament,
+    /// unless given. "forfeit": [null, "faults"] (or "time") says who forfeited, "submissions": ["v1", "v3"]
+    /// which submissions played, so that ratings tell them apart, "pair": 7 that the game is one half of a mirrored
+    /// pair.
+    Tournament(TournamentArgs),
 }
 
 impl ScoreCommand {
@@ -67,17 +74,17 @@ impl ScoreCommand {
 }
 
 impl Stage {
-    const fn name(self) -> &'static str {
+    const fn name(&self) -> &'static str {
         match self {
             Self::Qualifying { .. } => "qualifying",
-            Self::Tournament => "tournament",
+            Self::Tournament(_) => "tournament",
         }
     }
 
-    const fn file(self) -> &'static str {
+    const fn file(&self) -> &'static str {
         match self {
             Self::Qualifying { .. } => "tasks.json",
-            Self::Tournament => "games.json",
+            Self::Tournament(_) => "games.json",
         }
     }
 
@@ -87,13 +94,14 @@ impl Stage {
         out: &mut impl Write,
         warnings: &mut impl Write,
     ) -> anyhow::Result<()> {
-        let input = read_all(input, self.file())?;
+        let file = self.file();
+        let input = read_all(input, file)?;
         match self {
             Self::Qualifying {
                 weights,
                 tier_bounds,
             } => {
-                let sheet: QualifyingSheet = parse(&input, self.file())?;
+                let sheet: QualifyingSheet = parse(&input, file)?;
                 for row in sheet.board_by(
                     &weights.unwrap_or_default(),
                     &tier_bounds.unwrap_or_default(),
@@ -101,18 +109,9 @@ impl Stage {
                     write_line(out, &row)?;
                 }
             }
-            Self::Tournament => {
-                let games: Vec<PlayedGame> = parse(&input, self.file())?;
-                let tournament = score_tournament(&games);
-                for repeated in &tournament.repeated_pairings {
-                    let [a, b] = &repeated.teams;
-                    writeln!(
-                        warnings,
-                        "warning: {a} and {b} meet {} times in round {}; every game counts",
-                        repeated.games, repeated.round
-                    )?;
-                }
-                write_line(out, &tournament)?;
+            Self::Tournament(args) => {
+                let games: Vec<PlayedGame> = parse(&input, file)?;
+                args.score(&games, out, warnings)?;
             }
         }
         Ok(())
@@ -146,13 +145,6 @@ fn parse<T: DeserializeOwned>(json: &[u8], file: &str) -> anyhow::Result<T> {
     Ok(value)
 }
 
-fn write_line(out: &mut impl Write, value: &impl serde::Serialize) -> anyhow::Result<()> {
-    let mut line = serde_json::to_vec(value)?;
-    line.push(b'\n');
-    // With its io::Error as the cause: a reader that goes away is no failure of ours.
-    out.write_all(&line).context("standard output")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -162,6 +154,8 @@ mod tests {
         weights: None,
         tier_bounds: None,
     };
+
+    const TOURNAMENT: Stage = Stage::Tournament(TournamentArgs::JSON);
 
     fn score(stage: Stage, input: &str) -> (anyhow::Result<()>, Vec<Value>, String) {
         let (mut out, mut warnings) = (Vec::new(), Vec::new());
@@ -237,13 +231,22 @@ mod tests {
     fn the_tournament_is_one_object_with_games_and_standings() {
         let game = json!({"round": 1, "home": "A", "away": "B", "goals": [1, 4], "fouls": [0, 9],
             "penalty_points": [136.0, 12]});
-        let (outcome, rows, warnings) = score(Stage::Tournament, &json!([game, game]).to_string());
+        let (outcome, rows, warnings) = score(TOURNAMENT, &json!([game, game]).to_string());
         outcome.unwrap();
         assert_eq!(rows.len(), 1);
         assert_eq!(rows[0]["games"][0]["winner"], "B");
         assert_eq!(rows[0]["games"][1]["score"], json!([4, 4]));
         assert_eq!(rows[0]["standings"][0]["team"], "B");
         assert_eq!(rows[0]["standings"][0]["points_per_round"], json!([6]));
+        let why = json!([
+            rows[0]["games"][0]["won_by"],
+            rows[0]["games"][0]["winner_led"]
+        ]);
+        assert_eq!(why, json!(["tier", false]));
+        let record = json!({"teams": ["A", "B"], "wins": [0, 2], "draws": 0, "goals": [2, 8]});
+        assert_eq!(rows[0]["head_to_head"], json!([record]));
+        let best = &rows[0]["ratings"]["results"][0]["ratings"][0];
+        assert_eq!((&best["team"], &best["games"]), (&json!("B"), &json!(2)));
         assert_eq!(
             warnings,
             "warning: A and B meet 2 times in round 1; every game counts\n"
@@ -266,7 +269,7 @@ mod tests {
                 "tasks.json: expected JSON on standard input, got nothing",
             ),
             (
-                Stage::Tournament,
+                TOURNAMENT,
                 " \n",
                 "games.json: expected JSON on standard input, got nothing",
             ),
@@ -277,12 +280,12 @@ mod tests {
             ),
             (QUALIFYING, "{\"A\"", "tasks.json: "),
             (
-                Stage::Tournament,
+                TOURNAMENT,
                 "{}",
                 "games.json: invalid type: map, expected a sequence",
             ),
             (
-                Stage::Tournament,
+                TOURNAMENT,
                 "\u{0}\u{1}",
                 "games.json: expected value at line 1 column 1",
             ),
@@ -291,7 +294,7 @@ mod tests {
             assert!(got.starts_with(expected), "{input:?}: {got}");
         }
         let deep = "[".repeat(100_000);
-        assert!(error(Stage::Tournament, &deep).starts_with("games.json: "));
+        assert!(error(TOURNAMENT, &deep).starts_with("games.json: "));
         let not_utf8 = score_bytes(b"{\"\xff\": 1}");
         assert!(not_utf8.starts_with("tasks.json: "), "{not_utf8}");
     }
@@ -313,8 +316,13 @@ mod tests {
         let (outcome, rows, _) = score(QUALIFYING, "{}");
         outcome.unwrap();
         assert_eq!(rows, Vec::<Value>::new());
-        let (outcome, rows, _) = score(Stage::Tournament, "[]");
+        let (outcome, rows, _) = score(TOURNAMENT, "[]");
         outcome.unwrap();
-        assert_eq!(rows, [json!({"games": [], "standings": []})]);
+        let prior = json!({"mean": 1500.0, "sd": 350.0});
+        let ratings = json!({"prior": prior, "resamples": 1000, "results": [], "goals": []});
+        assert_eq!(
+            rows,
+            [json!({"games": [], "standings": [], "head_to_head": [], "ratings": ratings})]
+        );
     }
 }

@@ -1,0 +1,179 @@
+//! A tournament as tables for a terminal.
+
+use super::scored::ScoredTournament;
+use anyhow::Context as _;
+use faceoff_scoring::tournament::{
+    HeadToHead, LeftAs, ScoredGame, Standing,
+    rating::{Pool, Ratings},
+};
+use std::{fmt::Write as _, io::Write};
+
+/// Writes games, standings, records and ratings.
+pub fn write(out: &mut impl Write, scored: &ScoredTournament) -> anyhow::Result<()> {
+    let mut text = String::new();
+    tables(&mut text, scored).expect("writing to memory cannot fail");
+    out.write_all(text.as_bytes()).context("standard output")
+}
+
+fn tables(out: &mut String, scored: &ScoredTournament) -> std::fmt::Result {
+    games(out, &scored.tournament.games)?;
+    standings(out, &scored.tournament.standings)?;
+    records(out, &scored.head_to_head)?;
+    if let Some(ratings) = &scored.ratings {
+        self::ratings(out, ratings)?;
+    }
+    Ok(())
+}
+
+/// The width of the longest of these, at least that of the heading.
+fn width<'a>(heading: &str, cells: impl Iterator<Item = &'a str>) -> usize {
+    cells
+        .map(|cell| cell.chars().count())
+        .fold(heading.chars().count(), usize::max)
+}
+
+fn pair(numbers: [u32; 2]) -> String {
+    format!("{}-{}", numbers[0], numbers[1])
+}
+
+fn games(out: &mut String, games: &[ScoredGame]) -> std::fmt::Result {
+    let teams = |side: usize| games.iter().map(move |game| game.teams()[side].as_str());
+    let (home, away) = (width("home", teams(0)), width("away", teams(1)));
+    let winner = width("winner", teams(0).chain(teams(1)));
+    writeln!(
+        out,
+        "{:>5}  {:<home$}  {:<away$}  {:>7}  {:>7}  {:>7}  {:>15}  {:<winner$}  why",
+        "round", "home", "away", "score", "goals", "fouls", "penalty points", "winner"
+    )?;
+    for game in games {
+        let [first, second] = game.teams();
+        let points = game.penalty_points().map(|points| format!("{points:.1}"));
+        write!(
+            out,
+            "{:>5}  {first:<home$}  {second:<away$}  {:>7}  {:>7}  {:>7}  {:>15}  {:<winner$}  {}",
+            game.round(),
+            pair(game.score),
+            pair(game.goals()),
+            game.fouls().map_or_else(|| "?".to_owned(), pair),
+            points.join(" / "),
+            game.winner.as_ref().map_or("draw", |team| team.as_str()),
+            game.result
+        )?;
+        match &game.taken_out_by {
+            Some(team) => writeln!(out, " (does not count: {team} left)")?,
+            None => writeln!(out)?,
+        }
+    }
+    Ok(())
+}
+
+fn standings(out: &mut String, standings: &[Standing]) -> std::fmt::Result {
+    let names = standings.iter().map(|row| row.team.as_str());
+    let team = width("team", names);
+    writeln!(
+        out,
+        "\n{:>4}  {:<team$}  {:>6}  {:>4}  {:>5}  {:>6}  {:>9}  {:>14}  points per round",
+        "rank", "team", "points", "wins", "draws", "losses", "goals", "penalty points"
+    )?;
+    for row in standings {
+        let rounds: Vec<_> = row.points_per_round.iter().map(u32::to_string).collect();
+        write!(
+            out,
+            "{:>4}  {:<team$}  {:>6}  {:>4}  {:>5}  {:>6}  {:>9}  {:>14.1}  {}",
+            row.rank,
+            row.team,
+            row.points,
+            row.wins,
+            row.draws,
+            row.losses,
+            format!("{}-{}", row.goals_for, row.goals_against),
+            row.penalty_points,
+            rounds.join(" + ")
+        )?;
+        match row.left {
+            Some(LeftAs::Withdrawn) => writeln!(out, " (withdrawn)")?,
+            Some(LeftAs::Disqualified) => writeln!(out, " (disqualified)")?,
+            None => writeln!(out)?,
+        }
+    }
+    Ok(())
+}
+
+fn records(out: &mut String, records: &[HeadToHead]) -> std::fmt::Result {
+    let names = |side: usize| {
+        records
+            .iter()
+            .map(move |record| record.teams[side].as_str())
+    };
+    let (first, second) = (width("A", names(0)), width("B", names(1)));
+    writeln!(
+        out,
+        "\n{:<first$}  {:<second$}  {:>6}  {:>5}  {:>6}  {:>9}",
+        "A", "B", "A wins", "draws", "B wins", "goals"
+    )?;
+    for record in records {
+        let [a, b] = &record.teams;
+        writeln!(
+            out,
+            "{a:<first$}  {b:<second$}  {:>6}  {:>5}  {:>6}  {:>9}",
+            record.wins[0],
+            record.draws,
+            record.wins[1],
+            format!("{}-{}", record.goals[0], record.goals[1])
+        )?;
+    }
+    Ok(())
+}
+
+fn ratings(out: &mut String, ratings: &Ratings) -> std::fmt::Result {
+    for (by, pools) in [("results", &ratings.results), ("goals", &ratings.goals)] {
+        for (number, pool) in (1..).zip(pools) {
+            write!(out, "\nratings by {by}")?;
+            if pools.len() > 1 {
+                write!(
+                    out,
+                    ", pool {number} of {}, which never met the others",
+                    pools.len()
+                )?;
+            }
+            writeln!(out)?;
+            self::pool(out, pool)?;
+        }
+    }
+    writeln!(
+        out,
+        "\nBradley-Terry, 400 points more are odds of 10 to 1; prior {} ± {}; interval: bootstrap over games, {} samples",
+        ratings.prior.mean, ratings.prior.sd, ratings.resamples
+    )
+}
+
+fn pool(out: &mut String, pool: &Pool) -> std::fmt::Result {
+    let names: Vec<String> = pool
+        .ratings
+        .iter()
+        .map(|row| match &row.rated.submission {
+            Some(submission) => format!("{} ({submission})", row.rated.team),
+            None => row.rated.team.to_string(),
+        })
+        .collect();
+    let wide = width("team", names.iter().map(String::as_str));
+    writeln!(
+        out,
+        "{:<wide$}  {:>6}  {:>15}  {:>5}",
+        "team", "rating", "95 % interval", "games"
+    )?;
+    for (name, row) in names.iter().zip(&pool.ratings) {
+        let interval = match row.ci95 {
+            [Some(low), Some(high)] => format!("{low:.0} to {high:.0}"),
+            [Some(low), None] => format!("above {low:.0}"),
+            [None, Some(high)] => format!("below {high:.0}"),
+            [None, None] => "unknown".to_owned(),
+        };
+        writeln!(
+            out,
+            "{name:<wide$}  {:>6.0}  {interval:>15}  {:>5}",
+            row.rating, row.games
+        )?;
+    }
+    Ok(())
+}
