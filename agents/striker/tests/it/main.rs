@@ -2,3 +2,5 @@
 
 mod episodes;
 mod protocol;
+#[path = "../support/mod.rs"]
+mod support;

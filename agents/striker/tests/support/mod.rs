@@ -1,0 +1,4 @@
+//! What tests and development tools share.
+
+pub mod env;
+pub mod game;
