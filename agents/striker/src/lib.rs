@@ -10,6 +10,7 @@ mod contact;
 mod env;
 mod estimator;
 mod field;
+mod keeper;
 mod kinematics;
 mod motion;
 mod opponent;
@@ -23,8 +24,8 @@ mod testing;
 use arm::Arm;
 use estimator::{Estimator, MalletState, PuckObservation};
 use field::{Field, Vec2};
+use keeper::Keeper;
 use motion::Motion;
-use opponent::Opponent;
 use skills::{Defend, Hit, Order, Prepare, Scene, Tournament};
 
 pub use env::{BaseFrame, Env, JOINTS, Joints, RadiusInfo, RobotInfo, TableInfo};
@@ -63,7 +64,7 @@ pub struct Agent {
     field: Field,
     arm: Arm,
     estimator: Estimator,
-    opponent: Option<Opponent>,
+    keeper: Keeper,
     skill: Skill,
     mallet: Motion,
     step: u32,
@@ -79,7 +80,7 @@ impl Agent {
             dt: env.dt,
             arm: Arm::new(env),
             estimator: Estimator::new(&field, env.dt),
-            opponent: None,
+            keeper: Keeper::Nobody,
             skill: new_skill(task),
             mallet: Motion::rest(Vec2::zeros()),
             step: 0,
@@ -90,7 +91,7 @@ impl Agent {
     /// Starts a new episode or rally.
     pub fn reset(&mut self) {
         self.estimator.reset();
-        self.opponent = None;
+        self.keeper = Keeper::Nobody;
         self.skill = new_skill(self.task);
         self.step = 0;
     }
@@ -127,10 +128,10 @@ impl Agent {
             seen,
         );
         if let [x, y, _] = o[20..] {
-            let opponent = self
-                .opponent
-                .get_or_insert_with(|| Opponent::new(&self.field));
-            opponent.observe(time, self.field.to_field(Vec2::new(x, y)));
+            let seen = self.field.to_field(Vec2::new(x, y));
+            let in_game = self.task == Task::Tournament;
+            self.keeper
+                .observe(&self.field, in_game, time, self.dt, seen);
         }
         let scene = Scene {
             field: &self.field,
@@ -140,8 +141,7 @@ impl Agent {
             puck_speed_deviation: self.estimator.speed_deviation(),
             mallet: self.mallet,
             arm: &self.arm,
-            // In a game the other side is no pendulum; its position is no basis for a prediction.
-            opponent: self.opponent.as_ref().filter(|_| self.task == Task::Hit),
+            keeper: &self.keeper,
         };
         let order = match &mut self.skill {
             Skill::Hit(s) => s.decide(&scene),

@@ -6,6 +6,7 @@
 //! along the line of the shot so that it arrives at full speed at the chosen time.
 
 mod plan;
+mod shot;
 
 use super::Prepare;
 use super::scene::{Order, Scene, around, lean};
