@@ -12,8 +12,9 @@ use super::Prepare;
 use super::scene::{Order, Scene, around, lean};
 use crate::arm::Posture;
 use crate::field::Vec2;
+use crate::keeper::Keeper;
 use crate::motion::{Pace, Target};
-use plan::{Plan, WORTH_A_NUDGE, again, best_nudge, best_plan, refresh};
+use plan::{Plan, WORTH_A_NUDGE, WORTH_A_NUDGE_IN_GAME, again, best_nudge, best_plan, refresh};
 
 /// A running plan is given up only for one that is better by this much.
 const LOYALTY: f64 = 0.06;
@@ -106,7 +107,11 @@ impl Hit {
         }
         let kept = old.and_then(|p| refresh(scene, &p));
         let mut best = best_plan(scene);
-        if self.nudges < NUDGES_MAX && best.is_some_and(|b| b.chance < WORTH_A_NUDGE) {
+        let worth = match scene.keeper {
+            Keeper::Rival(_) => WORTH_A_NUDGE_IN_GAME,
+            Keeper::Nobody | Keeper::Pendulum(_) => WORTH_A_NUDGE,
+        };
+        if self.nudges < NUDGES_MAX && best.is_some_and(|b| b.chance < worth) {
             best = best_nudge(scene).or(best);
         }
         let plan = match (kept, best) {
@@ -134,6 +139,7 @@ impl Hit {
         let (start, run_up) = plan.run_up(scene.field);
         let left = plan.contact_time - scene.time;
         if left <= run_up + 0.5 * scene.dt {
+            eprintln!("shot t {:.2} puck {:+.2} {:+.2} v {:+.2} {:+.2} aim {:+.3} via {} speed {:.2} chance {:.2} nudge {}", scene.time, scene.puck.pos.x, scene.puck.pos.y, scene.puck.vel.x, scene.puck.vel.y, plan.aim.y, plan.aim.via, plan.speed, plan.chance, plan.nudge);
             self.phase = Phase::Swing(plan);
             return self.swing(scene, plan);
         }

@@ -71,11 +71,11 @@ impl Tournament {
         }
         // Near a rim there is no room for a mallet behind the puck.
         let margin = if self.mode == Mode::Prepare {
-            0.36
-        } else {
             0.4
+        } else {
+            0.445
         };
-        if puck.pos.y.abs() > margin || puck.pos.x < -0.8 {
+        if puck.pos.y.abs() > margin || puck.pos.x < -0.86 {
             return Mode::Prepare;
         }
         // A strike that could not be placed for long: move the puck elsewhere instead of fouling.
