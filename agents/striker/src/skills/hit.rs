@@ -139,7 +139,6 @@ impl Hit {
         let (start, run_up) = plan.run_up(scene.field);
         let left = plan.contact_time - scene.time;
         if left <= run_up + 0.5 * scene.dt {
-            eprintln!("shot t {:.2} puck {:+.2} {:+.2} v {:+.2} {:+.2} aim {:+.3} via {} speed {:.2} chance {:.2} nudge {}", scene.time, scene.puck.pos.x, scene.puck.pos.y, scene.puck.vel.x, scene.puck.vel.y, plan.aim.y, plan.aim.via, plan.speed, plan.chance, plan.nudge);
             self.phase = Phase::Swing(plan);
             return self.swing(scene, plan);
         }

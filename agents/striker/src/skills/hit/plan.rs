@@ -19,7 +19,7 @@ const IMPATIENCE: f64 = 0.02;
 /// Shots with less chance are not taken while the puck can be nudged to a better place.
 pub const WORTH_A_NUDGE: f64 = 0.45;
 /// The same in a game, where another shot may follow and the other side stands in the way.
-pub const WORTH_A_NUDGE_IN_GAME: f64 = 0.12;
+pub const WORTH_A_NUDGE_IN_GAME: f64 = 0.06;
 /// Pucks nearer to our goal are worth a nudge.
 const NUDGE_FROM_X: f64 = -0.5;
 /// Where a nudged puck shall be …

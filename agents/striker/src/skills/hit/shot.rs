@@ -12,13 +12,13 @@ const AIM_ERROR: f64 = 0.012;
 /// What a bounce leaves of a path's slope against the rim, on average.
 const SLOPE_KEPT: f64 = 0.855;
 /// Standard deviation of that share: where in the millisecond the puck meets the rim is chance.
-const SLOPE_ERROR: f64 = 0.11;
+const SLOPE_ERROR: f64 = 0.08;
 /// Straight goal-line points that are tried against the pendulum of `hit`, metres.
 const AIMS: [f64; 5] = [-0.05, -0.025, 0.0, 0.025, 0.05];
 /// The same in a game, where the other side may stand still before the middle.
 const GAME_AIMS: [f64; 9] = [-0.084, -0.063, -0.042, -0.021, 0.0, 0.021, 0.042, 0.063, 0.084];
 /// Goal-line points of shots by a rim, metres.
-const BANK_AIMS: [f64; 5] = [-0.07, -0.035, 0.0, 0.035, 0.07];
+const BANK_AIMS: [f64; 6] = [-0.09, -0.06, -0.03, 0.03, 0.06, 0.09];
 
 /// Where on the goal line a shot shall arrive, and how.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -201,7 +201,7 @@ fn past_rival(field: &Field, rival: &Rival, struck: &Puck, aim: Aim) -> f64 {
     let (lo, hi) = (on_line(middle - half_angle), on_line(middle + half_angle));
     let shadow_deviation = rival.deviation() * (last / distance).max(1.0);
     let blurred = spread.hypot(shadow_deviation);
-    let hit = within(lo, hi, aim.y, blurred);
+    let stopped = within(lo.max(-half), hi.min(half), aim.y, blurred);
     let first_hit = if first > 0.0 {
         let to_rival = rival.pos - from;
         let heading = (corner - from) / first;
@@ -212,5 +212,5 @@ fn past_rival(field: &Field, rival: &Rival, struck: &Puck, aim: Aim) -> f64 {
     } else {
         0.0
     };
-    open * (1.0 - hit) * (1.0 - first_hit)
+    (open - stopped).max(0.0) * (1.0 - first_hit)
 }
