@@ -3,6 +3,7 @@
 use crate::arm::Side;
 use super::shot::{Aim, aims, chance};
 use crate::field::{Field, Vec2};
+use crate::keeper::Keeper;
 use crate::motion::{Pace, Target};
 use crate::puck::{DRAG, MALLET_RESTITUTION};
 use crate::skills::aim::strike_towards;
@@ -124,6 +125,11 @@ pub fn best_plan(scene: &Scene<'_>) -> Option<Plan> {
     let side = lean(scene.puck.pos);
     let mut left = RUN_UP + 0.1;
     let aims = aims(scene.keeper);
+    // A game has four times as many aims, and another shot soon.
+    let step = match scene.keeper {
+        Keeper::Rival(_) => 0.12,
+        Keeper::Nobody | Keeper::Pendulum(_) => 0.06,
+    };
     while left < HORIZON {
         for &aim in &aims {
             if let Some(plan) = aim_at(scene, left, aim, side, None)
@@ -133,7 +139,7 @@ pub fn best_plan(scene: &Scene<'_>) -> Option<Plan> {
                 best = Some(plan);
             }
         }
-        left += 0.06;
+        left += step;
     }
     best
 }
