@@ -2,12 +2,17 @@
 //!
 //! `cargo run --release -p striker --example game -- striker hold [steps] [profile] [games] [first seed]`
 //!
+//! A player is `striker`, `hold`, or the folder of a bundle whose actions are positions and velocities
+//! (interpolation 3), which is started as it is, without a sandbox.
+//!
 //! With `TRACE=from:to` the control steps between these of each game are printed, with `LIST=1` the end of each
 //! rally and each step at which a constraint was first broken in its window.
 
 #![expect(clippy::print_stdout, reason = "a tool for the terminal")]
 
-use anyhow::{Context, bail};
+use std::path::Path;
+
+use anyhow::Context;
 use faceoff_sim::{Game, GameStep};
 use faceoff_types::Profile;
 
@@ -15,6 +20,7 @@ use faceoff_types::Profile;
 mod support;
 
 use support::game::{Player, game, play};
+use support::program::Program;
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -49,7 +55,7 @@ fn player(name: &str, own: usize) -> anyhow::Result<Player> {
     match name {
         "hold" => Ok(Player::Hold(None)),
         "striker" => Ok(Player::striker(own)),
-        other => bail!("expected hold or striker as a player, got {other}"),
+        folder => Ok(Player::Program(Program::start(Path::new(folder), own)?)),
     }
 }
 

@@ -6,6 +6,7 @@ use faceoff_types::{Profile, Seed, Violations};
 use striker::{Agent, Task};
 
 use super::env::env;
+use super::program::Program;
 
 /// Who moves a robot.
 pub enum Player {
@@ -13,6 +14,8 @@ pub enum Player {
     Hold(Option<[f64; 14]>),
     /// This agent.
     Striker(Box<Agent>),
+    /// A bundle's program.
+    Program(Program),
 }
 
 impl Player {
@@ -25,6 +28,7 @@ impl Player {
         match self {
             Self::Hold(pose) => *pose = None,
             Self::Striker(agent) => agent.reset(),
+            Self::Program(program) => program.reset(),
         }
     }
 
@@ -37,6 +41,7 @@ impl Player {
                 let action = agent.act(observation).expect("an observation of a game");
                 std::array::from_fn(|i| action[i / 7][i % 7])
             }
+            Self::Program(program) => program.act(observation),
         }
     }
 }
