@@ -12,9 +12,10 @@ from puck import Puck
 
 INCOMING = -0.3  # a puck with less vx comes at us, m/s
 SLOW = 0.35  # slower pucks can be struck, m/s
-STRIKE = 1.2  # speed of the mallet in a strike, m/s
-PUSH = 0.45  # the same to move a puck off the rim
-TRAVEL = 1.0  # and on its way elsewhere
+STRIKE = 1.6  # speed of the mallet in a strike, m/s
+RUN_UP = 0.16  # and the way on which it gets there, metres
+PUSH = 0.45  # speed to move a puck off the rim
+TRAVEL = 1.0  # and on the way to somewhere else
 SHARE_TO_STOP = 0.31  # a mallet that retreats at this share of the puck's speed takes all of it away
 NEAR_RIM = 0.39  # beyond this |y| there is no room for the mallet beside the puck, metres
 
@@ -96,7 +97,7 @@ class Starter:
 
     def line_up(self, dx, dy, speed):
         """Plans a strike in the direction (dx, dy): where the run-up starts, and what follows."""
-        run_up = 0.04 + 0.06 * speed / STRIKE
+        run_up = RUN_UP * speed / STRIKE
         back = self.contact + run_up
         self.start = self.arm.inside(self.puck.x - back * dx, self.puck.y - back * dy)
         # The mallet may not get exactly behind the puck: strike from where it can be.
@@ -116,18 +117,20 @@ class Starter:
         return self.arm.go(self.around(x, y), TRAVEL)
 
     def go_through(self):
-        """A strike: accelerate along its line until the puck is off, then brake."""
+        """A strike: accelerate along its line until the puck is hit, then brake."""
         (dx, dy), speed, left = self.strike
         puck, arm = self.puck, self.arm
-        gone = (puck.vx * dx + puck.vy * dy) > 0.7 * speed
-        passed = (puck.x - arm.pos[0]) * dx + (puck.y - arm.pos[1]) * dy < 0.0
-        if left == 0 or gone or passed:
+        ahead = (puck.x - arm.pos[0]) * dx + (puck.y - arm.pos[1]) * dy
+        if left == 0 or ahead < 0.0:
             self.strike = None
             return arm.move(0.0, 0.0)
+        # Once it touches the puck, a moment more is enough.
+        if ahead < self.contact + 0.005:
+            left = min(left, 2)
         self.strike = ((dx, dy), speed, left - 1)
         # Across the line it follows the puck, which may be rolling.
         across = (puck.x - arm.pos[0]) * -dy + (puck.y - arm.pos[1]) * dx
-        return arm.move(speed * dx - 4 * across * dy, speed * dy + 4 * across * dx)
+        return arm.move(speed * dx - 6 * across * dy, speed * dy + 6 * across * dx)
 
     def around(self, x, y):
         """The way to a point that does not lead through the puck: the point, or one beside the puck."""

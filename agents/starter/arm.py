@@ -23,7 +23,7 @@ def joints_at(x, y, z):
     ahead = reach - HAND * math.sin(hand)
     above = z - HAND * math.cos(hand) - SHOULDER
     # Shoulder, elbow and wrist are a triangle whose sides are known.
-    side = min(math.hypot(ahead, above), 0.999 * (UPPER_ARM + FOREARM))
+    side = max(0.05, min(math.hypot(ahead, above), 0.999 * (UPPER_ARM + FOREARM)))
     elbow = _corner(side, UPPER_ARM, FOREARM)
     upper = math.atan2(ahead, above) - _corner(FOREARM, UPPER_ARM, side)
     forearm = upper + math.pi - elbow
