@@ -15,6 +15,7 @@ use std::path::Path;
 use anyhow::Context;
 use faceoff_sim::{Game, GameStep};
 use faceoff_types::Profile;
+use striker::Agent;
 
 #[path = "../tests/support/mod.rs"]
 mod support;
@@ -24,9 +25,12 @@ use support::program::Program;
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let argument = |i: usize, default: &str| arguments.get(i).map_or(default, String::as_str).to_owned();
+    let argument =
+        |i: usize, default: &str| arguments.get(i).map_or(default, String::as_str).to_owned();
     let names = [argument(0, "striker"), argument(1, "hold")];
-    let steps: u32 = argument(2, "45000").parse().context("number of control steps")?;
+    let steps: u32 = argument(2, "45000")
+        .parse()
+        .context("number of control steps")?;
     let profile: Profile = argument(3, "evaluation").parse()?;
     let games: u64 = argument(4, "1").parse().context("number of games")?;
     let first: u64 = argument(5, "1").parse().context("first game's seed")?;
@@ -38,14 +42,19 @@ fn main() -> anyhow::Result<()> {
     for seed in first..first + games {
         let mut players = [player(&names[0], 0)?, player(&names[1], 1)?];
         let mut broken = [[false; 4]; 2];
-        let tally = play(&mut game(profile, seed), &mut players, steps, |game, players, step| {
-            if trace.as_ref().is_some_and(|t| t.contains(&game.steps())) {
-                print_step(game, players);
-            }
-            if list {
-                print_events(game, step, &mut broken);
-            }
-        });
+        let tally = play(
+            &mut game(profile, seed),
+            &mut players,
+            steps,
+            |game, players, step| {
+                if trace.as_ref().is_some_and(|t| t.contains(&game.steps())) {
+                    print_step(game, players);
+                }
+                if list {
+                    print_events(game, step, &mut broken);
+                }
+            },
+        );
         println!("seed {seed}: {tally:?}");
     }
     Ok(())
@@ -54,7 +63,7 @@ fn main() -> anyhow::Result<()> {
 fn player(name: &str, own: usize) -> anyhow::Result<Player> {
     match name {
         "hold" => Ok(Player::Hold(None)),
-        "striker" => Ok(Player::striker(own)),
+        "striker" => Ok(Player::agent::<Agent>(own)),
         folder => Ok(Player::Program(Program::start(Path::new(folder), own)?)),
     }
 }
@@ -62,10 +71,18 @@ fn player(name: &str, own: usize) -> anyhow::Result<Player> {
 fn print_events(game: &Game, step: &GameStep, broken: &mut [[bool; 4]; 2]) {
     for (robot, values) in step.constraints.iter().enumerate() {
         let values = [values.ee, values.link, values.joint_pos, values.joint_vel];
-        for (k, name) in ["ee", "link", "joint_pos", "joint_vel"].into_iter().enumerate() {
+        for (k, name) in ["ee", "link", "joint_pos", "joint_vel"]
+            .into_iter()
+            .enumerate()
+        {
             if values[k] > 0.0 && !broken[robot][k] {
                 broken[robot][k] = true;
-                println!("  {} robot {} breaks {name} by {:.4}", game.steps(), robot + 1, values[k]);
+                println!(
+                    "  {} robot {} breaks {name} by {:.4}",
+                    game.steps(),
+                    robot + 1,
+                    values[k]
+                );
             }
         }
     }
@@ -80,15 +97,22 @@ fn print_events(game: &Game, step: &GameStep, broken: &mut [[bool; 4]; 2]) {
 fn print_step(game: &Game, players: &[Player; 2]) {
     let puck = game.world().puck();
     let ([x, y, _], [vx, vy, _]) = (puck.pose, puck.velocity);
-    print!("{:5} puck {x:+.3} {y:+.3} v {vx:+.2} {vy:+.2}", game.steps());
+    print!(
+        "{:5} puck {x:+.3} {y:+.3} v {vx:+.2} {vy:+.2}",
+        game.steps()
+    );
     for robot in [0, 1] {
         // Each robot's mallet is what the other observes, in the other's frame.
         let seen = &game.observation(1 - robot)[20..22];
         let side = if robot == 0 { -1.0 } else { 1.0 };
-        print!(" mallet {:+.3} {:+.3}", side * (seen[0] - 1.51), side * seen[1]);
+        print!(
+            " mallet {:+.3} {:+.3}",
+            side * (seen[0] - 1.51),
+            side * seen[1]
+        );
     }
     for (robot, player) in players.iter().enumerate() {
-        if let Player::Striker(agent) = player {
+        if let Player::Agent(agent) = player {
             print!(" | {}: {:.220}", robot + 1, agent.describe());
         }
     }

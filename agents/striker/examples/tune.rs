@@ -13,7 +13,7 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use faceoff_sim::{Episode, EpisodeState, Interpolation, PerturbationSettings, Plant, env_info};
 use faceoff_types::{Profile, Seed, Task};
-use striker::Agent;
+use striker::{Agent, Policy};
 
 #[path = "../tests/support/env.rs"]
 mod env;

@@ -9,11 +9,11 @@ mod plan;
 mod shot;
 
 use super::Prepare;
-use super::scene::{Order, Scene, around, lean};
 use crate::arm::Posture;
 use crate::field::Vec2;
 use crate::keeper::Keeper;
 use crate::motion::{Pace, Target};
+use crate::scene::{Order, Scene, around, lean};
 use plan::{Plan, WORTH_A_NUDGE, WORTH_A_NUDGE_IN_GAME, again, best_nudge, best_plan, refresh};
 
 /// A running plan is given up only for one that is better by this much.

@@ -1,8 +1,9 @@
 //! The whole game: defend against what comes, free the puck from the rim, shoot.
 
-use super::{Defend, Hit, Order, Prepare, Scene};
+use super::{Defend, Hit, Prepare};
 use crate::field::Vec2;
 use crate::motion::Pace;
+use crate::scene::{Order, Scene};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Mode {

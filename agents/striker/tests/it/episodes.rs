@@ -2,7 +2,7 @@
 
 use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
 use faceoff_types::{Profile, Seed, Task};
-use striker::Agent;
+use striker::{Agent, Policy};
 
 use crate::support::env::env;
 

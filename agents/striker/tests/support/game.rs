@@ -3,7 +3,7 @@
 use faceoff_sim::{Command, Game, GameSetup, GameStep, Interpolation, RallyEnd};
 use faceoff_sim::{PerturbationSettings, Plant};
 use faceoff_types::{Profile, Seed, Violations};
-use striker::{Agent, Task};
+use striker::{Policy, Task};
 
 use super::env::env;
 use super::program::Program;
@@ -12,22 +12,22 @@ use super::program::Program;
 pub enum Player {
     /// Keeps the pose in which a rally finds it, as `agents/hold` does.
     Hold(Option<[f64; 14]>),
-    /// This agent.
-    Striker(Box<Agent>),
+    /// An agent in this process.
+    Agent(Box<dyn Policy>),
     /// A bundle's program.
     Program(Program),
 }
 
 impl Player {
-    /// The agent, as that of robot `own` (0 or 1).
-    pub fn striker(own: usize) -> Self {
-        Self::Striker(Box::new(Agent::new(Task::Tournament, &env(2, own))))
+    /// An agent as that of robot `own` (0 or 1).
+    pub fn agent<P: Policy + 'static>(own: usize) -> Self {
+        Self::Agent(Box::new(P::new(Task::Tournament, &env(2, own))))
     }
 
     pub fn reset(&mut self) {
         match self {
             Self::Hold(pose) => *pose = None,
-            Self::Striker(agent) => agent.reset(),
+            Self::Agent(agent) => agent.reset(),
             Self::Program(program) => program.reset(),
         }
     }
@@ -37,7 +37,7 @@ impl Player {
             Self::Hold(pose) => *pose.get_or_insert_with(|| {
                 std::array::from_fn(|i| if i < 7 { observation[6 + i] } else { 0.0 })
             }),
-            Self::Striker(agent) => {
+            Self::Agent(agent) => {
                 let action = agent.act(observation).expect("an observation of a game");
                 std::array::from_fn(|i| action[i / 7][i % 7])
             }

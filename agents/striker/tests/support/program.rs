@@ -67,7 +67,9 @@ impl Program {
     fn ask(&mut self, question: &Value) -> Value {
         writeln!(self.input, "{question}").expect("the program reads");
         let mut line = String::new();
-        self.output.read_line(&mut line).expect("the program answers");
+        self.output
+            .read_line(&mut line)
+            .expect("the program answers");
         serde_json::from_str(&line).expect("an answer in JSON")
     }
 }

@@ -1,13 +1,13 @@
 //! Which strike, when: contact times and aims compared by the chance of a goal.
 
-use crate::arm::Side;
 use super::shot::{Aim, aims, chance};
+use crate::arm::Side;
 use crate::field::{Field, Vec2};
 use crate::keeper::Keeper;
 use crate::motion::{Pace, Target};
 use crate::puck::{DRAG, MALLET_RESTITUTION};
+use crate::scene::{Scene, around, lean};
 use crate::skills::aim::strike_towards;
-use crate::skills::scene::{Scene, around, lean};
 
 /// Duration of the run-up, seconds.
 const RUN_UP: f64 = 0.32;

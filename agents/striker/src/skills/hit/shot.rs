@@ -16,7 +16,9 @@ const SLOPE_ERROR: f64 = 0.08;
 /// Straight goal-line points that are tried against the pendulum of `hit`, metres.
 const AIMS: [f64; 5] = [-0.05, -0.025, 0.0, 0.025, 0.05];
 /// The same in a game, where the other side may stand still before the middle.
-const GAME_AIMS: [f64; 9] = [-0.084, -0.063, -0.042, -0.021, 0.0, 0.021, 0.042, 0.063, 0.084];
+const GAME_AIMS: [f64; 9] = [
+    -0.084, -0.063, -0.042, -0.021, 0.0, 0.021, 0.042, 0.063, 0.084,
+];
 /// Goal-line points of shots by a rim, metres.
 const BANK_AIMS: [f64; 6] = [-0.09, -0.06, -0.03, 0.03, 0.06, 0.09];
 
@@ -121,13 +123,7 @@ fn flight(length: f64, speed: f64) -> Option<f64> {
     (share <= 0.9).then(|| -(1.0 - share).ln() / DRAG)
 }
 
-fn straight(
-    field: &Field,
-    opponent: Option<&Opponent>,
-    time: f64,
-    struck: &Puck,
-    aim: f64,
-) -> f64 {
+fn straight(field: &Field, opponent: Option<&Opponent>, time: f64, struck: &Puck, aim: f64) -> f64 {
     let length = (Vec2::new(field.half_length, aim) - struck.pos).norm();
     let Some(flight) = flight(length, struck.vel.norm()) else {
         return 0.0;
@@ -170,7 +166,12 @@ fn past_rival(field: &Field, rival: &Rival, struck: &Puck, aim: Aim) -> f64 {
     let last = (goal - corner).norm();
     let length = first + last;
     // A bounce costs about a fifth of the speed.
-    let speed = struck.vel.norm() * if aim.via == 0.0 { 1.0 } else { 1.0 - 0.2 * last / length };
+    let speed = struck.vel.norm()
+        * if aim.via == 0.0 {
+            1.0
+        } else {
+            1.0 - 0.2 * last / length
+        };
     let Some(flight) = flight(length, speed) else {
         return 0.0;
     };
