@@ -14,7 +14,7 @@ const HORIZON: f64 = 2.0;
 /// The plan is made this long before the contact and then kept, seconds.
 const PLAN_TIME: f64 = 0.35;
 /// Share of the puck's speed with which the mallet gives way.
-const GIVE: f64 = 0.12;
+const GIVE: f64 = 0.035;
 
 /// A planned contact.
 #[derive(Debug, Clone, Copy)]

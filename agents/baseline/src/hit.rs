@@ -6,7 +6,7 @@ use striker::motion::{Pace, Target};
 use striker::scene::{Order, Scene, around, lean};
 
 /// Speed of the mallet at the contact, m/s.
-const SPEED: f64 = 1.15;
+const SPEED: f64 = 0.93;
 /// Length of the run-up, metres.
 const RUN_UP: f64 = 0.14;
 /// The mallet is behind the puck when it is this near to the start of the run-up, metres.

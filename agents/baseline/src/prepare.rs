@@ -9,9 +9,9 @@ use striker::scene::{Order, Scene, around};
 use crate::tactics::guard;
 
 /// Directions of a push that are tried.
-const DIRECTIONS: usize = 48;
+const DIRECTIONS: usize = 8;
 /// Its speeds, m/s.
-const SPEEDS: [f64; 4] = [0.2, 0.35, 0.5, 0.7];
+const SPEEDS: [f64; 1] = [0.4];
 /// How long a pushed puck is looked after, seconds.
 const HORIZON: f64 = 4.0;
 /// A puck slower than this may be pushed, m/s.
