@@ -8,13 +8,13 @@ use striker::scene::{Order, Scene};
 use crate::tactics::guard;
 
 /// Where the puck is met, metres.
-const LINE_X: f64 = -0.62;
+const LINE_X: f64 = -0.56;
 /// How far ahead the crossing is looked for, seconds.
 const HORIZON: f64 = 2.0;
 /// The plan is made this long before the contact and then kept, seconds.
-const PLAN_TIME: f64 = 0.35;
+const PLAN_TIME: f64 = 0.6;
 /// Share of the puck's speed with which the mallet gives way.
-const GIVE: f64 = 0.035;
+const GIVE: f64 = 0.0;
 
 /// A planned contact.
 #[derive(Debug, Clone, Copy)]

@@ -6,7 +6,7 @@ use striker::motion::{Pace, Target};
 use striker::scene::{Order, Scene, around, lean};
 
 /// Speed of the mallet at the contact, m/s.
-const SPEED: f64 = 0.93;
+const SPEED: f64 = 0.84;
 /// Length of the run-up, metres.
 const RUN_UP: f64 = 0.14;
 /// The mallet is behind the puck when it is this near to the start of the run-up, metres.
@@ -17,8 +17,15 @@ const STOP_TIME: f64 = 0.3;
 #[derive(Debug, Clone, Copy)]
 enum Phase {
     Approach,
-    Strike { contact: f64, mallet: Vec2, velocity: Vec2 },
-    Stop { until: f64, pos: Vec2 },
+    Strike {
+        contact: f64,
+        mallet: Vec2,
+        velocity: Vec2,
+    },
+    Stop {
+        until: f64,
+        pos: Vec2,
+    },
 }
 
 /// The skill's memory.
@@ -44,7 +51,11 @@ impl Hit {
     pub fn decide(&mut self, scene: &Scene<'_>) -> Order {
         match self.phase {
             Phase::Approach => self.approach(scene),
-            Phase::Strike { contact, mallet, velocity } => self.strike(scene, contact, mallet, velocity),
+            Phase::Strike {
+                contact,
+                mallet,
+                velocity,
+            } => self.strike(scene, contact, mallet, velocity),
             Phase::Stop { until, pos } => {
                 let left = until - scene.time;
                 if left < scene.dt {

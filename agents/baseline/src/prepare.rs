@@ -10,33 +10,37 @@ use crate::tactics::guard;
 
 /// Directions of a push that are tried.
 const DIRECTIONS: usize = 8;
-/// Its speeds, m/s.
-const SPEEDS: [f64; 1] = [0.4];
+/// Its speed, m/s.
+const SPEED: f64 = 0.5;
 /// How long a pushed puck is looked after, seconds.
 const HORIZON: f64 = 4.0;
 /// A puck slower than this may be pushed, m/s.
-const SLOW: f64 = 0.12;
+const SLOW: f64 = 0.06;
 /// Within this |y| and between these x it lies well, metres.
 const GOOD_Y: f64 = 0.37;
 const GOOD_X: (f64, f64) = (-0.76, -0.24);
 /// Time of the run-up, seconds.
 const RUN_UP_TIME: f64 = 0.25;
+/// How long it watches what a push came to before the next one, seconds.
+const WATCH_TIME: f64 = 0.3;
 /// Time for the mallet to stop after the push, seconds.
 const STOP_TIME: f64 = 0.12;
-
-/// A push: mallet to puck, and speed.
-#[derive(Debug, Clone, Copy)]
-struct Push {
-    normal: Vec2,
-    speed: f64,
-}
 
 #[derive(Debug, Clone, Copy)]
 enum Phase {
     Look,
-    Approach { push: Push, puck: Vec2 },
-    Run { push: Push, mallet: Vec2, contact: f64 },
-    Away { until: f64 },
+    Approach {
+        normal: Vec2,
+        puck: Vec2,
+    },
+    Run {
+        normal: Vec2,
+        mallet: Vec2,
+        contact: f64,
+    },
+    Away {
+        until: f64,
+    },
 }
 
 /// The skill's memory.
@@ -60,8 +64,12 @@ impl Prepare {
     pub fn decide(&mut self, scene: &Scene<'_>) -> Order {
         match self.phase {
             Phase::Look => self.look(scene),
-            Phase::Approach { push, puck } => self.approach(scene, push, puck),
-            Phase::Run { push, mallet, contact } => self.run(scene, push, mallet, contact),
+            Phase::Approach { normal, puck } => self.approach(scene, normal, puck),
+            Phase::Run {
+                normal,
+                mallet,
+                contact,
+            } => self.run(scene, normal, mallet, contact),
             Phase::Away { until } => {
                 if scene.time > until {
                     self.phase = Phase::Look;
@@ -74,9 +82,9 @@ impl Prepare {
     fn look(&mut self, scene: &Scene<'_>) -> Order {
         let puck = &scene.puck;
         if puck.vel.norm() < SLOW && !lies_well(puck) {
-            if let Some(push) = best_push(scene.field, puck) {
+            if let Some(normal) = best_push(scene.field, puck) {
                 self.phase = Phase::Approach {
-                    push,
+                    normal,
                     puck: puck.pos,
                 };
             }
@@ -84,18 +92,21 @@ impl Prepare {
         guard(scene)
     }
 
-    fn approach(&mut self, scene: &Scene<'_>, push: Push, planned: Vec2) -> Order {
+    fn approach(&mut self, scene: &Scene<'_>, normal: Vec2, planned: Vec2) -> Order {
         let field = scene.field;
         if (scene.puck.pos - planned).norm() > 0.03 {
             self.phase = Phase::Look;
             return guard(scene);
         }
-        let mallet = scene.puck.pos - field.contact() * push.normal;
-        let start = field.clamp_mallet(mallet - 0.5 * RUN_UP_TIME * push.speed * push.normal);
+        let mallet = scene.puck.pos - field.contact() * normal;
+        let start = field.clamp_mallet(mallet - 0.5 * RUN_UP_TIME * SPEED * normal);
         let way = around(scene, start, field.contact() + 0.015);
-        if way == start && (scene.mallet.pos - start).norm() < 0.004 && scene.mallet.vel.norm() < 0.05 {
+        if way == start
+            && (scene.mallet.pos - start).norm() < 0.012
+            && scene.mallet.vel.norm() < 0.1
+        {
             self.phase = Phase::Run {
-                push,
+                normal,
                 mallet,
                 contact: scene.time + RUN_UP_TIME,
             };
@@ -104,12 +115,12 @@ impl Prepare {
         Order::stop(scene, way, if near { Pace::CALM } else { Pace::QUICK })
     }
 
-    fn run(&mut self, scene: &Scene<'_>, push: Push, mallet: Vec2, contact: f64) -> Order {
+    fn run(&mut self, scene: &Scene<'_>, normal: Vec2, mallet: Vec2, contact: f64) -> Order {
         let left = contact - scene.time;
         if left > 0.5 * scene.dt {
             let target = Target {
                 pos: mallet,
-                vel: push.speed * push.normal,
+                vel: SPEED * normal,
                 time: left,
             };
             return Order::new(target, Posture::Free);
@@ -117,7 +128,7 @@ impl Prepare {
         let rest = STOP_TIME + left;
         if rest < scene.dt {
             self.phase = Phase::Away {
-                until: scene.time + 0.3,
+                until: scene.time + WATCH_TIME,
             };
             return guard(scene);
         }
@@ -135,9 +146,10 @@ fn lies_well(puck: &Puck) -> bool {
     p.y.abs() < GOOD_Y && p.x > GOOD_X.0 && p.x < GOOD_X.1
 }
 
-/// The push after which the puck comes nearest to the middle line of the own half, slowly.
-fn best_push(field: &Field, puck: &Puck) -> Option<Push> {
-    let mut best: Option<(Push, f64)> = None;
+/// The direction, mallet to puck, of the push after which the puck comes nearest to the middle line of the
+/// own half, slowly.
+fn best_push(field: &Field, puck: &Puck) -> Option<Vec2> {
+    let mut best: Option<(Vec2, f64)> = None;
     for k in 0..DIRECTIONS {
         let angle = std::f64::consts::TAU * k as f64 / DIRECTIONS as f64;
         let normal = Vec2::new(angle.cos(), angle.sin());
@@ -145,14 +157,12 @@ fn best_push(field: &Field, puck: &Puck) -> Option<Push> {
         if (mallet - field.clamp_mallet(mallet)).norm() > 1e-9 {
             continue;
         }
-        for speed in SPEEDS {
-            let worth = worth(field, *puck, mallet, speed * normal);
-            if best.is_none_or(|(_, w)| worth > w) {
-                best = Some((Push { normal, speed }, worth));
-            }
+        let worth = worth(field, *puck, mallet, SPEED * normal);
+        if best.is_none_or(|(_, w)| worth > w) {
+            best = Some((normal, worth));
         }
     }
-    best.map(|(push, _)| push)
+    best.map(|(normal, _)| normal)
 }
 
 /// What a push comes to: 1 over the middle line where it is wanted, less the further away it ends.
@@ -166,7 +176,9 @@ fn worth(field: &Field, mut puck: Puck, mallet: Vec2, velocity: Vec2) -> f64 {
         }
         time += 0.05;
         if side * puck.pos.y < 0.01 {
-            let margin = (puck.pos.x - GOOD_X.0).min(GOOD_X.1 - puck.pos.x).clamp(0.0, 0.1);
+            let margin = (puck.pos.x - GOOD_X.0)
+                .min(GOOD_X.1 - puck.pos.x)
+                .clamp(0.0, 0.1);
             let slow = (0.08 - puck.vel.x).clamp(0.0, 0.08);
             return 10.0 * margin.min(slow + 0.02);
         }

@@ -99,5 +99,9 @@ impl Tactics {
 pub fn guard(scene: &Scene<'_>) -> Order {
     let y = (0.3 * scene.puck.pos.y).clamp(-0.1, 0.1);
     let clearance = scene.field.contact() + 0.03;
-    Order::stop(scene, around(scene, Vec2::new(-0.82, y), clearance), Pace::CALM)
+    Order::stop(
+        scene,
+        around(scene, Vec2::new(-0.82, y), clearance),
+        Pace::CALM,
+    )
 }
