@@ -5,7 +5,9 @@ What they do to the robot is tested end to end, with the simulator.
 
 import json
 import math
+import random
 import subprocess
+import sys
 import tomllib
 import unittest
 from pathlib import Path
@@ -18,10 +20,15 @@ POS_LIMIT = [2.96706, 2.0944, 2.96706, 2.0944, 2.96706, 2.0944, 3.05433]
 VEL_LIMIT = [math.radians(limit) for limit in (85, 85, 100, 75, 130, 135, 135)]
 ENV = {
     "dt": 0.02,
+    "table": {"length": 1.948, "width": 1.038, "goal_width": 0.25},
+    "puck": {"radius": 0.03165},
+    "mallet": {"radius": 0.04815},
     "joint_pos_ids": list(range(6, 13)),
     "joint_vel_ids": list(range(13, 20)),
     "robot": {
         "n_joints": 7,
+        "ee_desired_height": 0.1645,
+        "base_frame": [[1, 0, 0, -1.51, 0, 1, 0, 0, 0, 0, 1, -0.1, 0, 0, 0, 1]],
         "joint_pos_limit": [[-limit for limit in POS_LIMIT], POS_LIMIT],
         "joint_vel_limit": [[-limit for limit in VEL_LIMIT], VEL_LIMIT],
     },
@@ -58,15 +65,15 @@ class Agent:
     def reset(self, episode):
         return self.ask({"type": "reset", "episode": episode})
 
-    def step(self, step, pose, opponent=True):
-        obs = [-0.5, 0.1, 0.0, 0.0, 0.0, 0.0, *pose, *[0.0] * 7, *[0.65, 0.0, 0.1645] * opponent]
+    def step(self, step, pose, opponent=True, puck=(1.0, 0.1, 0.0, 0.0, 0.0, 0.0)):
+        obs = [*puck, *pose, *[0.0] * 7, *[2.37, 0.0, 0.1645] * opponent]
         answer = self.ask({"type": "step", "step": step, "obs": obs})
         assert (answer["type"], answer["step"]) == ("act", step), answer
         return answer["action"]
 
 
 class EveryAgent(unittest.TestCase):
-    names = ["hold", "reckless"]
+    names = ["hold", "reckless", "starter"]
 
     def test_speaks_the_protocol_from_hello_to_bye(self):
         for name in self.names:
@@ -123,6 +130,60 @@ class Reckless(unittest.TestCase):
             self.assertGreater(max(positions), 0.99 * POS_LIMIT[joint])
             self.assertLess(min(positions), -0.99 * POS_LIMIT[joint])
             self.assertLessEqual(max(map(abs, positions)), POS_LIMIT[joint])
+
+
+class Starter(unittest.TestCase):
+    """Its geometry, and that it keeps its limits whatever it sees."""
+
+    @classmethod
+    def setUpClass(cls):
+        sys.path.insert(0, str(AGENTS / "starter"))
+        import arm
+
+        cls.arm = arm
+
+    def test_joint_angles_lead_to_the_point_they_were_made_for(self):
+        for x in (0.6, 0.65, 0.8, 1.0, 1.2):
+            for y in (-0.45, -0.2, 0.0, 0.3):
+                q = self.arm.joints_at(x, y, 0.1645)
+                there = self.arm.mallet_at(q)
+                self.assertAlmostEqual(there[0], x, 9)
+                self.assertAlmostEqual(there[1], y, 9)
+                self.assertTrue(all(abs(a) < 0.95 * limit for a, limit in zip(q, POS_LIMIT)), (x, y, q))
+        for angle, home in zip(self.arm.joints_at(0.65, 0.0, 0.1645), POSE):
+            self.assertAlmostEqual(angle, home, 3)
+
+    def test_keeps_its_limits_whatever_the_puck_does(self):
+        """Pucks at random places that jump, vanish and race: the arm never does."""
+        chance = random.Random(2023)
+        for task in ("hit", "defend", "prepare", "tournament"):
+            with self.subTest(task), Agent("starter", task) as agent:
+                agent.reset(0)
+                last, puck = POSE, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+                for step in range(3000):
+                    if chance.random() < 0.05:
+                        place = (chance.uniform(0.5, 2.5), chance.uniform(-0.52, 0.52), 0.0)
+                        puck = (*place, chance.gauss(0, 1.5), chance.gauss(0, 1.5), chance.gauss(0, 10))
+                    if chance.random() < 0.03:
+                        puck = (*puck[:3], 0.0, 0.0, 0.0)
+                    pose, speeds = agent.step(step, last, task in ("hit", "tournament"), puck)
+                    for before, q, dq, limit in zip(last, pose, speeds, VEL_LIMIT):
+                        self.assertLess(abs(dq), 0.95 * limit)
+                        self.assertLess(abs(q - before), 0.95 * limit * 0.02)
+                    x, y = self.arm.mallet_at(pose)
+                    self.assertGreater(x, 1.51 - 0.974 + 0.04815)
+                    self.assertLess(abs(y), 0.519 - 0.04815)
+                    last = pose
+
+    def test_strikes_a_puck_that_lies_in_front_of_it(self):
+        with Agent("starter", "tournament") as agent:
+            agent.reset(0)
+            pose, ahead = POSE, []
+            for step in range(250):
+                pose, _ = agent.step(step, pose, puck=(1.0, 0.2, 0.0, 0.0, 0.0, 0.0))
+                ahead.append(self.arm.mallet_at(pose))
+            nearest = min(math.dist(at, (1.0, 0.2)) for at in ahead)
+            self.assertLess(nearest, 0.03165 + 0.04815, "it never touched the puck")
 
 
 if __name__ == "__main__":

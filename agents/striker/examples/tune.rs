@@ -13,7 +13,12 @@ use std::time::Instant;
 use anyhow::{Context, bail};
 use faceoff_sim::{Episode, EpisodeState, Interpolation, PerturbationSettings, Plant, env_info};
 use faceoff_types::{Profile, Seed, Task};
-use striker::{Agent, BaseFrame, Env, RadiusInfo, RobotInfo, TableInfo};
+use striker::{Agent, Policy};
+
+#[path = "../tests/support/env.rs"]
+mod env;
+
+use env::env;
 
 /// Sums over the episodes of a task.
 #[derive(Default)]
@@ -185,29 +190,8 @@ fn print_step(agent: &Agent, episode: &Episode, state: &EpisodeState) {
 }
 
 fn agent(task: Task) -> anyhow::Result<Agent> {
-    let info = env_info(task);
-    let env = Env {
-        dt: info.dt,
-        table: TableInfo {
-            length: info.table_length,
-            width: info.table_width,
-            goal_width: info.goal_width,
-        },
-        puck: RadiusInfo {
-            radius: info.puck_radius,
-        },
-        mallet: RadiusInfo {
-            radius: info.mallet_radius,
-        },
-        robot: RobotInfo {
-            ee_desired_height: info.ee_desired_height,
-            joint_pos_limit: info.joint_pos_limit,
-            joint_vel_limit: info.joint_vel_limit,
-            base_frame: info.base_frame.into_iter().map(BaseFrame::Flat).collect(),
-        },
-    };
     Ok(Agent::new(
         serde_json::from_str(&format!("{:?}", task.as_str()))?,
-        &env,
+        &env(1, 0),
     ))
 }

@@ -1,5 +1,8 @@
 //! Speaks the agent protocol over standard input and output.
 
+use striker::{Agent, protocol};
+
 fn main() -> anyhow::Result<()> {
-    striker::protocol::serve(std::io::stdin().lock(), std::io::stdout().lock())
+    let name = [env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION")];
+    protocol::serve::<Agent>(name, std::io::stdin().lock(), std::io::stdout().lock())
 }

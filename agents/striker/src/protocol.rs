@@ -5,7 +5,7 @@ use std::io::{BufRead, Write};
 use anyhow::{Context, bail};
 use serde::{Deserialize, Serialize};
 
-use crate::{Action, Agent, Env, Task};
+use crate::{Action, Env, Policy, Task};
 
 /// The protocol version that this agent speaks.
 const VERSION: u32 = 1;
@@ -60,12 +60,17 @@ enum Ready {
     },
 }
 
-/// Answers messages from `input` on `output` until `bye` or the end of the input.
+/// Lets `P` answer messages from `input` on `output` until `bye` or the end of the input. `name` and
+/// `version` are what the program calls itself.
 ///
 /// # Errors
 /// If a message is not understood or the pipe breaks.
-pub fn serve(input: impl BufRead, mut output: impl Write) -> anyhow::Result<()> {
-    let mut agent: Option<Agent> = None;
+pub fn serve<P: Policy>(
+    [name, version]: [&'static str; 2],
+    input: impl BufRead,
+    mut output: impl Write,
+) -> anyhow::Result<()> {
+    let mut agent: Option<P> = None;
     for line in input.lines() {
         let line = line.context("read a message")?;
         let message = serde_json::from_str(&line)
@@ -79,8 +84,7 @@ pub fn serve(input: impl BufRead, mut output: impl Write) -> anyhow::Result<()> 
                 if protocol != VERSION {
                     bail!("expected protocol {VERSION}, the evaluator speaks {protocol}");
                 }
-                agent = Some(Agent::new(task, &env));
-                let (name, version) = (env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION"));
+                agent = Some(P::new(task, &env));
                 let ready = Ready::Hello {
                     protocol: VERSION,
                     interpolation: INTERPOLATION,

@@ -4,11 +4,11 @@
 //! with hardly any speed at all. A fast puck is met where the mallet can be in time with the least
 //! effort; a slow one is overtaken, around it if need be, and met as soon as possible.
 
-use super::scene::{Order, Scene, around};
 use crate::arm::Posture;
 use crate::field::Vec2;
 use crate::motion::{Pace, Target};
 use crate::puck::{DRAG, MALLET_RESTITUTION, Puck};
+use crate::scene::{Order, Scene, around};
 
 /// Pucks are best met with their centre between these.
 const MEET_X: (f64, f64) = (-0.68, -0.4);

@@ -4,10 +4,10 @@
 //! mallet keeps out of its way.
 
 use super::absorb::Absorb;
-use super::scene::{Order, Scene};
 use crate::field::{Field, Vec2};
 use crate::motion::Pace;
 use crate::puck::{DRAG, Puck};
+use crate::scene::{Order, Scene};
 
 /// The zone in which a puck may come to rest, with a margin.
 const SAFE_X: (f64, f64) = (-0.74, -0.27);

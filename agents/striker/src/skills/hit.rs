@@ -6,13 +6,15 @@
 //! along the line of the shot so that it arrives at full speed at the chosen time.
 
 mod plan;
+mod shot;
 
 use super::Prepare;
-use super::scene::{Order, Scene, around, lean};
 use crate::arm::Posture;
 use crate::field::Vec2;
+use crate::keeper::Keeper;
 use crate::motion::{Pace, Target};
-use plan::{Plan, WORTH_A_NUDGE, again, best_nudge, best_plan, refresh};
+use crate::scene::{Order, Scene, around, lean};
+use plan::{Plan, WORTH_A_NUDGE, WORTH_A_NUDGE_IN_GAME, again, best_nudge, best_plan, refresh};
 
 /// A running plan is given up only for one that is better by this much.
 const LOYALTY: f64 = 0.06;
@@ -105,7 +107,11 @@ impl Hit {
         }
         let kept = old.and_then(|p| refresh(scene, &p));
         let mut best = best_plan(scene);
-        if self.nudges < NUDGES_MAX && best.is_some_and(|b| b.chance < WORTH_A_NUDGE) {
+        let worth = match scene.keeper {
+            Keeper::Rival(_) => WORTH_A_NUDGE_IN_GAME,
+            Keeper::Nobody | Keeper::Pendulum(_) => WORTH_A_NUDGE,
+        };
+        if self.nudges < NUDGES_MAX && best.is_some_and(|b| b.chance < worth) {
             best = best_nudge(scene).or(best);
         }
         let plan = match (kept, best) {

@@ -5,11 +5,11 @@ mod aim;
 mod defend;
 mod hit;
 mod prepare;
-mod scene;
+
 mod tournament;
 
 pub use defend::Defend;
 pub use hit::Hit;
 pub use prepare::Prepare;
-pub use scene::{Order, Scene};
+
 pub use tournament::Tournament;

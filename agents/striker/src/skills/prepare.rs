@@ -8,10 +8,10 @@
 mod strike;
 
 use super::absorb::Absorb;
-use super::scene::{Order, Scene, around};
 use crate::arm::Posture;
 use crate::field::Vec2;
 use crate::motion::{Pace, Target};
+use crate::scene::{Order, Scene, around};
 use strike::{BRAKE, NORMALS, Strike, prepared, run_up, slide_out, try_normal};
 
 /// Puck speed below which a strike may be planned, m/s.

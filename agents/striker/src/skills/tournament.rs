@@ -1,8 +1,9 @@
 //! The whole game: defend against what comes, free the puck from the rim, shoot.
 
-use super::{Defend, Hit, Order, Prepare, Scene};
+use super::{Defend, Hit, Prepare};
 use crate::field::Vec2;
 use crate::motion::Pace;
+use crate::scene::{Order, Scene};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Mode {
@@ -71,11 +72,11 @@ impl Tournament {
         }
         // Near a rim there is no room for a mallet behind the puck.
         let margin = if self.mode == Mode::Prepare {
-            0.36
-        } else {
             0.4
+        } else {
+            0.445
         };
-        if puck.pos.y.abs() > margin || puck.pos.x < -0.8 {
+        if puck.pos.y.abs() > margin || puck.pos.x < -0.86 {
             return Mode::Prepare;
         }
         // A strike that could not be placed for long: move the puck elsewhere instead of fouling.

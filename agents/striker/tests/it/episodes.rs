@@ -1,8 +1,10 @@
 //! Whole episodes in the simulator under all perturbations, with fixed seeds.
 
-use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant, env_info};
+use faceoff_sim::{Episode, Interpolation, PerturbationSettings, Plant};
 use faceoff_types::{Profile, Seed, Task};
-use striker::{Agent, BaseFrame, Env, RadiusInfo, RobotInfo, TableInfo};
+use striker::{Agent, Policy};
+
+use crate::support::env::env;
 
 const EPISODES: u32 = 12;
 
@@ -38,33 +40,12 @@ fn play(task: Task) -> (u32, u32) {
 }
 
 fn agent(task: Task) -> Agent {
-    let info = env_info(task);
-    let env = Env {
-        dt: info.dt,
-        table: TableInfo {
-            length: info.table_length,
-            width: info.table_width,
-            goal_width: info.goal_width,
-        },
-        puck: RadiusInfo {
-            radius: info.puck_radius,
-        },
-        mallet: RadiusInfo {
-            radius: info.mallet_radius,
-        },
-        robot: RobotInfo {
-            ee_desired_height: info.ee_desired_height,
-            joint_pos_limit: info.joint_pos_limit,
-            joint_vel_limit: info.joint_vel_limit,
-            base_frame: info.base_frame.into_iter().map(BaseFrame::Flat).collect(),
-        },
-    };
     let task = match task {
         Task::Hit => striker::Task::Hit,
         Task::Defend => striker::Task::Defend,
         Task::Prepare => striker::Task::Prepare,
     };
-    Agent::new(task, &env)
+    Agent::new(task, &env(1, 0))
 }
 
 /// Deployable: at most half a point per episode.

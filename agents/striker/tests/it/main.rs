@@ -1,4 +1,7 @@
 //! The agent as the evaluator meets it: over the protocol, and in whole simulated episodes.
 
 mod episodes;
+mod games;
 mod protocol;
+#[path = "../support/mod.rs"]
+mod support;

@@ -1,13 +1,13 @@
 //! Which strike, when: contact times and aims compared by the chance of a goal.
 
+use super::shot::{Aim, aims, chance};
 use crate::arm::Side;
-use crate::estimator::{FLOW_PER_SPEED, FLOW_TIME};
 use crate::field::{Field, Vec2};
+use crate::keeper::Keeper;
 use crate::motion::{Pace, Target};
-use crate::opponent::Opponent;
-use crate::puck::{DRAG, MALLET_RESTITUTION, Puck};
-use crate::skills::aim::{normal_cdf, strike_towards};
-use crate::skills::scene::{Scene, around, lean};
+use crate::puck::{DRAG, MALLET_RESTITUTION};
+use crate::scene::{Scene, around, lean};
+use crate::skills::aim::strike_towards;
 
 /// Duration of the run-up, seconds.
 const RUN_UP: f64 = 0.32;
@@ -17,26 +17,24 @@ const RUN_ACCELERATION: f64 = 30.0;
 const HORIZON: f64 = 2.2;
 /// Chance that a second of waiting costs.
 const IMPATIENCE: f64 = 0.02;
-/// Standard deviation of a shot's direction without air flow, radians.
-const AIM_ERROR: f64 = 0.012;
 /// Shots with less chance are not taken while the puck can be nudged to a better place.
 pub const WORTH_A_NUDGE: f64 = 0.45;
+/// The same in a game, where another shot may follow and the other side stands in the way.
+pub const WORTH_A_NUDGE_IN_GAME: f64 = 0.06;
 /// Pucks nearer to our goal are worth a nudge.
 const NUDGE_FROM_X: f64 = -0.5;
 /// Where a nudged puck shall be …
 const NUDGE_TO_X: f64 = -0.36;
 /// … this long after the nudge, seconds.
 const NUDGE_TIME: f64 = 2.6;
-/// Goal-line points that are tried, metres.
-const AIMS: [f64; 5] = [-0.05, -0.025, 0.0, 0.025, 0.05];
 
 /// A strike at a chosen time.
 #[derive(Debug, Clone, Copy)]
 pub struct Plan {
     /// Time of contact since the episode's start, seconds.
     pub contact_time: f64,
-    /// Where on the goal line the puck shall arrive.
-    pub aim: f64,
+    /// Where on the goal line the puck shall arrive, and by which way.
+    pub aim: Aim,
     /// Mallet at contact.
     pub mallet: Vec2,
     /// Direction of the mallet's motion and of the contact.
@@ -111,7 +109,7 @@ fn nudge_at(scene: &Scene<'_>, left: f64, side: Side) -> Option<Plan> {
     let contact_time = scene.time + left;
     Some(Plan {
         contact_time,
-        aim: 0.0,
+        aim: Aim { y: 0.0, via: 0.0 },
         mallet,
         normal,
         speed,
@@ -126,8 +124,14 @@ pub fn best_plan(scene: &Scene<'_>) -> Option<Plan> {
     let mut best: Option<Plan> = None;
     let side = lean(scene.puck.pos);
     let mut left = RUN_UP + 0.1;
+    let aims = aims(scene.keeper);
+    // A game has four times as many aims, and another shot soon.
+    let step = match scene.keeper {
+        Keeper::Rival(_) => 0.12,
+        Keeper::Nobody | Keeper::Pendulum(_) => 0.06,
+    };
     while left < HORIZON {
-        for aim in AIMS {
+        for &aim in &aims {
             if let Some(plan) = aim_at(scene, left, aim, side, None)
                 && reachable(scene, &plan, left)
                 && best.is_none_or(|b| plan.chance > b.chance)
@@ -135,7 +139,7 @@ pub fn best_plan(scene: &Scene<'_>) -> Option<Plan> {
                 best = Some(plan);
             }
         }
-        left += 0.06;
+        left += step;
     }
     best
 }
@@ -171,14 +175,13 @@ fn room_behind(field: &Field, contact: Vec2, direction: Vec2) -> f64 {
 }
 
 /// A strike in `left` seconds that sends the puck to `aim` on the goal line.
-fn aim_at(scene: &Scene<'_>, left: f64, aim: f64, side: Side, speed: Option<f64>) -> Option<Plan> {
+fn aim_at(scene: &Scene<'_>, left: f64, aim: Aim, side: Side, speed: Option<f64>) -> Option<Plan> {
     let field = scene.field;
     let mut puck = scene.puck;
     if !puck.advance(field, left) {
         return None;
     }
-    let goal = Vec2::new(field.half_length, aim);
-    let direction = (goal - puck.pos).normalize();
+    let direction = aim.direction(field, puck.pos);
     let guess = puck.pos - field.contact() * direction;
     let speed = speed.unwrap_or_else(|| {
         let room = room_behind(field, guess, direction);
@@ -187,12 +190,12 @@ fn aim_at(scene: &Scene<'_>, left: f64, aim: f64, side: Side, speed: Option<f64>
             .strike_speed(field.to_base(guess), direction, side);
         swing.min((RUN_ACCELERATION * room).sqrt())
     });
-    let (normal, struck) = strike_towards(&puck, direction, speed, field.contact());
+    let (normal, struck) = aim.strike(field, &puck, speed);
     let mallet = puck.pos - field.contact() * normal;
     if (mallet - field.clamp_mallet(mallet)).norm() > 1e-9 || mallet.x > -0.25 {
         return None;
     }
-    let chance = chance(field, scene.opponent, scene.time + left, &struck, aim) - IMPATIENCE * left;
+    let chance = chance(field, scene.keeper, scene.time + left, &struck, aim) - IMPATIENCE * left;
     Some(Plan {
         contact_time: scene.time + left,
         aim,
@@ -203,38 +206,4 @@ fn aim_at(scene: &Scene<'_>, left: f64, aim: f64, side: Side, speed: Option<f64>
         nudge: false,
         chance,
     })
-}
-
-/// The chance that the struck puck passes the opponent and enters the goal.
-fn chance(field: &Field, opponent: Option<&Opponent>, time: f64, struck: &Puck, aim: f64) -> f64 {
-    let way = Vec2::new(field.half_length, aim) - struck.pos;
-    let length = way.norm();
-    let share = DRAG * length / struck.vel.norm().max(1e-3);
-    if share > 0.9 {
-        return 0.0;
-    }
-    let flight = -(1.0 - share).ln() / DRAG;
-    // The air flow pushes with a random, correlated acceleration proportional to the speed; twice
-    // integrated over the flight this is its spread across the way. Aiming errors add to it.
-    let tau = FLOW_TIME;
-    let integral = 2.0 * tau * flight.powi(3) / 3.0 - (tau * flight).powi(2) + 2.0 * tau.powi(4)
-        - 2.0 * tau.powi(3) * (flight + tau) * (-flight / tau).exp();
-    let spread =
-        (FLOW_PER_SPEED * length / flight * integral.max(0.0).sqrt()).hypot(AIM_ERROR * length);
-    let within = |lo: f64, hi: f64| {
-        if hi <= lo {
-            0.0
-        } else {
-            normal_cdf((hi - aim) / spread) - normal_cdf((lo - aim) / spread)
-        }
-    };
-    let half = field.half_goal - 0.7 * field.puck;
-    let open = within(-half, half);
-    let Some(opponent) = opponent else {
-        return open;
-    };
-    let arrival = time + flight * (1.0 - (field.half_length - opponent.x()) / length);
-    let y = opponent.y_at(arrival);
-    let block = field.contact() + 0.005;
-    open - within((y - block).max(-half), (y + block).min(half))
 }

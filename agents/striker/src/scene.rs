@@ -2,8 +2,8 @@
 
 use crate::arm::{Arm, Posture, Side};
 use crate::field::{Field, Vec2};
+use crate::keeper::Keeper;
 use crate::motion::{Motion, Pace, Target};
-use crate::opponent::Opponent;
 use crate::puck::Puck;
 
 /// What a skill sees at a control step. All in the field frame.
@@ -23,8 +23,8 @@ pub struct Scene<'a> {
     pub mallet: Motion,
     /// The arm, for what it can do.
     pub arm: &'a Arm,
-    /// The opponent, if there is one on the table.
-    pub opponent: Option<&'a Opponent>,
+    /// Who may be in a shot's way.
+    pub keeper: &'a Keeper,
 }
 
 /// What a skill wants the mallet to do next.

@@ -1,0 +1,47 @@
+//! A rule-based opponent of about the strength of the 2023 challenge's baseline agent.
+//!
+//! The paper describes that agent as typical approaches, planning and optimisation, that do well in the ideal
+//! simulator and struggle beside it. So does this one, which shares nothing with it but that description: it
+//! predicts the puck, chooses a tactic by rules, plans one motion for it and carries it out without looking
+//! again. It refuses what makes [`striker`] strong: corrections of a running strike, the choice among many
+//! shots, and cushioning.
+
+mod defend;
+mod hit;
+mod prepare;
+mod tactics;
+
+use striker::{Action, Body, Env, Policy, Task, WrongLength};
+use tactics::Tactics;
+
+/// The agent: everything between an observation and an action.
+#[derive(Debug, Clone)]
+pub struct Baseline {
+    task: Task,
+    body: Body,
+    tactics: Tactics,
+}
+
+impl Policy for Baseline {
+    fn new(task: Task, env: &Env) -> Self {
+        Self {
+            task,
+            body: Body::new(task, env),
+            tactics: Tactics::new(task),
+        }
+    }
+
+    fn reset(&mut self) {
+        self.body.reset();
+        self.tactics = Tactics::new(self.task);
+    }
+
+    fn act(&mut self, observation: &[f64]) -> Result<Action, WrongLength> {
+        let order = self.tactics.decide(&self.body.observe(observation)?);
+        Ok(self.body.follow(&order))
+    }
+
+    fn describe(&self) -> String {
+        format!("{:?}", self.tactics)
+    }
+}

@@ -1,0 +1,9 @@
+//! Speaks the agent protocol over standard input and output.
+
+use baseline::Baseline;
+use striker::protocol;
+
+fn main() -> anyhow::Result<()> {
+    let name = [env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION")];
+    protocol::serve::<Baseline>(name, std::io::stdin().lock(), std::io::stdout().lock())
+}

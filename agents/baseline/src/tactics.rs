@@ -1,0 +1,107 @@
+//! Which skill plays when.
+
+use striker::Task;
+use striker::field::Vec2;
+use striker::motion::Pace;
+use striker::scene::{Order, Scene, around};
+
+use crate::defend::Defend;
+use crate::hit::Hit;
+use crate::prepare::Prepare;
+
+/// A puck that comes faster than this is defended against, m/s.
+const INCOMING: f64 = 0.35;
+/// A puck slower than this can be struck, m/s.
+const SLOW: f64 = 0.3;
+/// Beyond this |y| a puck lies too near to the rim for a shot, metres.
+const NEAR_RIM: f64 = 0.38;
+/// Beyond this x it is out of reach, metres.
+const OUT_OF_REACH: f64 = -0.16;
+/// Behind this x there is no room for a run-up, metres.
+const NEAR_END: f64 = -0.78;
+
+/// What it is at.
+#[derive(Debug, Clone)]
+enum Skill {
+    Wait,
+    Defend(Defend),
+    Hit(Hit),
+    Prepare(Prepare),
+}
+
+/// The memory of an episode or rally.
+#[derive(Debug, Clone)]
+pub struct Tactics {
+    task: Task,
+    skill: Skill,
+}
+
+impl Tactics {
+    /// Nothing seen yet.
+    pub fn new(task: Task) -> Self {
+        Self {
+            task,
+            skill: Skill::Wait,
+        }
+    }
+
+    /// The order for this control step.
+    pub fn decide(&mut self, scene: &Scene<'_>) -> Order {
+        let busy = match &self.skill {
+            Skill::Hit(hit) => hit.committed(),
+            Skill::Prepare(prepare) => prepare.committed(),
+            Skill::Wait | Skill::Defend(_) => false,
+        };
+        if !busy {
+            self.choose(scene);
+        }
+        match &mut self.skill {
+            Skill::Wait => guard(scene),
+            Skill::Defend(defend) => defend.decide(scene),
+            Skill::Hit(hit) => hit.decide(scene),
+            Skill::Prepare(prepare) => prepare.decide(scene),
+        }
+    }
+
+    /// Goes on with the skill if it is still the right one, or begins another.
+    fn choose(&mut self, scene: &Scene<'_>) {
+        let puck = &scene.puck;
+        let cornered = puck.pos.y.abs() > NEAR_RIM || puck.pos.x < NEAR_END;
+        let strikeable = puck.vel.norm() < SLOW && puck.pos.x < OUT_OF_REACH;
+        match self.task {
+            Task::Defend => self.begin_defend(),
+            Task::Prepare => self.begin_prepare(),
+            Task::Hit | Task::Tournament if puck.vel.x < -INCOMING => self.begin_defend(),
+            Task::Hit | Task::Tournament if strikeable && cornered => self.begin_prepare(),
+            Task::Hit | Task::Tournament if strikeable => {
+                if !matches!(self.skill, Skill::Hit(_)) {
+                    self.skill = Skill::Hit(Hit::new());
+                }
+            }
+            Task::Hit | Task::Tournament => self.skill = Skill::Wait,
+        }
+    }
+
+    fn begin_defend(&mut self) {
+        if !matches!(self.skill, Skill::Defend(_)) {
+            self.skill = Skill::Defend(Defend::new());
+        }
+    }
+
+    fn begin_prepare(&mut self) {
+        if !matches!(self.skill, Skill::Prepare(_)) {
+            self.skill = Skill::Prepare(Prepare::new());
+        }
+    }
+}
+
+/// Waits in front of the goal.
+pub fn guard(scene: &Scene<'_>) -> Order {
+    let y = (0.3 * scene.puck.pos.y).clamp(-0.1, 0.1);
+    let clearance = scene.field.contact() + 0.03;
+    Order::stop(
+        scene,
+        around(scene, Vec2::new(-0.82, y), clearance),
+        Pace::CALM,
+    )
+}

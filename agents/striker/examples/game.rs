@@ -1,0 +1,120 @@
+//! Plays games in process and prints what counts. For development only; `faceoff play` plays the real thing.
+//!
+//! `cargo run --release -p striker --example game -- striker hold [steps] [profile] [games] [first seed]`
+//!
+//! A player is `striker`, `hold`, or the folder of a bundle whose actions are positions and velocities
+//! (interpolation 3), which is started as it is, without a sandbox.
+//!
+//! With `TRACE=from:to` the control steps between these of each game are printed, with `LIST=1` the end of each
+//! rally and each step at which a constraint was first broken in its window.
+
+#![expect(clippy::print_stdout, reason = "a tool for the terminal")]
+
+use std::path::Path;
+
+use anyhow::Context;
+use faceoff_sim::{Game, GameStep};
+use faceoff_types::Profile;
+use striker::Agent;
+
+#[path = "../tests/support/mod.rs"]
+mod support;
+
+use support::game::{Player, game, play};
+use support::program::Program;
+
+fn main() -> anyhow::Result<()> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let argument =
+        |i: usize, default: &str| arguments.get(i).map_or(default, String::as_str).to_owned();
+    let names = [argument(0, "striker"), argument(1, "hold")];
+    let steps: u32 = argument(2, "45000")
+        .parse()
+        .context("number of control steps")?;
+    let profile: Profile = argument(3, "evaluation").parse()?;
+    let games: u64 = argument(4, "1").parse().context("number of games")?;
+    let first: u64 = argument(5, "1").parse().context("first game's seed")?;
+    let trace = std::env::var("TRACE").ok().and_then(|t| {
+        let (from, to) = t.split_once(':')?;
+        Some(from.parse::<u32>().ok()?..to.parse::<u32>().ok()?)
+    });
+    let list = std::env::var("LIST").is_ok();
+    for seed in first..first + games {
+        let mut players = [player(&names[0], 0)?, player(&names[1], 1)?];
+        let mut broken = [[false; 4]; 2];
+        let tally = play(
+            &mut game(profile, seed),
+            &mut players,
+            steps,
+            |game, players, step| {
+                if trace.as_ref().is_some_and(|t| t.contains(&game.steps())) {
+                    print_step(game, players);
+                }
+                if list {
+                    print_events(game, step, &mut broken);
+                }
+            },
+        );
+        println!("seed {seed}: {tally:?}");
+    }
+    Ok(())
+}
+
+fn player(name: &str, own: usize) -> anyhow::Result<Player> {
+    match name {
+        "hold" => Ok(Player::Hold(None)),
+        "striker" => Ok(Player::agent::<Agent>(own)),
+        folder => Ok(Player::Program(Program::start(Path::new(folder), own)?)),
+    }
+}
+
+fn print_events(game: &Game, step: &GameStep, broken: &mut [[bool; 4]; 2]) {
+    for (robot, values) in step.constraints.iter().enumerate() {
+        let values = [values.ee, values.link, values.joint_pos, values.joint_vel];
+        for (k, name) in ["ee", "link", "joint_pos", "joint_vel"]
+            .into_iter()
+            .enumerate()
+        {
+            if values[k] > 0.0 && !broken[robot][k] {
+                broken[robot][k] = true;
+                println!(
+                    "  {} robot {} breaks {name} by {:.4}",
+                    game.steps(),
+                    robot + 1,
+                    values[k]
+                );
+            }
+        }
+    }
+    if step.window.is_some() {
+        *broken = [[false; 4]; 2];
+    }
+    if let Some(end) = step.rally_end {
+        println!("  {} rally ends: {end:?}", game.steps());
+    }
+}
+
+fn print_step(game: &Game, players: &[Player; 2]) {
+    let puck = game.world().puck();
+    let ([x, y, _], [vx, vy, _]) = (puck.pose, puck.velocity);
+    print!(
+        "{:5} puck {x:+.3} {y:+.3} v {vx:+.2} {vy:+.2}",
+        game.steps()
+    );
+    for robot in [0, 1] {
+        // Each robot's mallet is what the other observes, in the other's frame.
+        let seen = &game.observation(1 - robot)[20..22];
+        let side = if robot == 0 { -1.0 } else { 1.0 };
+        print!(
+            " mallet {:+.3} {:+.3}",
+            side * (seen[0] - 1.51),
+            side * seen[1]
+        );
+    }
+    for (robot, player) in players.iter().enumerate() {
+        if let Player::Agent(agent) = player {
+            print!(" | {}: {:.220}", robot + 1, agent.describe());
+        }
+    }
+    println!();
+}

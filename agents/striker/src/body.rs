@@ -1,0 +1,118 @@
+//! The agent's body: what it senses, and how its mallet follows orders. Who decides is elsewhere.
+
+use crate::arm::Arm;
+use crate::env::{Env, Joints};
+use crate::estimator::{Estimator, MalletState, PuckObservation};
+use crate::field::{Field, Vec2};
+use crate::keeper::Keeper;
+use crate::kinematics::forward;
+use crate::motion::Motion;
+use crate::scene::{Order, Scene};
+use crate::task::{Action, Task, WrongLength};
+
+/// Estimates, the arm's reference and the mallet's.
+#[derive(Debug, Clone)]
+pub struct Body {
+    task: Task,
+    dt: f64,
+    field: Field,
+    arm: Arm,
+    estimator: Estimator,
+    keeper: Keeper,
+    mallet: Motion,
+    step: u32,
+}
+
+impl Body {
+    /// A body in the environment that the evaluator described.
+    #[must_use]
+    pub fn new(task: Task, env: &Env) -> Self {
+        let field = Field::new(env);
+        Self {
+            task,
+            dt: env.dt,
+            arm: Arm::new(env),
+            estimator: Estimator::new(&field, env.dt),
+            keeper: Keeper::Nobody,
+            mallet: Motion::rest(Vec2::zeros()),
+            step: 0,
+            field,
+        }
+    }
+
+    /// Starts a new episode or rally.
+    pub fn reset(&mut self) {
+        self.estimator.reset();
+        self.keeper = Keeper::Nobody;
+        self.step = 0;
+    }
+
+    /// Takes in an observation of 20 or 23 numbers (robot base frame).
+    ///
+    /// # Errors
+    /// If the observation has another length.
+    pub fn observe(&mut self, observation: &[f64]) -> Result<Scene<'_>, WrongLength> {
+        if observation.len() != 20 && observation.len() != 23 {
+            return Err(WrongLength(observation.len()));
+        }
+        let q = Joints::from_column_slice(&observation[6..13]);
+        let dq = Joints::from_column_slice(&observation[13..20]);
+        let time = f64::from(self.step) * self.dt;
+        let pose = forward(&q);
+        let tip_velocity = pose.jacobian * dq;
+        let seen = MalletState {
+            pos: self.field.to_field(Vec2::new(pose.tip.x, pose.tip.y)),
+            vel: Vec2::new(tip_velocity.x, tip_velocity.y),
+        };
+        if self.step == 0 {
+            self.arm.reset(&q);
+            self.mallet = Motion::rest(seen.pos);
+        } else {
+            self.arm.observe(&q);
+        }
+        let o = observation;
+        let puck = self.estimator.observe(
+            &PuckObservation {
+                pose: [o[0] - self.field.base, o[1], o[2]],
+                velocity: [o[3], o[4], o[5]],
+            },
+            seen,
+        );
+        if let [x, y, _] = o[20..] {
+            let seen = self.field.to_field(Vec2::new(x, y));
+            let in_game = self.task == Task::Tournament;
+            self.keeper
+                .observe(&self.field, in_game, time, self.dt, seen);
+        }
+        Ok(Scene {
+            field: &self.field,
+            dt: self.dt,
+            time,
+            puck,
+            puck_speed_deviation: self.estimator.speed_deviation(),
+            mallet: self.mallet,
+            arm: &self.arm,
+            keeper: &self.keeper,
+        })
+    }
+
+    /// Moves the references on by one control step: the action.
+    pub fn follow(&mut self, order: &Order) -> Action {
+        let before = self.mallet;
+        let mut next = before.towards(&order.target, self.dt);
+        next.limit(&before, self.dt, order.acceleration);
+        next.confine(&before, self.dt, &self.field);
+        let reached = self
+            .arm
+            .advance(self.field.to_base(next.pos), next.vel, order.posture);
+        // Where limits cut the motion, go on from what is possible.
+        if (reached.velocity - next.vel).norm() > 0.02 {
+            next.vel = reached.velocity;
+            next.acc = Vec2::zeros();
+        }
+        next.pos = self.field.to_field(reached.position);
+        self.mallet = next;
+        self.step += 1;
+        self.arm.action()
+    }
+}

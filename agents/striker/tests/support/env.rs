@@ -1,0 +1,29 @@
+//! The environment that agents are told, made from the simulator's.
+
+use faceoff_sim::env_info_for;
+use striker::{BaseFrame, Env, RadiusInfo, RobotInfo, TableInfo};
+
+/// As `hello` tells it to the agent of robot `own` (0 or 1) among `robots`.
+pub fn env(robots: u32, own: usize) -> Env {
+    let info = env_info_for(robots, own);
+    Env {
+        dt: info.dt,
+        table: TableInfo {
+            length: info.table_length,
+            width: info.table_width,
+            goal_width: info.goal_width,
+        },
+        puck: RadiusInfo {
+            radius: info.puck_radius,
+        },
+        mallet: RadiusInfo {
+            radius: info.mallet_radius,
+        },
+        robot: RobotInfo {
+            ee_desired_height: info.ee_desired_height,
+            joint_pos_limit: info.joint_pos_limit,
+            joint_vel_limit: info.joint_vel_limit,
+            base_frame: info.base_frame.into_iter().map(BaseFrame::Flat).collect(),
+        },
+    }
+}

@@ -1,0 +1,120 @@
+//! A game in process, without pipes, clocks and sandbox.
+
+use faceoff_sim::{Command, Game, GameSetup, GameStep, Interpolation, RallyEnd};
+use faceoff_sim::{PerturbationSettings, Plant};
+use faceoff_types::{Profile, Seed, Violations};
+use striker::{Policy, Task};
+
+use super::env::env;
+use super::program::Program;
+
+/// Who moves a robot.
+pub enum Player {
+    /// Keeps the pose in which a rally finds it, as `agents/hold` does.
+    Hold(Option<[f64; 14]>),
+    /// An agent in this process.
+    Agent(Box<dyn Policy>),
+    /// A bundle's program.
+    Program(Program),
+}
+
+impl Player {
+    /// An agent as that of robot `own` (0 or 1).
+    pub fn agent<P: Policy + 'static>(own: usize) -> Self {
+        Self::Agent(Box::new(P::new(Task::Tournament, &env(2, own))))
+    }
+
+    pub fn reset(&mut self) {
+        match self {
+            Self::Hold(pose) => *pose = None,
+            Self::Agent(agent) => agent.reset(),
+            Self::Program(program) => program.reset(),
+        }
+    }
+
+    pub fn act(&mut self, observation: &[f64]) -> [f64; 14] {
+        match self {
+            Self::Hold(pose) => *pose.get_or_insert_with(|| {
+                std::array::from_fn(|i| if i < 7 { observation[6 + i] } else { 0.0 })
+            }),
+            Self::Agent(agent) => {
+                let action = agent.act(observation).expect("an observation of a game");
+                std::array::from_fn(|i| action[i / 7][i % 7])
+            }
+            Self::Program(program) => program.act(observation),
+        }
+    }
+}
+
+/// What a game came to. Robot 1's first.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    pub score: [u32; 2],
+    pub goals: [u32; 2],
+    pub fouls: [u32; 2],
+    /// Rallies that ended in the middle of the table or beside it.
+    pub stuck: u32,
+    pub left: u32,
+    /// Penalty points over all windows, without computation time.
+    pub points: [u32; 2],
+    /// Windows with each violation: end effector, link, joint position, joint velocity.
+    pub windows: [[u32; 4]; 2],
+}
+
+impl Tally {
+    fn window(&mut self, violations: &[Violations; 2]) {
+        for (robot, v) in violations.iter().enumerate() {
+            let broken = [v.ee, v.link, v.joint_pos, v.joint_vel];
+            for (k, (is_broken, points)) in broken.into_iter().zip([3, 3, 2, 1]).enumerate() {
+                self.windows[robot][k] += u32::from(is_broken);
+                self.points[robot] += u32::from(is_broken) * points;
+            }
+        }
+    }
+}
+
+/// The game of a seed.
+pub fn game(profile: Profile, seed: u64) -> Game {
+    let seed = Seed::from_number(seed);
+    let settings = PerturbationSettings::default();
+    Game::new(GameSetup {
+        interpolation: [Interpolation::Cubic; 2],
+        factors: profile.factors(),
+        plant: Plant::under(profile.factors(), &settings, seed.model_mismatch()),
+        settings,
+        seed,
+    })
+}
+
+/// Plays `steps` control steps; `watch` sees each of them.
+pub fn play(
+    game: &mut Game,
+    players: &mut [Player; 2],
+    steps: u32,
+    mut watch: impl FnMut(&Game, &[Player; 2], &GameStep),
+) -> Tally {
+    let mut tally = Tally::default();
+    for player in players.iter_mut() {
+        player.reset();
+    }
+    for _ in 0..steps {
+        let actions = [0, 1].map(|robot| players[robot].act(game.observation(robot)));
+        let step = game.step([Command::Act(&actions[0]), Command::Act(&actions[1])]);
+        watch(game, players, &step);
+        if let Some(violations) = &step.window {
+            tally.window(violations);
+        }
+        if let Some(end) = step.rally_end {
+            tally.stuck += u32::from(end == RallyEnd::Stuck);
+            tally.left += u32::from(end == RallyEnd::LeftTable);
+            for player in players.iter_mut() {
+                player.reset();
+            }
+        }
+    }
+    let referee = game.referee();
+    tally.score = referee.score();
+    tally.goals = referee.goals;
+    tally.fouls = referee.fouls;
+    tally
+}

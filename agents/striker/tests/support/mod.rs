@@ -1,0 +1,5 @@
+//! What tests and development tools share.
+
+pub mod env;
+pub mod game;
+pub mod program;
