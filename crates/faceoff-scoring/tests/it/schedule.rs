@@ -1,6 +1,9 @@
 //! What schedules promise, for any number of teams, any seed and any results.
 
-use crate::support::{read, team};
+use crate::{
+    most_pairs::most_pairs,
+    support::{read, team},
+};
 use faceoff_scoring::tournament::{
     Departure, Departures, LeftAs, POINTS_BYE, PlayedGame, RoundNumber,
     schedule::{Entrants, Format, Progress, Round, ScheduleError, TableOf},
@@ -98,22 +101,6 @@ fn nobody_plays_twice_a_day(round: &Round) {
         let different: BTreeSet<_> = all.iter().collect();
         assert_eq!(different.len(), all.len(), "{day:?}");
     }
-}
-
-/// The most pairs among `members` that `may_meet`, by trying everything.
-fn most_pairs(members: &[&TeamName], may_meet: &impl Fn(&TeamName, &TeamName) -> bool) -> usize {
-    let Some((first, rest)) = members.split_first() else {
-        return 0;
-    };
-    let mut best = most_pairs(rest, may_meet);
-    for (place, other) in rest.iter().enumerate() {
-        if may_meet(first, other) {
-            let mut left = rest.to_vec();
-            left.remove(place);
-            best = best.max(1 + most_pairs(&left, may_meet));
-        }
-    }
-    best
 }
 
 proptest! {

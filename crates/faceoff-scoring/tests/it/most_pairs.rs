@@ -1,0 +1,20 @@
+use faceoff_types::TeamName;
+
+/// The most pairs among `members` that `may_meet`, by trying everything.
+pub fn most_pairs(
+    members: &[&TeamName],
+    may_meet: &impl Fn(&TeamName, &TeamName) -> bool,
+) -> usize {
+    let Some((first, rest)) = members.split_first() else {
+        return 0;
+    };
+    let mut best = most_pairs(rest, may_meet);
+    for (place, other) in rest.iter().enumerate() {
+        if may_meet(first, other) {
+            let mut left = rest.to_vec();
+            left.remove(place);
+            best = best.max(1 + most_pairs(&left, may_meet));
+        }
+    }
+    best
+}
