@@ -160,7 +160,7 @@ impl Totals {
         let counted = timing.map_or(0, |timing| timing.host_noise_reruns);
         if counted != self.host_noise_reruns {
             return Err(Difference {
-                file: CALIBRATION_FILE.to_owned(),
+                file: CALIBRATION_FILE,
                 task: None,
                 episode: None,
                 rally: None,

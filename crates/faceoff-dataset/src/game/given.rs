@@ -27,7 +27,7 @@ impl Place {
         expected: impl Into<String>,
     ) -> Difference {
         Difference {
-            file: self.file.to_owned(),
+            file: self.file,
             task: None,
             episode: None,
             rally: Some(self.rally),

@@ -90,7 +90,7 @@ fn text(array: &dyn Array, row: usize) -> String {
 }
 
 /// The first place in which a JSON file is not what it should be, byte for byte.
-pub(crate) fn json(file: &str, recorded: &[u8], expected: &[u8]) -> Option<Difference> {
+pub(crate) fn json(file: &'static str, recorded: &[u8], expected: &[u8]) -> Option<Difference> {
     if recorded == expected {
         return None;
     }
@@ -112,7 +112,7 @@ pub(crate) fn json(file: &str, recorded: &[u8], expected: &[u8]) -> Option<Diffe
         )
     });
     Some(Difference {
-        file: file.to_owned(),
+        file,
         task: None,
         episode: None,
         rally: None,

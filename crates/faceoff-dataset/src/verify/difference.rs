@@ -6,7 +6,7 @@ use std::fmt;
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Difference {
     /// The file.
-    pub file: String,
+    pub file: &'static str,
     /// The task, where it is about one.
     pub task: Option<Task>,
     /// The episode, where it is about one.
@@ -26,7 +26,7 @@ pub struct Difference {
 
 impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.file)?;
+        f.write_str(self.file)?;
         if let Some(task) = self.task {
             write!(f, ", {task}")?;
         }

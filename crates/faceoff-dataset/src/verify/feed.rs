@@ -173,10 +173,10 @@ impl<'a> Feed<'a> {
     }
 
     /// A row after the last that belongs here.
-    fn extra(&self, file: &str, row: &RecordBatch, expected: &str) -> VerifyError {
+    fn extra(&self, file: &'static str, row: &RecordBatch, expected: &str) -> VerifyError {
         let columns = Columns(row);
         Difference {
-            file: file.to_owned(),
+            file,
             task: columns.text("task", 0).and_then(|task| task.parse().ok()),
             episode: columns.int("episode", 0),
             rally: None,
@@ -198,13 +198,13 @@ fn shown<T: ToString>(value: Option<T>) -> String {
 fn difference(
     task: Task,
     episode: u32,
-    file: &str,
+    file: &'static str,
     field: &str,
     recorded: impl ToString,
     expected: impl ToString,
 ) -> VerifyError {
     Difference {
-        file: file.to_owned(),
+        file,
         task: Some(task),
         episode: Some(episode),
         rally: None,

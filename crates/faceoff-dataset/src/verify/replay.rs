@@ -277,7 +277,7 @@ impl Again<'_> {
 
     fn at_step(&self, step: u32, field: &str, recorded: String, expected: String) -> Difference {
         Difference {
-            file: STEPS_FILE.to_owned(),
+            file: STEPS_FILE,
             task: Some(self.recorded.task),
             episode: Some(self.recorded.episode),
             rally: None,
@@ -331,7 +331,7 @@ fn in_row(
 ) -> Difference {
     let Recorded { task, episode, .. } = recorded;
     Difference {
-        file: EPISODES_FILE.to_owned(),
+        file: EPISODES_FILE,
         task: Some(*task),
         episode: Some(*episode),
         rally: None,

@@ -196,7 +196,7 @@ fn one_bit_of_any_column_of_an_episode_is_found() {
         let found = difference(forgery.reseal().dir.path(), 2);
         if name == "host_noise_reruns" {
             // Nothing but the slots' own count tells that one was added.
-            assert_eq!((&found.field, &*found.file), (&name, "calibration.json"));
+            assert_eq!((&found.field, found.file), (&name, "calibration.json"));
             continue;
         }
         assert_eq!(
@@ -209,7 +209,7 @@ fn one_bit_of_any_column_of_an_episode_is_found() {
             "interpolation" => assert_eq!(found.file, "steps.parquet", "{found}"),
             "steps" => {}
             _ => assert_eq!(
-                (&found.field, &*found.file),
+                (&found.field, found.file),
                 (&name, "episodes.parquet"),
                 "{found}"
             ),

@@ -1,15 +1,17 @@
 //! `faceoff verify`: does a published dataset, or a recorded game, give its published score?
 
+mod failure;
 mod game;
 
-use anyhow::{Context, anyhow};
+use anyhow::Context;
 use clap::Args;
 use faceoff_dataset::{
-    Dataset, DatasetError,
+    Dataset,
     game::GameRecording,
-    verify::{Difference, SeasonClaim, SeasonMismatch, Verified, VerifyError, verify},
+    verify::{Difference, SeasonClaim, Verified, VerifyError, verify},
 };
 use faceoff_types::{EvaluationResult, Seed, StageId};
+use failure::{Failure, check_hash};
 use game::SimulatedGame;
 use indicatif::{ProgressBar, ProgressStyle};
 use jiff::civil::Date;
@@ -86,46 +88,6 @@ struct Simulated {
     /// The archive's hash; `null` for an unpacked folder.
     blake3: Option<String>,
     result: EvaluationResult,
-}
-
-/// Why there is no "verified".
-#[derive(Debug, thiserror::Error)]
-enum Failure {
-    #[error(transparent)]
-    Verify(#[from] VerifyError),
-    #[error("{error}{hint}")]
-    Season {
-        #[source]
-        error: SeasonMismatch,
-        hint: &'static str,
-    },
-    #[error("{0:#}")]
-    Here(anyhow::Error),
-}
-
-impl From<SeasonMismatch> for Failure {
-    fn from(error: SeasonMismatch) -> Self {
-        Self::Season { error, hint: "" }
-    }
-}
-
-impl From<DatasetError> for Failure {
-    fn from(error: DatasetError) -> Self {
-        Self::Verify(error.into())
-    }
-}
-
-impl Failure {
-    /// 1 for what differs, 2 for what could not be compared.
-    fn code(&self) -> ExitCode {
-        match self {
-            Self::Season { .. }
-            | Self::Verify(
-                VerifyError::Differs(_) | VerifyError::Dataset(DatasetError::Altered(_)),
-            ) => ExitCode::from(1),
-            Self::Verify(_) | Self::Here(_) => ExitCode::from(2),
-        }
-    }
 }
 
 impl VerifyCommand {
@@ -223,21 +185,6 @@ impl VerifyCommand {
             blake3: archive,
             result: verified.result,
         })
-    }
-}
-
-/// Is the archive the one that was published?
-fn check_hash(expected: Option<&blake3::Hash>, found: Option<&str>) -> Result<(), Failure> {
-    match (expected, found) {
-        (Some(_), None) => Err(Failure::Here(anyhow!(
-            "--blake3 is the hash of an archive, this is an unpacked folder; name the archive"
-        ))),
-        (Some(expected), Some(found)) if expected.to_hex().as_str() != found => {
-            Err(Failure::from(DatasetError::Altered(format!(
-                "the archive's BLAKE3 is {found}, expected {expected}"
-            ))))
-        }
-        _ => Ok(()),
     }
 }
 

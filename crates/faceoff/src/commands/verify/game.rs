@@ -1,6 +1,6 @@
 //! Verifying a game.
 
-use super::Failure;
+use super::failure::{Failure, check_hash};
 use anyhow::Context;
 use faceoff_dataset::{
     DatasetError,
@@ -27,7 +27,7 @@ pub(super) struct SimulatedGame {
 pub(super) fn verify(path: &Path, blake3: Option<&blake3::Hash>) -> Result<SimulatedGame, Failure> {
     let recording = GameRecording::open(path)?;
     let archive = recording.archive()?.map(|digest| digest.blake3);
-    super::check_hash(blake3, archive.as_deref())?;
+    check_hash(blake3, archive.as_deref())?;
     let bar = ProgressBar::new(u64::from(recording.manifest().spec.steps)).with_style(
         ProgressStyle::with_template("{bar:40} {pos}/{len} steps, {per_sec}, {eta} left")
             .context("the progress bar's template")

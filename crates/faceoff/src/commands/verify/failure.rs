@@ -1,0 +1,64 @@
+use anyhow::anyhow;
+use faceoff_dataset::{
+    DatasetError,
+    verify::{SeasonMismatch, VerifyError},
+};
+use std::process::ExitCode;
+
+/// Why there is no "verified".
+#[derive(Debug, thiserror::Error)]
+pub(super) enum Failure {
+    #[error(transparent)]
+    Verify(#[from] VerifyError),
+    #[error("{error}{hint}")]
+    Season {
+        #[source]
+        error: SeasonMismatch,
+        hint: &'static str,
+    },
+    #[error("{0:#}")]
+    Here(anyhow::Error),
+}
+
+impl From<SeasonMismatch> for Failure {
+    fn from(error: SeasonMismatch) -> Self {
+        Self::Season { error, hint: "" }
+    }
+}
+
+impl From<DatasetError> for Failure {
+    fn from(error: DatasetError) -> Self {
+        Self::Verify(error.into())
+    }
+}
+
+impl Failure {
+    /// 1 for what differs, 2 for what could not be compared.
+    pub(super) fn code(&self) -> ExitCode {
+        match self {
+            Self::Season { .. }
+            | Self::Verify(
+                VerifyError::Differs(_) | VerifyError::Dataset(DatasetError::Altered(_)),
+            ) => ExitCode::from(1),
+            Self::Verify(_) | Self::Here(_) => ExitCode::from(2),
+        }
+    }
+}
+
+/// Is the archive the one that was published?
+pub(super) fn check_hash(
+    expected: Option<&blake3::Hash>,
+    found: Option<&str>,
+) -> Result<(), Failure> {
+    match (expected, found) {
+        (Some(_), None) => Err(Failure::Here(anyhow!(
+            "--blake3 is the hash of an archive, this is an unpacked folder; name the archive"
+        ))),
+        (Some(expected), Some(found)) if expected.to_hex().as_str() != found => {
+            Err(Failure::from(DatasetError::Altered(format!(
+                "the archive's BLAKE3 is {found}, expected {expected}"
+            ))))
+        }
+        _ => Ok(()),
+    }
+}
