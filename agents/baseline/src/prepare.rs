@@ -81,13 +81,14 @@ impl Prepare {
 
     fn look(&mut self, scene: &Scene<'_>) -> Order {
         let puck = &scene.puck;
-        if puck.vel.norm() < SLOW && !lies_well(puck) {
-            if let Some(normal) = best_push(scene.field, puck) {
-                self.phase = Phase::Approach {
-                    normal,
-                    puck: puck.pos,
-                };
-            }
+        if puck.vel.norm() < SLOW
+            && !lies_well(puck)
+            && let Some(normal) = best_push(scene.field, puck)
+        {
+            self.phase = Phase::Approach {
+                normal,
+                puck: puck.pos,
+            };
         }
         guard(scene)
     }
