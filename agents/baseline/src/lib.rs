@@ -7,6 +7,7 @@
 //! shots, and cushioning.
 
 mod defend;
+mod guard;
 mod hit;
 mod prepare;
 mod tactics;

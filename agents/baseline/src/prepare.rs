@@ -6,7 +6,7 @@ use striker::motion::{Pace, Target};
 use striker::puck::Puck;
 use striker::scene::{Order, Scene, around};
 
-use crate::tactics::guard;
+use crate::guard::guard;
 
 /// Directions of a push that are tried.
 const DIRECTIONS: usize = 8;
