@@ -19,7 +19,7 @@ fn striker_beats_an_arm_that_holds_still_from_either_side() {
     for own in [0, 1] {
         let mut players = [Player::Hold(None), Player::Hold(None)];
         players[own] = Player::agent(Agent::new, own);
-        let tally = played(Profile::Evaluation, 2023, players);
+        let tally = played(Profile::Evaluation, 2, players);
         assert!(tally.goals[own] >= 2, "{tally:?}");
         assert_eq!(tally.goals[1 - own], 0, "{tally:?}");
         assert_eq!(tally.fouls[own], 0, "{tally:?}");
@@ -30,7 +30,7 @@ fn striker_beats_an_arm_that_holds_still_from_either_side() {
 #[test]
 fn two_strikers_keep_the_puck_going_and_stay_deployable() {
     let players = [Player::agent(Agent::new, 0), Player::agent(Agent::new, 1)];
-    let tally = played(Profile::Evaluation, 2023, players);
+    let tally = played(Profile::Evaluation, 2, players);
     assert_eq!(tally.fouls, [0, 0], "{tally:?}");
     assert!(tally.points.iter().all(|p| *p <= POINTS_MAX), "{tally:?}");
 }
