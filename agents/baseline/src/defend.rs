@@ -5,7 +5,7 @@ use striker::field::Vec2;
 use striker::motion::Target;
 use striker::scene::{Order, Scene};
 
-use crate::tactics::guard;
+use crate::guard::guard;
 
 /// Where the puck is met, metres.
 const LINE_X: f64 = -0.56;

@@ -7,6 +7,7 @@
 //! shots, and cushioning.
 
 mod defend;
+mod guard;
 mod hit;
 mod prepare;
 mod tactics;
@@ -22,15 +23,19 @@ pub struct Baseline {
     tactics: Tactics,
 }
 
-impl Policy for Baseline {
-    fn new(task: Task, env: &Env) -> Self {
+impl Baseline {
+    /// An agent for `task` in the environment that the evaluator described.
+    #[must_use]
+    pub fn new(task: Task, env: &Env) -> Self {
         Self {
             task,
             body: Body::new(task, env),
             tactics: Tactics::new(task),
         }
     }
+}
 
+impl Policy for Baseline {
     fn reset(&mut self) {
         self.body.reset();
         self.tactics = Tactics::new(self.task);

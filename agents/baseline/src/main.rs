@@ -5,5 +5,6 @@ use striker::protocol;
 
 fn main() -> anyhow::Result<()> {
     let name = [env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION")];
-    protocol::serve::<Baseline>(name, std::io::stdin().lock(), std::io::stdout().lock())
+    let (input, output) = (std::io::stdin().lock(), std::io::stdout().lock());
+    protocol::serve(name, Baseline::new, input, output)
 }

@@ -6,7 +6,7 @@ use striker::motion::{Pace, Target};
 use striker::puck::Puck;
 use striker::scene::{Order, Scene, around};
 
-use crate::tactics::guard;
+use crate::guard::guard;
 
 /// Directions of a push that are tried.
 const DIRECTIONS: usize = 8;
@@ -81,13 +81,14 @@ impl Prepare {
 
     fn look(&mut self, scene: &Scene<'_>) -> Order {
         let puck = &scene.puck;
-        if puck.vel.norm() < SLOW && !lies_well(puck) {
-            if let Some(normal) = best_push(scene.field, puck) {
-                self.phase = Phase::Approach {
-                    normal,
-                    puck: puck.pos,
-                };
-            }
+        if puck.vel.norm() < SLOW
+            && !lies_well(puck)
+            && let Some(normal) = best_push(scene.field, puck)
+        {
+            self.phase = Phase::Approach {
+                normal,
+                puck: puck.pos,
+            };
         }
         guard(scene)
     }

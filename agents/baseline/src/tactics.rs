@@ -1,11 +1,10 @@
 //! Which skill plays when.
 
 use striker::Task;
-use striker::field::Vec2;
-use striker::motion::Pace;
-use striker::scene::{Order, Scene, around};
+use striker::scene::{Order, Scene};
 
 use crate::defend::Defend;
+use crate::guard::guard;
 use crate::hit::Hit;
 use crate::prepare::Prepare;
 
@@ -93,15 +92,4 @@ impl Tactics {
             self.skill = Skill::Prepare(Prepare::new());
         }
     }
-}
-
-/// Waits in front of the goal.
-pub fn guard(scene: &Scene<'_>) -> Order {
-    let y = (0.3 * scene.puck.pos.y).clamp(-0.1, 0.1);
-    let clearance = scene.field.contact() + 0.03;
-    Order::stop(
-        scene,
-        around(scene, Vec2::new(-0.82, y), clearance),
-        Pace::CALM,
-    )
 }

@@ -20,8 +20,10 @@ use striker::Agent;
 #[path = "../tests/support/mod.rs"]
 mod support;
 
+mod program;
+
+use program::Program;
 use support::game::{Player, game, play};
-use support::program::Program;
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -63,8 +65,11 @@ fn main() -> anyhow::Result<()> {
 fn player(name: &str, own: usize) -> anyhow::Result<Player> {
     match name {
         "hold" => Ok(Player::Hold(None)),
-        "striker" => Ok(Player::agent::<Agent>(own)),
-        folder => Ok(Player::Program(Program::start(Path::new(folder), own)?)),
+        "striker" => Ok(Player::agent(Agent::new, own)),
+        folder => Ok(Player::Agent(Box::new(Program::start(
+            Path::new(folder),
+            own,
+        )?))),
     }
 }
 

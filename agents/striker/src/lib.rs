@@ -68,15 +68,19 @@ pub struct Agent {
     skill: Skill,
 }
 
-impl Policy for Agent {
-    fn new(task: Task, env: &Env) -> Self {
+impl Agent {
+    /// An agent for `task` in the environment that the evaluator described.
+    #[must_use]
+    pub fn new(task: Task, env: &Env) -> Self {
         Self {
             task,
             body: Body::new(task, env),
             skill: Skill::new(task),
         }
     }
+}
 
+impl Policy for Agent {
     fn reset(&mut self) {
         self.body.reset();
         self.skill = Skill::new(self.task);

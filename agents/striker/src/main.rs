@@ -4,5 +4,6 @@ use striker::{Agent, protocol};
 
 fn main() -> anyhow::Result<()> {
     let name = [env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION")];
-    protocol::serve::<Agent>(name, std::io::stdin().lock(), std::io::stdout().lock())
+    let (input, output) = (std::io::stdin().lock(), std::io::stdout().lock());
+    protocol::serve(name, Agent::new, input, output)
 }

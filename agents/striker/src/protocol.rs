@@ -60,13 +60,14 @@ enum Ready {
     },
 }
 
-/// Lets `P` answer messages from `input` on `output` until `bye` or the end of the input. `name` and
-/// `version` are what the program calls itself.
+/// Lets the policy that `make` makes answer messages from `input` on `output` until `bye` or the end of the
+/// input. `name` and `version` are what the program calls itself.
 ///
 /// # Errors
 /// If a message is not understood or the pipe breaks.
 pub fn serve<P: Policy>(
     [name, version]: [&'static str; 2],
+    make: impl Fn(Task, &Env) -> P,
     input: impl BufRead,
     mut output: impl Write,
 ) -> anyhow::Result<()> {
@@ -84,7 +85,7 @@ pub fn serve<P: Policy>(
                 if protocol != VERSION {
                     bail!("expected protocol {VERSION}, the evaluator speaks {protocol}");
                 }
-                agent = Some(P::new(task, &env));
+                agent = Some(make(task, &env));
                 let ready = Ready::Hello {
                     protocol: VERSION,
                     interpolation: INTERPOLATION,

@@ -1,6 +1,6 @@
 //! What is asked of an agent, and what it answers.
 
-use crate::env::{Env, JOINTS};
+use crate::env::JOINTS;
 
 /// Which behaviour is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
@@ -21,11 +21,6 @@ pub type Action = [[f64; JOINTS]; 2];
 
 /// A policy: everything between an observation and an action.
 pub trait Policy {
-    /// An agent for `task` in the environment that the evaluator described.
-    fn new(task: Task, env: &Env) -> Self
-    where
-        Self: Sized;
-
     /// Starts a new episode or rally.
     fn reset(&mut self);
 

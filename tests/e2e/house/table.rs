@@ -88,16 +88,18 @@ pub fn allowed() -> BTreeMap<String, Allowed> {
             continue;
         };
         let name = match name.trim_matches('`') {
-            "agents/striker" => "striker",
             "tests" => "faceoff-tests",
-            name => name,
+            name => name.trim_start_matches("agents/"),
         };
         let uses = match *uses {
             "any" => Allowed::Any,
             "–" => Allowed::These(BTreeSet::new()),
             list => Allowed::These(
                 list.split(", ")
-                    .map(|name| format!("faceoff-{name}"))
+                    .map(|name| match name.strip_prefix("agents/") {
+                        Some(agent) => agent.to_owned(),
+                        None => format!("faceoff-{name}"),
+                    })
                     .collect(),
             ),
         };

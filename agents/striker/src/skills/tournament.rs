@@ -5,6 +5,9 @@ use crate::field::Vec2;
 use crate::motion::Pace;
 use crate::scene::{Order, Scene};
 
+/// A puck that stayed this long is shot away from where it is not shot otherwise, seconds.
+const URGENT: f64 = 6.0;
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Mode {
     Wait,
@@ -18,6 +21,8 @@ enum Mode {
 pub struct Tournament {
     mode: Mode,
     since: f64,
+    /// When the puck came to our side; a foul is 15 s later.
+    ours_since: f64,
     hit: Hit,
     defend: Defend,
     prepare: Prepare,
@@ -29,6 +34,7 @@ impl Tournament {
         Self {
             mode: Mode::Wait,
             since: 0.0,
+            ours_since: 0.0,
             hit: Hit::new(),
             defend: Defend::new(),
             prepare: Prepare::new(),
@@ -37,6 +43,9 @@ impl Tournament {
 
     /// The order for this control step.
     pub fn decide(&mut self, scene: &Scene<'_>) -> Order {
+        if scene.puck.pos.x > 0.0 {
+            self.ours_since = scene.time;
+        }
         let busy = match self.mode {
             Mode::Hit => self.hit.committed(),
             Mode::Prepare => self.prepare.committed(),
@@ -71,10 +80,12 @@ impl Tournament {
             return Mode::Defend;
         }
         // Near a rim there is no room for a mallet behind the puck.
-        let margin = if self.mode == Mode::Prepare {
-            0.4
-        } else {
-            0.445
+        let urgent = scene.time - self.ours_since > URGENT;
+        let margin = match (self.mode, urgent) {
+            (Mode::Prepare, false) => 0.4,
+            (Mode::Prepare, true) => 0.45,
+            (_, false) => 0.445,
+            (_, true) => 0.47,
         };
         if puck.pos.y.abs() > margin || puck.pos.x < -0.86 {
             return Mode::Prepare;

@@ -18,8 +18,8 @@ fn played(profile: Profile, seed: u64, mut players: [Player; 2]) -> Tally {
 fn striker_beats_an_arm_that_holds_still_from_either_side() {
     for own in [0, 1] {
         let mut players = [Player::Hold(None), Player::Hold(None)];
-        players[own] = Player::agent::<Agent>(own);
-        let tally = played(Profile::Evaluation, 2023, players);
+        players[own] = Player::agent(Agent::new, own);
+        let tally = played(Profile::Evaluation, 2, players);
         assert!(tally.goals[own] >= 2, "{tally:?}");
         assert_eq!(tally.goals[1 - own], 0, "{tally:?}");
         assert_eq!(tally.fouls[own], 0, "{tally:?}");
@@ -29,8 +29,8 @@ fn striker_beats_an_arm_that_holds_still_from_either_side() {
 
 #[test]
 fn two_strikers_keep_the_puck_going_and_stay_deployable() {
-    let players = [Player::agent::<Agent>(0), Player::agent::<Agent>(1)];
-    let tally = played(Profile::Evaluation, 2023, players);
+    let players = [Player::agent(Agent::new, 0), Player::agent(Agent::new, 1)];
+    let tally = played(Profile::Evaluation, 2, players);
     assert_eq!(tally.fouls, [0, 0], "{tally:?}");
     assert!(tally.points.iter().all(|p| *p <= POINTS_MAX), "{tally:?}");
 }
@@ -39,7 +39,7 @@ fn two_strikers_keep_the_puck_going_and_stay_deployable() {
 fn a_game_is_the_same_again() {
     let once = || {
         let mut game = game(Profile::Evaluation, 7);
-        let mut players = [Player::agent::<Agent>(0), Player::agent::<Agent>(1)];
+        let mut players = [Player::agent(Agent::new, 0), Player::agent(Agent::new, 1)];
         let tally = play(&mut game, &mut players, 1000, |_, _, _| {});
         (tally, game.world().puck().pose)
     };

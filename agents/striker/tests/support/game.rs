@@ -3,10 +3,9 @@
 use faceoff_sim::{Command, Game, GameSetup, GameStep, Interpolation, RallyEnd};
 use faceoff_sim::{PerturbationSettings, Plant};
 use faceoff_types::{Profile, Seed, Violations};
-use striker::{Policy, Task};
+use striker::{Env, Policy, Task};
 
 use super::env::env;
-use super::program::Program;
 
 /// Who moves a robot.
 pub enum Player {
@@ -14,21 +13,18 @@ pub enum Player {
     Hold(Option<[f64; 14]>),
     /// An agent in this process.
     Agent(Box<dyn Policy>),
-    /// A bundle's program.
-    Program(Program),
 }
 
 impl Player {
     /// An agent as that of robot `own` (0 or 1).
-    pub fn agent<P: Policy + 'static>(own: usize) -> Self {
-        Self::Agent(Box::new(P::new(Task::Tournament, &env(2, own))))
+    pub fn agent<P: Policy + 'static>(make: impl Fn(Task, &Env) -> P, own: usize) -> Self {
+        Self::Agent(Box::new(make(Task::Tournament, &env(2, own))))
     }
 
     pub fn reset(&mut self) {
         match self {
             Self::Hold(pose) => *pose = None,
             Self::Agent(agent) => agent.reset(),
-            Self::Program(program) => program.reset(),
         }
     }
 
@@ -41,7 +37,6 @@ impl Player {
                 let action = agent.act(observation).expect("an observation of a game");
                 std::array::from_fn(|i| action[i / 7][i % 7])
             }
-            Self::Program(program) => program.act(observation),
         }
     }
 }

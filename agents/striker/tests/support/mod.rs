@@ -2,4 +2,3 @@
 
 pub mod env;
 pub mod game;
-pub mod program;

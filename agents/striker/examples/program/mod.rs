@@ -7,6 +7,7 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use anyhow::Context;
 use faceoff_sim::env_info_for;
 use serde_json::{Value, json};
+use striker::{Action, Policy, WrongLength};
 
 /// A running agent, in the middle of a session.
 pub struct Program {
@@ -50,20 +51,6 @@ impl Program {
         Ok(started)
     }
 
-    pub fn reset(&mut self) {
-        self.ask(&json!({"type": "reset", "episode": self.rally}));
-        self.rally += 1;
-        self.step = 0;
-    }
-
-    pub fn act(&mut self, observation: &[f64]) -> [f64; 14] {
-        let answer = self.ask(&json!({"type": "step", "step": self.step, "obs": observation}));
-        self.step += 1;
-        let action: [[f64; 7]; 2] =
-            serde_json::from_value(answer["action"].clone()).expect("positions and velocities");
-        std::array::from_fn(|i| action[i / 7][i % 7])
-    }
-
     fn ask(&mut self, question: &Value) -> Value {
         writeln!(self.input, "{question}").expect("the program reads");
         let mut line = String::new();
@@ -71,6 +58,25 @@ impl Program {
             .read_line(&mut line)
             .expect("the program answers");
         serde_json::from_str(&line).expect("an answer in JSON")
+    }
+}
+
+impl Policy for Program {
+    fn reset(&mut self) {
+        self.ask(&json!({"type": "reset", "episode": self.rally}));
+        self.rally += 1;
+        self.step = 0;
+    }
+
+    fn act(&mut self, observation: &[f64]) -> Result<Action, WrongLength> {
+        let answer = self.ask(&json!({"type": "step", "step": self.step, "obs": observation}));
+        self.step += 1;
+        let action = answer["action"].clone();
+        Ok(serde_json::from_value(action).expect("positions and velocities"))
+    }
+
+    fn describe(&self) -> String {
+        format!("step {} of rally {}", self.step, self.rally)
     }
 }
 
