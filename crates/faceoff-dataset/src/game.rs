@@ -11,7 +11,7 @@ mod rows;
 mod table;
 mod verify;
 
-pub use archive::{GameArchives, RecordedGame};
+pub use archive::{GameArchives, RecordedGame, clear_game};
 pub use files::{GAME_FILE, side_file};
 pub use recorder::GameRecorder;
 pub use recording::GameRecording;

@@ -35,8 +35,11 @@ pub(crate) struct Exchange<'w> {
     glance: Option<Arc<CpuReading>>,
     /// The message being sent; its memory is reused.
     line: Vec<u8>,
-    /// CPU time of the whole process tree at its last answer, in seconds, where the host tells.
+    /// CPU time of the whole process tree at its last answer, or when it was asked long after that, in seconds, where
+    /// the host tells.
     cpu_time_s: Option<f64>,
+    /// When that was.
+    cpu_time_at: Instant,
     /// How long it may take to exit once it has closed its output, so that its status can be told.
     exit_grace: Duration,
 }
@@ -108,6 +111,7 @@ impl<'w> Exchange<'w> {
                 .is_ok_and(|own| own.iter().all(|cpu| !env.agent_cpus.contains(cpu)));
         Ok(Self {
             cpu_time_s: process.cpu_time_s(),
+            cpu_time_at: Instant::now(),
             process,
             watch,
             apart,
@@ -131,6 +135,11 @@ impl<'w> Exchange<'w> {
         }
         message.write_line(&mut self.line);
         let before = self.glance(phase);
+        // In a game it may have been the other side's turn meanwhile: what it ran then is not of this wait.
+        if self.cpu_time_at.elapsed() >= GLANCE_LASTS {
+            self.cpu_time_s = self.process.cpu_time_s();
+            self.cpu_time_at = Instant::now();
+        }
         match self.process.send_line(&self.line) {
             Ok(asked) => {
                 let limit = TimeLimits::duration(limit_s);
@@ -223,6 +232,7 @@ impl<'w> Exchange<'w> {
         let cpu_time_s = self.process.cpu_time_s();
         let waited = self.waited(sent, at, used_s(self.cpu_time_s, cpu_time_s));
         self.cpu_time_s = cpu_time_s;
+        self.cpu_time_at = at;
         self.is_quick = waited.wall < QUICK;
         Answer { bytes, waited }
     }
@@ -252,7 +262,8 @@ impl<'w> Exchange<'w> {
         Ok(())
     }
 
-    /// The wait for an answer until `now`; `agent_ran_s` is the CPU time since the answer before.
+    /// The wait for an answer until `now`; `agent_ran_s` is the CPU time since the answer before, or since it was asked
+    /// if that was long ago.
     fn waited(&self, sent: &Sent, now: Instant, agent_ran_s: Option<f64>) -> Waited {
         Waited {
             wall: now.saturating_duration_since(sent.wait.asked),

@@ -171,10 +171,12 @@ impl Wait {
             .map(|kept| kept.max(self.unlet.min(most)) + overslept)
             // Whatever the rest says: while it ran, it was not kept from running.
             .map(|proven| proven.min(wall.saturating_sub(ran)));
-        // What the evaluator did elsewhere is nobody's but ours, whoever shares whose CPUs.
+        // What the evaluator did elsewhere is nobody's but ours, whoever shares whose CPUs; but an agent that ran
+        // meanwhile had not answered yet.
+        let away = wall.saturating_sub(agent_ran.unwrap_or_default());
         watch
             .taken(self.asked, now, proven)
-            .max(self.away)
+            .max(self.away.min(away))
             .min(wall)
     }
 
@@ -320,16 +322,23 @@ mod tests {
     fn an_evaluator_that_saw_to_another_agent_is_nobodys_delay() {
         let asked = Instant::now();
         let mut wait = Wait::begin(None, asked, asked, MS(1000));
-        let taken = |wait: &Wait, at| wait.taken(&Counters, evidence(asked + MS(at), 0, 1, false));
+        let taken = |wait: &Wait, at, ran| {
+            wait.taken(&Counters, evidence(asked + MS(at), 0, ran, false))
+        };
         wait.was_away(MS(500));
         assert_eq!(
-            taken(&wait, 510),
+            taken(&wait, 510, 1),
             MS(500),
             "its answer may lie there for as long"
         );
-        assert_eq!(taken(&wait, 400), MS(400), "but never longer than the wait");
+        assert_eq!(taken(&wait, 510, 300), MS(210), "but it ran");
+        assert_eq!(
+            taken(&wait, 400, 1),
+            MS(399),
+            "but never longer than the wait"
+        );
         wait.nothing_is_there();
-        assert_eq!(taken(&wait, 510), MS(0), "it was still at work");
+        assert_eq!(taken(&wait, 510, 1), MS(0), "it was still at work");
     }
 
     #[test]

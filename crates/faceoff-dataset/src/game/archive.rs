@@ -24,7 +24,10 @@ use faceoff_wire::{
     },
 };
 use fs_err::{self as fs, File};
-use std::{io::Write, path::Path};
+use std::{
+    io::{ErrorKind, Write},
+    path::{Path, PathBuf},
+};
 
 /// A game that is over, as it is recorded.
 #[derive(Debug)]
@@ -60,6 +63,7 @@ pub(super) fn played_as(spec: &GameSpec, agents: &[String; 2]) -> PlayedAs {
         ruleset: spec.ruleset,
         profile: spec.profile,
         perturbations: spec.perturbations.clone(),
+        limits: spec.limits.clone(),
         seed: spec.seed,
         agents: agents.clone(),
     }
@@ -92,14 +96,22 @@ impl RecordedGame<'_> {
             score: &score,
             outcome: &outcome,
         };
-        let game = in_place(&out.join(GAME_FILE), |path| files.write_game(path))?;
-        let [first, second] = Side::BOTH.map(|side| {
-            in_place(&out.join(side_file(side)), |path| {
-                files.write_side(side, path)
-            })
-        });
-        let sides = [first?, second?];
+        let game = partial(GAME_FILE, out);
+        files.write_game(&game)?;
+        let mut archives = Vec::new();
+        for side in Side::BOTH {
+            let name = side_file(side);
+            files.write_side(side, &partial(name, out))?;
+            archives.push((name, digest::of_file(&partial(name, out))?));
+        }
+        let game = digest::of_file(&game)?;
         fs::remove_dir_all(tables.path(""))?;
+        // All are there, so all get their names; the game last, for who finds it finds all of them.
+        for name in Side::BOTH.map(side_file).into_iter().chain([GAME_FILE]) {
+            fs::rename(partial(name, out), out.join(name))?;
+        }
+        let [first, second] = archives.try_into().expect("one of each side");
+        let sides = [first.1, second.1];
         Ok(GameArchives {
             score,
             outcome,
@@ -109,16 +121,25 @@ impl RecordedGame<'_> {
     }
 }
 
-/// Writes a file under a temporary name and renames it.
-fn in_place(
-    path: &Path,
-    write: impl FnOnce(&Path) -> Result<(), RecordingError>,
-) -> Result<FileDigest, RecordingError> {
-    let partial = path.with_extension("zip.partial");
-    write(&partial)?;
-    let digest = digest::of_file(&partial)?;
-    fs::rename(&partial, path)?;
-    Ok(digest)
+/// Where an archive is written before it is complete.
+fn partial(name: &str, out: &Path) -> PathBuf {
+    out.join(name).with_extension("zip.partial")
+}
+
+/// Removes the archives of a game, and what of them is half written, from the folder `out`.
+///
+/// # Errors
+/// Why one of them is still there.
+pub fn clear_game(out: &Path) -> std::io::Result<()> {
+    for name in [GAME_FILE].into_iter().chain(Side::BOTH.map(side_file)) {
+        for path in [out.join(name), partial(name, out)] {
+            match fs::remove_file(path) {
+                Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
+                _ => {}
+            }
+        }
+    }
+    Ok(())
 }
 
 /// What the archives are made of.

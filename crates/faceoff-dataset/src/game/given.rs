@@ -73,6 +73,14 @@ impl GivenEntry {
                 return Err(at.differs("fault", fault.to_string(), expected));
             }
         }
+        // A world diverges by an answer, and that it did is seen again when the answer is played.
+        if let Some(fault) = &fault
+            && matches!(fault.fault, AgentFaultKind::Diverged { .. })
+            && fault.step.is_none()
+        {
+            let expected = "a fault that the agent was seen to make";
+            return Err(at.differs("fault", fault.to_string(), expected));
+        }
         let startup_s = time(row, "startup_ns", 0, at)?;
         let reset_s = time(row, "reset_ns", 0, at)?;
         let interpolation = columns
@@ -180,6 +188,9 @@ impl GivenResponse {
                 let Some(fault) = fault.cloned() else {
                     return wrong("in_time or late: no fault of this step is recorded");
                 };
+                if matches!(fault.fault, AgentFaultKind::Diverged { .. }) {
+                    return wrong("in_time or late: a world diverges by an answer");
+                }
                 Ok(Self::Fault {
                     fault: side_fault(fault),
                     answered: answered(steps, row, at)?,

@@ -18,14 +18,16 @@ use faceoff_types::{AgentFault, Interpolation, Side};
 /// A game being simulated again with what was recorded of it.
 pub(super) struct Replay {
     course: GameCourse<GameRows>,
-    rallies: Vec<RecordBatch>,
-    entries: [Vec<RecordBatch>; 2],
+    rallies: GameTable,
+    entries: [GameTable; 2],
     motion: GameTable,
     steps: [GameTable; 2],
 }
 
 /// What is recorded of both sides for the rally under way.
 struct Given {
+    /// How both sides got ready.
+    entries: [RecordBatch; 2],
     interpolations: [Interpolation; 2],
     faults: [Option<AgentFault>; 2],
 }
@@ -41,18 +43,12 @@ impl Replay {
             spec.mismatch_seed,
         );
         let rows = GameRows::new();
-        let entries = |side: Side| {
-            let name = entries_file(side);
-            recording
-                .table(name, rows.entries[side.index()].schema())?
-                .rows()
-        };
+        let entries =
+            |side: Side| recording.table(entries_file(side), rows.entries[side.index()].schema());
         let steps =
             |side: Side| recording.table(steps_file(side), rows.sides[side.index()].schema());
         Ok(Self {
-            rallies: recording
-                .table(RALLIES_FILE, rows.rallies.schema())?
-                .rows()?,
+            rallies: recording.table(RALLIES_FILE, rows.rallies.schema())?,
             entries: [entries(Side::First)?, entries(Side::Second)?],
             motion: recording.table(MOTION_FILE, rows.motion.schema())?,
             steps: [steps(Side::First)?, steps(Side::Second)?],
@@ -62,7 +58,7 @@ impl Replay {
 
     /// Plays all of it; `progress` is told how many control steps have been.
     pub fn play(mut self, progress: &dyn Fn(u64)) -> Result<FinishedGame<GameRows>, VerifyError> {
-        for rally in std::mem::take(&mut self.rallies) {
+        while let Some(rally) = self.rallies.next_row()? {
             self.rally(&rally, progress)?;
         }
         let number = self.course.rally();
@@ -75,9 +71,9 @@ impl Replay {
             let expected = "another rally: the game has not ended";
             return Err(at(RALLIES_FILE).differs("rows", "no more", expected).into());
         }
-        for (side, rows) in Side::BOTH.into_iter().zip(&self.entries) {
-            if rows.len() > number as usize {
-                let at = at(entries_file(side));
+        for table in &mut self.entries {
+            if table.fill()? > 0 {
+                let at = at(table.name());
                 return Err(at.differs("rows", "another row", "no more rallies").into());
             }
         }
@@ -121,31 +117,30 @@ impl Replay {
             let rows = &mut rows.entries[side.index()];
             let played = batch(rows.take(), rows.schema());
             let file = entries_file(side);
-            // That there is a row was seen at the rally's start.
-            if let Some(recorded) = self.entries[side.index()].get(number as usize) {
-                differs(Place { file, ..at }, recorded, &played)?;
-            }
+            differs(Place { file, ..at }, &given.entries[side.index()], &played)?;
         }
         Ok(())
     }
 
     /// Gets both sides ready.
     fn start(&mut self, rally: u32) -> Result<Given, VerifyError> {
-        let read = |side: Side| -> Result<GivenEntry, Difference> {
+        let mut read = |side: Side| -> Result<(RecordBatch, GivenEntry), VerifyError> {
             let at = Place {
                 file: entries_file(side),
                 rally,
                 step: None,
             };
-            let row = self.entries[side.index()].get(rally as usize);
+            let row = self.entries[side.index()].next_row()?;
             let row = row.ok_or_else(|| at.differs("rows", "no more", "a row of this rally"))?;
-            GivenEntry::read(row, side, self.course.needs_start(side), at)
+            let entry = GivenEntry::read(&row, side, self.course.needs_start(side), at)?;
+            Ok((row, entry))
         };
-        let [first, second] = [read(Side::First)?, read(Side::Second)?];
+        let [(first_row, first), (second_row, second)] = [read(Side::First)?, read(Side::Second)?];
         // Of one that does not play nothing is interpolated.
         let interpolation =
             |given: &GivenEntry| given.entry.interpolation().unwrap_or(Interpolation::Cubic);
         let given = Given {
+            entries: [first_row, second_row],
             interpolations: [interpolation(&first), interpolation(&second)],
             faults: [first.later, second.later],
         };

@@ -73,15 +73,8 @@ impl GameTable {
         Some(taken)
     }
 
-    /// All that is left, row by row.
-    pub fn rows(mut self) -> Result<Vec<RecordBatch>, DatasetError> {
-        let mut rows = Vec::new();
-        loop {
-            let count = self.fill()?;
-            let Some(batch) = self.take(count).filter(|_| count > 0) else {
-                return Ok(rows);
-            };
-            rows.extend((0..count).map(|row| batch.slice(row, 1)));
-        }
+    /// Takes the next row; `None` after the last.
+    pub fn next_row(&mut self) -> Result<Option<RecordBatch>, DatasetError> {
+        Ok(if self.fill()? > 0 { self.take(1) } else { None })
     }
 }

@@ -6,14 +6,14 @@ use crate::{
     fault::PlatformFault,
     host_watch::{Counters, HostWatch},
 };
-use faceoff_dataset::game::{GAME_FILE, GameArchives, GameRecorder, RecordedGame, side_file};
+use faceoff_dataset::game::{GameArchives, GameRecorder, RecordedGame, clear_game};
 use faceoff_episode::{
     Arena, FinishedGame, GameCourse, GameSink, GameStepRow, RallyRow, RallyStart, RecordError,
 };
 use faceoff_sandbox::affinity::PinnedElsewhere;
 use faceoff_types::Side;
 use faceoff_wire::game::{GameCalibration, GameSpec};
-use std::{fs, io::ErrorKind, path::Path};
+use std::{fs, path::Path};
 
 /// Follows a game as it runs, and can stop it.
 pub trait GameObserver {
@@ -72,19 +72,19 @@ pub fn run_game_watched(
     observer: &mut dyn GameObserver,
     watches: [&dyn HostWatch; 2],
 ) -> Result<GameReport, PlatformFault> {
-    let clearing = || PlatformFault::io(format!("clearing {}", out.display()));
-    for name in [GAME_FILE].into_iter().chain(Side::BOTH.map(side_file)) {
-        match fs::remove_file(out.join(name)) {
-            Err(error) if error.kind() != ErrorKind::NotFound => return Err(clearing()(error)),
-            _ => {}
-        }
-    }
+    let clear = || {
+        clear_game(out).map_err(PlatformFault::io(format!("clearing {}", out.display())))
+    };
+    clear()?;
     let tables = out.join(TABLES);
     let report = record(spec, bundles, envs, out, &tables, observer, watches);
-    if report.is_err()
-        && let Err(error) = fs::remove_dir_all(&tables)
-    {
-        tracing::debug!(%error, "no tables of a broken game to remove");
+    if report.is_err() {
+        if let Err(error) = fs::remove_dir_all(&tables) {
+            tracing::debug!(%error, "no tables of a broken game to remove");
+        }
+        if let Err(error) = clear() {
+            tracing::warn!(%error, "what a broken game has left could not be removed");
+        }
     }
     report
 }

@@ -66,11 +66,17 @@ impl Departures {
     /// The team by whose leaving the game does not count; the home team if both left.
     #[must_use]
     pub fn taken_out_by<'a>(&self, game: &'a PlayedGame) -> Option<&'a TeamName> {
-        game.teams().into_iter().find(|team| {
-            self.0
-                .get(*team)
-                .is_some_and(|(_, from)| game.round() >= from.get())
-        })
+        game.teams()
+            .into_iter()
+            .find(|team| self.takes_out(team, game.round()))
+    }
+
+    /// Does what a team had in a round count no more?
+    #[must_use]
+    pub fn takes_out(&self, team: &TeamName, round: u32) -> bool {
+        self.0
+            .get(team)
+            .is_some_and(|(_, from)| round >= from.get())
     }
 
     /// The games that count.

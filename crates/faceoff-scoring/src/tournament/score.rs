@@ -9,7 +9,7 @@ use crate::{
     tier::tier_of,
 };
 use faceoff_types::{
-    ComputationTimeSummary, ForfeitCause, GameOutcome, GameWindow, PerturbationSettings, Profile,
+    ComputationTimeSummary, ForfeitCause, GameLimits, GameOutcome, GameWindow, PerturbationSettings, Profile,
     Ruleset, Seed, SideOutcome, Tier, ViolationCounts, WINDOW_STEPS,
 };
 use serde::{Deserialize, Serialize};
@@ -23,6 +23,8 @@ pub struct PlayedAs {
     pub profile: Profile,
     /// Magnitudes of what the profile switches on.
     pub perturbations: Box<PerturbationSettings>,
+    /// What each side was held to.
+    pub limits: GameLimits,
     /// The game's own seed.
     pub seed: Seed,
     /// The agents' names, the first side's first.
@@ -39,6 +41,9 @@ pub struct GameScore {
     /// Magnitudes of what it switches on; absent: the ruleset's.
     #[serde(default, skip_serializing_if = "is_the_rulesets")]
     pub perturbations: Box<PerturbationSettings>,
+    /// What each side was held to; absent: the rules' limits.
+    #[serde(default, skip_serializing_if = "are_the_rules")]
+    pub limits: GameLimits,
     /// The game's own seed.
     pub seed: Seed,
     /// Control steps played.
@@ -166,6 +171,7 @@ pub fn score_game(
         ruleset: played_as.ruleset,
         profile: played_as.profile,
         perturbations: played_as.perturbations.clone(),
+        limits: played_as.limits.clone(),
         seed: played_as.seed,
         steps: outcome.steps,
         windows,
@@ -205,6 +211,10 @@ fn count(number: usize) -> u32 {
 
 fn is_the_rulesets(perturbations: &PerturbationSettings) -> bool {
     *perturbations == PerturbationSettings::default()
+}
+
+fn are_the_rules(limits: &GameLimits) -> bool {
+    *limits == GameLimits::default()
 }
 
 /// A side as the index of its place, 0 or 1.
@@ -267,6 +277,7 @@ mod tests {
             ruleset: Ruleset::CURRENT,
             profile: Profile::Evaluation,
             perturbations: Box::default(),
+            limits: GameLimits::default(),
             seed,
             agents: ["a".to_owned(), "b".to_owned()],
         };

@@ -114,7 +114,10 @@ pub fn score_tournament_with(
         }
     }
     for bye in byes {
-        row(&mut teams, &bye.team, rounds).add_bye(bye.round);
+        let standing = row(&mut teams, &bye.team, rounds);
+        if !departures.takes_out(&bye.team, bye.round.get()) {
+            standing.add_bye(bye.round);
+        }
     }
     for standing in teams.values_mut() {
         standing.left = departures.left_as(&standing.team);

@@ -185,6 +185,15 @@ fn a_bye_that_gives_points_is_no_game() {
                "draws": 0, "losses": 0, "goals_for": 0, "goals_against": 0, "penalty_points": 0.0,
                "byes": 2})
     );
+    // A bye of a round that its team did not finish counts no more than its games would.
+    let leaves = Departures::new([Departure {
+        team: team("C"),
+        left_as: LeftAs::Withdrawn,
+        from_round: round(3),
+    }]);
+    let tournament = score_tournament_with(&played, &leaves.unwrap(), &byes);
+    let of_c = tournament.standings.iter().find(|row| row.team == team("C"));
+    assert_eq!(of_c.map(|row| (row.points, row.byes)), Some((3, 1)));
 }
 
 #[test]

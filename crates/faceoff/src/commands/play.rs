@@ -4,9 +4,9 @@ mod table;
 
 use super::local_bundle;
 use crate::config::Config;
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::Args;
-use faceoff_dataset::game::{GAME_FILE, side_file};
+use faceoff_dataset::game::{GAME_FILE, clear_game, side_file};
 use faceoff_episode::{GameStepRow, RallyRow};
 use faceoff_runner::{
     AgentEnvironment, GameObserver, GameReport, GameSpec, PlatformFault, bundle::Bundle, run_game,
@@ -23,6 +23,8 @@ use std::{
 
 /// The score beside the recording.
 const RESULTS: &str = "results.json";
+/// What an evaluation writes, with a score of the same name.
+const DATASET: &str = "dataset.zip";
 /// The longest game: ten of the usual ones.
 const MAX_STEPS: u32 = 10 * GAME_WINDOWS * WINDOW_STEPS;
 
@@ -77,8 +79,16 @@ impl PlayCommand {
             .context("the configuration")?;
         fs::create_dir_all(&self.out)
             .with_context(|| format!("creating {}", self.out.display()))?;
+        if self.out.join(DATASET).exists() {
+            bail!(
+                "{} holds the results of an evaluation: name another folder with --out",
+                self.out.display()
+            );
+        }
+        // Whatever comes of this one, an earlier game is not it.
         let results = self.out.join(RESULTS);
         remove(&results)?;
+        clear_game(&self.out).with_context(|| format!("clearing {}", self.out.display()))?;
         let scratch = local_bundle::scratch_in(&self.out)?;
         let open = |path: &Path, name: &str| -> anyhow::Result<Bundle> {
             let scratch = scratch.path().join(name);
@@ -114,7 +124,10 @@ impl PlayCommand {
             played.map_err(explained).context("there is no result")?;
         let mut json = serde_json::to_string_pretty(&archives.score).context("the result")?;
         json.push('\n');
-        fs::write(&results, &json).with_context(|| format!("writing {}", results.display()))?;
+        let writing = || format!("writing {}", results.display());
+        let partial = results.with_extension("json.partial");
+        fs::write(&partial, &json).with_context(writing)?;
+        fs::rename(&partial, &results).with_context(writing)?;
         if self.json {
             print!("{json}");
             return Ok(());

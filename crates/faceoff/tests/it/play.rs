@@ -182,7 +182,19 @@ fn what_cannot_be_played_is_refused_with_a_reason() {
         assert!(stderr.contains(reason), "{stderr:?} lacks {reason:?}");
         assert!(!out.join("results.json").exists());
     };
+    let evaluated = dir.path().join("evaluated");
+    fs::create_dir(&evaluated).unwrap();
+    fs::write(evaluated.join("dataset.zip"), "an evaluation").unwrap();
+    fs::write(evaluated.join("results.json"), "{}").unwrap();
+    let output = play([&hold, &hold], &evaluated, &[]);
+    assert!(!output.status.success());
+    assert!(text(&output.stderr).contains("results of an evaluation"));
+    assert!(evaluated.join("results.json").exists());
+    // Of an earlier game nothing is left that could be taken for this one's.
+    fs::create_dir(&out).unwrap();
+    fs::write(out.join("game.zip"), "an earlier game").unwrap();
     refused([&hold, &nothing], &[], "there is no bundle at");
+    assert!(!out.join("game.zip").exists());
     refused([dir.path(), &hold], &[], "there is no agent.toml");
     refused([&hold, &hold], &["--steps", "0"], "0 is not in 1..=450000");
     refused(

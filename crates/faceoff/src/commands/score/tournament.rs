@@ -4,7 +4,7 @@ use super::{lines::write_line, scored::ScoredTournament, table};
 use anyhow::ensure;
 use clap::Args;
 use faceoff_scoring::tournament::{
-    Departure, Departures, LeftAs, PlayedGame, RoundNumber, head_to_head,
+    Bye, Departure, Departures, LeftAs, PlayedGame, RoundNumber, head_to_head,
     rating::{RatingError, rate},
     score_tournament_with,
 };
@@ -22,6 +22,9 @@ pub struct TournamentArgs {
     /// A disqualified team, and the round from which its games do not count; it stands below all others
     #[arg(long, value_name = "TEAM=ROUND")]
     disqualified: Vec<TeamAndRound>,
+    /// A round in which a team had no opponent and got the points of a win for it, as Swiss tournaments give them
+    #[arg(long = "bye", value_name = "TEAM=ROUND")]
+    byes: Vec<TeamAndRound>,
     /// Print JSON; so it is anyway where standard output is no terminal
     #[arg(long, conflicts_with = "table")]
     json: bool,
@@ -65,6 +68,14 @@ impl TournamentArgs {
         warnings: &mut impl Write,
     ) -> anyhow::Result<()> {
         let as_table = self.table || (!self.json && std::io::stdout().is_terminal());
+        let byes: Vec<Bye> = self
+            .byes
+            .iter()
+            .map(|bye| Bye {
+                team: bye.team.clone(),
+                round: bye.round,
+            })
+            .collect();
         let departures = self.departures(games)?;
         let ratings = match rate(departures.counting(games)) {
             Ok(ratings) => Some(ratings),
@@ -75,7 +86,7 @@ impl TournamentArgs {
             }
         };
         let scored = ScoredTournament {
-            tournament: score_tournament_with(games, &departures, &[]),
+            tournament: score_tournament_with(games, &departures, &byes),
             head_to_head: head_to_head(departures.counting(games)),
             ratings,
         };

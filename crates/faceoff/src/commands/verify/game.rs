@@ -7,6 +7,7 @@ use faceoff_dataset::{
     game::{GameRecording, VerifiedGame, verify_game},
 };
 use faceoff_scoring::tournament::GameScore;
+use faceoff_types::GameLimits;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::{path::Path, time::Instant};
@@ -62,9 +63,18 @@ pub(super) fn describe(path: &Path, simulated: &SimulatedGame) -> String {
         .as_ref()
         .map_or_else(String::new, |hash| format!("; BLAKE3 {hash}"));
     let [first, second] = &result.sides;
+    let limits = if result.limits == GameLimits::default() {
+        String::new()
+    } else {
+        let limits = &result.limits;
+        format!(
+            "; not by the rules' limits: answers took effect up to {} s, {} faults were allowed, and {} s in all",
+            limits.in_time_s, limits.max_faults, limits.total_s
+        )
+    };
     format!(
         "verified {}: a game of {rallies} rallies, {steps} control steps, every state and score identical \
-         ({} {} : {} {}, penalty points {:.1} and {:.1}); {seconds:.1} s{hash}",
+         ({} {} : {} {}, penalty points {:.1} and {:.1}); {seconds:.1} s{hash}{limits}",
         path.display(),
         first.agent,
         first.score,
