@@ -322,9 +322,8 @@ mod tests {
     fn an_evaluator_that_saw_to_another_agent_is_nobodys_delay() {
         let asked = Instant::now();
         let mut wait = Wait::begin(None, asked, asked, MS(1000));
-        let taken = |wait: &Wait, at, ran| {
-            wait.taken(&Counters, evidence(asked + MS(at), 0, ran, false))
-        };
+        let taken =
+            |wait: &Wait, at, ran| wait.taken(&Counters, evidence(asked + MS(at), 0, ran, false));
         wait.was_away(MS(500));
         assert_eq!(
             taken(&wait, 510, 1),

@@ -72,9 +72,8 @@ pub fn run_game_watched(
     observer: &mut dyn GameObserver,
     watches: [&dyn HostWatch; 2],
 ) -> Result<GameReport, PlatformFault> {
-    let clear = || {
-        clear_game(out).map_err(PlatformFault::io(format!("clearing {}", out.display())))
-    };
+    let clear =
+        || clear_game(out).map_err(PlatformFault::io(format!("clearing {}", out.display())));
     clear()?;
     let tables = out.join(TABLES);
     let report = record(spec, bundles, envs, out, &tables, observer, watches);

@@ -9,8 +9,8 @@ use crate::{
     tier::tier_of,
 };
 use faceoff_types::{
-    ComputationTimeSummary, ForfeitCause, GameLimits, GameOutcome, GameWindow, PerturbationSettings, Profile,
-    Ruleset, Seed, SideOutcome, Tier, ViolationCounts, WINDOW_STEPS,
+    ComputationTimeSummary, ForfeitCause, GameLimits, GameOutcome, GameWindow,
+    PerturbationSettings, Profile, Ruleset, Seed, SideOutcome, Tier, ViolationCounts, WINDOW_STEPS,
 };
 use serde::{Deserialize, Serialize};
 

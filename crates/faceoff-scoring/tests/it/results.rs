@@ -192,7 +192,10 @@ fn a_bye_that_gives_points_is_no_game() {
         from_round: round(3),
     }]);
     let tournament = score_tournament_with(&played, &leaves.unwrap(), &byes);
-    let of_c = tournament.standings.iter().find(|row| row.team == team("C"));
+    let of_c = tournament
+        .standings
+        .iter()
+        .find(|row| row.team == team("C"));
     assert_eq!(of_c.map(|row| (row.points, row.byes)), Some((3, 1)));
 }
 
