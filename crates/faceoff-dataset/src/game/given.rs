@@ -9,7 +9,7 @@ use arrow_array::{
     types::{Float64Type, Int64Type},
 };
 use faceoff_episode::{Answered, Effect, Entry, Response, SideFault};
-use faceoff_types::{ACTION_LIMIT, AgentFault, Contest, Interpolation, Side};
+use faceoff_types::{ACTION_LIMIT, AgentFault, AgentFaultKind, Contest, Interpolation, Side};
 
 /// Where something is recorded.
 #[derive(Debug, Clone, Copy)]

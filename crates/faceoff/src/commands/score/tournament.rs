@@ -136,6 +136,7 @@ mod tests {
         pub const JSON: Self = Self {
             withdrawn: Vec::new(),
             disqualified: Vec::new(),
+            byes: Vec::new(),
             json: true,
             table: false,
         };
@@ -156,6 +157,7 @@ mod tests {
         TournamentArgs {
             withdrawn: list(withdrawn),
             disqualified: list(disqualified),
+            byes: Vec::new(),
             json: false,
             table: true,
         }
