@@ -52,7 +52,7 @@ pub(super) fn check_hash(
 ) -> Result<(), Failure> {
     match (expected, found) {
         (Some(_), None) => Err(Failure::Here(anyhow!(
-            "--blake3 is the hash of an archive, this is an unpacked folder; name the archive"
+            "--blake3 is the hash of an archive, this is an unpacked folder; name dataset.zip or game.zip itself"
         ))),
         (Some(expected), Some(found)) if expected.to_hex().as_str() != found => {
             Err(Failure::from(DatasetError::Altered(format!(
