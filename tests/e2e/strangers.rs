@@ -125,16 +125,15 @@ fn disturbed_by(manner: Manner) {
             .json::<serde_json::Value>()
             .expect("the API speaks JSON");
         let over = state["state"] == "finished";
-        // The strangers have gone nowhere; it is the server that lets go of them.
-        all_gone |= server.sockets() <= 8;
+        // The strangers have gone nowhere; it is the server that lets go of them. The last few of its sockets may be
+        // theirs or ours. Who reads nothing cannot see it.
+        all_gone |= server.sockets() <= 8
+            && (manner == Manner::ReadsNothing || strangers.iter().all(Stranger::is_let_go));
         if over && all_gone {
             break;
         }
         assert!(started.elapsed() < PATIENCE, "{manner:?}: {state:#}");
         thread::sleep(Duration::from_millis(200));
-    }
-    if manner != Manner::ReadsNothing {
-        assert!(strangers.iter().all(Stranger::is_let_go), "{manner:?}");
     }
     // Whoever comes now is answered.
     let health = reqwest::blocking::get(format!("{}/api/v1/health", server.url));
