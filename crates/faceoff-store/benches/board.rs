@@ -60,10 +60,9 @@ async fn fill(folder: &Path, stage: StageId) {
     let (log, stage) = ("x".repeat(LOG_BYTES), stage.to_string());
     for team_number in 0..TEAMS {
         let team = TeamId::new().to_string();
-        sqlx::query("INSERT INTO teams (id, name, token_hash, created_at) VALUES (?, ?, ?, 0)")
+        sqlx::query("INSERT INTO teams (id, name, created_at) VALUES (?, ?, 0)")
             .bind(&team)
             .bind(format!("Team {team_number}"))
-            .bind(&blake3::hash(&team_number.to_le_bytes()).as_bytes()[..])
             .execute(&mut *tx)
             .await
             .unwrap();
