@@ -35,7 +35,7 @@ pub struct Removed {
     pub bytes: u64,
     /// Datasets among them whose size nobody has measured yet.
     pub unmeasured: u32,
-    /// When all of it goes at the latest, if some of it not yet.
+    /// Some of it goes only from then on; `None`: nothing of it waits for a date.
     pub not_before: Option<Timestamp>,
 }
 
