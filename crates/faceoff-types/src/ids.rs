@@ -131,3 +131,13 @@ id!(
     ProposalId,
     "proposal"
 );
+id!(
+    /// Rounds of games.
+    TournamentId,
+    "tournament"
+);
+id!(
+    /// Two submissions at one table.
+    GameId,
+    "game"
+);

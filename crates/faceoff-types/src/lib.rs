@@ -15,6 +15,7 @@ mod fault;
 mod full_disk;
 mod game;
 mod game_limits;
+mod game_seed;
 mod harmless;
 mod ids;
 mod interpolation;
@@ -26,6 +27,7 @@ mod perturbations;
 mod profile;
 mod result;
 mod retention;
+mod round_number;
 mod ruleset;
 mod runtimes;
 mod schedule;
@@ -39,6 +41,8 @@ mod stage_settings;
 mod task;
 mod tier;
 mod timing;
+mod tournament_format;
+mod tournament_rules;
 mod variation;
 mod zone;
 
@@ -53,10 +57,12 @@ pub use fault::{AgentFault, AgentFaultKind, Phase};
 pub use full_disk::tells_of_full_disk;
 pub use game::{ForfeitCause, GameEnd, GameFault, GameOutcome, GameWindow, SideOutcome};
 pub use game_limits::GameLimits;
+pub use game_seed::{GameSeed, ParseGameSeedError};
 pub use harmless::{harmless, is_harmless};
 pub use ids::{
-    AblationId, AnnouncementId, EvaluationId, InvitationId, ParseIdError, PersonId, ProposalId,
-    QuestionId, RegistrationId, RunId, ShardId, StageId, SubmissionId, TeamId, TokenId,
+    AblationId, AnnouncementId, EvaluationId, GameId, InvitationId, ParseIdError, PersonId,
+    ProposalId, QuestionId, RegistrationId, RunId, ShardId, StageId, SubmissionId, TeamId, TokenId,
+    TournamentId,
 };
 pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, UnknownInterpolation};
 pub use limits::{AgentLimits, BundleLimits, ResourceLimits, TimeLimits};
@@ -70,6 +76,7 @@ pub use perturbations::{
 pub use profile::{Factor, Factors, ParseProfileError, Profile};
 pub use result::{ComputationTimeSummary, EvaluationResult, TaskResult, ViolationCounts};
 pub use retention::{InvalidRetention, MAX_DAYS_AFTER_SIGN_OFF, MAX_LAST, Retention};
+pub use round_number::{InvalidRoundNumber, RoundNumber};
 pub use ruleset::{
     ACTION_LIMIT, FOULS_PER_POINT, GAME_WINDOWS, RULESET, Ruleset, UnknownRuleset, WINDOW_STEPS,
 };
@@ -85,5 +92,9 @@ pub use stage_settings::{Publishes, StageSettings, Standings, UnknownSetting};
 pub use task::{CONTROL_STEP_S, EPISODE_STEPS, MAX_EPISODES_PER_TASK, ParseTaskError, Task};
 pub use tier::Tier;
 pub use timing::{RoundTrips, SlotTiming};
+pub use tournament_format::TournamentFormat;
+pub use tournament_rules::{
+    InvalidTournament, MAX_FREE_GAMES, MAX_GAME_STEPS, TournamentRules, TournamentSettings,
+};
 pub use variation::{InvalidVariation, TaskWeights, TierBounds, Variation};
 pub use zone::{UnknownZone, Zone};

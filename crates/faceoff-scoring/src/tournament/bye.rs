@@ -1,5 +1,4 @@
-use super::round_number::RoundNumber;
-use faceoff_types::TeamName;
+use faceoff_types::{RoundNumber, TeamName};
 use serde::{Deserialize, Serialize};
 
 /// Points of a bye in a Swiss tournament, those of a won game: a team that was kept from playing does

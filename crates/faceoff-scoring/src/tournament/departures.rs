@@ -1,7 +1,7 @@
 //! Teams that leave in the middle, and what counts then.
 
-use super::{game::PlayedGame, round_number::RoundNumber};
-use faceoff_types::TeamName;
+use super::game::PlayedGame;
+use faceoff_types::{RoundNumber, TeamName};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

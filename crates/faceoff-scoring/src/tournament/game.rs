@@ -1,12 +1,11 @@
 use super::{
     result::{Forfeit, GameResult, Why},
-    round_number::RoundNumber,
     rules::{GameFacts, final_score, forfeit_score, judge},
     side::Side,
     submission_label::SubmissionLabel,
 };
 use crate::episode::MAX_EPISODE_PENALTY;
-use faceoff_types::{FOULS_PER_POINT, GAME_WINDOWS, TeamName, WINDOW_STEPS};
+use faceoff_types::{FOULS_PER_POINT, GAME_WINDOWS, RoundNumber, TeamName, WINDOW_STEPS};
 use serde::{Deserialize, Serialize};
 
 /// A played game, one entry of `games.json`. Pairs are `[home, away]`.

@@ -10,7 +10,6 @@ mod game;
 mod head_to_head;
 pub mod rating;
 mod result;
-mod round_number;
 mod rules;
 pub mod schedule;
 mod score;
@@ -20,10 +19,10 @@ mod submission_label;
 
 pub use bye::{Bye, POINTS_BYE};
 pub use departures::{Departure, Departures, LeavesTwice, LeftAs};
+pub use faceoff_types::{InvalidRoundNumber, RoundNumber};
 pub use game::{GameEntry, InvalidGame, PlayedGame, ScoredGame};
 pub use head_to_head::{HeadToHead, head_to_head};
 pub use result::{DrawnBy, Forfeit, GameResult, Why, WonBy};
-pub use round_number::{InvalidRoundNumber, RoundNumber};
 pub use rules::{
     FORFEIT_GOALS, GameFacts, POINTS_DRAW, POINTS_LOSS, POINTS_WIN, final_score, forfeit_score,
     judge, winner,

@@ -2,11 +2,10 @@ use super::{
     bye::{Bye, POINTS_BYE},
     departures::{Departures, LeftAs},
     game::{PlayedGame, ScoredGame},
-    round_number::RoundNumber,
     rules::{POINTS_DRAW, POINTS_LOSS, POINTS_WIN},
     side::Side,
 };
-use faceoff_types::TeamName;
+use faceoff_types::{RoundNumber, TeamName};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -6,7 +6,7 @@ use crate::{
 };
 use faceoff_scoring::tournament::{
     Departure, Departures, LeftAs, POINTS_BYE, PlayedGame, RoundNumber,
-    schedule::{Entrants, Format, Progress, Round, ScheduleError, TableOf},
+    schedule::{Entrants, Format, Progress, Round, Schedule, ScheduleError, TableOf},
     score_tournament_with,
 };
 use faceoff_types::{Seed, TeamName};

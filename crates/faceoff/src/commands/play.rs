@@ -12,7 +12,9 @@ use faceoff_runner::{
     AgentEnvironment, GameObserver, GameReport, GameSpec, PlatformFault, bundle::Bundle, run_game,
 };
 use faceoff_sandbox::affinity;
-use faceoff_types::{GAME_WINDOWS, GameLimits, Profile, Ruleset, Seed, Side, WINDOW_STEPS};
+use faceoff_types::{
+    GAME_WINDOWS, GameLimits, MAX_GAME_STEPS, Profile, Ruleset, Seed, Side, WINDOW_STEPS,
+};
 use faceoff_worker::CpuLayout;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{
@@ -25,8 +27,6 @@ use std::{
 const RESULTS: &str = "results.json";
 /// What an evaluation writes, with a score of the same name.
 const DATASET: &str = "dataset.zip";
-/// The longest game: ten of the usual ones.
-const MAX_STEPS: u32 = 10 * GAME_WINDOWS * WINDOW_STEPS;
 
 /// Plays one game between two agents, each in a sandbox of its own, prints the result and writes
 /// `results.json`, `game.zip` (which `faceoff verify` simulates again), `side-1.zip` and `side-2.zip` (what each
@@ -38,7 +38,7 @@ pub struct PlayCommand {
     /// The second side's agent; it may be the same
     bundle_b: PathBuf,
     /// Control steps of the game; 50 are a second
-    #[arg(long, value_name = "N", default_value_t = GAME_WINDOWS * WINDOW_STEPS, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_STEPS)))]
+    #[arg(long, value_name = "N", default_value_t = GAME_WINDOWS * WINDOW_STEPS, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_GAME_STEPS)))]
     steps: u32,
     /// Perturbations: ideal, one factor's name, or evaluation
     #[arg(long, default_value = "evaluation")]

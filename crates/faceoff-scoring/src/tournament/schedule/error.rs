@@ -1,5 +1,4 @@
-use crate::tournament::round_number::RoundNumber;
-use faceoff_types::TeamName;
+use faceoff_types::{RoundNumber, TeamName};
 
 /// Why there is no schedule, or no next round.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -5,41 +5,13 @@ use super::{
     round::Round,
     round_robin::round_robin,
     swiss::{byes, swiss},
+    tables::{self, Table},
 };
-use crate::{
-    draws::Draws,
-    tournament::{bye::Bye, round_number::RoundNumber},
-};
-use faceoff_types::{Seed, TeamName};
-use serde::{Deserialize, Serialize};
+use crate::{draws::Draws, tournament::bye::Bye};
+use faceoff_types::{Seed, TeamName, TournamentFormat};
 
-/// How a tournament is played.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(tag = "format", rename_all = "snake_case", deny_unknown_fields)]
-pub enum Format {
-    /// In every round everybody meets everybody once: one round, or two with sides swapped, as the
-    /// challenge had it.
-    RoundRobin {
-        /// How many times everybody meets everybody.
-        rounds: RoundNumber,
-    },
-    /// A first round in drawn groups, each a round robin; a final round among the best of them, a round
-    /// robin again: with two groups and one to advance, a single game.
-    Groups {
-        /// How many groups.
-        groups: u32,
-        /// How many of each reach the final.
-        advance: u32,
-    },
-    /// A number of rounds in each of which everybody has one game, against somebody who stands near and
-    /// was not met before.
-    Swiss {
-        /// How many rounds.
-        rounds: RoundNumber,
-    },
-}
-
-impl Format {
+/// What follows from a format.
+pub trait Schedule {
     /// The next round; `None` after the last one.
     ///
     /// All that is drawn follows from `seed` and the round's number, whatever was drawn before.
@@ -47,7 +19,23 @@ impl Format {
     /// # Errors
     /// If fewer than two teams are left, the groups do not fit the teams, a game of an earlier round has
     /// no result, or rounds and games do not belong together.
-    pub fn next_round(
+    fn next_round(
+        &self,
+        seed: &Seed,
+        progress: &Progress<'_>,
+    ) -> Result<Option<Round>, ScheduleError>;
+
+    /// The byes that give points: those of a Swiss tournament.
+    #[must_use]
+    fn byes(&self, rounds: &[Round]) -> Vec<Bye>;
+
+    /// The standings, the deciding ones first: one table, or the final's and each group's.
+    #[must_use]
+    fn tables(&self, progress: &Progress<'_>) -> Vec<Table>;
+}
+
+impl Schedule for TournamentFormat {
+    fn next_round(
         &self,
         seed: &Seed,
         progress: &Progress<'_>,
@@ -101,21 +89,19 @@ impl Format {
         }))
     }
 
-    /// The byes that give points: those of a Swiss tournament.
-    #[must_use]
-    pub fn byes(&self, rounds: &[Round]) -> Vec<Bye> {
+    fn byes(&self, rounds: &[Round]) -> Vec<Bye> {
         match self {
             Self::Swiss { .. } => byes(rounds),
             Self::RoundRobin { .. } | Self::Groups { .. } => Vec::new(),
         }
     }
 
-    /// How many rounds there are.
-    #[must_use]
-    pub fn last_round(&self) -> RoundNumber {
+    fn tables(&self, progress: &Progress<'_>) -> Vec<Table> {
         match self {
-            Self::RoundRobin { rounds } | Self::Swiss { rounds } => *rounds,
-            Self::Groups { .. } => RoundNumber::SECOND,
+            Self::Groups { .. } => tables::of_groups(progress),
+            Self::RoundRobin { .. } | Self::Swiss { .. } => {
+                vec![tables::of_all(progress, &self.byes(progress.rounds))]
+            }
         }
     }
 }

@@ -18,7 +18,8 @@ mod tables;
 
 pub use entrants::{Entrants, MAX_ENTRANTS};
 pub use error::ScheduleError;
-pub use format::Format;
+pub use faceoff_types::TournamentFormat as Format;
+pub use format::Schedule;
 pub use progress::Progress;
 pub use round::{Matchday, Pairing, Round};
 pub use tables::{Table, TableOf};

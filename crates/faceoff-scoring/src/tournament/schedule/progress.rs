@@ -3,8 +3,8 @@ use super::{
     error::ScheduleError,
     round::{Pairing, Round},
 };
-use crate::tournament::{departures::Departures, game::PlayedGame, round_number::RoundNumber};
-use faceoff_types::TeamName;
+use crate::tournament::{departures::Departures, game::PlayedGame};
+use faceoff_types::{RoundNumber, TeamName};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What has happened in a tournament so far.

@@ -1,5 +1,4 @@
-use crate::tournament::round_number::RoundNumber;
-use faceoff_types::TeamName;
+use faceoff_types::{RoundNumber, TeamName};
 use serde::{Deserialize, Serialize};
 
 /// A game to be played.

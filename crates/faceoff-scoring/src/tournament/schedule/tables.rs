@@ -1,5 +1,6 @@
-use super::{format::Format, groups::group_standings, progress::Progress};
+use super::{groups::group_standings, progress::Progress};
 use crate::tournament::{
+    bye::Bye,
     game::PlayedGame,
     standings::{Standing, score_tournament_with},
 };
@@ -26,40 +27,38 @@ pub enum TableOf {
     Final,
 }
 
-impl Format {
-    /// The standings, the deciding ones first: one table, or the final's and each group's.
-    #[must_use]
-    pub fn tables(&self, progress: &Progress<'_>) -> Vec<Table> {
-        let Self::Groups { .. } = self else {
-            let byes = self.byes(progress.rounds);
-            let all = score_tournament_with(progress.games, progress.departures, &byes);
-            return vec![Table {
-                of: TableOf::Tournament,
-                standings: all.standings,
-            }];
-        };
-        let mut tables = Vec::new();
-        if let Some(last) = progress.rounds.get(1) {
-            let of_final: Vec<PlayedGame> = progress
-                .games
-                .iter()
-                .filter(|game| game.round() == last.number.get())
-                .cloned()
-                .collect();
-            tables.push(Table {
-                of: TableOf::Final,
-                standings: score_tournament_with(&of_final, progress.departures, &[]).standings,
-            });
-        }
-        let Some(first) = progress.rounds.first() else {
-            return tables;
-        };
-        for (number, group) in (1..).zip(&first.groups) {
-            tables.push(Table {
-                of: TableOf::Group(number),
-                standings: group_standings(group, first, progress.games, progress.departures),
-            });
-        }
-        tables
+/// Of all rounds, with the byes that give points.
+pub(super) fn of_all(progress: &Progress<'_>, byes: &[Bye]) -> Table {
+    let all = score_tournament_with(progress.games, progress.departures, byes);
+    Table {
+        of: TableOf::Tournament,
+        standings: all.standings,
     }
+}
+
+/// Of the final and each group.
+pub(super) fn of_groups(progress: &Progress<'_>) -> Vec<Table> {
+    let mut tables = Vec::new();
+    if let Some(last) = progress.rounds.get(1) {
+        let of_final: Vec<PlayedGame> = progress
+            .games
+            .iter()
+            .filter(|game| game.round() == last.number.get())
+            .cloned()
+            .collect();
+        tables.push(Table {
+            of: TableOf::Final,
+            standings: score_tournament_with(&of_final, progress.departures, &[]).standings,
+        });
+    }
+    let Some(first) = progress.rounds.first() else {
+        return tables;
+    };
+    for (number, group) in (1..).zip(&first.groups) {
+        tables.push(Table {
+            of: TableOf::Group(number),
+            standings: group_standings(group, first, progress.games, progress.departures),
+        });
+    }
+    tables
 }
