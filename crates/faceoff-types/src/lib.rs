@@ -19,6 +19,7 @@ mod game_seed;
 mod harmless;
 mod ids;
 mod interpolation;
+mod left_as;
 mod limits;
 mod millionths;
 mod names;
@@ -65,6 +66,7 @@ pub use ids::{
     TournamentId,
 };
 pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, UnknownInterpolation};
+pub use left_as::LeftAs;
 pub use limits::{AgentLimits, BundleLimits, ResourceLimits, TimeLimits};
 pub use millionths::{Millionths, NotMillionths};
 pub use names::{DivisionName, InvalidName, PersonName, StageName, TeamName};

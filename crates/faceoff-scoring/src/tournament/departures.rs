@@ -1,19 +1,9 @@
 //! Teams that leave in the middle, and what counts then.
 
 use super::game::PlayedGame;
-use faceoff_types::{RoundNumber, TeamName};
+use faceoff_types::{LeftAs, RoundNumber, TeamName};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-
-/// How a team left.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum LeftAs {
-    /// By its own wish. It keeps its place among the others.
-    Withdrawn,
-    /// By the organiser's decision. It stands below all others.
-    Disqualified,
-}
 
 /// A team that left.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -18,8 +18,8 @@ mod standings;
 mod submission_label;
 
 pub use bye::{Bye, POINTS_BYE};
-pub use departures::{Departure, Departures, LeavesTwice, LeftAs};
-pub use faceoff_types::{InvalidRoundNumber, RoundNumber};
+pub use departures::{Departure, Departures, LeavesTwice};
+pub use faceoff_types::{InvalidRoundNumber, LeftAs, RoundNumber};
 pub use game::{GameEntry, InvalidGame, PlayedGame, ScoredGame};
 pub use head_to_head::{HeadToHead, head_to_head};
 pub use result::{DrawnBy, Forfeit, GameResult, Why, WonBy};

@@ -1,11 +1,11 @@
 use super::{
     bye::{Bye, POINTS_BYE},
-    departures::{Departures, LeftAs},
+    departures::Departures,
     game::{PlayedGame, ScoredGame},
     rules::{POINTS_DRAW, POINTS_LOSS, POINTS_WIN},
     side::Side,
 };
-use faceoff_types::{RoundNumber, TeamName};
+use faceoff_types::{LeftAs, RoundNumber, TeamName};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -480,7 +480,7 @@ fn a_format_and_a_round_are_kept_as_json() {
     let written = serde_json::to_value(format).unwrap();
     assert_eq!(
         written,
-        json!({"format": "groups", "groups": 2, "advance": 1})
+        json!({"kind": "groups", "groups": 2, "advance": 1})
     );
     assert_eq!(serde_json::from_value::<Format>(written).unwrap(), format);
     let mut played = Played::new(format, names(5), 1);
@@ -488,7 +488,7 @@ fn a_format_and_a_round_are_kept_as_json() {
     let written = serde_json::to_string(round).unwrap();
     assert_eq!(&read::<Round>(&written).unwrap(), round);
     assert!(
-        read::<Format>(r#"{"format": "swiss", "rounds": 0}"#)
+        read::<Format>(r#"{"kind": "swiss", "rounds": 0}"#)
             .unwrap_err()
             .contains("expected 1 to 100, got 0")
     );
