@@ -129,9 +129,14 @@ impl SideCourse {
     }
 
     /// All that it did, and the computation times of its answers.
+    ///
+    /// A window is something that was played, and both sides have the same ones: a fault by which the game ends as a
+    /// window would begin is one of the last that was played, if there is any.
     pub fn finish(mut self, goals: u32, fouls: u32) -> (SideOutcome, Vec<f64>) {
-        if self.window.steps > 0 || self.window.faults > 0 {
+        if self.window.steps > 0 {
             self.end_window();
+        } else if let Some(last) = self.windows.last_mut() {
+            last.faults += self.window.faults;
         }
         let outcome = SideOutcome {
             goals,
@@ -143,5 +148,39 @@ impl SideCourse {
             time_used_s: self.time_used_s,
         };
         (outcome, self.answer_times_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use faceoff_types::{AgentFaultKind, WINDOW_STEPS};
+
+    /// A window of no steps was counted for the side that forfeited as a window would begin, and not for the other.
+    #[test]
+    fn a_fault_as_a_window_would_begin_makes_no_window_that_nobody_played() {
+        let mut side = SideCourse::new(Side::First);
+        for _ in 0..WINDOW_STEPS {
+            side.step(&ConstraintValues::default());
+        }
+        side.end_window();
+        let failed = Entry::FailedToStart {
+            startup_s: 1.0,
+            fault: SideFault {
+                kind: AgentFaultKind::ClosedOutput,
+                line: None,
+            },
+        };
+        side.enter(&failed, 1, WINDOW_STEPS);
+        // The game goes on: the fault is the next window's.
+        let mut goes_on = side.clone();
+        goes_on.step(&ConstraintValues::default());
+        let faults = |side: SideCourse| -> Vec<(u32, u32)> {
+            let windows = side.finish(0, 0).0.windows;
+            windows.iter().map(|w| (w.steps, w.faults)).collect()
+        };
+        assert_eq!(faults(goes_on), [(WINDOW_STEPS, 0), (1, 1)]);
+        // The game is over.
+        assert_eq!(faults(side), [(WINDOW_STEPS, 1)]);
     }
 }

@@ -1,10 +1,11 @@
 use super::{game::PlayedGame, side::Side};
 use faceoff_types::TeamName;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// What two teams' games against each other came to. Pairs are in the order of `teams`.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct HeadToHead {
     /// The teams, by name.
     pub teams: [TeamName; 2],

@@ -37,6 +37,7 @@ pub enum WonBy {
 
 /// Why nobody won.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum DrawnBy {
     /// Both sides were safe enough, and their final scores equal.
@@ -49,6 +50,7 @@ pub enum DrawnBy {
 
 /// What a side used up that forfeits a game.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Forfeit {
     /// Its faults.
@@ -111,21 +113,29 @@ impl fmt::Display for GameResult {
 
 /// The fields of a game's JSON that say why.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Why {
+    /// Why a side won.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     won_by: Option<WonByWord>,
+    /// Whether the winner also had the higher final score as played.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     winner_led: Option<bool>,
+    /// Why nobody won.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     drawn_by: Option<DrawnBy>,
 }
 
 /// [`WonBy`] in a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 enum WonByWord {
+    /// Both sides were safe enough, and it had the higher final score.
     Score,
+    /// The other side was non-deployable.
     Tier,
+    /// The other side forfeited.
     Forfeit,
 }
 

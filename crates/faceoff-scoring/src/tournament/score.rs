@@ -1,4 +1,5 @@
 use super::{
+    game::GameEntry,
     result::{Forfeit, GameResult, Why},
     rules::{GameFacts, final_score, forfeit_score, judge},
     side::Side,
@@ -10,7 +11,8 @@ use crate::{
 };
 use faceoff_types::{
     ComputationTimeSummary, ForfeitCause, GameLimits, GameOutcome, GameWindow,
-    PerturbationSettings, Profile, Ruleset, Seed, SideOutcome, Tier, ViolationCounts, WINDOW_STEPS,
+    PerturbationSettings, Profile, RoundNumber, Ruleset, Seed, SideOutcome, TeamName, Tier,
+    ViolationCounts, WINDOW_STEPS,
 };
 use serde::{Deserialize, Serialize};
 
@@ -65,6 +67,32 @@ pub struct GameScore {
 }
 
 impl GameScore {
+    /// Who forfeited, and by what.
+    #[must_use]
+    pub fn forfeits(&self) -> [Option<Forfeit>; 2] {
+        self.sides.each_ref().map(|side| by(side.forfeit))
+    }
+
+    /// The game as standings and ratings read it: one of a round, between these teams, without labels of submissions
+    /// and without a pair. One that was forfeited before a step was played has one window there, of which nothing counts.
+    #[must_use]
+    pub fn entry(&self, round: RoundNumber, [home, away]: [TeamName; 2]) -> GameEntry {
+        let [first, second] = &self.sides;
+        GameEntry {
+            round: round.get(),
+            home,
+            away,
+            goals: [first.goals, second.goals],
+            fouls: Some([first.fouls, second.fouls]),
+            score: None,
+            penalty_points: [first.penalty_points, second.penalty_points],
+            windows: Some(self.windows.max(1)),
+            forfeit: self.forfeits(),
+            submissions: None,
+            pair: None,
+        }
+    }
+
     /// Who won, and why.
     #[must_use]
     pub fn result(&self) -> GameResult {
@@ -73,7 +101,7 @@ impl GameScore {
             score: final_score([first.goals, second.goals], [first.fouls, second.fouls]),
             penalty_points: [first.penalty_points, second.penalty_points],
             windows: self.windows,
-            forfeits: [first.forfeit, second.forfeit].map(by),
+            forfeits: self.forfeits(),
         })
     }
 }
@@ -244,7 +272,7 @@ mod index {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::game::PlayedGame, *};
     use faceoff_types::{ComputationTime, GameEnd, Violations};
 
     fn window(ee: bool, max_s: f64, faults: u32) -> GameWindow {
@@ -346,5 +374,34 @@ mod tests {
         let score = scored(both, sides());
         assert_eq!((score.winner, score.sides[0].score), (None, 0));
         assert_eq!(score.end, "both_forfeit");
+    }
+
+    #[test]
+    fn an_entry_of_a_game_has_the_result_that_its_score_has() {
+        let cause = ForfeitCause::Time {
+            used_s: 3601.0,
+            allowed_s: 3600.0,
+        };
+        let clean = || vec![window(false, 0.0, 0); 3];
+        let unsafe_windows = vec![window(true, 0.0, 0); 3];
+        let teams = || ["h", "a"].map(|name| name.parse().unwrap());
+        let forfeit = GameEnd::Forfeit {
+            by: faceoff_types::Side::First,
+            cause,
+        };
+        for (end, first) in [
+            (GameEnd::Played, side(1, 3, clean())),
+            (GameEnd::Played, side(9, 0, unsafe_windows)),
+            (forfeit.clone(), side(9, 0, clean())),
+        ] {
+            let score = scored(end, [first, side(1, 0, clean())]);
+            let game = PlayedGame::try_from(score.entry(RoundNumber::FIRST, teams())).unwrap();
+            assert_eq!(game.result(), score.result());
+            assert_eq!(game.score(), [score.sides[0].score, score.sides[1].score]);
+        }
+        let mut unplayed = scored(forfeit, [side(0, 0, Vec::new()), side(0, 0, Vec::new())]);
+        (unplayed.steps, unplayed.windows) = (0, 0);
+        let game = PlayedGame::try_from(unplayed.entry(RoundNumber::FIRST, teams())).unwrap();
+        assert_eq!((game.score(), game.winner()), ([0, 10], Some(Side::Away)));
     }
 }

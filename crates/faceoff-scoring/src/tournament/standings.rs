@@ -6,11 +6,12 @@ use super::{
     side::Side,
 };
 use faceoff_types::{LeftAs, RoundNumber, TeamName};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A team's place in the tournament.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Standing {
     /// From 1; no rank is given twice.
     pub rank: u32,
@@ -33,10 +34,10 @@ pub struct Standing {
     /// Penalty points of all games that count.
     pub penalty_points: f64,
     /// Byes that gave points, of a Swiss tournament.
-    #[serde(skip_serializing_if = "none")]
+    #[serde(default, skip_serializing_if = "none")]
     pub byes: u32,
     /// How the team left the tournament, if it did.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub left: Option<LeftAs>,
 }
 

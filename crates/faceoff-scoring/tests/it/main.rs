@@ -5,6 +5,7 @@
 mod boards;
 mod comparison;
 mod evaluation;
+mod mirrored;
 mod most_pairs;
 mod pairing;
 mod paper_qualifying;

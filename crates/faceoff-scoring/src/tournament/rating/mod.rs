@@ -16,3 +16,4 @@ pub use bootstrap::{MIN_USABLE_SAMPLES, RESAMPLES};
 pub use ratings::{Pool, Prior, Rated, Rating, RatingError, Ratings, rate};
 pub use scale::{CENTRE, POINTS_PER_TENFOLD, PRIOR_SD, expected_score};
 pub use units::InvalidPair;
+pub(super) use units::units;

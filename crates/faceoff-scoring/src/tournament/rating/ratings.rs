@@ -8,7 +8,7 @@ use super::{
 };
 use crate::tournament::{game::PlayedGame, side::Side, submission_label::SubmissionLabel};
 use faceoff_types::TeamName;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// The most submissions that one pool may have: the work grows with their number's cube, a thousand
@@ -16,7 +16,8 @@ use std::collections::BTreeMap;
 const MAX_POOL: usize = 200;
 
 /// Ratings by both ways.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Ratings {
     /// Mean and standard deviation of the prior, in points.
     pub prior: Prior,
@@ -29,7 +30,8 @@ pub struct Ratings {
 }
 
 /// What is taken for known of a submission before its first game.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Prior {
     /// Mean rating.
     pub mean: f64,
@@ -39,7 +41,8 @@ pub struct Prior {
 
 /// Submissions that games connect, the strongest first. Ratings of different pools cannot be compared:
 /// each pool's mean is that of the prior.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Pool {
     /// What the bootstrap draws: games and mirrored pairs that say something about the pool.
     pub units: u32,
@@ -50,17 +53,30 @@ pub struct Pool {
 }
 
 /// What is rated: a submission, or, where games do not name submissions, all that a team played.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Rated {
     /// The team.
     pub team: TeamName,
     /// Which of its submissions.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "openapi", schema(value_type = Option<String>))]
     pub submission: Option<SubmissionLabel>,
 }
 
+impl Rated {
+    /// Who played a side of a game.
+    pub(in crate::tournament) fn of(game: &PlayedGame, side: Side) -> Self {
+        Self {
+            team: game.teams()[side as usize].clone(),
+            submission: game.submissions()[side as usize].cloned(),
+        }
+    }
+}
+
 /// A submission's rating.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Rating {
     /// Whose.
     #[serde(flatten)]
@@ -101,7 +117,7 @@ pub fn rate<'a>(games: impl IntoIterator<Item = &'a PlayedGame>) -> Result<Ratin
     let mut numbers = BTreeMap::<Rated, usize>::new();
     for game in units.iter().flatten() {
         for side in Side::BOTH {
-            numbers.insert(rated(game, side), 0);
+            numbers.insert(Rated::of(game, side), 0);
         }
     }
     for (number, of) in numbers.values_mut().enumerate() {
@@ -202,7 +218,7 @@ impl Field<'_> {
     }
 
     fn contest(&self, game: &PlayedGame, by: RatedBy) -> Option<Contest> {
-        let sides = Side::BOTH.map(|side| self.numbers[&rated(game, side)]);
+        let sides = Side::BOTH.map(|side| self.numbers[&Rated::of(game, side)]);
         Some(Contest::new(sides, by.won(game)?)).filter(Contest::is_informative)
     }
 }
@@ -256,12 +272,5 @@ fn rate_pool(rated: &[&Rated], units: Vec<Vec<Contest>>, by: RatedBy) -> Pool {
         units: count,
         usable_samples: samples.usable,
         ratings,
-    }
-}
-
-fn rated(game: &PlayedGame, side: Side) -> Rated {
-    Rated {
-        team: game.teams()[side as usize].clone(),
-        submission: game.submissions()[side as usize].cloned(),
     }
 }

@@ -27,7 +27,7 @@ fn sides(game: &PlayedGame) -> [Entry<'_>; 2] {
 }
 
 /// The games in units, single games first. A pair of which only one half counts is a unit of one.
-pub(super) fn units<'a>(
+pub(in crate::tournament) fn units<'a>(
     games: impl IntoIterator<Item = &'a PlayedGame>,
 ) -> Result<Vec<Vec<&'a PlayedGame>>, InvalidPair> {
     let mut units = Vec::new();

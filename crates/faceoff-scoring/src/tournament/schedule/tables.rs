@@ -4,10 +4,11 @@ use crate::tournament::{
     game::PlayedGame,
     standings::{Standing, score_tournament_with},
 };
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Standings of a tournament, or of a part of it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Table {
     /// Of what.
     pub of: TableOf,
@@ -16,7 +17,8 @@ pub struct Table {
 }
 
 /// What standings are of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum TableOf {
     /// All rounds.
