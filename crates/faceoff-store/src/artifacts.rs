@@ -181,7 +181,7 @@ impl Artifacts {
         self.delete_others(prefix, "").await
     }
 
-    /// Removes every artifact under `prefix/` but the one with the key `kept`.
+    /// Removes every artifact under `prefix/` but the one with the key `kept`, or those under `kept/`.
     pub async fn delete_others(&self, prefix: &str, kept: &str) -> Result<()> {
         let listed: Vec<_> = self
             .objects
@@ -191,7 +191,11 @@ impl Artifacts {
             .await
             .map_err(artifact_error)?;
         for location in listed {
-            if location.as_ref() != kept {
+            let is_kept = location
+                .as_ref()
+                .strip_prefix(kept)
+                .is_some_and(|rest| !kept.is_empty() && (rest.is_empty() || rest.starts_with('/')));
+            if !is_kept {
                 self.delete(location.as_ref()).await?;
             }
         }

@@ -29,6 +29,17 @@ pub enum StoreError {
     /// Names that differ only in case count as the same.
     #[error("a stage named {0:?} exists already")]
     StageNameTaken(String),
+    /// Names that differ only in case count as the same.
+    #[error("a tournament named {0:?} exists already")]
+    TournamentNameTaken(String),
+    /// The team has asked for as many games that do not count as it may on one UTC day.
+    #[error("{used} of {limit} games that do not count were asked for today")]
+    FreeGamesSpent {
+        /// Of a day.
+        limit: u32,
+        /// Asked for today.
+        used: u32,
+    },
     /// The stage's days do not start yet, or no longer.
     #[error("the stage {name:?} {}", match closed_at {
         Some(at) => format!("closed at {at}"),

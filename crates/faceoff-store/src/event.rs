@@ -11,9 +11,9 @@ pub use parse::ParseEventError;
 pub use subject::Subject;
 
 use faceoff_types::{
-    DivisionName, EvaluationId, InvitationId, PersonName, ProposalId, Retention, RunId, ShardId,
-    StageId, StageName, StageRules, StageSettings, SubmissionId, Task, TeamId, TeamName, TokenId,
-    Zone,
+    DivisionName, EvaluationId, InvitationId, LeftAs, PersonName, ProposalId, Retention,
+    RoundNumber, RunId, ShardId, StageId, StageName, StageRules, StageSettings, SubmissionId, Task,
+    TeamId, TeamName, TokenId, TournamentRules, TournamentSettings, Zone,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
@@ -413,6 +413,123 @@ pub enum Event {
     },
     /// Its result is signed off: nothing of it changes any more.
     StageFinalised,
+    /// The season has another tournament.
+    TournamentOpened {
+        /// As it was then.
+        name: StageName,
+        /// What results depend on.
+        rules: Box<TournamentRules>,
+        /// What they do not depend on.
+        settings: TournamentSettings,
+        /// Its first teams.
+        teams: Vec<TeamId>,
+    },
+    /// It is otherwise: all of it as it is now.
+    TournamentChanged {
+        /// The name.
+        name: StageName,
+        /// What results depend on.
+        rules: Box<TournamentRules>,
+        /// What they do not depend on.
+        settings: TournamentSettings,
+        /// The agent to test against.
+        baseline: Option<SubmissionId>,
+    },
+    /// No game of it begins from now on.
+    TournamentPaused {
+        /// As everybody may read it.
+        reason: String,
+    },
+    /// Its games begin again.
+    TournamentResumed,
+    /// Nothing of it changes any more.
+    TournamentClosed,
+    /// Teams are in it from now on.
+    TeamsEntered {
+        /// Which.
+        teams: Vec<TeamId>,
+    },
+    /// A team is not in it any more, before anything was played.
+    TeamOut {
+        /// Which.
+        team: TeamId,
+        /// As everybody may read it.
+        reason: String,
+    },
+    /// A team plays no more in it; each of its games that is called off has an event of its own.
+    TeamLeftTournament {
+        /// Which.
+        team: TeamId,
+        /// How.
+        left_as: LeftAs,
+        /// The first round whose games with it do not count.
+        from_round: RoundNumber,
+        /// As everybody may read it.
+        reason: String,
+    },
+    /// What its teams have active is fixed, and its games are queued.
+    RoundStarted {
+        /// Which.
+        round: RoundNumber,
+        /// How many.
+        games: u32,
+    },
+    /// The last of its games has ended.
+    RoundOver {
+        /// Which.
+        round: RoundNumber,
+    },
+    /// The schedule is to be played again, without counting.
+    ReplaysOrdered {
+        /// How often.
+        times: u32,
+        /// So many games.
+        games: u32,
+    },
+    /// What was not played of it is called off.
+    ReplaysCancelled {
+        /// So many games.
+        games: u32,
+    },
+    /// A game that does not count waits.
+    FreeGameQueued {
+        /// Who plays.
+        team: TeamId,
+        /// Against whom; none: the baseline.
+        opponent: Option<TeamId>,
+    },
+    /// A slot plays it.
+    GameBegun {
+        /// Which attempt, from 1.
+        attempt: u32,
+    },
+    /// It has a result.
+    GamePlayed {
+        /// Of which attempt.
+        attempt: u32,
+    },
+    /// Our fault, given up: it has no result.
+    GameBroken {
+        /// What went wrong.
+        reason: String,
+    },
+    /// Its result counts no more.
+    GameVoided {
+        /// As everybody may read it.
+        reason: String,
+    },
+    /// It is to be played again.
+    GameQueuedAgain,
+    /// It is not played.
+    GameCancelled {
+        /// As everybody may read it.
+        reason: String,
+    },
+    /// Does the team play no friendly games that others ask for?
+    FriendlyGamesDeclined {
+        /// Or does it again.
+        declines: bool,
+    },
     /// Nothing of the queue is begun from now on.
     QueuePaused {
         /// As everybody may read it.

@@ -25,6 +25,7 @@ mod database;
 mod error;
 mod event;
 mod health;
+mod live;
 mod log;
 mod operations;
 mod pulse;
@@ -40,10 +41,11 @@ pub use artifacts::{ArtifactStream, Artifacts};
 pub use error::StoreError;
 pub use event::{Actor, Change, Event, EventRecord, ParseEventError, Subject};
 pub use health::{Health, QueueHealth};
+pub use live::{LIVE_GAMES_KEPT, LiveGames, LiveMark, LiveNews, LiveWatch};
 pub use log::LOG_BOUND_BYTES;
 pub use operations::{
     announcements::MAX_OPEN_QUESTIONS,
-    claim::{Claimed, MAX_LEASES, RunSeeds, Work},
+    claim::MAX_LEASES,
     commit::Committed,
     describe_submission::SubmissionWords,
     give_back::MAX_ATTEMPTS,
@@ -58,6 +60,12 @@ pub use operations::{
     teams::TeamChange,
     tidy::{RECORDINGS_KEPT, UNCHECKED_KEPT},
     tokens::{Holder, LAST_USE, MAX_TOKENS, NewToken, Refusal, SESSION, Who},
+    tournament::{
+        entrants::Leaving,
+        open::{NewTournament, TournamentChange},
+        replays::MAX_REPLAYS,
+    },
+    work::{Claimed, RunSeeds, Work},
 };
 pub use queue::Claim;
 pub use reads::{
@@ -66,6 +74,7 @@ pub use reads::{
     runs::RunFaults,
     standings::BoardDays,
     storage::{Counted, TeamStorage},
+    tournaments::{GamesOf, TournamentRecord},
 };
 pub use room::Room;
 pub use store::Store;
@@ -76,9 +85,12 @@ pub use tables::{
     bundles::{UploadQuota, UploadUsage},
     days::Day,
     drafts::Draft,
+    entrants::{Entrant, Leave},
     evaluations::{Evaluation, EvaluationState},
     events::EventFilter,
     finalised::Finalised,
+    game_attempts::{AttemptEnd, AttemptOutcome, GameAttempt},
+    games::{Game, GameCommit, GamePurpose, GameRecording, GameResultRow, GameState, Meeting},
     invitations::{Invitation, InvitationState, InvitedAs},
     measured::Measured,
     people::Person,
@@ -86,6 +98,7 @@ pub use tables::{
     proposals::{Proposal, ProposalKind, Settled},
     questions::{Question, Reply},
     registrations::{Registration, RegistrationState},
+    rounds::{DrawnMatchday, DrawnRound, RoundBye, TournamentRound},
     rulings::Ruling,
     runs::{Clearable, Run},
     season::Season,
@@ -95,4 +108,5 @@ pub use tables::{
     teams::{Team, TeamProfile},
     terms::Terms,
     tokens::{Token, TokenKind, TokenOwner},
+    tournaments::Tournament,
 };

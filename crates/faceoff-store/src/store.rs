@@ -1,6 +1,6 @@
 use crate::{
-    artifacts::Artifacts, database::Database, error::Result, event::Change, pulse::Pulse,
-    room::Room, signals::Signals, tables::archived::Archived,
+    artifacts::Artifacts, database::Database, error::Result, event::Change, live::LiveGames,
+    pulse::Pulse, room::Room, signals::Signals, tables::archived::Archived,
 };
 use std::sync::Arc;
 use tokio::sync::{broadcast, watch};
@@ -14,6 +14,7 @@ pub struct Store {
     pub(crate) artifacts: Artifacts,
     pub(crate) room: Arc<Room>,
     pub(crate) pulse: Arc<Pulse>,
+    pub(crate) live: LiveGames,
     pub(crate) archived: Option<Arc<Archived>>,
 }
 
@@ -50,6 +51,12 @@ impl Store {
     #[must_use]
     pub const fn artifacts(&self) -> &Artifacts {
         &self.artifacts
+    }
+
+    /// Games as this process's slots play them.
+    #[must_use]
+    pub const fn live_games(&self) -> &LiveGames {
+        &self.live
     }
 
     /// What changes from now on, of this process's doing, told after the commit. A receiver that falls

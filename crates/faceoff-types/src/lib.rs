@@ -21,6 +21,7 @@ mod ids;
 mod interpolation;
 mod left_as;
 mod limits;
+mod live_game;
 mod millionths;
 mod names;
 mod outcome;
@@ -68,6 +69,7 @@ pub use ids::{
 pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, UnknownInterpolation};
 pub use left_as::LeftAs;
 pub use limits::{AgentLimits, BundleLimits, ResourceLimits, TimeLimits};
+pub use live_game::{GameHappening, LiveGame, LiveHappening, LivePosition};
 pub use millionths::{Millionths, NotMillionths};
 pub use names::{DivisionName, InvalidName, PersonName, StageName, TeamName};
 pub use outcome::{EpisodeEnd, EpisodeOutcome};

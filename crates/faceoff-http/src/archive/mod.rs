@@ -114,6 +114,7 @@ pub(crate) async fn prepare(app: &App, edition: Edition) -> Result<Prepared, Pro
             recorded.push(match kept.of {
                 KeptOf::Bundle(id) => Recorded::beside("submission", id, kept.key, kept.blake3),
                 KeptOf::Draft(id) => Recorded::beside("proposal", id, kept.key, kept.blake3),
+                KeptOf::Game(id) => Recorded::beside("game", id, kept.key, kept.blake3),
             });
         }
     }
@@ -169,7 +170,7 @@ fn readme(season: &str, edition: Edition, made_at: Timestamp) -> String {
         "The archive of the season {season:?} as it was at {}; {whose}.\n\
          \n\
          manifest.json          every file with its length and its BLAKE3 hash\n\
-         results/               stages, boards and days as JSON and CSV, teams, announcements, questions\n\
+         results/               stages, boards and days as JSON and CSV, tournaments, teams, announcements, questions\n\
          events.jsonl           what happened, in its order\n\
          datasets.csv           whose the recordings are, and which of them are public\n\
          artifacts/datasets/    the recordings; `faceoff verify FILE` plays them again\n\

@@ -1,4 +1,4 @@
-//! What an archive tells in files that need no program: stages, boards, days, teams, words to everybody.
+//! What an archive tells in files that need no program: stages, boards, days, tournaments, teams, words to everybody.
 
 use super::{
     csv,
@@ -13,10 +13,13 @@ use crate::{
         announcement::{AnnouncementView, QuestionView, TermsView},
         board::BoardView,
         evaluation::EvaluationView,
+        game::GameView,
         season::SeasonView,
         sight::Sight,
         stage::StageView,
         team::TeamView,
+        tournament::TournamentView,
+        tournament_sheet::TournamentSheet,
     },
 };
 use faceoff_archive::Edition;
@@ -104,7 +107,26 @@ pub(super) async fn gather(
             }
         }
     }
+    tournaments(app, viewer, files).await?;
     Ok(recorded)
+}
+
+/// Tournaments with their games, as the viewer sees them.
+async fn tournaments(app: &AppState, viewer: Viewer, files: &mut Files) -> Result<(), Problem> {
+    for tournament in app.store.tournaments().await? {
+        let name = plain(tournament.name.as_str());
+        let folder = format!("results/tournament-{}-{name}", tournament.number);
+        let sheet = TournamentSheet::find(app, tournament.id).await?;
+        let view = TournamentView::of(&sheet)?;
+        files
+            .put_json(&format!("{folder}/tournament.json"), &view)
+            .await?;
+        let games = GameView::of_rounds(&sheet, viewer, None)?;
+        files
+            .put_json(&format!("{folder}/games.json"), &games)
+            .await?;
+    }
+    Ok(())
 }
 
 /// A stage, and its boards by each of its rules that has rows.

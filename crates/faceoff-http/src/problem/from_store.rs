@@ -20,6 +20,19 @@ impl From<StoreError> for Problem {
                 ProblemKind::StageNameTaken,
                 format!("a stage named {name:?} exists already; choose another name"),
             ),
+            StoreError::TournamentNameTaken(name) => Self::new(
+                ProblemKind::TournamentNameTaken,
+                format!("a tournament named {name:?} exists already; choose another name"),
+            ),
+            StoreError::FreeGamesSpent { limit, used } => Self::new(
+                ProblemKind::FreeGamesSpent,
+                format!(
+                    "a team asks for at most {limit} games that do not count on a UTC day; yours has asked for {used} \
+                     today. Ask again after midnight UTC"
+                ),
+            )
+            .with("limit", limit)
+            .with("used", used),
             StoreError::StageNotOpen {
                 name,
                 opens_at,

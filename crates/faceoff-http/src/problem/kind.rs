@@ -75,6 +75,9 @@ kinds! {
     StageNameTaken "stage-name-taken" CONFLICT
         "The name is taken"
         "Another stage of the season has this name. Choose another one."
+    TournamentNameTaken "tournament-name-taken" CONFLICT
+        "The name is taken"
+        "Another tournament of the season has this name. Choose another one."
     StageNotOpen "stage-not-open" CONFLICT
         "The stage is not open"
         "Days of a stage start from its opening to its closing; “opens_at” and “closed_at” say when these are. GET /api/v1/stages lists the stages."
@@ -120,6 +123,9 @@ kinds! {
     StoredQuotaSpent "stored-quota-spent" CONFLICT
         "The team's storage is full"
         "The bundles that are kept of the team fill its room; “limit_bytes” and “used_bytes” state how much. Ask the organiser for more."
+    FreeGamesSpent "free-games-spent" TOO_MANY_REQUESTS
+        "The day's games are spent"
+        "A team asks for so many games that do not count on a UTC day. “limit” and “used” state how many; “Retry-After” is the time to midnight UTC."
     TooManyConnections "too-many-connections" TOO_MANY_REQUESTS
         "Too many connections"
         "An address has so many connections at a time. Close some, or send several requests over one."

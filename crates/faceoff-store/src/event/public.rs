@@ -39,6 +39,15 @@ impl Event {
             | Self::StageFinalStarted { .. }
             | Self::StageFinalised
             | Self::StageRetentionChanged { .. }
+            | Self::TournamentOpened { .. }
+            | Self::TournamentPaused { .. }
+            | Self::TournamentResumed
+            | Self::TournamentClosed
+            | Self::TeamsEntered { .. }
+            | Self::TeamOut { .. }
+            | Self::TeamLeftTournament { .. }
+            | Self::RoundStarted { .. }
+            | Self::RoundOver { .. }
             | Self::DatasetRemoved { .. }
             | Self::QueuePaused { .. }
             | Self::QueueResumed
@@ -84,6 +93,18 @@ impl Event {
             | Self::ProposalApplied
             | Self::ProposalDropped
             | Self::ShardCommitted { .. }
+            // Of games that do not count, too.
+            | Self::FreeGameQueued { .. }
+            | Self::GameBegun { .. }
+            | Self::GamePlayed { .. }
+            | Self::GameBroken { .. }
+            | Self::GameVoided { .. }
+            | Self::GameQueuedAgain
+            | Self::GameCancelled { .. }
+            | Self::TournamentChanged { .. }
+            | Self::ReplaysOrdered { .. }
+            | Self::ReplaysCancelled { .. }
+            | Self::FriendlyGamesDeclined { .. }
             | Self::UnitGivenBack { .. } => false,
         }
     }

@@ -1,7 +1,7 @@
 use super::parse::ParseEventError;
 use faceoff_types::{
-    AblationId, AnnouncementId, EvaluationId, PersonId, ProposalId, QuestionId, RegistrationId,
-    StageDay, StageId, SubmissionId, TeamId,
+    AblationId, AnnouncementId, EvaluationId, GameId, PersonId, ProposalId, QuestionId,
+    RegistrationId, StageDay, StageId, SubmissionId, TeamId, TournamentId,
 };
 use jiff::civil::Date;
 use std::{fmt, str::FromStr};
@@ -35,6 +35,10 @@ pub enum Subject {
     Question(QuestionId),
     /// A trial or a re-evaluation with its runs.
     Proposal(ProposalId),
+    /// Rounds of games.
+    Tournament(TournamentId),
+    /// One game with its attempts.
+    Game(GameId),
 }
 
 impl Subject {
@@ -54,6 +58,8 @@ impl Subject {
             Self::Announcement(id) => ("announcement", id.to_string()),
             Self::Question(id) => ("question", id.to_string()),
             Self::Proposal(id) => ("proposal", id.to_string()),
+            Self::Tournament(id) => ("tournament", id.to_string()),
+            Self::Game(id) => ("game", id.to_string()),
         }
     }
 
@@ -73,6 +79,8 @@ impl Subject {
             "announcement" => Self::Announcement(id.parse().map_err(|_| unknown())?),
             "question" => Self::Question(id.parse().map_err(|_| unknown())?),
             "proposal" => Self::Proposal(id.parse().map_err(|_| unknown())?),
+            "tournament" => Self::Tournament(id.parse().map_err(|_| unknown())?),
+            "game" => Self::Game(id.parse().map_err(|_| unknown())?),
             _ => return Err(unknown()),
         })
     }
@@ -119,6 +127,8 @@ mod tests {
             Subject::Announcement(AnnouncementId::new()),
             Subject::Question(QuestionId::new()),
             Subject::Proposal(ProposalId::new()),
+            Subject::Tournament(TournamentId::new()),
+            Subject::Game(GameId::new()),
         ];
         for subject in subjects {
             let (kind, id) = subject.columns();

@@ -5,23 +5,21 @@ use crate::{
         ends,
         give_back::give_up,
         purpose::{self, Purpose},
-        runs::{self, RunOwner},
+        runs,
+        tournament::play,
+        work::{Claimed, RunSeeds, Work},
     },
     queue::{self, Claim, Leased},
     store::Store,
     tables::{
         evaluations, runs as run_rows,
         runs::Run,
-        season,
-        shards::{self, Shard},
-        stage_runtimes, stages,
+        season, shards, stage_runtimes, stages,
         submissions::{self, Submission},
     },
     write::Tx,
 };
-use faceoff_types::{
-    BundleRef, EvaluationId, RunId, Seed, StageLimits, StageRuntimes, SubmissionId,
-};
+use faceoff_types::{EvaluationId, RunId, SubmissionId};
 use jiff::{SignedDuration, Timestamp};
 use uuid::Uuid;
 
@@ -29,69 +27,6 @@ use uuid::Uuid;
 /// it kills its worker. Far above [`MAX_ATTEMPTS`](crate::MAX_ATTEMPTS), since a server that is killed
 /// again and again for other reasons must not cost a team its evaluation.
 pub const MAX_LEASES: u32 = 50;
-
-/// A leased unit of work, with all that a worker must know of it.
-#[derive(Debug, Clone)]
-pub struct Claimed {
-    /// Proof of the lease.
-    pub claim: Claim,
-    /// What to do.
-    pub work: Work,
-}
-
-/// What a worker does under a lease.
-#[derive(Debug, Clone)]
-pub enum Work {
-    /// Check that an uploaded bundle starts, answers and keeps time.
-    Smoke {
-        /// What to check.
-        submission: Submission,
-        /// Of the episodes that it plays, its own.
-        seeds: RunSeeds,
-        /// What the agent is held to: as in the stage that matters now.
-        limits: Box<StageLimits>,
-        /// It is refused if none of these takes its runtime: the stages that it could play in; none, if one of them takes
-        /// any.
-        runtimes: Vec<StageRuntimes>,
-    },
-    /// Play a range of episodes.
-    Shard {
-        /// What the run is a part of.
-        owner: RunOwner,
-        /// What the range is a part of.
-        run: Run,
-        /// The range.
-        shard: Shard,
-        /// The agent.
-        bundle: BundleRef,
-        /// Of the run's episodes.
-        seeds: RunSeeds,
-        /// How often it was begun before and broken by us.
-        platform_retries: u32,
-    },
-    /// Join the recordings of an evaluation whose shards are all committed, and score it, whether it counts or not.
-    Finalise {
-        /// What is scored.
-        evaluation: EvaluationId,
-        /// What was played.
-        run: Run,
-        /// Artifact key prefixes of the shards' recordings, in order of play.
-        recordings: Vec<String>,
-        /// The agent's own name.
-        agent_name: String,
-        /// Of the run's episodes.
-        seeds: RunSeeds,
-    },
-}
-
-/// The seeds of what is played, derived from the season's secret, which stays in the store.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct RunSeeds {
-    /// Of the episodes: that of the day, of ablations, or of a submission's smoke run.
-    pub episodes: Seed,
-    /// Of the season's model mismatch.
-    pub mismatch: Seed,
-}
 
 impl Store {
     /// Leases the next unit of work for `lease_s` seconds. Finalisations come first; smoke runs and
@@ -114,8 +49,12 @@ impl Store {
                 let reason = if unit.attempts > MAX_LEASES {
                     format!("{MAX_LEASES} workers died over it")
                 } else {
-                    match describe(tx, &unit).await {
-                        Ok(work) => {
+                    match describe(tx, &unit, worker).await {
+                        Ok(None) => {
+                            queue::park(tx, unit.id.0).await?;
+                            continue;
+                        }
+                        Ok(Some(work)) => {
                             let lease = SignedDuration::from_secs(lease_s.into());
                             let claim = Claim {
                                 unit: unit.id.0,
@@ -142,9 +81,14 @@ impl Store {
     }
 }
 
-/// Reads what the leased unit is about.
-async fn describe(tx: &mut Tx, unit: &Leased) -> Result<Work> {
-    match purpose::of_unit(tx, unit.id.0, &unit.kind).await? {
+/// Reads what the leased unit is about. `None`: it is not to be begun now.
+async fn describe(tx: &mut Tx, unit: &Leased, worker: &str) -> Result<Option<Work>> {
+    let retries = unit.attempts.saturating_sub(1);
+    let work = match purpose::of_unit(tx, unit.id.0, &unit.kind).await? {
+        Purpose::Game(id) => {
+            tx.advanced(Subject::Game(id));
+            return play::begin(tx, id, worker, retries).await;
+        }
         Purpose::Smoke(id) => {
             tx.advanced(Subject::Submission(id));
             let submission = submissions::find(tx, id).await?;
@@ -177,7 +121,7 @@ async fn describe(tx: &mut Tx, unit: &Leased) -> Result<Work> {
                 shard,
                 bundle: submission.bundle,
                 seeds,
-                platform_retries: unit.attempts.saturating_sub(1),
+                platform_retries: retries,
             })
         }
         Purpose::Finalise(evaluation) => {
@@ -189,7 +133,8 @@ async fn describe(tx: &mut Tx, unit: &Leased) -> Result<Work> {
             tx.advanced(Subject::Proposal(proposal));
             finalise(tx, id, run).await
         }
-    }
+    };
+    work.map(Some)
 }
 
 async fn finalise(tx: &mut Tx, evaluation: EvaluationId, id: RunId) -> Result<Work> {

@@ -55,7 +55,10 @@ impl Store {
             let purpose = purpose::of_unit(tx, claim.unit, &kind).await?;
             let progress = match &purpose {
                 Purpose::Shard { shard, .. } => shard.episodes(),
-                Purpose::Smoke(_) | Purpose::Finalise(_) | Purpose::FinaliseDraft { .. } => 0,
+                Purpose::Smoke(_)
+                | Purpose::Game(_)
+                | Purpose::Finalise(_)
+                | Purpose::FinaliseDraft { .. } => 0,
             };
             queue::mark_done(tx, claim, progress).await?;
             commit(tx, purpose).await?;

@@ -5,7 +5,7 @@ use crate::{
     event::{Actor, Event, Subject},
     store::Store,
     tables::{
-        bundles,
+        bundles, games,
         submissions::{self, Submission, SubmissionState},
         teams::{self, Evidence},
     },
@@ -79,6 +79,11 @@ async fn check_idle(tx: &mut Tx, submission: &Submission) -> Result<()> {
     if needs.unreleased > 0 {
         return conflict(
             "it has played a day that is not released, and may have to play it again: wait for the release",
+        );
+    }
+    if games::needs(tx, submission.id).await? {
+        return conflict(
+            "it plays in a tournament that is not closed: its games may have to be played again until then",
         );
     }
     if needs.proposed > 0 {

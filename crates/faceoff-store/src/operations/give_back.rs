@@ -6,11 +6,13 @@ use crate::{
         ends::{self, RunEnd},
         purpose::{self, Purpose},
         runs,
+        tournament::play,
     },
     queue::{self, Claim, Hold},
     store::Store,
     tables::{
         evaluations::{self, Failure},
+        game_attempts::AttemptOutcome,
         submissions,
     },
     write::Tx,
@@ -33,6 +35,7 @@ pub(crate) async fn subject(
 ) -> Result<Subject> {
     Ok(match purpose {
         Purpose::Smoke(id) => Subject::Submission(*id),
+        Purpose::Game(id) => Subject::Game(*id),
         Purpose::Shard { run, .. } => runs::owner(connection, *run).await?.subject(),
         Purpose::Finalise(id) => Subject::Evaluation(*id),
         Purpose::FinaliseDraft { proposal, .. } => Subject::Proposal(*proposal),
@@ -52,6 +55,7 @@ pub(crate) async fn give_up(tx: &mut Tx, unit: Uuid, label: &str, reason: &str) 
             );
             Ok(())
         }
+        Ok(Purpose::Game(id)) => play::give_up(tx, id, reason).await,
         Ok(Purpose::Shard { run, .. }) => {
             let owner = runs::owner(tx, run).await?;
             ends::run_ended(tx, run, owner, RunEnd::PlatformFailed(reason)).await
@@ -90,6 +94,9 @@ impl Store {
             };
             let subject = subject(tx, &purpose).await?;
             tx.record(subject, event);
+            if let Purpose::Game(id) = purpose {
+                play::give_back(tx, id, AttemptOutcome::Broken, Some(reason)).await?;
+            }
             if failures >= MAX_ATTEMPTS {
                 give_up(tx, claim.unit, &kind, reason).await?;
             }
@@ -136,6 +143,9 @@ impl Store {
             };
             queue::release(tx, claim, rest_s, without_room).await?;
             let purpose = purpose::of_unit(tx, claim.unit, &kind).await?;
+            if let Purpose::Game(id) = purpose {
+                play::give_back(tx, id, AttemptOutcome::GivenBack, None).await?;
+            }
             let subject = subject(tx, &purpose).await?;
             tx.advanced(subject);
             Ok(())

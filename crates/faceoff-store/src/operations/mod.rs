@@ -44,4 +44,6 @@ mod summaries;
 pub(crate) mod teams;
 pub(crate) mod tidy;
 pub(crate) mod tokens;
+pub(crate) mod tournament;
 mod withdraw;
+pub(crate) mod work;

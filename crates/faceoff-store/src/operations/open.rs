@@ -2,6 +2,7 @@ use crate::{
     artifacts::Artifacts,
     database::Database,
     error::{Result, StoreError},
+    live::LiveGames,
     pulse::Pulse,
     room::Room,
     signals::Signals,
@@ -28,6 +29,7 @@ impl Store {
             artifacts,
             room: Arc::new(Room::new(vec![data_dir.to_owned()], 0)),
             pulse: Arc::new(Pulse::new()),
+            live: LiveGames::default(),
             archived: archived.map(Arc::new),
         })
     }

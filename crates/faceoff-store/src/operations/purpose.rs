@@ -2,12 +2,12 @@ use crate::{
     error::{Result, StoreError},
     queue::{Lane, NewUnit},
     tables::{
-        drafts, finalisations,
+        drafts, finalisations, games,
         shards::{self, Shard},
         smoke_runs,
     },
 };
-use faceoff_types::{EvaluationId, ProposalId, RunId, SubmissionId};
+use faceoff_types::{EvaluationId, GameId, ProposalId, RunId, SubmissionId};
 use sqlx::SqliteConnection;
 use uuid::Uuid;
 
@@ -17,16 +17,18 @@ enum Kind {
     Smoke,
     Finalise,
     Shard,
+    Game,
 }
 
 impl Kind {
-    const ALL: [Self; 3] = [Self::Smoke, Self::Finalise, Self::Shard];
+    const ALL: [Self; 4] = [Self::Smoke, Self::Finalise, Self::Shard, Self::Game];
 
     const fn label(self) -> &'static str {
         match self {
             Self::Smoke => "smoke",
             Self::Finalise => "finalise",
             Self::Shard => "shard",
+            Self::Game => "game",
         }
     }
 
@@ -48,13 +50,16 @@ const fn lane(name: &'static str, urgency: u32, rank: u32) -> Lane {
     }
 }
 
-// A finalisation runs no agent, is the platform's own, and ends what has had its turn. Smoke runs and
-// shards share the slots half and half, so that neither makes the other wait for long. Ablations, trials and
-// proposals do not count: they have what is left.
+// A finalisation runs no agent, is the platform's own, and ends what has had its turn. Smoke runs, shards and games of
+// rounds share the slots equally, so that none makes the others wait for long. Ablations, trials, proposals and all
+// other games do not count: they have what is left.
 pub(crate) const FINALISE: NewUnit = Kind::Finalise.waiting_in(lane("finalise", 0, 0));
 pub(crate) const SMOKE: NewUnit = Kind::Smoke.waiting_in(lane("smoke", 1, 0));
 pub(crate) const SHARD: NewUnit = Kind::Shard.waiting_in(lane("shard", 1, 1));
 pub(crate) const ABLATION_SHARD: NewUnit = Kind::Shard.waiting_in(lane("ablation", 2, 0));
+pub(crate) const ROUND_GAME: NewUnit = Kind::Game.waiting_in(lane("game", 1, 2));
+pub(crate) const FREE_GAME: NewUnit = Kind::Game.waiting_in(lane("free_game", 2, 2));
+pub(crate) const REPLAY_GAME: NewUnit = Kind::Game.waiting_in(lane("replay", 2, 3));
 pub(crate) const PROPOSAL_SHARD: NewUnit = Kind::Shard.waiting_in(lane("proposal", 2, 1));
 
 /// Finalisations are done for nobody in particular, in the order in which evaluations were played.
@@ -64,6 +69,7 @@ pub(crate) const PLATFORM: &str = "";
 #[derive(Debug)]
 pub(crate) enum Purpose {
     Smoke(SubmissionId),
+    Game(GameId),
     Shard {
         run: RunId,
         shard: Shard,
@@ -86,6 +92,7 @@ pub(crate) async fn of_unit(
         Some(Kind::Smoke) => smoke_runs::of_unit(connection, unit)
             .await?
             .map(Purpose::Smoke),
+        Some(Kind::Game) => games::of_unit(connection, unit).await?.map(Purpose::Game),
         Some(Kind::Shard) => shards::of_unit(connection, unit)
             .await?
             .map(|(run, shard)| Purpose::Shard { run, shard }),

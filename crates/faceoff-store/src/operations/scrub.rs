@@ -11,7 +11,7 @@ use sqlx::{AssertSqlSafe, SqliteConnection};
 
 /// Tables of which the public archive holds anything. All others are emptied for it: a new one is, until somebody has
 /// decided what of it is public.
-const PUBLIC_TABLES: [&str; 23] = [
+const PUBLIC_TABLES: [&str; 29] = [
     "_sqlx_migrations",
     "ablation_runs",
     "ablations",
@@ -21,12 +21,17 @@ const PUBLIC_TABLES: [&str; 23] = [
     "contestants",
     "days",
     "divisions",
+    "entrants",
     "episode_summaries",
     "evaluations",
     "events",
     "frozen_boards",
+    "game_attempts",
+    "games",
     "lanes",
     "questions",
+    "round_submissions",
+    "rounds",
     "runs",
     "season",
     "stage_retentions",
@@ -35,6 +40,7 @@ const PUBLIC_TABLES: [&str; 23] = [
     "submissions",
     "teams",
     "terms",
+    "tournaments",
 ];
 
 /// For whom a step is.
@@ -67,6 +73,15 @@ const STEPS: &[(For, &str)] = &[
     (For::Both, "DELETE FROM draft_finalisations WHERE draft_id NOT IN (SELECT id FROM drafts)"),
     (For::Both, "DELETE FROM ablations WHERE finished_at IS NULL"),
     (For::Both, "DELETE FROM ablation_runs WHERE ablation_id NOT IN (SELECT id FROM ablations)"),
+    // A game that is open or was called off has no result, and what does not count is its teams' own.
+    (For::Both, "DELETE FROM games WHERE state IN ('queued', 'running')"),
+    (For::Public, "DELETE FROM games WHERE purpose IN ('test', 'friendly')"),
+    (For::Both, "DELETE FROM game_attempts WHERE game_id NOT IN (SELECT id FROM games)"),
+    // Of attempts everybody gets the ones that count, and what went wrong of no other.
+    (For::Public, "DELETE FROM game_attempts WHERE NOT EXISTS
+        (SELECT 1 FROM games g WHERE g.id = game_attempts.game_id AND g.attempt = game_attempts.number)"),
+    (For::Public, "UPDATE game_attempts SET worker = '', home_log = '', away_log = ''"),
+    (For::Public, "UPDATE tournaments SET baseline_id = NULL"),
     (For::Both, "DELETE FROM runs WHERE id NOT IN (SELECT run_id FROM evaluations)
         AND id NOT IN (SELECT run_id FROM drafts) AND id NOT IN (SELECT run_id FROM ablation_runs)"),
     (For::Both, "DELETE FROM contestants WHERE run_id NOT IN (SELECT id FROM runs)"),
@@ -83,7 +98,8 @@ const STEPS: &[(For, &str)] = &[
         (SELECT id FROM submissions WHERE state = 'validating')"),
     (For::Both, "DELETE FROM submissions WHERE state = 'validating'"),
     (For::Public, "DELETE FROM submissions WHERE id NOT IN (SELECT submission_id FROM evaluations)
-        AND id NOT IN (SELECT submission_id FROM ablations) AND id NOT IN (SELECT submission_id FROM contestants)"),
+        AND id NOT IN (SELECT submission_id FROM ablations) AND id NOT IN (SELECT submission_id FROM contestants)
+        AND id NOT IN (SELECT submission_id FROM round_submissions)"),
     (For::Public, "UPDATE submissions SET bundle_key = '', bundle_bytes = 0, bundle_blake3 = '', bundle_file_name = '',
         label = NULL, note = NULL, timing = NULL, runtime = NULL, withdrawn_at = NULL, deleted_at = NULL, deleted_by = NULL,
         bundle_removed_at = NULL, bundle_removed_for = NULL, bundle_gone = 0, log = CASE WHEN log IS NOT NULL THEN '' END,
@@ -91,17 +107,18 @@ const STEPS: &[(For, &str)] = &[
     (For::Both, "DELETE FROM smoke_runs WHERE submission_id NOT IN (SELECT id FROM submissions)"),
     (For::Public, "DELETE FROM smoke_runs"),
     (For::Public, "DELETE FROM finalisations"),
+    (For::Public, "UPDATE games SET unit_id = NULL"),
     (For::Public, "DELETE FROM questions WHERE public = 0"),
     (For::Public, "UPDATE questions SET team_id = NULL"),
     // Who has played or stands on a board; who only wanted to is nobody's business.
     (For::Public, "DELETE FROM teams WHERE disqualified_at IS NULL AND id NOT IN (SELECT team_id FROM evaluations)
-        AND id NOT IN (SELECT team_id FROM submissions)
+        AND id NOT IN (SELECT team_id FROM submissions) AND id NOT IN (SELECT team_id FROM entrants)
         AND id NOT IN (SELECT e.value FROM stages s JOIN json_each(s.finalised_without) e)"),
     (For::Public, "UPDATE teams SET retired_by_organiser = 0"),
     // Nothing of it is to be done any more, and who did it is nobody's business.
     (For::Both, "DELETE FROM units WHERE id NOT IN (SELECT unit_id FROM shards)
         AND id NOT IN (SELECT unit_id FROM smoke_runs) AND id NOT IN (SELECT unit_id FROM finalisations)
-        AND id NOT IN (SELECT unit_id FROM draft_finalisations)"),
+        AND id NOT IN (SELECT unit_id FROM draft_finalisations) AND id NOT IN (SELECT unit_id FROM games WHERE unit_id IS NOT NULL)"),
     (For::Both, "UPDATE units SET state = 'dropped', nonce = NULL WHERE state IN ('queued', 'leased')"),
     (For::Both, "UPDATE units SET nonce = '' WHERE nonce IS NOT NULL"),
     // The log for everybody: what is public (its kinds are sorted out before), by whom as far as that is.

@@ -3,7 +3,7 @@ use crate::{
     event::{Actor, Event, Subject},
     operations::finalise_stage::final_is_owed,
     store::Store,
-    tables::{drafts, evaluations, season, stages},
+    tables::{drafts, evaluations, games, season, stages},
 };
 use jiff::Timestamp;
 
@@ -32,6 +32,13 @@ impl Store {
                 return Err(StoreError::Conflict(format!(
                     "{proposed} evaluations of trials and proposals are queued or running: wait until they are over, \
                      or drop them"
+                )));
+            }
+            let games = games::count_open(tx).await?;
+            if games > 0 {
+                return Err(StoreError::Conflict(format!(
+                    "{games} games are queued or running, and closing the season publishes their seeds: wait until they \
+                     are over, or call them off"
                 )));
             }
             if under_way > 0 {

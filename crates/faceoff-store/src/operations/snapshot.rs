@@ -3,6 +3,7 @@
 use crate::{
     database::Database,
     error::{Result, StoreError},
+    live::LiveGames,
     operations::scrub::scrub,
     pulse::Pulse,
     room::Room,
@@ -80,6 +81,7 @@ impl Store {
             artifacts: self.artifacts.clone(),
             room: Arc::new(Room::new(vec![folder.to_owned()], 0)),
             pulse: Arc::new(Pulse::new()),
+            live: LiveGames::default(),
             archived: archived.map(Arc::new),
         };
         Ok(Snapshot {

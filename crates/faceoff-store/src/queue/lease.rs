@@ -163,6 +163,40 @@ pub(crate) async fn release(
     Ok(())
 }
 
+/// A unit just claimed is not to be begun: it waits until it is [unparked](unpark), and neither the attempt nor its slot
+/// time counts.
+pub(crate) async fn park(tx: &mut Tx, unit: Uuid) -> Result<()> {
+    let id = Text(unit);
+    sqlx::query!(
+        "UPDATE units SET state = 'queued', worker = NULL, nonce = NULL, progress = 0, charged_ms = 0,
+                          attempts = attempts - 1, claimable_at = ?
+         WHERE id = ?",
+        PARKED,
+        id,
+    )
+    .execute(&mut **tx)
+    .await?;
+    Ok(())
+}
+
+/// A unit can be claimed from now on, if it waits.
+pub(crate) async fn unpark(tx: &mut Tx, unit: Uuid) -> Result<()> {
+    let (id, now) = (Text(unit), Instant(tx.now));
+    sqlx::query!(
+        "UPDATE units SET claimable_at = ? WHERE id = ? AND state = 'queued' AND claimable_at = ?",
+        now,
+        id,
+        PARKED,
+    )
+    .execute(&mut **tx)
+    .await?;
+    tx.work_added();
+    Ok(())
+}
+
+/// When what is parked could be claimed: long after everybody.
+const PARKED: i64 = 253_402_207_200_000;
+
 /// An instant some seconds later.
 pub(crate) fn after(now: Timestamp, seconds: u32) -> Timestamp {
     now.saturating_add(SignedDuration::from_secs(seconds.into()))

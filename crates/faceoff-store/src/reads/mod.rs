@@ -16,3 +16,4 @@ pub(crate) mod storage;
 mod submissions;
 mod summaries;
 mod teams;
+pub(crate) mod tournaments;

@@ -11,7 +11,7 @@ use crate::{
         season,
     },
 };
-use faceoff_types::{EvaluationId, RunId, StageDay, SubmissionId, TeamId};
+use faceoff_types::{EvaluationId, GameId, RunId, StageDay, SubmissionId, TeamId};
 use jiff::{SignedDuration, Timestamp};
 use sqlx::{SqliteConnection, types::Text};
 use std::collections::{BTreeMap, HashMap};
@@ -34,6 +34,8 @@ pub struct Outlook {
     pub submissions: HashMap<SubmissionId, QueuePlace>,
     /// Until they are scored.
     pub evaluations: HashMap<EvaluationId, QueuePlace>,
+    /// Until they have a result; those of a paused tournament are in none of it.
+    pub games: HashMap<GameId, QueuePlace>,
 }
 
 /// What a day has left to play.
@@ -68,6 +70,9 @@ struct OpenUnit {
     run: Option<Text<RunId>>,
     smoke_of: Option<Text<SubmissionId>>,
     score_of: Option<Text<EvaluationId>>,
+    game: Option<Text<GameId>>,
+    game_steps: Option<u32>,
+    is_paused: bool,
 }
 
 async fn open_units(connection: &mut SqliteConnection) -> Result<Vec<OpenUnit>> {
@@ -78,10 +83,12 @@ async fn open_units(connection: &mut SqliteConnection) -> Result<Vec<OpenUnit>> 
                   l.urgency AS "urgency: u32", s.end_episode - s.first_episode AS "episodes?: u32",
                   a.holder, s.run_id AS "run?: Text<RunId>",
                   m.submission_id AS "smoke_of?: Text<SubmissionId>",
-                  f.evaluation_id AS "score_of?: Text<EvaluationId>"
+                  f.evaluation_id AS "score_of?: Text<EvaluationId>", g.id AS "game?: Text<GameId>",
+                  json_extract(t.rules, '$.steps') AS "game_steps?: u32", t.paused_at IS NOT NULL AS "is_paused!: bool"
            FROM units u JOIN accounts a ON a.account_no = u.account_no JOIN lanes l ON l.lane = a.lane
            LEFT JOIN shards s ON s.unit_id = u.id LEFT JOIN smoke_runs m ON m.unit_id = u.id
            LEFT JOIN finalisations f ON f.unit_id = u.id
+           LEFT JOIN games g ON g.unit_id = u.id LEFT JOIN tournaments t ON t.id = g.tournament_id
            WHERE u.state IN ('queued', 'leased') ORDER BY u.batch, u.queue_no"#
     )
     .fetch_all(connection)
@@ -123,6 +130,7 @@ async fn holders(connection: &mut SqliteConnection) -> Result<BTreeMap<i64, Hold
 enum JobOf {
     Submission(SubmissionId),
     Evaluation(EvaluationId),
+    Game(GameId),
     /// Ablations, trials and proposals: they only matter for the slots that they hold.
     Nobody,
 }
@@ -176,6 +184,12 @@ impl<'a> Jobs<'a> {
                 return (job, self.measured.finalisation_ms);
             }
         }
+        if let Some(id) = &unit.game {
+            let takes = unit.game_steps.zip(self.measured.game_step_ms);
+            self.jobs.push((JobOf::Game(id.0), Job { then: None }));
+            let takes = takes.map(|(steps, ms)| f64::from(steps) * ms);
+            return (self.jobs.len() - 1, takes);
+        }
         let (of, takes) = match &unit.smoke_of {
             Some(id) => (JobOf::Submission(id.0), self.measured.smoke_ms),
             None if unit.urgency == FINALISES => (JobOf::Nobody, self.measured.finalisation_ms),
@@ -227,7 +241,7 @@ impl Store {
         let mut running = Vec::new();
         for unit in &units {
             let is_running = unit.is_leased && unit.claimable_at.0 > now;
-            if unit.urgency > COUNTS && !is_running {
+            if (unit.urgency > COUNTS || unit.is_paused) && !is_running {
                 continue;
             }
             let (job, takes) = jobs.of_unit(unit);
@@ -281,13 +295,14 @@ fn places(of: &[JobOf], ends: &[End], is_held: bool, now: Timestamp) -> Outlook 
     };
     let submissions = count(|of| matches!(of, JobOf::Submission(_)));
     let evaluations = count(|of| matches!(of, JobOf::Evaluation(_)));
+    let games = count(|of| matches!(of, JobOf::Game(_)));
     let mut outlook = Outlook::default();
     let expected_at = |end: &End| {
         let in_ms = end.in_ms.filter(|_| !is_held)?;
         let in_ms = SignedDuration::try_from_secs_f64(in_ms / 1000.0).ok()?;
         now.checked_add(in_ms).ok()
     };
-    let mut place = [0, 0];
+    let mut place = [0, 0, 0];
     for (of, end) in by_end {
         let expected_at = expected_at(end);
         match of {
@@ -308,6 +323,15 @@ fn places(of: &[JobOf], ends: &[End], is_held: bool, now: Timestamp) -> Outlook 
                     expected_at,
                 };
                 outlook.evaluations.insert(*id, place);
+            }
+            JobOf::Game(id) => {
+                place[2] += 1;
+                let place = QueuePlace {
+                    place: place[2],
+                    of: games,
+                    expected_at,
+                };
+                outlook.games.insert(*id, place);
             }
             JobOf::Nobody => {}
         }

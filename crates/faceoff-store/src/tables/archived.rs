@@ -4,7 +4,7 @@ use crate::{
     column::{Bytes32, Instant},
     error::Result,
 };
-use faceoff_types::{EvaluationId, Seed, StageDay, StageId, SubmissionId};
+use faceoff_types::{EvaluationId, GameId, Seed, StageDay, StageId, SubmissionId};
 use jiff::{Timestamp, civil::Date};
 use sqlx::{SqliteConnection, types::Text};
 use std::{collections::BTreeMap, fmt, str::FromStr};
@@ -147,6 +147,8 @@ pub enum KeptOf {
     Bundle(SubmissionId),
     /// The recording of what was played as a part of a proposal.
     Draft(EvaluationId),
+    /// The recording of a game, whole or one side's.
+    Game(GameId),
 }
 
 /// What there is beside the datasets of evaluations.
@@ -166,8 +168,28 @@ pub(crate) async fn kept_artifacts(connection: &mut SqliteConnection) -> Result<
              AND id NOT IN (SELECT id FROM evaluations)
              AND proposal_id NOT IN (SELECT id FROM proposals WHERE outcome = 'dropped') ORDER BY created_at, id"#
     )
+    .fetch_all(&mut *connection)
+    .await?;
+    let games = sqlx::query!(
+        r#"SELECT g.id AS "id: Text<GameId>", a.recording AS "key!", a.game_blake3 AS "game!", a.home_blake3 AS "home!",
+                  a.away_blake3 AS "away!"
+           FROM games g JOIN game_attempts a ON a.game_id = g.id AND a.number = g.attempt
+           WHERE a.recording IS NOT NULL ORDER BY g.game_no"#
+    )
     .fetch_all(connection)
     .await?;
+    let games = games.into_iter().flat_map(|row| {
+        let files = [
+            ("game", row.game),
+            ("side-1", row.home),
+            ("side-2", row.away),
+        ];
+        files.map(|(name, blake3)| KeptArtifact {
+            key: format!("{}/{name}.zip", row.key),
+            blake3,
+            of: KeptOf::Game(row.id.0),
+        })
+    });
     let bundles = bundles.into_iter().map(|row| KeptArtifact {
         key: row.bundle_key,
         blake3: row.bundle_blake3,
@@ -178,5 +200,5 @@ pub(crate) async fn kept_artifacts(connection: &mut SqliteConnection) -> Result<
         blake3: row.dataset_blake3,
         of: KeptOf::Draft(row.id.0),
     });
-    Ok(bundles.chain(drafts).collect())
+    Ok(bundles.chain(drafts).chain(games).collect())
 }

@@ -20,6 +20,8 @@ pub struct Measured {
     pub smoke_ms: Option<f64>,
     /// Of computing a score.
     pub finalisation_ms: Option<f64>,
+    /// Of a control step of a game, whoever played.
+    pub game_step_ms: Option<f64>,
 }
 
 impl Measured {
@@ -132,9 +134,18 @@ pub(crate) async fn lately(
         first,
         since
     )
+    .fetch_one(&mut *connection)
+    .await?;
+    let game_step_ms = sqlx::query_scalar!(
+        r#"SELECT AVG(CAST(u.charged_ms AS REAL) / json_extract(t.rules, '$.steps')) AS "ms: f64"
+           FROM games g JOIN tournaments t ON t.id = g.tournament_id JOIN units u ON u.id = g.unit_id
+           WHERE g.ended_at >= ? AND g.state = 'played' AND u.state = 'done' AND u.charged_ms > 0"#,
+        since
+    )
     .fetch_one(connection)
     .await?;
     Ok(Measured {
+        game_step_ms,
         any_episode_ms: mean(all),
         episode_ms: of_team
             .into_iter()

@@ -164,7 +164,12 @@ pub(crate) async fn idle_archives(
                                  WHERE e.submission_id = s.id AND st.finalised_at IS NULL))
              AND NOT EXISTS (SELECT 1 FROM drafts d JOIN proposals p ON p.id = d.proposal_id
                              WHERE d.submission_id = s.id AND p.outcome IS NULL)
-             AND NOT EXISTS (SELECT 1 FROM ablations a WHERE a.submission_id = s.id AND a.finished_at IS NULL)"#,
+             AND NOT EXISTS (SELECT 1 FROM ablations a WHERE a.submission_id = s.id AND a.finished_at IS NULL)
+             AND NOT EXISTS (SELECT 1 FROM round_submissions r JOIN tournaments o ON o.id = r.tournament_id
+                             WHERE r.submission_id = s.id AND o.closed_at IS NULL)
+             AND NOT EXISTS (SELECT 1 FROM tournaments o WHERE o.baseline_id = s.id AND o.closed_at IS NULL)
+             AND NOT EXISTS (SELECT 1 FROM games g WHERE g.home_submission_id = s.id AND g.state IN ('queued', 'running'))
+             AND NOT EXISTS (SELECT 1 FROM games g WHERE g.away_submission_id = s.id AND g.state IN ('queued', 'running'))"#,
         stage,
         going,
     )

@@ -26,6 +26,10 @@ const PUBLIC_COLUMNS: &[(&str, &str)] = &[
         "cut_at day deadline_at is_final missed_for released_at stage_id",
     ),
     ("divisions", "name position"),
+    (
+        "entrants",
+        "entered_at from_round left_as left_at left_for team_id tournament_id",
+    ),
     ("episode_summaries", "run_id summary version"),
     (
         "evaluations",
@@ -34,10 +38,27 @@ const PUBLIC_COLUMNS: &[(&str, &str)] = &[
     ),
     ("events", "actor at id kind payload subject_id subject_kind"),
     ("frozen_boards", "frozen_at reason stage_id"),
+    (
+        "game_attempts",
+        "away_blake3 away_log begun_at ended_at game_blake3 game_id home_blake3 home_log number outcome reason recording score worker",
+    ),
+    (
+        "games",
+        "asked_by attempt away_submission_id away_team_id created_at ended_at game_no home_submission_id home_team_id id matchday \
+         meeting purpose reason replay round second_half seed state tournament_id unit_id",
+    ),
     ("lanes", "lane rank served_ms urgency"),
     (
         "questions",
         "answer answered_at asked_at id public team_id text",
+    ),
+    (
+        "round_submissions",
+        "round submission_id team_id tournament_id",
+    ),
+    (
+        "rounds",
+        "byes groups number over_at started_at tournament_id",
     ),
     (
         "runs",
@@ -65,6 +86,10 @@ const PUBLIC_COLUMNS: &[(&str, &str)] = &[
         "affiliation created_at disqualified_at disqualified_for division id link name retired_at retired_by_organiser",
     ),
     ("terms", "since text version"),
+    (
+        "tournaments",
+        "baseline_id closed_at created_at id name number paused_at paused_for rules settings stage_id",
+    ),
 ];
 
 async fn open(file: &Path) -> SqliteConnection {
@@ -424,4 +449,104 @@ async fn keys_that_somebody_has_put_into_an_archive_open_nothing() {
     assert!(shown.set_host_token([9; 32], f.now).await.unwrap());
     let holder = shown.holder([9; 32], TokenKind::Key, f.now).await.unwrap();
     assert!(matches!(holder.unwrap().who, Who::Host));
+}
+
+#[tokio::test]
+async fn of_a_tournament_everybody_gets_what_counts() {
+    let f = Fixture::new().await;
+    let teams = [
+        f.ready_team("Alpha").await.team,
+        f.ready_team("Beta").await.team,
+    ];
+    let new = NewTournament {
+        name: "Cup".parse().unwrap(),
+        stage: None,
+        rules: TournamentRules::default(),
+        settings: TournamentSettings::default(),
+        entrants: teams.to_vec(),
+    };
+    let cup = f
+        .store
+        .open_tournament(Actor::Organiser, &new, f.now)
+        .await
+        .unwrap();
+    let friendly =
+        f.store
+            .order_friendly_game(Actor::Team(teams[0]), cup.id, teams[0], teams[1], f.now);
+    friendly.await.unwrap();
+    play_game(&f).await;
+    for number in 1..=2 {
+        let drawn = DrawnRound {
+            number: RoundNumber::try_from(number).unwrap(),
+            groups: Vec::new(),
+            matchdays: vec![DrawnMatchday {
+                games: vec![teams],
+                byes: Vec::new(),
+            }],
+        };
+        f.store
+            .start_round(Actor::Organiser, cup.id, &drawn, f.now)
+            .await
+            .unwrap();
+        if number == 1 {
+            play_game(&f).await;
+        }
+    }
+    for edition in [Edition::Organiser, Edition::Public] {
+        let folder = tempfile::tempdir().unwrap();
+        let snapshot = f
+            .store
+            .snapshot(folder.path(), edition, "a test", f.now)
+            .await
+            .unwrap();
+        let kept = snapshot.kept_artifacts().await.unwrap();
+        let store = snapshot.store();
+        let shown = store.tournament_record(cup.id).await.unwrap();
+        assert_eq!(shown.entrants.len(), 2);
+        assert_eq!(shown.games.len(), 1, "what waits is no result");
+        assert!(matches!(shown.games[0].state, GameState::Played(_)));
+        let games = kept
+            .iter()
+            .filter(|one| matches!(one.of, KeptOf::Game(_)))
+            .count();
+        let free = store.games(cup.id, GamesOf::Free(None)).await.unwrap();
+        let log = store
+            .game_log(shown.games[0].id, Side::First)
+            .await
+            .unwrap();
+        match edition {
+            Edition::Organiser => {
+                assert_eq!((games, free.len()), (6, 1));
+                assert_eq!(log.as_deref(), Some("home\n"));
+            }
+            Edition::Public => {
+                assert_eq!(free.len(), 0);
+                assert_eq!(log.as_deref(), Some(""));
+                let attempts = store.game_attempts(shown.games[0].id).await.unwrap();
+                assert_eq!(attempts[0].worker, "");
+            }
+        }
+    }
+}
+
+/// Plays the next unit, which must be a game with a recording.
+async fn play_game(f: &Fixture) {
+    let Some(Claimed {
+        claim,
+        work: Work::Game { .. },
+    }) = f.claim().await
+    else {
+        panic!("a game is queued")
+    };
+    let hash = || "0".repeat(64);
+    let commit = GameCommit {
+        score: serde_json::json!({}),
+        recording: Some(GameRecording {
+            key: format!("games/{}", claim.nonce),
+            game_blake3: hash(),
+            side_blake3: [hash(), hash()],
+        }),
+        logs: ["home\n".into(), "away\n".into()],
+    };
+    f.store.commit_game(&claim, &commit, f.now).await.unwrap();
 }

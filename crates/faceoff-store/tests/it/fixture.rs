@@ -140,7 +140,9 @@ impl Fixture {
                     self.finish(&claim, 1.0, "d").await;
                     return evaluation;
                 }
-                Work::Smoke { .. } => panic!("expected a shard or a finalisation"),
+                Work::Smoke { .. } | Work::Game { .. } => {
+                    panic!("expected a shard or a finalisation")
+                }
             }
         }
     }
@@ -155,7 +157,7 @@ impl Fixture {
                 Work::Finalise { .. } => {
                     self.finish(&claim, score, "d").await;
                 }
-                Work::Smoke { .. } => panic!("no upload waits"),
+                Work::Smoke { .. } | Work::Game { .. } => panic!("no upload waits, no game"),
             }
         }
     }

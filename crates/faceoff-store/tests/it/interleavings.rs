@@ -55,7 +55,7 @@ impl Played {
             Work::Finalise { .. } => {
                 f.finish(&claim, 1.0, "d").await;
             }
-            Work::Smoke { .. } => unreachable!("the only smoke run is over"),
+            Work::Smoke { .. } | Work::Game { .. } => unreachable!("the only smoke run is over"),
         }
     }
 }

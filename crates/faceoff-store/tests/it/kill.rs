@@ -124,6 +124,7 @@ async fn child() {
                     assert_eq!(committed, Committed::Now);
                     tell(format!("shard {}", shard.id));
                 }
+                Work::Game { .. } => panic!("no game is queued"),
                 Work::Finalise { evaluation, .. } => {
                     let key = format!("datasets/{evaluation}/{}.zip", claim.nonce);
                     store.artifacts().put_file(&key, file.path()).await.unwrap();

@@ -37,3 +37,4 @@ mod sign_off;
 mod stages;
 mod teams;
 mod tokens;
+mod tournaments;

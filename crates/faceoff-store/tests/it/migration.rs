@@ -694,6 +694,7 @@ async fn work_goes_on_where_the_old_program_left_it() {
                 let committed = f.store.commit_shard(&claim, played, f.now).await;
                 assert_eq!(committed.unwrap(), Committed::Now);
             }
+            Work::Game { .. } => panic!("no game is queued"),
             Work::Finalise { recordings, .. } => {
                 assert_eq!(recordings.len(), 6);
                 f.finish(&claim, 1.0, "datasets/new.zip").await;

@@ -40,6 +40,7 @@ async fn work(f: &mut Fixture) -> bool {
             f.finish(&claim, 1.0, "d").await;
             return true;
         }
+        Work::Game { .. } => panic!("no game is queued"),
     }
     false
 }

@@ -95,6 +95,7 @@ impl Slots {
             } => (self.teams[&self.evaluations[id]], Kind::Shard),
             Work::Shard { .. } => ("", Kind::Ablation),
             Work::Finalise { .. } => ("", Kind::Finalise),
+            Work::Game { .. } => panic!("no game is queued"),
         }
     }
 
@@ -171,6 +172,7 @@ impl Slots {
                 store.commit_shard(claim, played, now).await
             }
             Work::Finalise { .. } => Ok(self.f.finish(claim, 1.0, "d").await),
+            Work::Game { .. } => panic!("no game is queued"),
         };
         assert_eq!(committed.unwrap(), Committed::Now);
     }

@@ -1,0 +1,46 @@
+use crate::{
+    error::{Result, StoreError},
+    event::{Actor, Event, Subject},
+    operations::tournament::playing::{owed, playing},
+    store::Store,
+    tables::{
+        games,
+        tournaments::{self, Tournament},
+    },
+};
+use faceoff_types::TournamentId;
+use jiff::Timestamp;
+
+impl Store {
+    /// Closes a tournament: nothing of it changes any more. [`StoreError::Conflict`] while a game is open, or one of a
+    /// round has no result and both its teams are in it.
+    pub async fn close_tournament(
+        &self,
+        actor: Actor,
+        id: TournamentId,
+        now: Timestamp,
+    ) -> Result<Tournament> {
+        self.write(actor, now, async |tx| {
+            let mut tournament = tournaments::find_open(tx, id).await?;
+            let open = games::open(tx, id).await?.len();
+            if open > 0 {
+                return Err(StoreError::Conflict(format!(
+                    "{open} games are queued or running: wait for their end, or call off those that do not count"
+                )));
+            }
+            let playing = playing(tx, id).await?;
+            let games = games::of_rounds(tx, id).await?;
+            if let Some(game) = owed(&games, &playing).first() {
+                return Err(StoreError::Conflict(format!(
+                    "game {} has no result: play it again, or let one of its teams leave",
+                    game.id
+                )));
+            }
+            tournament.closed_at = Some(now);
+            tournaments::update(tx, &tournament).await?;
+            tx.record(Subject::Tournament(id), Event::TournamentClosed);
+            Ok(tournament)
+        })
+        .await
+    }
+}

@@ -1,0 +1,197 @@
+use crate::{
+    error::{Result, StoreError},
+    event::{Actor, Event, Subject},
+    operations::tournament::{
+        play,
+        playing::{owed, playing},
+    },
+    store::Store,
+    tables::{
+        entrants::{self, Entrant, Leave},
+        games::{self, GamePurpose, GameState},
+        rounds, season, teams,
+        tournaments::{self, Tournament},
+    },
+    write::Tx,
+};
+use faceoff_types::{LeftAs, RoundNumber, TeamId, TournamentFormat, TournamentId};
+use jiff::Timestamp;
+use std::collections::BTreeSet;
+
+/// A team that leaves.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Leaving {
+    /// Which.
+    pub team: TeamId,
+    /// How.
+    pub left_as: LeftAs,
+    /// The first round whose games with it do not count, if it is another than the one that is under way or next.
+    pub from_round: Option<RoundNumber>,
+    /// As everybody may read it.
+    pub reason: String,
+}
+
+/// Refuses who would enter while a round is under way, or when the groups are drawn.
+async fn check_enterable(tx: &mut Tx, tournament: &Tournament, playing: &[Entrant]) -> Result<()> {
+    let is_drawn = rounds::count(tx, tournament.id).await? > 0;
+    if is_drawn && matches!(tournament.rules.format, TournamentFormat::Groups { .. }) {
+        return Err(StoreError::Conflict(
+            "the groups are drawn: nobody enters any more".into(),
+        ));
+    }
+    let games = games::of_rounds(tx, tournament.id).await?;
+    if !owed(&games, playing).is_empty() {
+        return Err(StoreError::Conflict(
+            "a round is under way: teams enter before the first round, or between two".into(),
+        ));
+    }
+    Ok(())
+}
+
+/// Calls off the games of a team that have no result.
+async fn call_off(tx: &mut Tx, id: TournamentId, team: TeamId, reason: &str) -> Result<()> {
+    let mut games = games::of_rounds(tx, id).await?;
+    games.extend(
+        games::free(tx, id, Some(team))
+            .await?
+            .into_iter()
+            .filter(|game| game.state.is_open()),
+    );
+    let mut rounds = BTreeSet::new();
+    for game in games {
+        let is_over = matches!(
+            game.state,
+            GameState::Played(_) | GameState::Cancelled { .. }
+        );
+        if is_over || !game.teams.contains(&team) {
+            continue;
+        }
+        play::call_off(tx, &game, reason).await?;
+        if let GamePurpose::Round(meeting) = game.purpose {
+            rounds.insert(meeting.round);
+        }
+    }
+    for round in rounds {
+        play::end_round_if_over(tx, id, round).await?;
+    }
+    Ok(())
+}
+
+/// The round that a team leaves from that leaves now: the first one with an open game, else the next.
+async fn round_under_way(
+    tx: &mut Tx,
+    id: TournamentId,
+    playing: &[Entrant],
+) -> Result<RoundNumber> {
+    let games = games::of_rounds(tx, id).await?;
+    let open = owed(&games, playing);
+    match open.first().and_then(|game| game.purpose.meeting()) {
+        Some(meeting) => Ok(meeting.round),
+        None => RoundNumber::try_from(rounds::count(tx, id).await? + 1)
+            .map_err(|_| StoreError::Conflict("all rounds that there can be were played".into())),
+    }
+}
+
+impl Store {
+    /// Adds teams, from the next round on. [`StoreError::Conflict`] while a round is under way, once the groups of a tournament
+    /// with groups were drawn, and of a team that is in it or has left it.
+    pub async fn enter_tournament(
+        &self,
+        actor: Actor,
+        id: TournamentId,
+        new: &[TeamId],
+        now: Timestamp,
+    ) -> Result<()> {
+        self.write(actor, now, async |tx| {
+            season::check_open(tx).await?;
+            let tournament = tournaments::find_open(tx, id).await?;
+            let playing = playing(tx, id).await?;
+            check_enterable(tx, &tournament, &playing).await?;
+            let all = entrants::all(tx, id).await?;
+            for team in new {
+                let team = teams::find(tx, *team).await?;
+                if let Some(entrant) = all.iter().find(|entrant| entrant.team == team.id) {
+                    let how = match entrant.left {
+                        None => "is in it already",
+                        Some(_) => "has left it, for good",
+                    };
+                    return Err(StoreError::Conflict(format!("{} {how}", team.name)));
+                }
+                entrants::put(tx, id, team.id, now).await?;
+            }
+            let teams = new.to_vec();
+            tx.record(Subject::Tournament(id), Event::TeamsEntered { teams });
+            Ok(())
+        })
+        .await
+    }
+
+    /// A team leaves for good: its games that have no result are called off, and no game with it counts from the round on
+    /// that is under way, or, between rounds, from the next; a disqualified one may lose earlier ones, too
+    /// (`from_round`). Before the first round it is just out (`None`), and may enter again. [`StoreError::Conflict`] if it has left,
+    /// or is not in it, or the tournament is closed.
+    pub async fn leave_tournament(
+        &self,
+        actor: Actor,
+        id: TournamentId,
+        leaving: &Leaving,
+        now: Timestamp,
+    ) -> Result<Option<Leave>> {
+        let Leaving {
+            team,
+            left_as,
+            from_round,
+            ref reason,
+        } = *leaving;
+        self.write(actor, now, async |tx| {
+            tournaments::find_open(tx, id).await?;
+            let playing = playing(tx, id).await?;
+            let Some(entrant) = playing.iter().find(|entrant| entrant.team == team) else {
+                return Err(StoreError::Conflict(
+                    "the team is not in the tournament, or has left it".into(),
+                ));
+            };
+            let called_off = format!("{} has left the tournament", entrant.name);
+            if rounds::count(tx, id).await? == 0 {
+                entrants::remove(tx, id, team).await?;
+                call_off(tx, id, team, &called_off).await?;
+                let reason = reason.clone();
+                tx.record(Subject::Tournament(id), Event::TeamOut { team, reason });
+                return Ok(None);
+            }
+            let current = round_under_way(tx, id, &playing).await?;
+            let from_round = match (from_round, left_as) {
+                (None, _) => current,
+                (Some(from), LeftAs::Disqualified) if from <= current => from,
+                (Some(from), LeftAs::Withdrawn) if from == current => from,
+                (Some(from), LeftAs::Withdrawn) => {
+                    return Err(StoreError::Conflict(format!(
+                        "from_round: who withdraws keeps what was played before round {current}; got {from}"
+                    )));
+                }
+                (Some(from), LeftAs::Disqualified) => {
+                    return Err(StoreError::Conflict(format!(
+                        "from_round: expected 1 to {current}, the round that is under way or next; got {from}"
+                    )));
+                }
+            };
+            let leave = Leave {
+                left_as,
+                from_round,
+                at: now,
+                reason: reason.clone(),
+            };
+            entrants::set_left(tx, id, team, &leave).await?;
+            call_off(tx, id, team, &called_off).await?;
+            let event = Event::TeamLeftTournament {
+                team,
+                left_as,
+                from_round,
+                reason: reason.clone(),
+            };
+            tx.record(Subject::Tournament(id), event);
+            Ok(Some(leave))
+        })
+        .await
+    }
+}

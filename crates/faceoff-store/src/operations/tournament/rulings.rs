@@ -1,0 +1,79 @@
+use crate::{
+    error::{Result, StoreError},
+    event::{Actor, Event, Subject},
+    operations::{
+        purpose,
+        tournament::{play, playing::playing},
+    },
+    store::Store,
+    tables::{
+        games::{self, Game, GamePurpose, GameState, NoResult},
+        season, tournaments,
+    },
+};
+use faceoff_types::GameId;
+use jiff::Timestamp;
+
+impl Store {
+    /// A result counts no more; its attempt stays. The next round waits until the game is played again.
+    /// [`StoreError::Conflict`] unless it is a round's game with a result.
+    pub async fn void_game(
+        &self,
+        actor: Actor,
+        id: GameId,
+        reason: &str,
+        now: Timestamp,
+    ) -> Result<Game> {
+        self.write(actor, now, async |tx| {
+            let game = games::find(tx, id).await?;
+            tournaments::find_open(tx, game.tournament).await?;
+            let (GamePurpose::Round(_), GameState::Played(_)) = (game.purpose, &game.state) else {
+                return Err(StoreError::Conflict(
+                    "only a game of a round that has a result is voided".into(),
+                ));
+            };
+            games::set_without_result(tx, id, NoResult::Void, reason, now).await?;
+            let reason = reason.to_owned();
+            tx.record(Subject::Game(id), Event::GameVoided { reason });
+            games::find(tx, id).await
+        })
+        .await
+    }
+
+    /// Queues a game again that was voided or broken by us: same submissions, same seed. [`StoreError::Conflict`] of any
+    /// other, and if one of its teams has left.
+    pub async fn rerun_game(&self, actor: Actor, id: GameId, now: Timestamp) -> Result<Game> {
+        self.write(actor, now, async |tx| {
+            season::check_open(tx).await?;
+            let game = games::find(tx, id).await?;
+            tournaments::find_open(tx, game.tournament).await?;
+            if !matches!(
+                game.state,
+                GameState::Void { .. } | GameState::Broken { .. }
+            ) {
+                return Err(StoreError::Conflict(
+                    "only a game that was voided, or that we could not play, is played again"
+                        .into(),
+                ));
+            }
+            let lane = match game.purpose {
+                GamePurpose::Round(_) => {
+                    let playing = playing(tx, game.tournament).await?;
+                    let plays = |team| playing.iter().any(|entrant| entrant.team == team);
+                    if !game.teams.into_iter().all(plays) {
+                        return Err(StoreError::Conflict(
+                            "one of its teams has left the tournament".into(),
+                        ));
+                    }
+                    purpose::ROUND_GAME
+                }
+                GamePurpose::Test { .. } | GamePurpose::Friendly { .. } => purpose::FREE_GAME,
+                GamePurpose::Replay { .. } => purpose::REPLAY_GAME,
+            };
+            play::enqueue_again(tx, &game, lane).await?;
+            tx.record(Subject::Game(id), Event::GameQueuedAgain);
+            games::find(tx, id).await
+        })
+        .await
+    }
+}

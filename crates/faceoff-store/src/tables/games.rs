@@ -1,0 +1,662 @@
+//! Games on the server: what they are for, and how they stand.
+
+use crate::{
+    column::{Instant, Json},
+    error::{Result, StoreError},
+};
+use faceoff_types::{GameId, GameSeed, RoundNumber, SubmissionId, TeamId, TournamentId};
+use jiff::Timestamp;
+use serde_json::Value;
+use sqlx::{SqliteConnection, types::Text};
+use uuid::Uuid;
+
+/// Two submissions at one table. Pairs are the home side's first, which moves the first robot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Game {
+    /// Part of its URLs.
+    pub id: GameId,
+    /// By whose rules.
+    pub tournament: TournamentId,
+    /// What it is for.
+    pub purpose: GamePurpose,
+    /// Who plays.
+    pub teams: [TeamId; 2],
+    /// With what.
+    pub submissions: [SubmissionId; 2],
+    /// What its seed follows from.
+    pub seed: GameSeed,
+    /// When it was queued first.
+    pub created_at: Timestamp,
+    /// How it stands.
+    pub state: GameState,
+}
+
+/// What a game is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GamePurpose {
+    /// It counts.
+    Round(Meeting),
+    /// Against the organisers' baseline, which is away.
+    Test {
+        /// Who asked for it; none: an organiser.
+        asked_by: Option<TeamId>,
+    },
+    /// Two teams, before or between rounds.
+    Friendly {
+        /// Who asked for it, and whose quota it takes.
+        asked_by: TeamId,
+    },
+    /// The schedule played again: how sure is its champion?
+    Replay {
+        /// Which time, from 1.
+        replay: u32,
+        /// The game that is played again.
+        of: Meeting,
+    },
+}
+
+/// The place of a game in its tournament.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Meeting {
+    /// The round.
+    pub round: RoundNumber,
+    /// From 1.
+    pub matchday: u32,
+    /// From 1, in the order in which the round was drawn.
+    pub meeting: u32,
+    /// Is it the second game of a mirrored pair, with sides swapped?
+    pub second_half: bool,
+}
+
+/// How a game stands.
+#[derive(Debug, Clone, PartialEq)]
+pub enum GameState {
+    /// No slot has it.
+    Queued,
+    /// A slot plays it.
+    Running {
+        /// Which attempt, from 1.
+        attempt: u32,
+        /// Since when.
+        since: Timestamp,
+    },
+    /// It has a result.
+    Played(Box<GameResultRow>),
+    /// Our fault, given up: it has no result until it is played again.
+    Broken {
+        /// When.
+        at: Timestamp,
+        /// What went wrong.
+        reason: String,
+    },
+    /// It had a result that counts no more: it has none until it is played again.
+    Void {
+        /// When.
+        at: Timestamp,
+        /// As everybody may read it.
+        reason: String,
+    },
+    /// It is not played: a side left, or it does not count and was called off.
+    Cancelled {
+        /// When.
+        at: Timestamp,
+        /// As everybody may read it.
+        reason: String,
+    },
+}
+
+impl GameState {
+    /// Does it wait for a slot, or is it played?
+    #[must_use]
+    pub const fn is_open(&self) -> bool {
+        matches!(self, Self::Queued | Self::Running { .. })
+    }
+}
+
+/// What a game came to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GameResultRow {
+    /// The attempt that counts, from 1.
+    pub attempt: u32,
+    /// When it was committed.
+    pub at: Timestamp,
+    /// The scoring's: a game's `results.json`.
+    pub score: Value,
+    /// Where its files are; none of a replay of the schedule.
+    pub recording: Option<GameRecording>,
+}
+
+/// The stored files of a game: `game.zip`, `side-1.zip` and `side-2.zip`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GameRecording {
+    /// Artifact key prefix, without the slash.
+    pub key: String,
+    /// BLAKE3 of `game.zip`, 64 hexadecimal digits.
+    pub game_blake3: String,
+    /// Of the sides' own files, the home side's first.
+    pub side_blake3: [String; 2],
+}
+
+/// What playing a game yields.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GameCommit {
+    /// The scoring's: a game's `results.json`.
+    pub score: Value,
+    /// Uploaded before; none exactly of a replay of the schedule.
+    pub recording: Option<GameRecording>,
+    /// The ends of both agents' standard errors, with their faults.
+    pub logs: [String; 2],
+}
+
+impl GamePurpose {
+    const fn word(self) -> &'static str {
+        match self {
+            Self::Round(_) => "round",
+            Self::Test { .. } => "test",
+            Self::Friendly { .. } => "friendly",
+            Self::Replay { .. } => "replay",
+        }
+    }
+
+    /// Its place in the schedule, if it has one.
+    #[must_use]
+    pub const fn meeting(self) -> Option<Meeting> {
+        match self {
+            Self::Round(meeting) | Self::Replay { of: meeting, .. } => Some(meeting),
+            Self::Test { .. } | Self::Friendly { .. } => None,
+        }
+    }
+
+    /// Is its recording stored?
+    #[must_use]
+    pub const fn keeps_recording(self) -> bool {
+        !matches!(self, Self::Replay { .. })
+    }
+}
+
+struct Row {
+    id: Text<GameId>,
+    tournament: Text<TournamentId>,
+    purpose: String,
+    round: Option<u32>,
+    matchday: Option<u32>,
+    meeting: Option<u32>,
+    second_half: Option<bool>,
+    replay: Option<u32>,
+    asked_by: Option<Text<TeamId>>,
+    home_team: Text<TeamId>,
+    away_team: Text<TeamId>,
+    home_submission: Text<SubmissionId>,
+    away_submission: Text<SubmissionId>,
+    seed: Text<GameSeed>,
+    created_at: Instant,
+    state: String,
+    attempt: Option<u32>,
+    ended_at: Option<Instant>,
+    reason: Option<String>,
+    begun_at: Option<Instant>,
+    score: Option<Json<Value>>,
+    recording: Option<String>,
+    game_blake3: Option<String>,
+    home_blake3: Option<String>,
+    away_blake3: Option<String>,
+}
+
+impl Row {
+    fn purpose(&self) -> Option<GamePurpose> {
+        let asked_by = self.asked_by.as_ref().map(|team| team.0);
+        let meeting = || {
+            Some(Meeting {
+                round: RoundNumber::try_from(self.round?).ok()?,
+                matchday: self.matchday?,
+                meeting: self.meeting?,
+                second_half: self.second_half?,
+            })
+        };
+        Some(match self.purpose.as_str() {
+            "round" => GamePurpose::Round(meeting()?),
+            "test" => GamePurpose::Test { asked_by },
+            "friendly" => GamePurpose::Friendly {
+                asked_by: asked_by?,
+            },
+            "replay" => GamePurpose::Replay {
+                replay: self.replay?,
+                of: meeting()?,
+            },
+            _ => return None,
+        })
+    }
+
+    fn state(&mut self) -> Option<GameState> {
+        let recording = match (
+            self.recording.take(),
+            self.game_blake3.take(),
+            self.home_blake3.take(),
+            self.away_blake3.take(),
+        ) {
+            (Some(key), Some(game_blake3), Some(home), Some(away)) => Some(GameRecording {
+                key,
+                game_blake3,
+                side_blake3: [home, away],
+            }),
+            _ => None,
+        };
+        let ended_at = self.ended_at.map(|at| at.0);
+        Some(match self.state.as_str() {
+            "queued" => GameState::Queued,
+            "running" => GameState::Running {
+                attempt: self.attempt?,
+                since: self.begun_at?.0,
+            },
+            "played" => GameState::Played(Box::new(GameResultRow {
+                attempt: self.attempt?,
+                at: ended_at?,
+                score: self.score.take()?.0,
+                recording,
+            })),
+            state => {
+                let (at, reason) = (ended_at?, self.reason.take()?);
+                match state {
+                    "broken" => GameState::Broken { at, reason },
+                    "void" => GameState::Void { at, reason },
+                    "cancelled" => GameState::Cancelled { at, reason },
+                    _ => return None,
+                }
+            }
+        })
+    }
+}
+
+impl TryFrom<Row> for Game {
+    type Error = StoreError;
+
+    fn try_from(mut row: Row) -> Result<Self> {
+        let damaged = |row: &Row, what| {
+            StoreError::Damaged(format!("game {}: {what} {:?}", row.id.0, row.state))
+        };
+        let purpose = row.purpose().ok_or_else(|| damaged(&row, "purpose"))?;
+        let state = row.state().ok_or_else(|| damaged(&row, "state"))?;
+        Ok(Self {
+            id: row.id.0,
+            tournament: row.tournament.0,
+            purpose,
+            teams: [row.home_team.0, row.away_team.0],
+            submissions: [row.home_submission.0, row.away_submission.0],
+            seed: row.seed.0,
+            created_at: row.created_at.0,
+            state,
+        })
+    }
+}
+
+/// `SELECT` of games `g` with the attempt that plays or counts; the argument is what follows the tables.
+macro_rules! select_games {
+    ($tail:literal $(, $argument:expr)*) => {
+        sqlx::query_as!(
+            Row,
+            r#"SELECT g.id AS "id: Text<GameId>", g.tournament_id AS "tournament: Text<TournamentId>", g.purpose,
+                      g.round AS "round: u32", g.matchday AS "matchday: u32", g.meeting AS "meeting: u32",
+                      g.second_half AS "second_half: bool", g.replay AS "replay: u32",
+                      g.asked_by AS "asked_by: Text<TeamId>",
+                      g.home_team_id AS "home_team: Text<TeamId>", g.away_team_id AS "away_team: Text<TeamId>",
+                      g.home_submission_id AS "home_submission: Text<SubmissionId>",
+                      g.away_submission_id AS "away_submission: Text<SubmissionId>",
+                      g.seed AS "seed: Text<GameSeed>", g.created_at AS "created_at: Instant", g.state,
+                      g.attempt AS "attempt: u32", g.ended_at AS "ended_at: Instant", g.reason,
+                      a.begun_at AS "begun_at?: Instant", a.score AS "score?: Json<Value>", a.recording AS "recording?",
+                      a.game_blake3 AS "game_blake3?", a.home_blake3 AS "home_blake3?", a.away_blake3 AS "away_blake3?"
+               FROM games g LEFT JOIN game_attempts a ON a.game_id = g.id AND a.number = g.attempt "# + $tail
+            $(, $argument)*
+        )
+    };
+}
+
+fn games(rows: Vec<Row>) -> Result<Vec<Game>> {
+    rows.into_iter().map(Game::try_from).collect()
+}
+
+pub(crate) async fn find(connection: &mut SqliteConnection, id: GameId) -> Result<Game> {
+    let id = Text(id);
+    select_games!("WHERE g.id = ?", id)
+        .fetch_optional(connection)
+        .await?
+        .ok_or(StoreError::NotFound("game"))?
+        .try_into()
+}
+
+/// Those of all rounds, in the order of play.
+pub(crate) async fn of_rounds(
+    connection: &mut SqliteConnection,
+    tournament: TournamentId,
+) -> Result<Vec<Game>> {
+    let id = Text(tournament);
+    let rows = select_games!(
+        "WHERE g.tournament_id = ? AND g.purpose = 'round' ORDER BY g.round, g.meeting, g.second_half",
+        id
+    );
+    games(rows.fetch_all(connection).await?)
+}
+
+/// Those of the schedule played again, in order.
+pub(crate) async fn of_replays(
+    connection: &mut SqliteConnection,
+    tournament: TournamentId,
+) -> Result<Vec<Game>> {
+    let id = Text(tournament);
+    let rows = select_games!(
+        "WHERE g.tournament_id = ? AND g.purpose = 'replay'
+         ORDER BY g.replay, g.round, g.meeting, g.second_half",
+        id
+    );
+    games(rows.fetch_all(connection).await?)
+}
+
+/// Those that do not count, the newest first; of one team if it is given.
+pub(crate) async fn free(
+    connection: &mut SqliteConnection,
+    tournament: TournamentId,
+    team: Option<TeamId>,
+) -> Result<Vec<Game>> {
+    let (id, team) = (Text(tournament), team.map(Text));
+    let rows = select_games!(
+        "WHERE g.tournament_id = ?1 AND g.purpose IN ('test', 'friendly')
+           AND (?2 IS NULL OR g.home_team_id = ?2 OR g.away_team_id = ?2)
+         ORDER BY g.game_no DESC",
+        id,
+        team
+    );
+    games(rows.fetch_all(connection).await?)
+}
+
+/// Those that wait or are played, of all purposes.
+pub(crate) async fn open(
+    connection: &mut SqliteConnection,
+    tournament: TournamentId,
+) -> Result<Vec<Game>> {
+    let id = Text(tournament);
+    let rows = select_games!(
+        "WHERE g.tournament_id = ? AND g.state IN ('queued', 'running') ORDER BY g.game_no",
+        id
+    );
+    games(rows.fetch_all(connection).await?)
+}
+
+/// Which game a unit of work plays.
+pub(crate) async fn of_unit(
+    connection: &mut SqliteConnection,
+    unit: Uuid,
+) -> Result<Option<GameId>> {
+    let unit = Text(unit);
+    let found = sqlx::query_scalar!(
+        r#"SELECT id AS "id: Text<GameId>" FROM games WHERE unit_id = ?"#,
+        unit
+    )
+    .fetch_optional(connection)
+    .await?;
+    Ok(found.map(|id| id.0))
+}
+
+/// What plays a game, or played it last.
+pub(crate) async fn unit_of(connection: &mut SqliteConnection, id: GameId) -> Result<Uuid> {
+    let id = Text(id);
+    let found = sqlx::query_scalar!(
+        r#"SELECT unit_id AS "unit: Text<Uuid>" FROM games WHERE id = ?"#,
+        id
+    )
+    .fetch_optional(connection)
+    .await?;
+    found
+        .flatten()
+        .map(|unit| unit.0)
+        .ok_or(StoreError::NotFound("game"))
+}
+
+/// Adds a game that `unit` is to play.
+pub(crate) async fn insert(
+    connection: &mut SqliteConnection,
+    game: &Game,
+    unit: Uuid,
+) -> Result<()> {
+    let (id, tournament, purpose) = (Text(game.id), Text(game.tournament), game.purpose.word());
+    let (round, matchday, meeting, second_half) = match game.purpose.meeting() {
+        None => (None, None, None, None),
+        Some(place) => (
+            Some(place.round.get()),
+            Some(place.matchday),
+            Some(place.meeting),
+            Some(place.second_half),
+        ),
+    };
+    let (replay, asked_by) = match game.purpose {
+        GamePurpose::Round(_) => (None, None),
+        GamePurpose::Test { asked_by } => (None, asked_by.map(Text)),
+        GamePurpose::Friendly { asked_by } => (None, Some(Text(asked_by))),
+        GamePurpose::Replay { replay, .. } => (Some(replay), None),
+    };
+    let [home, away] = game.teams.map(Text);
+    let [home_submission, away_submission] = game.submissions.map(Text);
+    let (seed, created_at, unit) = (Text(game.seed), Instant(game.created_at), Text(unit));
+    sqlx::query!(
+        "INSERT INTO games (id, tournament_id, purpose, round, matchday, meeting, second_half, replay, asked_by,
+                            home_team_id, away_team_id, home_submission_id, away_submission_id, seed, created_at,
+                            unit_id, state)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, 'queued')",
+        id,
+        tournament,
+        purpose,
+        round,
+        matchday,
+        meeting,
+        second_half,
+        replay,
+        asked_by,
+        home,
+        away,
+        home_submission,
+        away_submission,
+        seed,
+        created_at,
+        unit,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Another unit is to play it.
+pub(crate) async fn set_queued_again(
+    connection: &mut SqliteConnection,
+    id: GameId,
+    unit: Uuid,
+) -> Result<()> {
+    let (id, unit) = (Text(id), Text(unit));
+    sqlx::query!(
+        "UPDATE games SET state = 'queued', unit_id = ?, attempt = NULL, ended_at = NULL, reason = NULL WHERE id = ?",
+        unit,
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Its unit waits for a slot again.
+pub(crate) async fn set_waiting(connection: &mut SqliteConnection, id: GameId) -> Result<()> {
+    let id = Text(id);
+    sqlx::query!(
+        "UPDATE games SET state = 'queued', attempt = NULL WHERE id = ? AND state = 'running'",
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// A slot plays it.
+pub(crate) async fn set_running(
+    connection: &mut SqliteConnection,
+    id: GameId,
+    attempt: u32,
+) -> Result<()> {
+    let id = Text(id);
+    sqlx::query!(
+        "UPDATE games SET state = 'running', attempt = ? WHERE id = ?",
+        attempt,
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// The result of this attempt counts.
+pub(crate) async fn set_played(
+    connection: &mut SqliteConnection,
+    id: GameId,
+    attempt: u32,
+    now: Timestamp,
+) -> Result<()> {
+    let (id, now) = (Text(id), Instant(now));
+    sqlx::query!(
+        "UPDATE games SET state = 'played', attempt = ?, ended_at = ? WHERE id = ?",
+        attempt,
+        now,
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Why a game has no result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum NoResult {
+    Broken,
+    Void,
+    Cancelled,
+}
+
+/// It has no result.
+pub(crate) async fn set_without_result(
+    connection: &mut SqliteConnection,
+    id: GameId,
+    why: NoResult,
+    reason: &str,
+    now: Timestamp,
+) -> Result<()> {
+    let state = match why {
+        NoResult::Broken => "broken",
+        NoResult::Void => "void",
+        NoResult::Cancelled => "cancelled",
+    };
+    let (id, now) = (Text(id), Instant(now));
+    sqlx::query!(
+        "UPDATE games SET state = ?, attempt = NULL, ended_at = ?, reason = ? WHERE id = ?",
+        state,
+        now,
+        reason,
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// How many that do not count a team has asked for since an instant, called-off ones left out.
+pub(crate) async fn count_asked(
+    connection: &mut SqliteConnection,
+    team: TeamId,
+    since: Timestamp,
+) -> Result<u32> {
+    let (team, since) = (Text(team), Instant(since));
+    Ok(sqlx::query_scalar!(
+        r#"SELECT COUNT(*) AS "count!: u32" FROM games
+           WHERE asked_by = ? AND created_at >= ? AND NOT (state = 'cancelled' AND NOT EXISTS
+               (SELECT 1 FROM game_attempts a WHERE a.game_id = games.id))"#,
+        team,
+        since,
+    )
+    .fetch_one(connection)
+    .await?)
+}
+
+/// The last time that the schedule is, or was, to be played again; 0: never.
+pub(crate) async fn last_replay(
+    connection: &mut SqliteConnection,
+    tournament: TournamentId,
+) -> Result<u32> {
+    let id = Text(tournament);
+    Ok(sqlx::query_scalar!(
+        r#"SELECT COALESCE(MAX(replay), 0) AS "last!: u32" FROM games WHERE tournament_id = ?"#,
+        id
+    )
+    .fetch_one(connection)
+    .await?)
+}
+
+/// How many of all tournaments wait or are played.
+pub(crate) async fn count_open(connection: &mut SqliteConnection) -> Result<u32> {
+    Ok(sqlx::query_scalar!(
+        r#"SELECT COUNT(*) AS "count!: u32" FROM games WHERE state IN ('queued', 'running')"#
+    )
+    .fetch_one(connection)
+    .await?)
+}
+
+/// May a submission still play in a tournament that is not closed: in an open game, in one that is played again, or
+/// as its baseline?
+pub(crate) async fn needs(
+    connection: &mut SqliteConnection,
+    submission: SubmissionId,
+) -> Result<bool> {
+    let id = Text(submission);
+    Ok(sqlx::query_scalar!(
+        r#"SELECT EXISTS (SELECT 1 FROM round_submissions r JOIN tournaments t ON t.id = r.tournament_id
+                          WHERE r.submission_id = ?1 AND t.closed_at IS NULL)
+               OR EXISTS (SELECT 1 FROM games WHERE home_submission_id = ?1 AND state IN ('queued', 'running'))
+               OR EXISTS (SELECT 1 FROM games WHERE away_submission_id = ?1 AND state IN ('queued', 'running'))
+               OR EXISTS (SELECT 1 FROM tournaments WHERE baseline_id = ?1 AND closed_at IS NULL)
+               AS "needs!: bool""#,
+        id
+    )
+    .fetch_one(connection)
+    .await?)
+}
+
+/// Does a team play no friendly games that others ask for?
+pub(crate) async fn declines_friendlies(
+    connection: &mut SqliteConnection,
+    team: TeamId,
+) -> Result<bool> {
+    let team = Text(team);
+    Ok(sqlx::query_scalar!(
+        r#"SELECT EXISTS (SELECT 1 FROM friendly_games_declined WHERE team_id = ?) AS "declines!: bool""#,
+        team
+    )
+    .fetch_one(connection)
+    .await?)
+}
+
+pub(crate) async fn set_declines_friendlies(
+    connection: &mut SqliteConnection,
+    team: TeamId,
+    declines: bool,
+) -> Result<()> {
+    let team = Text(team);
+    if declines {
+        sqlx::query!(
+            "INSERT OR IGNORE INTO friendly_games_declined (team_id) VALUES (?)",
+            team
+        )
+        .execute(connection)
+        .await?;
+    } else {
+        sqlx::query!(
+            "DELETE FROM friendly_games_declined WHERE team_id = ?",
+            team
+        )
+        .execute(connection)
+        .await?;
+    }
+    Ok(())
+}

@@ -1,0 +1,176 @@
+//! The rounds of a tournament, as they were drawn.
+
+use crate::{
+    column::{Instant, Json},
+    error::{Result, StoreError},
+};
+use faceoff_types::{RoundNumber, SubmissionId, TeamId, TournamentId};
+use jiff::Timestamp;
+use sqlx::{SqliteConnection, types::Text};
+use std::collections::BTreeMap;
+
+/// A round that was started.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TournamentRound {
+    /// From 1.
+    pub number: RoundNumber,
+    /// From then on its submissions are fixed.
+    pub started_at: Timestamp,
+    /// When the last of its games had ended for the first time.
+    pub over_at: Option<Timestamp>,
+    /// Who plays in which group, where there are groups.
+    pub groups: Vec<Vec<TeamId>>,
+    /// Who has nobody to play, in the order of play.
+    pub byes: Vec<RoundBye>,
+    /// What each team plays with.
+    pub submissions: Vec<(TeamId, SubmissionId)>,
+}
+
+/// A team that has nobody to play on a matchday.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RoundBye {
+    /// From 1.
+    pub matchday: u32,
+    /// Which.
+    pub team: TeamId,
+}
+
+/// A round as it is drawn, to be started. Pairs are the home team's first.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DrawnRound {
+    /// The one after all that were started.
+    pub number: RoundNumber,
+    /// Who plays in which group, where there are groups.
+    pub groups: Vec<Vec<TeamId>>,
+    /// In the order of play.
+    pub matchdays: Vec<DrawnMatchday>,
+}
+
+/// Games that can be played side by side.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct DrawnMatchday {
+    /// The games.
+    pub games: Vec<[TeamId; 2]>,
+    /// Who has nobody to play.
+    pub byes: Vec<TeamId>,
+}
+
+/// All of a tournament, in order.
+pub(crate) async fn all(
+    connection: &mut SqliteConnection,
+    tournament: TournamentId,
+) -> Result<Vec<TournamentRound>> {
+    let id = Text(tournament);
+    let mut submissions = BTreeMap::<u32, Vec<(TeamId, SubmissionId)>>::new();
+    let rows = sqlx::query!(
+        r#"SELECT round AS "round: u32", team_id AS "team: Text<TeamId>", submission_id AS "submission: Text<SubmissionId>"
+           FROM round_submissions WHERE tournament_id = ? ORDER BY round, team_id"#,
+        id
+    )
+    .fetch_all(&mut *connection)
+    .await?;
+    for row in rows {
+        let of_round = submissions.entry(row.round).or_default();
+        of_round.push((row.team.0, row.submission.0));
+    }
+    let rows = sqlx::query!(
+        r#"SELECT number AS "number: u32", started_at AS "started_at: Instant", over_at AS "over_at: Instant",
+                  groups AS "groups: Json<Vec<Vec<TeamId>>>", byes AS "byes: Json<Vec<(u32, TeamId)>>"
+           FROM rounds WHERE tournament_id = ? ORDER BY number"#,
+        id
+    )
+    .fetch_all(connection)
+    .await?;
+    rows.into_iter()
+        .map(|row| {
+            let number = RoundNumber::try_from(row.number).map_err(|error| {
+                StoreError::Damaged(format!("a round of {tournament}: {error}"))
+            })?;
+            let byes = row.byes.0.into_iter();
+            Ok(TournamentRound {
+                number,
+                started_at: row.started_at.0,
+                over_at: row.over_at.map(|at| at.0),
+                groups: row.groups.0,
+                byes: byes
+                    .map(|(matchday, team)| RoundBye { matchday, team })
+                    .collect(),
+                submissions: submissions.remove(&row.number).unwrap_or_default(),
+            })
+        })
+        .collect()
+}
+
+/// How many were started.
+pub(crate) async fn count(
+    connection: &mut SqliteConnection,
+    tournament: TournamentId,
+) -> Result<u32> {
+    let id = Text(tournament);
+    Ok(sqlx::query_scalar!(
+        r#"SELECT COUNT(*) AS "count!: u32" FROM rounds WHERE tournament_id = ?"#,
+        id
+    )
+    .fetch_one(connection)
+    .await?)
+}
+
+pub(crate) async fn insert(
+    connection: &mut SqliteConnection,
+    tournament: TournamentId,
+    round: &TournamentRound,
+) -> Result<()> {
+    let (id, number, started_at) = (
+        Text(tournament),
+        round.number.get(),
+        Instant(round.started_at),
+    );
+    let byes: Vec<(u32, TeamId)> = round
+        .byes
+        .iter()
+        .map(|bye| (bye.matchday, bye.team))
+        .collect();
+    let (groups, byes) = (Json(&round.groups), Json(byes));
+    sqlx::query!(
+        "INSERT INTO rounds (tournament_id, number, started_at, groups, byes) VALUES (?, ?, ?, ?, ?)",
+        id,
+        number,
+        started_at,
+        groups,
+        byes,
+    )
+    .execute(&mut *connection)
+    .await?;
+    for (team, submission) in &round.submissions {
+        let (team, submission) = (Text(*team), Text(*submission));
+        sqlx::query!(
+            "INSERT INTO round_submissions (tournament_id, round, team_id, submission_id) VALUES (?, ?, ?, ?)",
+            id,
+            number,
+            team,
+            submission,
+        )
+        .execute(&mut *connection)
+        .await?;
+    }
+    Ok(())
+}
+
+/// All of its games have ended. False if they had before.
+pub(crate) async fn set_over(
+    connection: &mut SqliteConnection,
+    tournament: TournamentId,
+    round: RoundNumber,
+    now: Timestamp,
+) -> Result<bool> {
+    let (id, number, now) = (Text(tournament), round.get(), Instant(now));
+    let over = sqlx::query!(
+        "UPDATE rounds SET over_at = ? WHERE tournament_id = ? AND number = ? AND over_at IS NULL",
+        now,
+        id,
+        number,
+    )
+    .execute(connection)
+    .await?;
+    Ok(over.rows_affected() == 1)
+}

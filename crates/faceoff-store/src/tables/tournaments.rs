@@ -1,0 +1,189 @@
+use crate::{
+    column::{Instant, Json},
+    error::{Result, StoreError},
+    tables::rulings::Ruling,
+};
+use faceoff_types::{
+    StageId, StageName, SubmissionId, TournamentId, TournamentRules, TournamentSettings,
+};
+use jiff::Timestamp;
+use sqlx::{SqliteConnection, types::Text};
+
+/// Rounds of games among teams: a stage whose days are rounds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tournament {
+    /// Part of its URLs.
+    pub id: TournamentId,
+    /// In its season, from 1; its seeds follow from it.
+    pub number: u32,
+    /// No two that differ only in case.
+    pub name: StageName,
+    /// When the organiser opened it.
+    pub created_at: Timestamp,
+    /// The stage whose tiers its first entrants come from, if they do.
+    pub stage: Option<StageId>,
+    /// What results depend on; fixed from the first round on.
+    pub rules: TournamentRules,
+    /// What they do not depend on.
+    pub settings: TournamentSettings,
+    /// The organisers' agent, against which teams may test theirs.
+    pub baseline: Option<SubmissionId>,
+    /// No game of it begins, if so.
+    pub paused: Option<Ruling>,
+    /// From then on nothing of it changes.
+    pub closed_at: Option<Timestamp>,
+}
+
+struct Row {
+    id: Text<TournamentId>,
+    number: u32,
+    name: Text<StageName>,
+    created_at: Instant,
+    stage: Option<Text<StageId>>,
+    rules: Json<TournamentRules>,
+    settings: Json<TournamentSettings>,
+    baseline: Option<Text<SubmissionId>>,
+    paused_at: Option<Instant>,
+    paused_for: Option<String>,
+    closed_at: Option<Instant>,
+}
+
+impl From<Row> for Tournament {
+    fn from(row: Row) -> Self {
+        Self {
+            id: row.id.0,
+            number: row.number,
+            name: row.name.0,
+            created_at: row.created_at.0,
+            stage: row.stage.map(|id| id.0),
+            rules: row.rules.0,
+            settings: row.settings.0,
+            baseline: row.baseline.map(|id| id.0),
+            paused: Ruling::of(row.paused_at, row.paused_for),
+            closed_at: row.closed_at.map(|at| at.0),
+        }
+    }
+}
+
+/// `SELECT` of tournaments; the argument is what follows `FROM tournaments`.
+macro_rules! select_tournaments {
+    ($tail:literal $(, $argument:expr)*) => {
+        sqlx::query_as!(
+            Row,
+            r#"SELECT id AS "id: Text<TournamentId>", number AS "number: u32", name AS "name: Text<StageName>",
+                      created_at AS "created_at: Instant", stage_id AS "stage: Text<StageId>",
+                      rules AS "rules: Json<TournamentRules>", settings AS "settings: Json<TournamentSettings>",
+                      baseline_id AS "baseline: Text<SubmissionId>", paused_at AS "paused_at: Instant", paused_for,
+                      closed_at AS "closed_at: Instant"
+               FROM tournaments "# + $tail
+            $(, $argument)*
+        )
+    };
+}
+
+/// All, the first one first.
+pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<Tournament>> {
+    let rows = select_tournaments!("ORDER BY number")
+        .fetch_all(connection)
+        .await?;
+    Ok(rows.into_iter().map(Tournament::from).collect())
+}
+
+pub(crate) async fn find(
+    connection: &mut SqliteConnection,
+    id: TournamentId,
+) -> Result<Tournament> {
+    let id = Text(id);
+    select_tournaments!("WHERE id = ?", id)
+        .fetch_optional(connection)
+        .await?
+        .map(Tournament::from)
+        .ok_or(StoreError::NotFound("tournament"))
+}
+
+/// One that may still change. [`StoreError::Conflict`] once it is closed.
+pub(crate) async fn find_open(
+    connection: &mut SqliteConnection,
+    id: TournamentId,
+) -> Result<Tournament> {
+    let tournament = find(connection, id).await?;
+    match tournament.closed_at {
+        None => Ok(tournament),
+        Some(at) => Err(StoreError::Conflict(format!(
+            "the tournament was closed on {}: nothing of it changes any more",
+            at.strftime("%Y-%m-%d at %H:%M UTC")
+        ))),
+    }
+}
+
+/// The number of the next one of the season, from 1.
+pub(crate) async fn next_number(connection: &mut SqliteConnection) -> Result<u32> {
+    Ok(sqlx::query_scalar!(
+        r#"SELECT COALESCE(MAX(number), 0) + 1 AS "number!: u32" FROM tournaments"#
+    )
+    .fetch_one(connection)
+    .await?)
+}
+
+/// [`StoreError::TournamentNameTaken`] if another has its name.
+pub(crate) async fn insert(
+    connection: &mut SqliteConnection,
+    tournament: &Tournament,
+) -> Result<()> {
+    let (id, name) = (Text(tournament.id), tournament.name.as_str());
+    let (created_at, stage) = (Instant(tournament.created_at), tournament.stage.map(Text));
+    let (rules, settings) = (Json(&tournament.rules), Json(&tournament.settings));
+    sqlx::query!(
+        "INSERT INTO tournaments (id, number, name, created_at, stage_id, rules, settings) VALUES (?, ?, ?, ?, ?, ?, ?)",
+        id,
+        tournament.number,
+        name,
+        created_at,
+        stage,
+        rules,
+        settings,
+    )
+    .execute(connection)
+    .await
+    .map_err(|error| name_taken(error, &tournament.name))?;
+    Ok(())
+}
+
+/// Stores what can change of it. [`StoreError::TournamentNameTaken`] if another has its name.
+pub(crate) async fn update(
+    connection: &mut SqliteConnection,
+    tournament: &Tournament,
+) -> Result<()> {
+    let (id, name) = (Text(tournament.id), tournament.name.as_str());
+    let (rules, settings) = (Json(&tournament.rules), Json(&tournament.settings));
+    let (baseline, closed_at) = (
+        tournament.baseline.map(Text),
+        tournament.closed_at.map(Instant),
+    );
+    let paused_at = tournament.paused.as_ref().map(|paused| Instant(paused.at));
+    let paused_for = tournament.paused.as_ref().map(|paused| &paused.reason);
+    sqlx::query!(
+        "UPDATE tournaments SET name = ?, rules = ?, settings = ?, baseline_id = ?, paused_at = ?, paused_for = ?,
+                closed_at = ? WHERE id = ?",
+        name,
+        rules,
+        settings,
+        baseline,
+        paused_at,
+        paused_for,
+        closed_at,
+        id,
+    )
+    .execute(connection)
+    .await
+    .map_err(|error| name_taken(error, &tournament.name))?;
+    Ok(())
+}
+
+fn name_taken(error: sqlx::Error, name: &StageName) -> StoreError {
+    if StoreError::is_duplicate(&error, "tournaments.name") {
+        StoreError::TournamentNameTaken(name.to_string())
+    } else {
+        error.into()
+    }
+}
