@@ -1,5 +1,6 @@
 //! A whole game of 45,000 control steps between two compiled agents that answer at once, each in its sandbox,
-//! recorded: how long it takes, and what of it is this thread's own. `STEPS=5000` plays a shorter one.
+//! recorded: how long it takes, and what of it is this thread's own. `STEPS=5000` plays a shorter one; `SHOWN=1` tells of
+//! it, as a server does for those who watch.
 //!
 //! The agents are this very program, started with `--agent`.
 #![expect(clippy::unwrap_used, reason = "a benchmark that cannot go on ends")]
@@ -7,15 +8,37 @@
 
 mod instant;
 
-use faceoff_runner::{AgentEnvironment, GameObserver, GameSpec, run_game};
+use faceoff_runner::{
+    AgentEnvironment, Commentary, GameAudience, GameObserver, GameSpec, POSITION_EVERY, run_game,
+};
 use faceoff_sandbox::{Isolation, affinity};
-use faceoff_types::{GAME_WINDOWS, GameLimits, Profile, Ruleset, Seed, WINDOW_STEPS};
+use faceoff_types::{
+    GAME_WINDOWS, GameLimits, LiveHappening, LivePosition, Profile, Ruleset, Seed, WINDOW_STEPS,
+};
 use instant::{InstantAgent, environment, instant_agent};
 use std::{fs, time::Instant};
 
 struct Nobody;
 
 impl GameObserver for Nobody {
+    fn cancelled(&self) -> bool {
+        false
+    }
+}
+
+/// Keeps what it hears, as the server's hub does.
+#[derive(Default)]
+struct Audience {
+    happenings: Vec<LiveHappening>,
+    positions: u32,
+}
+
+impl GameAudience for Audience {
+    fn hear(&mut self, happenings: Vec<LiveHappening>, _: LivePosition) {
+        self.happenings.extend(happenings);
+        self.positions += 1;
+    }
+
     fn cancelled(&self) -> bool {
         false
     }
@@ -61,7 +84,15 @@ fn main() {
     println!("{} CPUs; load before: {}", cpus.len(), load().trim());
     let (started, cpu_started_s) = (Instant::now(), cpu_time_s());
     let bundles = [&agent.bundle; 2];
-    let report = run_game(&spec, bundles, envs.each_ref(), out.path(), &mut Nobody).unwrap();
+    let mut audience = std::env::var_os("SHOWN").map(|_| Audience::default());
+    let report = match &mut audience {
+        Some(audience) => {
+            let mut commentary = Commentary::new(audience, POSITION_EVERY);
+            run_game(&spec, bundles, envs.each_ref(), out.path(), &mut commentary)
+        }
+        None => run_game(&spec, bundles, envs.each_ref(), out.path(), &mut Nobody),
+    }
+    .unwrap();
     let (wall_s, cpu_s) = (
         started.elapsed().as_secs_f64(),
         cpu_time_s() - cpu_started_s,
@@ -85,6 +116,13 @@ fn main() {
             1e6 * times.mean,
             1e6 * times.p99,
             1e3 * times.max
+        );
+    }
+    if let Some(audience) = audience {
+        println!(
+            "shown: {} happenings, {} positions",
+            audience.happenings.len(),
+            audience.positions
         );
     }
     println!("load after: {}", load().trim());

@@ -26,12 +26,15 @@ mod waited;
 mod wire_env;
 
 pub use config::AgentEnvironment;
-pub use faceoff_dataset::{Assembled, ShardReport, assemble};
+pub use faceoff_dataset::{Assembled, ShardReport, assemble, game::GameArchives};
 pub use faceoff_types::TimeLimits;
 pub use faceoff_wire::game::{GameCalibration, GameSpec};
 pub use faceoff_wire::work::{EvaluationMeta, ShardSpec, SmokeSpec};
 pub use fault::{PlatformFault, Trouble};
-pub use game::{GameObserver, GameReport, play_game, run_game, run_game_watched};
+pub use game::{
+    Commentary, GameAudience, GameObserver, GameReport, POSITION_EVERY, play_game, run_game,
+    run_game_watched,
+};
 pub use host_watch::{Counters, HostWatch};
 pub use session::Session;
 pub use shard::{Observer, play_shard, run_shard, run_shard_watched};

@@ -3,12 +3,15 @@
 //! An order carries the seeds of the episodes that it asks for, never the secret that they are
 //! derived from: whoever carries it out learns nothing of another day.
 
+use crate::game::GameSpec;
 use faceoff_types::{
-    AgentLimits, BundleRef, EpisodeOutcome, EvaluationId, EvaluationResult, PerturbationSettings,
-    Profile, Ruleset, Seed, SmokeOutcome, StageRuntimes, SubmissionId, Task, Variation,
+    AgentLimits, BundleRef, EpisodeOutcome, EvaluationId, EvaluationResult, GameId,
+    PerturbationSettings, Profile, Ruleset, Seed, SmokeOutcome, StageRuntimes, SubmissionId, Task,
+    Variation,
 };
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::{fmt, ops::Range};
 use uuid::Uuid;
 
@@ -64,6 +67,19 @@ pub enum Assignment {
         /// Key prefix for the recording; `None`: the outcomes alone are kept.
         recording: Option<String>,
     },
+    /// Play a game.
+    Game {
+        /// Which; for the log, and for who watches it.
+        game: GameId,
+        /// Which attempt at it this is, from 1.
+        attempt: u32,
+        /// The home side's first; both have passed their smoke runs. They may be the same.
+        agents: Box<[AgentOrder; 2]>,
+        /// By which rules, and with which seeds.
+        spec: GameSpec,
+        /// Key prefix for the recording; `None`: the score alone is kept.
+        recording: Option<String>,
+    },
     /// Join an evaluation's recordings into its dataset and score them.
     Finalise {
         /// For the log.
@@ -84,6 +100,17 @@ pub struct AgentOrder {
     pub bundle: BundleRef,
     /// Enforced by whoever carries out the order.
     pub limits: AgentLimits,
+}
+
+/// Where the files of a game are, and what they hash to.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StoredGame {
+    /// Key prefix under which `game.zip`, `side-1.zip` and `side-2.zip` are stored.
+    pub key: String,
+    /// BLAKE3 of `game.zip`, 64 hexadecimal digits.
+    pub game_blake3: String,
+    /// Of the sides' own files, the home side's first.
+    pub side_blake3: [String; 2],
 }
 
 /// What decides which episodes a smoke run plays, and how many.
@@ -164,6 +191,15 @@ pub enum WorkReport {
         /// Key prefix under which the recording is stored, if it is kept.
         recording: Option<String>,
     },
+    /// Of [`Assignment::Game`].
+    Game {
+        /// The scoring's: a game's `results.json`.
+        score: Value,
+        /// Its files, if they are kept.
+        recording: Option<StoredGame>,
+        /// The ends of both agents' standard errors with their faults, the home side's first.
+        logs: [String; 2],
+    },
     /// Of [`Assignment::Finalise`].
     Finalise {
         /// Key under which the dataset is stored.
@@ -187,6 +223,16 @@ impl fmt::Display for Assignment {
                 spec.episodes.start,
                 spec.episodes.end.saturating_sub(1),
                 spec.profile
+            ),
+            Self::Game {
+                game,
+                attempt,
+                spec,
+                ..
+            } => write!(
+                f,
+                "game {game}, {} steps, profile {}, attempt {attempt}",
+                spec.steps, spec.profile
             ),
             Self::Finalise { evaluation, .. } => {
                 write!(f, "finalisation of evaluation {evaluation}")

@@ -16,9 +16,16 @@ pub(crate) enum Unpacked {
     Invalid(String),
 }
 
-/// The bundle that a slot used last, unpacked: a slot plays many shards of one agent in a row.
+/// The bundles that a slot used last, unpacked: a slot plays many shards of one agent in a row, and games of two.
+/// No more are held than the work at hand needs, since each takes room.
 #[derive(Debug)]
 pub(crate) struct BundleCache {
+    places: [Place; 2],
+}
+
+/// Where one bundle is unpacked.
+#[derive(Debug)]
+struct Place {
     folder: PathBuf,
     /// the archive's hash, and what was unpacked from it
     held: Option<(String, Bundle)>,
@@ -26,28 +33,67 @@ pub(crate) struct BundleCache {
 
 impl BundleCache {
     pub(crate) fn new(slot_folder: &Path) -> Self {
-        Self {
-            folder: slot_folder.join("bundle"),
+        let place = |name| Place {
+            folder: slot_folder.join(name),
             held: None,
+        };
+        Self {
+            places: [place("bundle-1"), place("bundle-2")],
         }
     }
 
-    /// The unpacked bundle, fetched if it is not the one held. Its bytes are the ones that were
+    /// The unpacked bundle, fetched if it is not held. All others are forgotten, but the one that is used `beside` it. Its bytes are the ones that were
     /// uploaded: the hash is checked on every fetch, and agents see the folder read-only. An error is
     /// ours, or `progress` has stopped.
     pub(crate) fn get(
+        &mut self,
+        agent: &AgentOrder,
+        beside: Option<&AgentOrder>,
+        evaluator: &dyn Evaluator,
+        server: &dyn WorkServer,
+        progress: &Progress,
+    ) -> anyhow::Result<Unpacked> {
+        let mut found = None;
+        let mut free = None;
+        for place in &mut self.places {
+            if let Some(bundle) = place.holds(agent) {
+                found = Some(bundle);
+            } else if beside.is_none_or(|beside| place.holds(beside).is_none()) {
+                place.forget()?;
+                free = Some(place);
+            }
+        }
+        match (found, free) {
+            (Some(bundle), _) => Ok(Unpacked::Bundle(bundle)),
+            (None, Some(place)) => place.take(agent, evaluator, server, progress),
+            (None, None) => anyhow::bail!("both places of a slot hold the same bundle"),
+        }
+    }
+}
+
+impl Place {
+    /// The bundle, if it is here.
+    fn holds(&self, agent: &AgentOrder) -> Option<Bundle> {
+        let (hash, held) = self.held.as_ref()?;
+        (*hash == agent.bundle.blake3).then(|| held.clone())
+    }
+
+    fn forget(&mut self) -> anyhow::Result<()> {
+        self.held = None;
+        if self.folder.exists() {
+            fs::remove_dir_all(&self.folder)?;
+        }
+        Ok(())
+    }
+
+    /// Fetches a bundle into this place, where nothing is.
+    fn take(
         &mut self,
         agent: &AgentOrder,
         evaluator: &dyn Evaluator,
         server: &dyn WorkServer,
         progress: &Progress,
     ) -> anyhow::Result<Unpacked> {
-        if let Some((hash, held)) = &self.held
-            && *hash == agent.bundle.blake3
-        {
-            return Ok(Unpacked::Bundle(held.clone()));
-        }
-        self.held = None;
         let fetched = self.fetch(agent, evaluator, server, progress);
         // What is of no use must not keep the room that the next one needs.
         if !matches!(fetched, Ok(Unpacked::Bundle(_)))
@@ -70,9 +116,6 @@ impl BundleCache {
         server: &dyn WorkServer,
         progress: &Progress,
     ) -> anyhow::Result<Unpacked> {
-        if self.folder.exists() {
-            fs::remove_dir_all(&self.folder)?;
-        }
         let unpacked = self.folder.join("unpacked");
         fs::create_dir_all(&unpacked)?;
         let archive = self.folder.join("archive");

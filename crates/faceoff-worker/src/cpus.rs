@@ -15,6 +15,28 @@ impl SlotCpus {
     pub fn of_agent(&self, agent: usize) -> &[usize] {
         self.agents.get(agent).map_or(&[], Vec::as_slice)
     }
+
+    /// Those of both sides of a game. What a slot has for one agent is halved, so that three CPUs keep the simulator
+    /// and both sides apart. Where there is one for both, they share it with the simulator, and it the simulator's with
+    /// them: what the others took of an answer is told apart as anywhere.
+    #[must_use]
+    pub fn of_a_game(&self) -> [Vec<usize>; 2] {
+        match &self.agents[..] {
+            [first, second, ..] => [first.clone(), second.clone()],
+            [both] if both.len() > 1 => {
+                let (first, second) = both.split_at(both.len() / 2);
+                // As many each, so that neither is favoured.
+                [first.to_vec(), second[..first.len()].to_vec()]
+            }
+            _ => {
+                let mut shared: Vec<usize> = self.simulator.clone();
+                shared.extend(self.agents.iter().flatten());
+                shared.sort_unstable();
+                shared.dedup();
+                [shared.clone(), shared]
+            }
+        }
+    }
 }
 
 /// Which slot runs where. An agent is timed, so it shares its CPUs with neither its simulator nor
@@ -178,6 +200,34 @@ mod tests {
         let layout = CpuLayout::divide(&first(6), 1, 2);
         assert_eq!(layout.slots, [slot(&[0], &[&[1, 2], &[3, 4]])]);
         assert_eq!(layout.slots[0].of_agent(1), [3, 4]);
+    }
+
+    #[test]
+    fn the_sides_of_a_game_have_halves_of_a_slots_cpus_or_share_them_all() {
+        let of_a_game = |simulator: &[usize], agents: &[&[usize]]| {
+            let [first, second] = slot(simulator, agents).of_a_game();
+            (first, second)
+        };
+        let (none, one) = (Vec::new(), vec![1]);
+        assert_eq!(of_a_game(&[0], &[&[1, 2]]), (one.clone(), vec![2]));
+        assert_eq!(
+            of_a_game(&[0], &[&[1, 2, 3, 4, 5]]),
+            (vec![1, 2], vec![3, 4])
+        );
+        assert_eq!(of_a_game(&[0], &[&[1], &[2]]), (one, vec![2]));
+        assert_eq!(of_a_game(&[1], &[&[0]]), (vec![0, 1], vec![0, 1]));
+        assert_eq!(of_a_game(&[], &[&[3]]), (vec![3], vec![3]));
+        assert_eq!(of_a_game(&[], &[&[]]), (none.clone(), none));
+        // As docs/operating.md advises.
+        for cpus in 7..=16 {
+            let layout = CpuLayout::beside_a_service(&first(cpus), 2, 1);
+            for slot in &layout.slots {
+                let [first, second] = slot.of_a_game();
+                assert!(!first.is_empty() && !second.is_empty(), "{cpus}");
+                assert!(first.iter().all(|cpu| !second.contains(cpu)), "{cpus}");
+                assert!(!first.contains(&slot.simulator[0]), "{cpus}");
+            }
+        }
     }
 
     #[test]

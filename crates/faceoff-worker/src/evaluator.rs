@@ -1,6 +1,6 @@
 use faceoff_runner::{
-    AgentEnvironment, Assembled, EvaluationMeta, Observer, PlatformFault, ShardReport, ShardSpec,
-    SmokeReport, SmokeSpec,
+    AgentEnvironment, Assembled, Commentary, EvaluationMeta, GameAudience, GameReport, GameSpec,
+    Observer, POSITION_EVERY, PlatformFault, ShardReport, ShardSpec, SmokeReport, SmokeSpec,
     bundle::{self, Bundle, BundleError, BundleLimits},
 };
 use std::path::{Path, PathBuf};
@@ -35,6 +35,16 @@ pub(crate) trait Evaluator: Send + Sync {
         out: &Path,
         observer: &mut dyn Observer,
     ) -> Result<ShardReport, PlatformFault>;
+
+    /// Plays a game; its files are left in `out`. Pairs are the home side's first.
+    fn play_game(
+        &self,
+        spec: &GameSpec,
+        bundles: [&Bundle; 2],
+        envs: [&AgentEnvironment; 2],
+        out: &Path,
+        audience: &mut dyn GameAudience,
+    ) -> Result<GameReport, PlatformFault>;
 
     /// Joins recordings into a dataset and scores them.
     fn assemble(
@@ -79,6 +89,20 @@ impl Evaluator for Runner {
         observer: &mut dyn Observer,
     ) -> Result<ShardReport, PlatformFault> {
         faceoff_runner::run_shard(spec, bundle, env, out, observer)
+    }
+
+    fn play_game(
+        &self,
+        spec: &GameSpec,
+        bundles: [&Bundle; 2],
+        envs: [&AgentEnvironment; 2],
+        out: &Path,
+        audience: &mut dyn GameAudience,
+    ) -> Result<GameReport, PlatformFault> {
+        let mut commentary = Commentary::new(audience, POSITION_EVERY);
+        let report = faceoff_runner::run_game(spec, bundles, envs, out, &mut commentary)?;
+        commentary.end(&report);
+        Ok(report)
     }
 
     fn assemble(

@@ -1,4 +1,4 @@
-//! The three kinds of work, each from its order to what is to be reported.
+//! The kinds of work, each from its order to what is to be reported.
 
 use crate::{
     bundle_cache::{BundleCache, Unpacked},
@@ -6,13 +6,15 @@ use crate::{
     evaluator::Evaluator,
     lease::Progress,
     server::WorkServer,
+    shown::Shown,
 };
 use anyhow::Context as _;
-use faceoff_runner::{AgentEnvironment, bundle::Bundle};
+use faceoff_runner::{AgentEnvironment, GameSpec, bundle::Bundle};
 use faceoff_sandbox::{Isolation, Runtime};
-use faceoff_types::{AgentLimits, SmokeOutcome, StageRuntimes};
+use faceoff_types::{AgentLimits, GameId, SmokeOutcome, StageRuntimes};
 use faceoff_wire::work::{
-    AgentOrder, Assignment, EvaluationMeta, ShardSpec, SmokeSpec, WorkReport,
+    AgentOrder, Assignment, EvaluationMeta, Lease, ShardSpec, SmokeSpec, StoredGame, WorkOrder,
+    WorkReport,
 };
 use std::{
     collections::BTreeMap,
@@ -40,13 +42,18 @@ pub(crate) struct AgentHost {
 }
 
 impl AgentHost {
+    /// Of an agent that plays alone.
     fn environment(&self, limits: &AgentLimits) -> AgentEnvironment {
+        self.environment_on(self.cpus.of_agent(0).to_vec(), limits)
+    }
+
+    fn environment_on(&self, agent_cpus: Vec<usize>, limits: &AgentLimits) -> AgentEnvironment {
         AgentEnvironment {
             limits: limits.resources.clone(),
             time: limits.time.clone(),
             isolation: self.isolation.clone(),
             runtimes: self.runtimes.clone(),
-            agent_cpus: self.cpus.of_agent(0).to_vec(),
+            agent_cpus,
         }
     }
 }
@@ -54,10 +61,10 @@ impl AgentHost {
 impl Executor {
     pub(crate) fn report(
         &mut self,
-        assignment: &Assignment,
+        order: &WorkOrder,
         progress: &Progress,
     ) -> anyhow::Result<WorkReport> {
-        match assignment {
+        match &order.assignment {
             Assignment::Smoke {
                 agent,
                 spec,
@@ -72,6 +79,16 @@ impl Executor {
                 recording,
                 ..
             } => self.play(agent, spec, recording.as_deref(), progress.clone()),
+            Assignment::Game {
+                game,
+                attempt,
+                agents,
+                spec,
+                recording,
+            } => {
+                let shown = self.show(&order.lease, (*game, *attempt), spec.steps, progress);
+                self.game(agents, spec, recording.as_deref(), shown)
+            }
             Assignment::Finalise {
                 meta,
                 recordings,
@@ -81,14 +98,24 @@ impl Executor {
         }
     }
 
-    fn bundle(&mut self, agent: &AgentOrder, progress: &Progress) -> anyhow::Result<Unpacked> {
+    fn bundle(
+        &mut self,
+        agent: &AgentOrder,
+        beside: Option<&AgentOrder>,
+        progress: &Progress,
+    ) -> anyhow::Result<Unpacked> {
         self.bundles
-            .get(agent, &*self.evaluator, &*self.server, progress)
+            .get(agent, beside, &*self.evaluator, &*self.server, progress)
     }
 
     /// The bundle of a valid submission: it passed its smoke run, so that the archive is not to blame.
-    fn valid_bundle(&mut self, agent: &AgentOrder, progress: &Progress) -> anyhow::Result<Bundle> {
-        match self.bundle(agent, progress)? {
+    fn valid_bundle(
+        &mut self,
+        agent: &AgentOrder,
+        beside: Option<&AgentOrder>,
+        progress: &Progress,
+    ) -> anyhow::Result<Bundle> {
+        match self.bundle(agent, beside, progress)? {
             Unpacked::Bundle(bundle) => Ok(bundle),
             Unpacked::Invalid(reason) => anyhow::bail!(reason),
         }
@@ -110,7 +137,7 @@ impl Executor {
         runtimes: &[StageRuntimes],
         progress: &Progress,
     ) -> anyhow::Result<SmokeOutcome> {
-        let bundle = match self.bundle(agent, progress)? {
+        let bundle = match self.bundle(agent, None, progress)? {
             Unpacked::Bundle(bundle) => bundle,
             Unpacked::Invalid(reason) => {
                 return Ok(SmokeOutcome::Invalid {
@@ -162,7 +189,7 @@ impl Executor {
         recording: Option<&str>,
         mut progress: Progress,
     ) -> anyhow::Result<WorkReport> {
-        let bundle = self.valid_bundle(agent, &progress)?;
+        let bundle = self.valid_bundle(agent, None, &progress)?;
         let environment = self.host.environment(&agent.limits);
         let out = self.folder("recording")?;
         let played = self
@@ -178,6 +205,59 @@ impl Executor {
             log: played.log,
             stopped_by_faults: played.stopped_by_faults,
             recording: recording.map(str::to_owned),
+        })
+    }
+
+    fn show(&self, lease: &Lease, game: (GameId, u32), steps: u32, progress: &Progress) -> Shown {
+        Shown::begin(
+            Arc::clone(&self.server),
+            lease.clone(),
+            game,
+            steps,
+            progress.clone(),
+        )
+    }
+
+    /// Plays a game, before those who watch, and stores its files, if they are kept.
+    fn game(
+        &mut self,
+        agents: &[AgentOrder; 2],
+        spec: &GameSpec,
+        recording: Option<&str>,
+        mut shown: Shown,
+    ) -> anyhow::Result<WorkReport> {
+        let [first, second] = agents;
+        let bundles = [
+            self.valid_bundle(first, Some(second), shown.progress())?,
+            self.valid_bundle(second, Some(first), shown.progress())?,
+        ];
+        let [first_cpus, second_cpus] = self.host.cpus.of_a_game();
+        let envs = [
+            self.host.environment_on(first_cpus, &first.limits),
+            self.host.environment_on(second_cpus, &second.limits),
+        ];
+        let out = self.folder("game")?;
+        let played = self.evaluator.play_game(
+            spec,
+            bundles.each_ref(),
+            envs.each_ref(),
+            out.path(),
+            &mut shown,
+        )?;
+        if let Some(key) = recording {
+            self.server
+                .store_recording(key, out.path())
+                .context("storing the game's recording")?;
+        }
+        let archives = played.archives;
+        Ok(WorkReport::Game {
+            score: serde_json::to_value(&archives.score).context("a game's score")?,
+            recording: recording.map(|key| StoredGame {
+                key: key.to_owned(),
+                game_blake3: archives.game.blake3,
+                side_blake3: archives.sides.map(|file| file.blake3),
+            }),
+            logs: played.logs,
         })
     }
 

@@ -1,5 +1,5 @@
 use crate::server::{GivenBack, Holding, WorkServer};
-use faceoff_types::EpisodeOutcome;
+use faceoff_types::{EpisodeOutcome, WINDOW_STEPS};
 use faceoff_wire::work::Lease;
 use std::{
     io,
@@ -30,6 +30,7 @@ pub(crate) struct LeaseKeeper {
 /// What passes between the slot's thread and the keeper's.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Progress {
+    /// Of a game, windows of control steps: what is to a game what an episode is to a shard.
     episodes_done: Arc<AtomicU32>,
     stop: CancellationToken,
 }
@@ -77,6 +78,12 @@ impl Progress {
     /// Is the unit no longer this slot's?
     pub(crate) fn stopped(&self) -> bool {
         self.stop.is_cancelled()
+    }
+
+    /// So many control steps of a game were played.
+    pub(crate) fn game_stepped(&self, steps: u32) {
+        self.episodes_done
+            .store(steps / WINDOW_STEPS, Ordering::Relaxed);
     }
 }
 

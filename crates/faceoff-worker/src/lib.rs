@@ -21,6 +21,7 @@ mod schedule;
 mod scratch;
 mod server;
 mod service;
+mod shown;
 mod slot;
 mod slot_threads;
 #[cfg(test)]

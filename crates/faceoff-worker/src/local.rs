@@ -3,15 +3,20 @@
 
 use crate::{
     full_disk::{self, Pause},
-    server::{Claimed, GivenBack, Holding, QueueMark, WorkServer},
+    server::{Claimed, GameShow, GivenBack, Holding, QueueMark, WorkServer},
     tidying,
 };
 use faceoff_store::{
-    Claim, Claimed as Leased, Committed, RunOwner, ShardCommit, Store, StoreError, Work,
+    Claim, Claimed as Leased, Committed, GameCommit, GameRecording, RunOwner, ShardCommit, Store,
+    StoreError, Work,
 };
-use faceoff_types::{AgentLimits, BundleRef, Clock, EvaluationResult, StageLimits};
-use faceoff_wire::work::{
-    AgentOrder, Assignment, EvaluationMeta, Lease, ShardSpec, SmokeSpec, WorkOrder, WorkReport,
+use faceoff_types::{AgentLimits, BundleRef, Clock, EvaluationResult, GameId, StageLimits};
+use faceoff_wire::{
+    game::GameSpec,
+    work::{
+        AgentOrder, Assignment, EvaluationMeta, Lease, ShardSpec, SmokeSpec, StoredGame, WorkOrder,
+        WorkReport,
+    },
 };
 use std::{path::Path, time::Duration};
 use tokio::runtime::Handle;
@@ -79,6 +84,30 @@ impl LocalServer {
                 },
                 recording: run.keeps_recordings.then(|| claim.recording_key(run.id)),
             },
+            Work::Game {
+                game,
+                rules,
+                bundles,
+                seeds,
+                attempt,
+                platform_retries,
+                keeps_recording,
+            } => Assignment::Game {
+                game,
+                attempt,
+                agents: Box::new(bundles.map(|bundle| self.agent(bundle, &rules.limits))),
+                spec: GameSpec {
+                    ruleset: rules.ruleset,
+                    steps: rules.steps,
+                    profile: rules.profile,
+                    seed: seeds.episodes,
+                    mismatch_seed: seeds.mismatch,
+                    limits: rules.game_limits,
+                    platform_retries,
+                    perturbations: rules.perturbations,
+                },
+                recording: keeps_recording.then(|| game_recording_key(game, &claim)),
+            },
             Work::Finalise {
                 evaluation,
                 run,
@@ -129,6 +158,32 @@ impl LocalServer {
             tracing::warn!(recording, %error, "the recording of a lost lease is left");
         }
         Ok(holding)
+    }
+
+    /// As [`commit_played`](Self::commit_played). Of a game's recordings only the one of the attempt that counts is kept: what
+    /// earlier attempts left that were killed between upload and commit, or whose result was voided, goes once another
+    /// result stands.
+    async fn commit_game(&self, claim: &Claim, played: GameCommit) -> anyhow::Result<Holding> {
+        let committed = self
+            .store
+            .commit_game(claim, &played, self.clock.now())
+            .await?;
+        let artifacts = self.store.artifacts();
+        let key = played.recording.map(|recording| recording.key);
+        if let Some(key) = key {
+            let tidied = match (committed, key.rsplit_once('/')) {
+                (Committed::Now, Some((of_the_game, _))) => {
+                    artifacts.delete_others(of_the_game, &key).await
+                }
+                // Of one that was repeated nobody knows what began since.
+                (Committed::Now | Committed::Before, _) => Ok(()),
+                (Committed::LeaseLost, _) => artifacts.delete_folder(&key).await,
+            };
+            if let Err(error) = tidied {
+                tracing::warn!(key, %error, "a game's recording that nobody needs is left");
+            }
+        }
+        Ok(holding(committed))
     }
 
     /// Publishes the dataset. It is removed only when it certainly was not published; after an error
@@ -190,6 +245,18 @@ impl WorkServer for LocalServer {
         })
     }
 
+    fn show(&self, _: &Lease, (game, attempt): (GameId, u32), show: GameShow) {
+        let live = self.store.live_games();
+        match show {
+            GameShow::Begun { steps } => live.begin(game, attempt, steps),
+            GameShow::Goes {
+                happenings,
+                position,
+            } => live.advance(game, attempt, happenings, Some(position)),
+            GameShow::Over => live.over(game, attempt),
+        }
+    }
+
     fn commit(&self, lease: &Lease, report: WorkReport) -> anyhow::Result<Holding> {
         let (claim, now) = (claim(lease), self.clock.now());
         self.runtime.block_on(async {
@@ -212,6 +279,19 @@ impl WorkServer for LocalServer {
                         recording,
                     };
                     self.commit_played(&claim, played).await
+                }
+                WorkReport::Game {
+                    score,
+                    recording,
+                    logs,
+                } => {
+                    let recording = recording.map(stored_game);
+                    let played = GameCommit {
+                        score,
+                        recording,
+                        logs,
+                    };
+                    self.commit_game(&claim, played).await
                 }
                 WorkReport::Finalise {
                     dataset,
@@ -287,6 +367,24 @@ impl WorkServer for LocalServer {
     fn store_dataset(&self, key: &str, archive: &Path) -> anyhow::Result<()> {
         let stored = self.store.artifacts().put_file(key, archive);
         Ok(self.runtime.block_on(stored)?)
+    }
+}
+
+/// Artifact key prefix for the recording that is made under a lease: each has its own, as those of shards.
+fn game_recording_key(game: GameId, claim: &Claim) -> String {
+    format!("games/{game}/{}", claim.nonce)
+}
+
+fn stored_game(stored: StoredGame) -> GameRecording {
+    let StoredGame {
+        key,
+        game_blake3,
+        side_blake3,
+    } = stored;
+    GameRecording {
+        key,
+        game_blake3,
+        side_blake3,
     }
 }
 

@@ -1,4 +1,4 @@
-use faceoff_types::BundleRef;
+use faceoff_types::{BundleRef, GameId, LiveHappening, LivePosition};
 use faceoff_wire::work::{Lease, WorkOrder, WorkReport};
 use std::{path::Path, time::Duration};
 use tokio_util::sync::CancellationToken;
@@ -14,6 +14,10 @@ pub(crate) trait WorkServer: Send + Sync {
 
     /// Extends the lease and tells how far the work is.
     fn renew(&self, lease: &Lease, episodes_done: u32) -> anyhow::Result<Holding>;
+
+    /// Shows an attempt at a game to those who watch it. Cheap, and as good as it goes: a connection that is slow or
+    /// broken loses positions.
+    fn show(&self, lease: &Lease, attempt: (GameId, u32), show: GameShow);
 
     /// Stores what came of a unit; harmless when repeated under the same lease. What was uploaded
     /// under a lease that turns out to be lost is removed.
@@ -64,6 +68,20 @@ pub(crate) enum Holding {
     Held,
     /// Another's, or nobody's any more.
     Lost,
+}
+
+/// What is told of a game while a slot plays it. It decides nothing, and nobody waits for it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum GameShow {
+    /// It begins; this many control steps are to be played.
+    Begun { steps: u32 },
+    /// What happened, and where things are.
+    Goes {
+        happenings: Vec<LiveHappening>,
+        position: LivePosition,
+    },
+    /// Nothing more comes of this attempt.
+    Over,
 }
 
 /// Why a unit goes back to the queue undone.

@@ -75,7 +75,7 @@ impl Slot {
         let progress = keeper.progress();
         let committed = self
             .executor
-            .report(&order.assignment, &progress)
+            .report(order, &progress)
             .and_then(|report| self.commit(order, &report, &progress));
         match committed {
             // no fault: the unit was given back, or is another's
@@ -152,7 +152,7 @@ fn outside(error: &anyhow::Error) -> &'static str {
             "the recording could not be made"
         }
         Some(PlatformFault::Simulation(_)) => "the simulator failed",
-        Some(PlatformFault::HostBusy(_)) => "the host kept the agent from answering",
+        Some(PlatformFault::HostBusy(_)) => "the host kept an agent from answering",
         Some(PlatformFault::Cancelled) | None => "the evaluator failed",
     }
 }

@@ -4,7 +4,9 @@
 mod between;
 mod fixture;
 mod full_disk;
+mod games;
 mod interrupted;
 mod orders;
 mod runtimes;
+mod scripted_game;
 mod slots;

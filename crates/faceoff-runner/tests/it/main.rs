@@ -6,6 +6,7 @@ mod agents;
 mod archives;
 mod budget;
 mod bundle;
+mod commentary;
 mod dataset;
 mod free_time;
 mod fuzz;

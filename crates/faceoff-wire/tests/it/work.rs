@@ -1,6 +1,7 @@
 //! Work orders and reports survive the way through JSON.
 
 use faceoff_types::*;
+use faceoff_wire::game::GameSpec;
 use faceoff_wire::work::*;
 use serde::{Serialize, de::DeserializeOwned};
 use std::{collections::BTreeMap, fmt::Debug};
@@ -61,6 +62,25 @@ fn shard(recording: Option<&str>) -> Assignment {
     }
 }
 
+fn game(recording: Option<&str>) -> Assignment {
+    Assignment::Game {
+        game: Uuid::from_u128(4).into(),
+        attempt: 2,
+        agents: Box::new([agent(), agent()]),
+        spec: GameSpec {
+            ruleset: Ruleset::CURRENT,
+            steps: 45_000,
+            profile: Profile::Evaluation,
+            seed: Seed::from_number(6),
+            mismatch_seed: Seed::from_number(5),
+            limits: GameLimits::default(),
+            platform_retries: 1,
+            perturbations: Default::default(),
+        },
+        recording: recording.map(str::to_owned),
+    }
+}
+
 #[test]
 fn every_order_round_trips() {
     let finalise = Assignment::Finalise {
@@ -88,7 +108,14 @@ fn every_order_round_trips() {
             runtimes: ["native".to_owned()].into_iter().collect(),
         }],
     };
-    for assignment in [smoke, shard(Some("recordings/a")), shard(None), finalise] {
+    for assignment in [
+        smoke,
+        shard(Some("recordings/a")),
+        shard(None),
+        game(Some("games/a")),
+        game(None),
+        finalise,
+    ] {
         travels(&order(assignment));
     }
 }
@@ -145,6 +172,15 @@ fn every_report_round_trips() {
             stopped_by_faults: true,
             recording: Some("recordings/a".into()),
         },
+        WorkReport::Game {
+            score: serde_json::json!({"winner": null, "sides": [{"goals": 3}, {"goals": 3}]}),
+            recording: Some(StoredGame {
+                key: "games/a".into(),
+                game_blake3: "ab".repeat(32),
+                side_blake3: ["cd".repeat(32), "ef".repeat(32)],
+            }),
+            logs: ["begun\n".into(), String::new()],
+        },
         WorkReport::Finalise {
             dataset: "datasets/c.zip".into(),
             blake3: "cd".repeat(32),
@@ -163,6 +199,11 @@ fn a_log_line_names_the_work() {
         told,
         "defend episodes 100 to 4294967294 of 00000000-0000-0000-0000-000000000003, profile \
          tracking_loss"
+    );
+    let told = game(None).to_string();
+    assert_eq!(
+        told,
+        "game 00000000-0000-0000-0000-000000000004, 45000 steps, profile evaluation, attempt 2"
     );
 }
 

@@ -2,9 +2,9 @@
 
 use crate::{
     local::LocalServer,
-    server::{Claimed, GivenBack, Holding, QueueMark, WorkServer},
+    server::{Claimed, GameShow, GivenBack, Holding, QueueMark, WorkServer},
 };
-use faceoff_types::BundleRef;
+use faceoff_types::{BundleRef, GameId};
 use faceoff_wire::work::{Lease, WorkReport};
 use std::{path::Path, sync::Arc, time::Duration};
 use tokio_util::sync::CancellationToken;
@@ -43,6 +43,10 @@ impl WorkServer for Between {
 
     fn renew(&self, lease: &Lease, episodes_done: u32) -> anyhow::Result<Holding> {
         self.server.renew(lease, episodes_done)
+    }
+
+    fn show(&self, lease: &Lease, attempt: (GameId, u32), show: GameShow) {
+        self.server.show(lease, attempt, show);
     }
 
     fn commit(&self, lease: &Lease, report: WorkReport) -> anyhow::Result<Holding> {

@@ -1,5 +1,6 @@
 //! The scripted evaluator and a server around it.
 
+use super::scripted_game::game_report;
 use crate::{
     cpus::CpuLayout,
     evaluator::Evaluator,
@@ -9,8 +10,8 @@ use crate::{
     slot_threads::SlotThreads,
 };
 use faceoff_runner::{
-    AgentEnvironment, Assembled, EvaluationMeta, Observer, PlatformFault, ShardReport, ShardSpec,
-    SmokeReport, SmokeSpec, TimeLimits,
+    AgentEnvironment, Assembled, EvaluationMeta, GameAudience, GameReport, GameSpec, Observer,
+    PlatformFault, ShardReport, ShardSpec, SmokeReport, SmokeSpec, TimeLimits,
     bundle::{Bundle, BundleError, BundleLimits},
 };
 use faceoff_sandbox::{Isolation, Limits};
@@ -33,9 +34,13 @@ use tokio_util::sync::CancellationToken;
 pub(super) type Play =
     dyn Fn(&ShardSpec, &mut dyn Observer) -> Result<(), PlatformFault> + Send + Sync;
 
+pub(super) type PlayGame =
+    dyn Fn(&GameSpec, &mut dyn GameAudience) -> Result<(), PlatformFault> + Send + Sync;
+
 /// Plays by a test's closure; records which episodes were played and what was assembled.
 pub(super) struct Scripted {
     play: Box<Play>,
+    game: Box<PlayGame>,
     pub(super) played: Mutex<Vec<(Task, u32)>>,
     pub(super) assembled: Mutex<Vec<String>>,
     /// Told when an archive is unpacked that has no end.
@@ -49,12 +54,36 @@ impl Scripted {
         + Sync
         + 'static,
     ) -> Arc<Self> {
-        Arc::new(Self {
+        Arc::new(Self::with(play, |_, _| Ok(())))
+    }
+
+    /// Plays games so, and all else well.
+    pub(super) fn of_games(
+        game: impl Fn(&GameSpec, &mut dyn GameAudience) -> Result<(), PlatformFault>
+        + Send
+        + Sync
+        + 'static,
+    ) -> Arc<Self> {
+        Arc::new(Self::with(|_, _| Ok(()), game))
+    }
+
+    fn with(
+        play: impl Fn(&ShardSpec, &mut dyn Observer) -> Result<(), PlatformFault>
+        + Send
+        + Sync
+        + 'static,
+        game: impl Fn(&GameSpec, &mut dyn GameAudience) -> Result<(), PlatformFault>
+        + Send
+        + Sync
+        + 'static,
+    ) -> Self {
+        Self {
             play: Box::new(play),
+            game: Box::new(game),
             played: Mutex::default(),
             assembled: Mutex::default(),
             endless: tokio::sync::Notify::new(),
-        })
+        }
     }
 }
 
@@ -146,6 +175,18 @@ impl Evaluator for Scripted {
             stopped_by_faults: false,
             timing: SlotTiming::default(),
         })
+    }
+
+    fn play_game(
+        &self,
+        spec: &GameSpec,
+        _bundles: [&Bundle; 2],
+        _envs: [&AgentEnvironment; 2],
+        out: &Path,
+        audience: &mut dyn GameAudience,
+    ) -> Result<GameReport, PlatformFault> {
+        (self.game)(spec, audience)?;
+        Ok(game_report(spec, out))
     }
 
     fn assemble(
@@ -273,9 +314,9 @@ impl Server {
             .unwrap()
     }
 
-    /// An evaluation of six shards, all of them queued.
-    pub(super) async fn evaluation(&self) -> EvaluationId {
-        let submission = self.upload("Alpha", b"archive").await;
+    /// A team with a submission that has passed its smoke run.
+    pub(super) async fn valid(&self, team: &str) -> Submission {
+        let submission = self.upload(team, b"archive").await;
         let claimed = self.store.claim("test", LEASE_S, self.now()).await.unwrap();
         let claim = claimed.expect("a smoke run is queued").claim;
         let outcome = SmokeOutcome::Valid {
@@ -288,6 +329,12 @@ impl Server {
             .commit_smoke(&claim, outcome, self.now())
             .await
             .unwrap();
+        submission
+    }
+
+    /// An evaluation of six shards, all of them queued.
+    pub(super) async fn evaluation(&self) -> EvaluationId {
+        let submission = self.valid("Alpha").await;
         let plan = RunPlan {
             profile: Profile::Evaluation,
             tasks: Task::ALL.to_vec(),

@@ -49,6 +49,7 @@ async fn report(server: &Server, order: &WorkOrder) -> WorkReport {
                 recording: recording.clone(),
             }
         }
+        Assignment::Game { .. } => panic!("no game is queued"),
         Assignment::Finalise { meta, dataset, .. } => {
             server.put(dataset, b"PK").await;
             WorkReport::Finalise {
@@ -89,6 +90,7 @@ async fn no_order_tells_the_seasons_secret() {
             Assignment::Smoke { .. } => smoke += 1,
             Assignment::Play { recording, .. } if recording.is_some() => recorded += 1,
             Assignment::Play { .. } => unrecorded += 1,
+            Assignment::Game { .. } => panic!("no game is queued"),
             Assignment::Finalise { recordings, .. } => {
                 assert_eq!(recordings.len(), 6);
                 finalised += 1;
@@ -173,7 +175,7 @@ async fn a_stages_limits_hold_for_smoke_runs_and_for_what_is_cut_by_its_rules() 
         match &order.assignment {
             Assignment::Smoke { agent, .. } => smoke.push(agent.limits.clone()),
             Assignment::Play { agent, .. } => shards.push(agent.limits.clone()),
-            Assignment::Finalise { .. } => {}
+            Assignment::Game { .. } | Assignment::Finalise { .. } => {}
         }
         let report = report(&server, &order).await;
         assert_eq!(commit(&server, &order, report).await, Holding::Held);

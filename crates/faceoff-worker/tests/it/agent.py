@@ -1,9 +1,14 @@
-"""Keeps the arm where it is. With GOOD_EPISODES, it exits in the first one after so many."""
+"""Keeps the arm where it is, or swings it by SWING rad. With GOOD_EPISODES, it exits in the first one after so many;
+with MISCHIEF, it does what a game's opponent must not suffer from."""
 import json
+import math
 import os
 import sys
+import time
 
 good_episodes = int(os.environ.get("GOOD_EPISODES", 1 << 30))
+swing = float(os.environ.get("SWING", 0))
+mischief = os.environ.get("MISCHIEF")
 begun = 0
 print("an agent's log", file=sys.stderr, flush=True)
 
@@ -21,11 +26,24 @@ for line in sys.stdin:
     elif kind == "reset":
         begun += 1
         held = None
+        if mischief == "crashes":
+            os._exit(4)
         answer({"type": "ready", "episode": message["episode"]})
     elif kind == "step":
         if begun > good_episodes:
             sys.exit(3)
+        step = message["step"]
         held = held or [message["obs"][i] for i in env["joint_pos_ids"]]
-        answer({"type": "act", "step": message["step"], "action": [held, [0.0] * 7]})
+        position = [held[0] + swing * math.sin(step / 10), *held[1:]]
+        action = [position, [0.0] * 7]
+        if mischief == "silent":
+            continue
+        if mischief == "floods":
+            print("x" * 100000, flush=True)
+        if mischief == "slow":
+            time.sleep(0.06)
+        if mischief == "at the bound":
+            action = [[1e4 if step % 2 else -1e4] * 7] * 2
+        answer({"type": "act", "step": step, "action": action})
     elif kind == "bye":
         break

@@ -2,5 +2,8 @@
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod evaluations;
+mod games;
+mod games_killed;
 mod kill;
 mod server;
+mod tournament;

@@ -5,10 +5,8 @@ use faceoff_dataset::{
 };
 use faceoff_episode::{Answered, Arena, Course, StepSink};
 use faceoff_types::{Interpolation, Phase, Profile, Ruleset, Seed, Task};
-use faceoff_wire::{
-    dataset::DatasetManifest,
-    work::{EvaluationMeta, ShardSpec},
-};
+use faceoff_wire::work::{EvaluationMeta, ShardSpec};
+use serde_json::{Value, json};
 use std::{
     collections::BTreeMap,
     fs::{self, File},
@@ -104,14 +102,14 @@ fn recorded(dir: &Path) {
     assemble(&meta, &[shard], &dir.join("dataset.zip")).unwrap();
 }
 
-/// The dataset's files by name, and the archive.
-struct Valid {
+/// The files of a dataset, or of a game's recording, by name, and the archive.
+pub(super) struct Valid {
     files: BTreeMap<String, Vec<u8>>,
     archive: Vec<u8>,
 }
 
 impl Valid {
-    fn of(archive: &Path, scratch: &Path) -> Self {
+    pub(super) fn of(archive: &Path, scratch: &Path) -> Self {
         let folder = scratch.join("unpacked");
         ZipArchive::new(File::open(archive).unwrap())
             .unwrap()
@@ -132,8 +130,8 @@ impl Valid {
         }
     }
 
-    /// Writes a changed dataset and returns what is to be opened.
-    fn changed(&self, dir: &Path, draws: &mut Draws) -> std::path::PathBuf {
+    /// Writes a changed one and returns what is to be opened.
+    pub(super) fn changed(&self, dir: &Path, draws: &mut Draws) -> std::path::PathBuf {
         if draws.once_in(3) {
             let mut archive = self.archive.clone();
             mutate(&mut archive, &WORDS, draws);
@@ -151,14 +149,17 @@ impl Valid {
         }
         // A forger makes the hashes fit.
         let manifest = files.get("manifest.json").map(Vec::as_slice);
-        let manifest = manifest.map(serde_json::from_slice::<DatasetManifest>);
+        let manifest = manifest.map(serde_json::from_slice::<Value>);
         if let Some(Ok(mut manifest)) = manifest
             && !draws.once_in(4)
         {
-            for (name, digest) in &mut manifest.files {
+            let listed = manifest.get_mut("files").and_then(Value::as_object_mut);
+            for (name, digest) in listed.into_iter().flatten() {
                 if let Some(bytes) = files.get(name) {
-                    digest.bytes = bytes.len() as u64;
-                    digest.blake3 = blake3::hash(bytes).to_hex().to_string();
+                    *digest = json!({
+                        "bytes": bytes.len(),
+                        "blake3": blake3::hash(bytes).to_hex().to_string(),
+                    });
                 }
             }
             let bytes = serde_json::to_vec(&manifest).unwrap();

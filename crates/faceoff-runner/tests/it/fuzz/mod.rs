@@ -6,6 +6,7 @@ mod answers;
 mod archives;
 mod datasets;
 mod draws;
+mod games;
 mod manifests;
 mod mutation;
 

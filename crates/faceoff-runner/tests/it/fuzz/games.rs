@@ -1,0 +1,113 @@
+use super::{assert_met, datasets::Valid, draws::Draws, fuzz};
+use faceoff_dataset::{
+    DatasetError,
+    game::{GAME_FILE, GameRecorder, GameRecording, RecordedGame, verify_game},
+    verify::VerifyError,
+};
+use faceoff_episode::{Answered, Arena, Entry, GameCourse, Response, SideFault};
+use faceoff_types::{
+    AgentFaultKind, GameLimits, Interpolation, Profile, Ruleset, Seed, Side, SlotTiming,
+};
+use faceoff_wire::game::{GameCalibration, GameSpec};
+use std::{fs, path::Path};
+use tempfile::TempDir;
+
+/// A short game, in which an answer is late and a side has a fault.
+fn recorded(out: &Path) {
+    let seed = Seed::from_number(5);
+    let spec = GameSpec {
+        ruleset: Ruleset::CURRENT,
+        steps: 40,
+        profile: Profile::Evaluation,
+        seed,
+        mismatch_seed: seed.model_mismatch(),
+        limits: GameLimits::default(),
+        platform_retries: 0,
+        perturbations: Box::default(),
+    };
+    let arena = Arena::new(spec.profile, spec.seed, spec.mismatch_seed);
+    let recorder = GameRecorder::create(&out.join("tables")).unwrap();
+    let mut course = GameCourse::begin(&arena, spec.steps, spec.limits.clone(), recorder);
+    while course.end().is_none() {
+        let entries = Side::BOTH.map(|side| Entry::Plays {
+            startup_s: course.needs_start(side).then_some(0.25),
+            interpolation: Interpolation::Linear,
+            reset_s: 0.125,
+        });
+        course.start_rally(entries).unwrap();
+        while course.is_in_rally() {
+            let step = course.rally_steps();
+            let actions = Side::BOTH.map(|side| {
+                let question = course.question(side).unwrap()?;
+                Some(question.observation[6..13].to_vec())
+            });
+            let responses = Side::BOTH.map(|side| {
+                let answered = Answered {
+                    computation_time_s: if step == 7 { 0.03125 } else { 0.001953125 },
+                    host_time_s: 0.0,
+                    cpu_time_s: None,
+                };
+                match &actions[side.index()] {
+                    None => Response::Held,
+                    Some(_) if (step, side) == (20, Side::Second) => Response::Fault {
+                        fault: SideFault {
+                            kind: AgentFaultKind::NonFinite,
+                            line: Some("oops".to_owned()),
+                        },
+                        answered,
+                    },
+                    Some(action) => Response::Answer { action, answered },
+                }
+            });
+            course.answer(responses).unwrap();
+        }
+    }
+    let recorded = RecordedGame {
+        spec: &spec,
+        agents: &["one".to_owned(), "other".to_owned()],
+        played: course.finish(),
+        calibration: GameCalibration {
+            sides: [SlotTiming::default(); 2],
+        },
+        logs: &["log of one\n".to_owned(), "log of the other\n".to_owned()],
+    };
+    recorded.write(out).unwrap();
+}
+
+/// Reads all of it, as far as it goes.
+fn read(path: &Path) -> Result<(), VerifyError> {
+    GameRecording::is_at(path)?;
+    let recording = GameRecording::open(path)?;
+    recording.results()?;
+    recording.outcome()?;
+    verify_game(&recording, &|_| ()).map(drop)
+}
+
+fn changed(valid: &Valid, dir: &Path, draws: &mut Draws) -> &'static str {
+    match read(&valid.changed(dir, draws)) {
+        Ok(()) => "read",
+        Err(VerifyError::Differs(_)) => "differs",
+        Err(VerifyError::Dataset(DatasetError::Io(_))) => "io",
+        Err(VerifyError::Dataset(DatasetError::Unreadable(_))) => "unreadable",
+        Err(VerifyError::Dataset(DatasetError::Foreign(_))) => "foreign",
+        Err(VerifyError::Dataset(DatasetError::Altered(_))) => "altered",
+        Err(VerifyError::Dataset(DatasetError::Absent(_))) => "absent",
+        Err(VerifyError::Workers(error)) => panic!("{error}"),
+    }
+}
+
+#[test]
+fn a_games_recording_is_read_or_refused() {
+    let scratch = TempDir::new().unwrap();
+    recorded(scratch.path());
+    let valid = Valid::of(&scratch.path().join(GAME_FILE), scratch.path());
+    let met = fuzz("games", 800, |draws| {
+        let dir = scratch.path().join("changed");
+        fs::create_dir(&dir).unwrap();
+        let label = changed(&valid, &dir, draws);
+        fs::remove_dir_all(&dir).unwrap();
+        label.to_owned()
+    });
+    let kinds = ["read", "differs", "unreadable", "foreign", "altered"];
+    assert_met(&met, &kinds);
+}

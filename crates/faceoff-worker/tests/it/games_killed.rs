@@ -1,0 +1,117 @@
+//! `kill -9` of a server in the middle of a hundred games, again and again.
+
+use crate::{
+    server::Server,
+    tournament::{recording, results, rules, start},
+};
+use faceoff_store::*;
+use faceoff_types::{TeamId, TournamentId};
+use std::{
+    collections::BTreeMap,
+    io::{BufRead as _, BufReader, Write as _},
+    path::Path,
+    process::{Command, Stdio},
+};
+
+const FOLDER: &str = "FACEOFF_WORKER_TEST_FOLDER";
+const TOURNAMENT: &str = "FACEOFF_WORKER_TEST_TOURNAMENT";
+const TOLD: &str = "something happened";
+const GAMES: usize = 100;
+
+async fn are_over(server: &Server, tournament: TournamentId) -> bool {
+    let games = server.store.games(tournament, GamesOf::Rounds);
+    let games = games.await.unwrap();
+    games.iter().all(|game| !game.state.is_open())
+}
+
+/// Works until it is killed or all games are over, telling of every event. Started by the test below.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[ignore = "the child process of a_hundred_games_survive_killed_servers"]
+async fn child() {
+    let Ok(folder) = std::env::var(FOLDER) else {
+        return;
+    };
+    let server = Server::at(Path::new(&folder)).await;
+    let id = std::env::var(TOURNAMENT).unwrap().parse().unwrap();
+    let mut events = server.store.events();
+    let worker = server.work(2);
+    while !are_over(&server, id).await {
+        let _ = events.recv().await;
+        let mut out = std::io::stdout().lock();
+        writeln!(out, "\n{TOLD}")
+            .and_then(|()| out.flush())
+            .unwrap();
+    }
+    worker.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_hundred_games_survive_killed_servers() {
+    let server = Server::new().await;
+    let mut teams: Vec<TeamId> = Vec::new();
+    for number in 0..20 {
+        teams.push(server.valid(&format!("Team {number}"), "").await);
+    }
+    let (home, away) = teams.split_at(10);
+    let all = |home: &TeamId| {
+        let home = *home;
+        away.iter().map(move |away| [home, *away])
+    };
+    let pairs: Vec<[TeamId; 2]> = home.iter().flat_map(all).collect();
+    let games = start(&server, rules(2), &pairs).await;
+    assert_eq!(games.len(), GAMES);
+    let tournament = games[0].tournament;
+
+    for events_to_live in [1, 2, 3, 5, 8, 13, 21, 13, 8, 5, 3, 2] {
+        let mut child = Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", "games_killed::child", "--ignored", "--nocapture"])
+            .env(FOLDER, server.path())
+            .env(TOURNAMENT, tournament.to_string())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let lines = BufReader::new(child.stdout.take().unwrap())
+            .lines()
+            .map_while(Result::ok);
+        let told = lines
+            .filter(|line| line == TOLD)
+            .take(events_to_live)
+            .count();
+        child.kill().unwrap();
+        child.wait().unwrap();
+        assert_eq!(told, events_to_live, "the child ended by itself");
+    }
+    let worker = server.work(2);
+    let results = results(&server, tournament).await;
+    worker.stop().await;
+
+    let (mut lost, mut of_team) = (0, BTreeMap::new());
+    for (game, result) in games.iter().zip(&results) {
+        assert_eq!(result.score["steps"], 2);
+        for team in game.teams {
+            *of_team.entry(team).or_insert(0) += 1;
+        }
+        recording(&server, result);
+        let attempts = server.store.game_attempts(game.id).await.unwrap();
+        let numbers: Vec<u32> = attempts.iter().map(|attempt| attempt.number).collect();
+        assert!(
+            numbers.iter().copied().eq(1..=result.attempt),
+            "{attempts:?}"
+        );
+        for attempt in &attempts {
+            let end = attempt.end.as_ref().expect("no attempt is left open");
+            let how = if attempt.number == result.attempt {
+                AttemptOutcome::Played
+            } else {
+                lost += 1;
+                AttemptOutcome::Lost
+            };
+            assert_eq!(end.how, how, "{attempts:?}");
+        }
+    }
+    assert!(lost > 0, "games were killed in the middle");
+    assert!(of_team.len() == 20 && of_team.values().all(|games| *games == 10));
+    let record = server.store.tournament_record(tournament).await.unwrap();
+    assert!(record.rounds[0].over_at.is_some());
+}

@@ -1,0 +1,94 @@
+//! Tournaments of the teams of a server.
+
+use crate::server::Server;
+use faceoff_store::*;
+use faceoff_types::*;
+use jiff::Timestamp;
+use std::{io::Read as _, path::PathBuf};
+
+/// Short games, in which only an answer that takes a second is late: what a busy machine does must not decide.
+pub fn rules(steps: u32) -> TournamentRules {
+    TournamentRules {
+        steps,
+        game_limits: GameLimits {
+            in_time_s: 1.0,
+            restart_s: 600.0,
+            ..GameLimits::default()
+        },
+        ..TournamentRules::default()
+    }
+}
+
+/// Opens a tournament of these teams and starts its first round with these pairs, on one matchday; its games.
+pub async fn start(server: &Server, rules: TournamentRules, pairs: &[[TeamId; 2]]) -> Vec<Game> {
+    let mut entrants: Vec<TeamId> = pairs.iter().flatten().copied().collect();
+    entrants.sort_unstable();
+    entrants.dedup();
+    let new = NewTournament {
+        name: "Finals".parse().unwrap(),
+        stage: None,
+        rules,
+        settings: TournamentSettings::default(),
+        entrants,
+    };
+    let (store, now) = (&server.store, Timestamp::now());
+    let opened = store.open_tournament(Actor::Organiser, &new, now);
+    let id = opened.await.unwrap().id;
+    let drawn = DrawnRound {
+        number: RoundNumber::FIRST,
+        groups: Vec::new(),
+        matchdays: vec![DrawnMatchday {
+            games: pairs.to_vec(),
+            byes: Vec::new(),
+        }],
+    };
+    let started = store.start_round(Actor::Organiser, id, &drawn, now);
+    started.await.unwrap();
+    store.games(id, GamesOf::Rounds).await.unwrap()
+}
+
+/// Everybody against everybody.
+pub fn pairs(teams: &[TeamId]) -> Vec<[TeamId; 2]> {
+    let with = |(at, home): (usize, &TeamId)| {
+        let home = *home;
+        teams[at + 1..].iter().map(move |away| [home, *away])
+    };
+    teams.iter().enumerate().flat_map(with).collect()
+}
+
+/// Waits until a tournament's games are over; what they came to, in the order of play.
+pub async fn results(server: &Server, tournament: TournamentId) -> Vec<GameResultRow> {
+    let mut events = server.store.events();
+    let of_rounds = || server.store.games(tournament, GamesOf::Rounds);
+    let mut games = of_rounds().await.unwrap();
+    while games.iter().any(|game| game.state.is_open()) {
+        // a lagging receiver has missed something: look again
+        let _ = events.recv().await;
+        games = of_rounds().await.unwrap();
+    }
+    let result = |game: Game| match game.state {
+        GameState::Played(result) => *result,
+        state => panic!("{state:?}"),
+    };
+    games.into_iter().map(result).collect()
+}
+
+/// The stored recording of a game.
+pub fn recording(server: &Server, result: &GameResultRow) -> PathBuf {
+    let recording = result.recording.as_ref().expect("a round's game has one");
+    let folder = server.path().join("data/artifacts").join(&recording.key);
+    let whole = folder.join("game.zip");
+    let hash = blake3::hash(&std::fs::read(&whole).unwrap());
+    assert_eq!(hash.to_string(), recording.game_blake3);
+    whole
+}
+
+/// A file of a stored recording.
+pub fn file_of(recording: PathBuf, name: &str) -> Vec<u8> {
+    let archive = std::fs::File::open(recording).unwrap();
+    let mut archive = zip::ZipArchive::new(archive).unwrap();
+    let mut bytes = Vec::new();
+    let read = archive.by_name(name).unwrap().read_to_end(&mut bytes);
+    read.unwrap();
+    bytes
+}
