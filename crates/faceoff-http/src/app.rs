@@ -1,7 +1,8 @@
 use crate::{
-    config::HttpConfig, passwords::Passwords, standing::KeptRows, summaries::Summaries,
-    uploads::Uploads,
+    config::HttpConfig, kept::Kept, passwords::Passwords, standing::KeptRows, summaries::Summaries,
+    uploads::Uploads, views::certainty::CertaintyView,
 };
+use faceoff_scoring::tournament::rating::Ratings;
 use faceoff_store::Store;
 use std::sync::Arc;
 use tokio::sync::Semaphore;
@@ -19,6 +20,10 @@ pub(crate) struct AppState {
     pub(crate) archiving: Arc<Semaphore>,
     pub(crate) summaries: Summaries,
     pub(crate) rows: KeptRows,
+    pub(crate) ratings: Kept<Ratings>,
+    pub(crate) certainties: Kept<CertaintyView>,
+    /// One permit per reader of a game under way.
+    pub(crate) watching: Arc<Semaphore>,
     pub(crate) passwords: Passwords,
 }
 
@@ -35,6 +40,9 @@ impl AppState {
             archiving: Arc::new(Semaphore::new(1)),
             summaries: Summaries::new(store.clone(), config.clock.clone()),
             rows: KeptRows::new(store.clone()),
+            ratings: Kept::default(),
+            certainties: Kept::default(),
+            watching: Arc::new(Semaphore::new(config.limits.live_readers)),
             passwords: Passwords::default(),
             store,
             config,

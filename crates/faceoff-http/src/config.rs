@@ -10,6 +10,8 @@ pub struct HttpLimits {
     pub requests: usize,
     /// Uploads of one team at the same time; each one writes to disk.
     pub team_uploads: usize,
+    /// Readers of games under way at the same time, each of whom holds a connection.
+    pub live_readers: usize,
     /// Longest time to answer a request that is no upload.
     pub answer: Duration,
     /// How fast the body of an upload must come.
@@ -25,6 +27,7 @@ impl Default for HttpLimits {
         Self {
             requests: 512,
             team_uploads: 2,
+            live_readers: 256,
             answer: Duration::from_secs(30),
             upload_rate: LeastRate {
                 bytes_per_s: 16 << 10,

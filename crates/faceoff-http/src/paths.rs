@@ -1,6 +1,6 @@
 //! Where the API's resources are, for answers that lead to them.
 
-use faceoff_types::{EvaluationId, SubmissionId};
+use faceoff_types::{EvaluationId, GameId, SubmissionId, TournamentId};
 
 /// Where the API lives.
 pub const API_BASE: &str = "/api/v1";
@@ -11,4 +11,12 @@ pub(crate) fn submission(id: SubmissionId) -> String {
 
 pub(crate) fn evaluation(id: EvaluationId) -> String {
     format!("{API_BASE}/evaluations/{id}")
+}
+
+pub(crate) fn tournament(id: TournamentId) -> String {
+    format!("{API_BASE}/tournaments/{id}")
+}
+
+pub(crate) fn game(id: GameId) -> String {
+    format!("{API_BASE}/games/{id}")
 }

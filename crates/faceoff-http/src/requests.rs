@@ -2,8 +2,10 @@
 
 mod left_out;
 mod people;
+mod tournaments;
 
 pub use people::*;
+pub use tournaments::*;
 
 use faceoff_archive::Edition;
 use faceoff_types::{
@@ -91,7 +93,7 @@ pub struct EventsQuery {
     /// `person`, `team` and `worker` name all of them.
     pub actor: Option<String>,
     /// What it is about: `season`, `stage:ID`, `day:STAGE/2026-03-01`, `team:ID`, `submission:ID`, `evaluation:ID`, `ablation:ID`,
-    /// `person:ID`, `registration:ID`, `announcement:ID`, `question:ID` or `proposal:ID`.
+    /// `person:ID`, `registration:ID`, `announcement:ID`, `question:ID`, `proposal:ID`, `tournament:ID` or `game:ID`.
     pub subject: Option<String>,
     /// What happened, e.g. `day_started`.
     pub kind: Option<String>,

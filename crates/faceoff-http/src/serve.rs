@@ -8,11 +8,12 @@ mod addresses;
 mod paced_stream;
 
 use crate::{
+    ending::Ending,
     pace::LeastRate,
     problem::{Problem, ProblemKind},
 };
 use addresses::Addresses;
-use axum::Router;
+use axum::{Extension, Router};
 use hyper::server::conn::http1;
 use hyper_util::{
     rt::{TokioIo, TokioTimer},
@@ -97,6 +98,9 @@ pub async fn serve(
     http.timer(TokioTimer::new())
         .header_read_timeout(limits.head);
     let ending = GracefulShutdown::new();
+    // Who follows a game would be waited for until that is over.
+    let (ends, told) = Ending::new();
+    let router = router.layer(Extension(told));
     let mut until = pin!(until);
     loop {
         let (stream, from, place) = tokio::select! {
@@ -121,6 +125,7 @@ pub async fn serve(
         });
     }
     drop(door);
+    ends.send_replace(true);
     ending.shutdown().await;
 }
 

@@ -11,16 +11,24 @@ mod datasets;
 mod days;
 mod document;
 mod downloads;
+mod entrants;
 mod episodes;
 mod evaluations;
 mod events;
+mod free_games;
 mod freezes;
+mod game_files;
+mod games;
 mod health;
 mod invitations;
+mod live_game;
 mod me;
 mod people;
 mod proposals;
+mod ratings;
 mod registrations;
+mod replays;
+mod rounds;
 mod rulings;
 mod season;
 mod season_archive;
@@ -33,6 +41,7 @@ mod submissions;
 mod teams;
 mod terms;
 mod tokens;
+mod tournaments;
 mod turns;
 mod upload;
 
@@ -131,6 +140,37 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(datasets::violations))
         .routes(routes!(datasets::publish_evaluation))
         .routes(routes!(comparisons::compare))
+        .routes(routes!(
+            tournaments::list_tournaments,
+            tournaments::open_tournament
+        ))
+        .routes(routes!(
+            tournaments::tournament,
+            tournaments::change_tournament
+        ))
+        .routes(routes!(entrants::enter_teams))
+        .routes(routes!(entrants::depart))
+        .routes(routes!(entrants::withdraw_team))
+        .routes(routes!(rounds::start_round))
+        .routes(routes!(tournaments::pause_tournament))
+        .routes(routes!(tournaments::resume_tournament))
+        .routes(routes!(tournaments::close_tournament))
+        .routes(routes!(free_games::order_test_games))
+        .routes(routes!(free_games::order_friendly_game))
+        .routes(routes!(free_games::list_free_games))
+        .routes(routes!(replays::order_replays, replays::cancel_replays))
+        .routes(routes!(replays::certainty))
+        .routes(routes!(ratings::ratings))
+        .routes(routes!(ratings::head_to_head))
+        .routes(routes!(games::list_games))
+        .routes(routes!(games::game, games::cancel_game))
+        .routes(routes!(games::list_attempts))
+        .routes(routes!(games::void_game))
+        .routes(routes!(games::rerun_game))
+        .routes(routes!(game_files::side))
+        .routes(routes!(game_files::side_log))
+        .routes(routes!(game_files::recording))
+        .routes(routes!(live_game::watch_game))
         .layer(middleware::from_fn_with_state(patience, layers::time_out))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES));
     // An upload may take long as long as it moves; `upload` itself watches size and pauses.

@@ -12,8 +12,8 @@ use crate::{
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_store::{Stage, StagePhase};
 use faceoff_types::{
-    MismatchSettings, Retention, Ruleset, Runtimes, StageId, StageName, StageRules, StageSettings,
-    Standings, Variation,
+    MismatchSettings, PerturbationSettings, Retention, Ruleset, Runtimes, StageId, StageName,
+    StageRules, StageSettings, Standings, Variation,
 };
 
 fn name(text: &str) -> Result<StageName, Problem> {
@@ -27,8 +27,8 @@ fn check(rules: &StageRules, settings: &StageSettings) -> Result<(), Problem> {
 }
 
 /// Refuses runtimes that the server does not offer.
-fn check_offered(app: &App, wanted: Option<&Option<Runtimes>>) -> Result<(), Problem> {
-    let Some(Some(wanted)) = wanted else {
+pub(super) fn check_offered(app: &App, wanted: Option<&Runtimes>) -> Result<(), Problem> {
+    let Some(wanted) = wanted else {
         return Ok(());
     };
     wanted
@@ -51,13 +51,13 @@ fn check_offered(app: &App, wanted: Option<&Option<Runtimes>>) -> Result<(), Pro
 }
 
 /// Refuses magnitudes that no robot of the season meets.
-async fn check_robot(app: &App, rules: &StageRules) -> Result<(), Problem> {
-    let settings = rules.variation.perturbations.clone();
+pub(super) async fn check_robot(app: &App, settings: &PerturbationSettings) -> Result<(), Problem> {
     if settings.model_mismatch == MismatchSettings::default() {
         return Ok(());
     }
     let seed = app.store.season().await?.secret.model_mismatch();
     let [least, most] = settings.model_mismatch.static_error_m;
+    let settings = settings.clone();
     let has_robot = move || faceoff_dataset::has_robot(&settings, seed);
     if tokio::task::spawn_blocking(has_robot)
         .await
@@ -113,7 +113,7 @@ pub(crate) async fn create_stage(
 ) -> Result<(StatusCode, Json<StageView>), Problem> {
     let like = stage::current(&app).await?;
     let now = app.config.clock.now();
-    check_offered(&app, new.runtimes.as_ref())?;
+    check_offered(&app, new.runtimes.as_ref().and_then(Option::as_ref))?;
     let rules = StageRules {
         ruleset: Ruleset::CURRENT,
         profile: new.profile.unwrap_or(like.rules.rules.profile),
@@ -149,7 +149,7 @@ pub(crate) async fn create_stage(
     };
     check(&rules, &settings)?;
     let retention = checked_retention(new.retention)?.unwrap_or_default();
-    check_robot(&app, &rules).await?;
+    check_robot(&app, &rules.variation.perturbations).await?;
     let wanted = faceoff_store::NewStage {
         name: name(&new.name)?,
         opens_at: new.opens_at.unwrap_or(now),
@@ -198,7 +198,7 @@ pub(crate) async fn change_stage(
         || change.perturbations.is_some()
         || change.limits.is_some()
         || change.runtimes.is_some();
-    check_offered(&app, change.runtimes.as_ref())?;
+    check_offered(&app, change.runtimes.as_ref().and_then(Option::as_ref))?;
     let rules = StageRules {
         // An upgrade of the program alone changes nothing of a stage.
         ruleset: if other_rules {
@@ -239,7 +239,7 @@ pub(crate) async fn change_stage(
     check(&rules, &settings)?;
     let retention = checked_retention(change.retention)?;
     if rules.variation.perturbations != is.variation.perturbations {
-        check_robot(&app, &rules).await?;
+        check_robot(&app, &rules.variation.perturbations).await?;
     }
     let mut told = Vec::new();
     if stage.phase(now) == StagePhase::Open {

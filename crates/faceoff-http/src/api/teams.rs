@@ -126,6 +126,7 @@ pub(crate) async fn change_team(
         link: change.link.unwrap_or(team.profile.link),
         division: change.division.unwrap_or(team.profile.division),
     };
+    let declines = change.declines_friendly_games;
     let (_, profile): (_, TeamProfile) = profile(described)?;
     let change = TeamChange {
         name: change.name,
@@ -136,8 +137,13 @@ pub(crate) async fn change_team(
         .store
         .change_team(caller.actor(), id, change, now)
         .await?;
+    if let Some(declines) = declines {
+        app.store
+            .set_declines_friendly_games(caller.actor(), id, declines, now)
+            .await?;
+    }
     tracing::info!(team = %team.name, %id, actor = %caller.actor(), "team changed");
-    Ok(Json(team.into()))
+    TeamView::find(&app, id).await.map(Json)
 }
 
 /// Takes a team out of all days to come, by its own wish: it neither uploads nor plays; its results stay.

@@ -135,6 +135,9 @@ pub struct TeamChange {
     )]
     #[schema(value_type = Option<String>)]
     pub division: Option<Option<DivisionName>>,
+    /// Does it play no friendly games that other teams ask for?
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub declines_friendly_games: Option<bool>,
 }
 
 /// What of the season is to be another; what is left out stays as it is.

@@ -22,7 +22,7 @@ pub struct EventView {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub actor_name: Option<String>,
     /// `season`, or kind and id: `stage:ID`, `day:STAGE/2026-03-01`, `team:ID`, `submission:ID`, `evaluation:ID`, `ablation:ID`,
-    /// `person:ID`, `registration:ID`, `announcement:ID`, `question:ID`, `proposal:ID`.
+    /// `person:ID`, `registration:ID`, `announcement:ID`, `question:ID`, `proposal:ID`, `tournament:ID`, `game:ID`.
     #[schema(example = "day:2026-03-01")]
     pub subject: String,
     /// What happened.
@@ -100,7 +100,7 @@ pub(crate) async fn names(app: &AppState) -> Result<BTreeMap<String, String>, Pr
 fn subject(text: &str) -> Result<Subject, Problem> {
     text.parse().map_err(|_| {
         let expected = "season, stage:ID, day:STAGE/DATE, team:ID, submission:ID, evaluation:ID, ablation:ID, \
-                        person:ID, registration:ID, announcement:ID, question:ID or proposal:ID";
+                        person:ID, registration:ID, announcement:ID, question:ID, proposal:ID, tournament:ID or game:ID";
         Problem::invalid("subject", format!("expected {expected}, got {text:?}"))
     })
 }

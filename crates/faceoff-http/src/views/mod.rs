@@ -7,8 +7,10 @@
 pub mod ablation;
 pub mod announcement;
 pub mod archived;
+pub mod attempt;
 pub mod board;
 pub mod capacity;
+pub mod certainty;
 pub mod comparison;
 pub mod day;
 mod division;
@@ -16,12 +18,16 @@ pub mod evaluation;
 mod evaluation_status;
 pub mod event;
 pub mod finalised;
+pub mod game;
 pub mod invitation;
+pub mod live;
 pub mod me;
 pub mod not_taken;
 pub mod person;
 pub mod proposal;
 pub mod queue;
+pub(crate) mod ratings;
+pub(crate) mod replays;
 pub mod ruling;
 pub mod season;
 pub(crate) mod sight;
@@ -32,6 +38,8 @@ pub mod submission;
 pub mod task;
 pub mod team;
 pub mod token;
+pub mod tournament;
+pub(crate) mod tournament_sheet;
 pub mod violations;
 
 /// Text of agents as API and pages show it; what older versions have stored may hold anything.

@@ -1,13 +1,17 @@
 //! What a viewer sees of stages: nobody but the organiser the scores of a blind one, and what was scored since boards
-//! stand still only its team beside; without a token what is published.
+//! stand still only its team beside; without a token what is published. And of games: all results of rounds, its own of
+//! what does not count, and of recordings its own side's until they are published.
 
 use crate::{
     app::AppState,
     problem::{Problem, ProblemKind},
     viewer::Viewer,
 };
-use faceoff_store::{Evaluation, EvaluationState, Ruling, Stage, StagePhase, StoreError};
-use faceoff_types::{Publishes, StageId};
+use faceoff_store::{
+    Evaluation, EvaluationState, Game, GamePurpose, Ruling, Stage, StagePhase, StoreError,
+    Tournament, TournamentRound,
+};
+use faceoff_types::{Publishes, Side, StageId};
 use jiff::Timestamp;
 use std::collections::BTreeMap;
 
@@ -193,5 +197,91 @@ impl Sight {
             Ok(_) | Err(StoreError::NotFound(_)) => Err(Problem::not_found("evaluation")),
             Err(error) => Err(error.into()),
         }
+    }
+}
+
+/// What a viewer sees of a tournament's games.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct GameSight<'a> {
+    viewer: Viewer,
+    tournament: &'a Tournament,
+    rounds: &'a [TournamentRound],
+}
+
+impl<'a> GameSight<'a> {
+    pub(crate) const fn new(
+        viewer: Viewer,
+        tournament: &'a Tournament,
+        rounds: &'a [TournamentRound],
+    ) -> Self {
+        Self {
+            viewer,
+            tournament,
+            rounds,
+        }
+    }
+
+    /// Does the viewer know of a game, and what it came to? What does not count is its two teams'.
+    pub(crate) fn shows(self, game: &Game) -> bool {
+        match game.purpose {
+            GamePurpose::Round(_) | GamePurpose::Replay { .. } => true,
+            GamePurpose::Test { .. } | GamePurpose::Friendly { .. } => {
+                Side::BOTH.iter().any(|side| self.is_own(game, *side))
+            }
+        }
+    }
+
+    /// Is it the viewer's side, of which they see file and log at once?
+    pub(crate) fn is_own(self, game: &Game, side: Side) -> bool {
+        match self.viewer {
+            Viewer::Organiser => true,
+            Viewer::Team(team) => team == game.teams[side.index()],
+            Viewer::Anybody => false,
+        }
+    }
+
+    /// Is the recording of both sides, with the game's seed, there for everybody?
+    pub(crate) fn is_public(self, game: &Game) -> bool {
+        let GamePurpose::Round(meeting) = game.purpose else {
+            return false;
+        };
+        let has_closed = self.tournament.closed_at.is_some();
+        match self.tournament.settings.publishes {
+            Publishes::Never => false,
+            Publishes::AtClose => has_closed,
+            Publishes::AtRelease => {
+                let round = self.rounds.iter().find(|one| one.number == meeting.round);
+                has_closed || round.is_some_and(|round| round.over_at.is_some())
+            }
+        }
+    }
+
+    /// Does the viewer see both sides' recording, and the game's seed?
+    pub(crate) fn sees_both_sides(self, game: &Game) -> bool {
+        self.viewer == Viewer::Organiser || self.is_public(game)
+    }
+
+    /// Refuses what the viewer does not see of a game that they know of; `what` it is, in words.
+    ///
+    /// # Errors
+    /// `Unauthenticated` or `Forbidden`, with when it comes out.
+    pub(crate) fn refused(self, game: &Game, what: &str) -> Problem {
+        let when = match (&game.purpose, self.tournament.settings.publishes) {
+            (GamePurpose::Round(_), Publishes::AtRelease) => {
+                "it is there for everybody when its round is over"
+            }
+            (GamePurpose::Round(_), Publishes::AtClose) => {
+                "it is there for everybody when the tournament is closed"
+            }
+            _ => "it is never there for everybody",
+        };
+        let kind = match self.viewer {
+            Viewer::Anybody => ProblemKind::Unauthenticated,
+            Viewer::Organiser | Viewer::Team(_) => ProblemKind::Forbidden,
+        };
+        Problem::new(
+            kind,
+            format!("{what} is not yours to see: {when}; a team gets its own side's at once"),
+        )
     }
 }

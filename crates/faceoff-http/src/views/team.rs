@@ -33,6 +33,9 @@ pub struct TeamView {
     /// Since when it plays no more, by its own wish; null: it plays.
     #[serde(default)]
     pub retired_at: Option<Timestamp>,
+    /// Does it play no friendly games that other teams ask for? Told of a single team; absent in lists.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub declines_friendly_games: Option<bool>,
 }
 
 impl From<Team> for TeamView {
@@ -46,13 +49,17 @@ impl From<Team> for TeamView {
             link: team.profile.link,
             division: team.profile.division,
             retired_at: team.retired_at,
+            declines_friendly_games: None,
         }
     }
 }
 
 impl TeamView {
     pub(crate) async fn find(app: &AppState, id: TeamId) -> Result<Self, Problem> {
-        Ok(app.store.team(id).await?.into())
+        Ok(Self {
+            declines_friendly_games: Some(app.store.declines_friendly_games(id).await?),
+            ..app.store.team(id).await?.into()
+        })
     }
 
     /// All teams, by name.

@@ -172,7 +172,7 @@ async fn ask(site: &Site, edition: &str) -> reqwest::Response {
 }
 
 /// Downloads and unpacks an archive; the manifest of what lies in the folder.
-async fn exported(site: &Site, edition: &str) -> (TempDir, Manifest) {
+pub async fn exported(site: &Site, edition: &str) -> (TempDir, Manifest) {
     let bytes = ask(site, edition).await.bytes().await.unwrap();
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("season.tar.zst");
@@ -184,7 +184,7 @@ async fn exported(site: &Site, edition: &str) -> (TempDir, Manifest) {
 }
 
 /// Imports what was unpacked, and serves it.
-async fn imported((folder, _): (TempDir, Manifest)) -> Site {
+pub async fn imported((folder, _): (TempDir, Manifest)) -> Site {
     let rest = folder.path().join("archive");
     let target = folder.path().join("faceoff.sqlite3");
     std::fs::rename(rest.join("database.sqlite3"), target).unwrap();
@@ -196,7 +196,7 @@ async fn imported((folder, _): (TempDir, Manifest)) -> Site {
     Site::showing(folder).await
 }
 
-fn read(folder: &TempDir, path: &str) -> String {
+pub fn read(folder: &TempDir, path: &str) -> String {
     let file = folder.path().join("archive").join(path);
     std::fs::read_to_string(&file).unwrap_or_else(|error| panic!("{}: {error}", file.display()))
 }

@@ -38,7 +38,7 @@ pub async fn play_slowly(site: &Site, seconds: i64) {
                 finished.await.unwrap();
                 return;
             }
-            Work::Smoke { .. } => panic!("no upload waits"),
+            Work::Smoke { .. } | Work::Game { .. } => panic!("no upload waits, and no game"),
         }
     }
 }

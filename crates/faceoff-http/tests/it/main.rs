@@ -38,6 +38,7 @@ mod stages;
 mod standings;
 mod submissions;
 mod teams;
+mod tournament;
 mod uploads;
 mod variation;
 mod whole_season;

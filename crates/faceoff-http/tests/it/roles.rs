@@ -1,6 +1,9 @@
 //! Every route for every role: who may, who may not, and for whom there is nothing to see.
 
-use crate::site::{ADMIN, Answer, GZIP, Site, text};
+use crate::{
+    site::{ADMIN, Answer, GZIP, Site, TestTeam, text},
+    tournament::slot::{self, Went},
+};
 use reqwest::Method;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -109,6 +112,36 @@ const TABLE: &[(&str, &str)] = &[
     ("POST /stages/{id}/trial", "?----++"),
     ("POST /stages/{id}/unfreeze", "?----++"),
     ("GET /whoami", "?++++++"),
+    // The game of these is one that does not count: the team's, against an agent of no team of the table.
+    ("DELETE /games/{id}", "?00++++"),
+    ("DELETE /tournaments/{id}/replays", "?----++"),
+    ("GET /games/{id}", "000++++"),
+    ("GET /games/{id}/attempts", "?----++"),
+    ("GET /games/{id}/live", "000++++"),
+    ("GET /games/{id}/recording", "000--++"),
+    ("GET /games/{id}/sides/{side}", "000++++"),
+    ("GET /games/{id}/sides/{side}/log", "?00++++"),
+    ("GET /tournaments", "+++++++"),
+    ("GET /tournaments/{id}", "+++++++"),
+    ("GET /tournaments/{id}/certainty", "+++++++"),
+    ("GET /tournaments/{id}/free-games", "?++++++"),
+    ("GET /tournaments/{id}/games", "+++++++"),
+    ("GET /tournaments/{id}/head-to-head", "+++++++"),
+    ("GET /tournaments/{id}/ratings", "+++++++"),
+    ("PATCH /tournaments/{id}", "?----++"),
+    ("POST /games/{id}/rerun", "?----++"),
+    ("POST /games/{id}/void", "?----++"),
+    ("POST /tournaments", "?----++"),
+    ("POST /tournaments/{id}/close", "?----++"),
+    ("POST /tournaments/{id}/departures", "?----++"),
+    ("POST /tournaments/{id}/entrants", "?----++"),
+    ("POST /tournaments/{id}/friendly-games", "?++++--"),
+    ("POST /tournaments/{id}/pause", "?----++"),
+    ("POST /tournaments/{id}/replays", "?----++"),
+    ("POST /tournaments/{id}/resume", "?----++"),
+    ("POST /tournaments/{id}/rounds", "?----++"),
+    ("POST /tournaments/{id}/test-games", "?++++++"),
+    ("POST /tournaments/{id}/withdrawal", "?-+-+--"),
 ];
 
 /// A body that gets past parsing, and does nothing that the next role would trip over.
@@ -142,9 +175,42 @@ fn body(route: &str) -> Value {
         "POST /stages" => json!({ "name": "" }),
         "POST /submissions/{id}/ablation" => json!({ "episodes_per_task": 0 }),
         "PATCH /submissions/{id}" => json!({ "label": "" }),
-        "POST /teams" | "POST /tokens" => json!({ "name": "" }),
+        "POST /teams" | "POST /tokens" | "POST /tournaments" => json!({ "name": "" }),
+        "POST /games/{id}/void"
+        | "POST /tournaments/{id}/pause"
+        | "POST /tournaments/{id}/withdrawal" => {
+            json!({ "reason": "" })
+        }
+        "POST /tournaments/{id}/departures" => {
+            json!({ "team": "Alpha", "as": "withdrawn", "reason": "" })
+        }
+        "POST /tournaments/{id}/entrants" => json!({ "teams": [] }),
+        "POST /tournaments/{id}/friendly-games" => json!({ "opponent": "Nobody" }),
+        "POST /tournaments/{id}/replays" => json!({ "times": 0 }),
         _ => json!({}),
     }
+}
+
+/// A tournament, and a game in it of the team against an agent of the organisers', which is played.
+async fn played_test_game(site: &Site, team: &TestTeam) -> [String; 2] {
+    let host = site.team("Organisers").await;
+    let baseline = site.valid_submission(&host, "baseline").await;
+    let new = json!({ "name": "Cup", "teams": ["Alpha"] });
+    let opened = site.post("/api/v1/tournaments", Some(ADMIN), &new).await;
+    let path = opened.header("location").to_owned();
+    let baseline = json!({ "baseline": baseline.rsplit('/').next().unwrap() });
+    let change = site
+        .request(Method::PATCH, &path, Some(ADMIN))
+        .json(&baseline);
+    Answer::of(change.send().await.unwrap()).await.json(200);
+    let ordered = site
+        .post(&format!("{path}/test-games"), Some(&team.token), &json!({}))
+        .await
+        .json(201);
+    let played = slot::play_next(site, |_, _| Went::goals(1, 0)).await;
+    assert!(played.is_some());
+    let id = path.rsplit('/').next().unwrap().to_owned();
+    [id, text(&ordered["ordered"][0]["id"])]
 }
 
 struct Cast {
@@ -200,6 +266,7 @@ impl Cast {
         let submission = site.valid_submission(&alpha, "a").await;
         let evaluation = site.evaluate(&alpha, &submission).await;
         site.finish(&crate::site::result([0.5; 3], 10.0)).await;
+        let game = played_test_game(&site, &alpha).await;
         let question = site
             .post(
                 "/api/v1/questions",
@@ -229,6 +296,8 @@ impl Cast {
                 "00000000-0000-7000-8000-000000000000".into(),
             ),
             ("proposals", "00000000-0000-7000-8000-000000000000".into()),
+            ("tournaments", game[0].clone()),
+            ("games", game[1].clone()),
         ]);
         let tokens = vec![
             None,
@@ -252,6 +321,7 @@ impl Cast {
             .replace("{other}", id)
             .replace("{task}", "hit")
             .replace("{day}", "2020-01-01")
+            .replace("{side}", "1")
             .replace("{version}", "7");
         format!("/api/v1{path}")
     }

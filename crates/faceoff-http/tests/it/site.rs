@@ -15,7 +15,7 @@ use std::{
     sync::{Arc, Mutex},
     time::Duration,
 };
-use tokio::{net::TcpListener, task::JoinHandle};
+use tokio::{net::TcpListener, sync::oneshot, task::JoinHandle};
 
 pub const ADMIN: &str = "fo_admin_0123456789abcdef";
 pub const MAX_BUNDLE: u64 = 64 * 1024;
@@ -30,6 +30,8 @@ pub struct Site {
     now: Arc<Mutex<Timestamp>>,
     http: reqwest::Client,
     server: JoinHandle<()>,
+    /// What makes it end in an orderly way.
+    ends: Option<oneshot::Sender<()>>,
 }
 
 impl Drop for Site {
@@ -157,7 +159,7 @@ impl Site {
                 runtimes: ["native", "python3"].map(str::to_owned).to_vec(),
             },
         };
-        let (url, server) = serve(&store, &config).await;
+        let (url, server, ends) = serve(&store, &config).await;
         let http = reqwest::Client::builder().no_proxy().build().unwrap();
         Self {
             url,
@@ -167,6 +169,7 @@ impl Site {
             now,
             http,
             server,
+            ends: Some(ends),
         }
     }
 
@@ -194,7 +197,7 @@ impl Site {
                 time: TimeLimits::default(),
             },
         };
-        let (url, server) = serve(&store, &config).await;
+        let (url, server, ends) = serve(&store, &config).await;
         Self {
             url,
             store,
@@ -203,13 +206,21 @@ impl Site {
             now: Arc::new(Mutex::new(made_at)),
             http: reqwest::Client::builder().no_proxy().build().unwrap(),
             server,
+            ends: Some(ends),
         }
     }
 
     /// Another server on the same folder, which remembers nothing.
     pub async fn restart(&mut self) {
         self.server.abort();
-        (self.url, self.server) = serve(&self.store, &self.config).await;
+        let (url, server, ends) = serve(&self.store, &self.config).await;
+        (self.url, self.server, self.ends) = (url, server, Some(ends));
+    }
+
+    /// Ends the server as a signal does, and waits until it has ended.
+    pub async fn end(&mut self) {
+        self.ends.take().unwrap().send(()).unwrap();
+        (&mut self.server).await.unwrap();
     }
 
     /// What warns of days that do not fit, with nothing seen yet.
@@ -551,14 +562,24 @@ fn connections() -> ConnectionLimits {
     }
 }
 
-async fn serve(store: &Store, config: &HttpConfig) -> (String, JoinHandle<()>) {
+async fn serve(
+    store: &Store,
+    config: &HttpConfig,
+) -> (String, JoinHandle<()>, oneshot::Sender<()>) {
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let url = format!("http://{}", listener.local_addr().unwrap());
     let site = router(store.clone(), config.clone());
+    let (ends, end) = oneshot::channel();
     let server = tokio::spawn(async move {
-        faceoff_http::serve(listener, site, connections(), std::future::pending()).await;
+        let until = async move {
+            // Without a word it goes on: who sends none has dropped it.
+            if end.await.is_err() {
+                std::future::pending().await
+            }
+        };
+        faceoff_http::serve(listener, site, connections(), until).await;
     });
-    (url, server)
+    (url, server, ends)
 }
 
 pub fn text(value: &Value) -> String {

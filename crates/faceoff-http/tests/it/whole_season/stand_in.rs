@@ -137,6 +137,7 @@ impl StandIn {
                 let result = scored(&run, seeds.episodes, &outcomes);
                 self.publish(site, &claim, evaluation, &result).await;
             }
+            Work::Game { .. } => panic!("the season has no tournament"),
         }
     }
 

@@ -1,0 +1,186 @@
+//! Games that do not count, before and between rounds: against the organisers' baseline, and between two teams.
+
+use crate::{
+    acts::entering,
+    app::App,
+    auth::{Caller, TeamCaller},
+    extract::{Json as Body, OptionalJson, PathParam},
+    paths,
+    problem::{Problem, ProblemKind},
+    requests::{NewFriendlyGame, NewTestGames},
+    viewer::Viewer,
+    views::{
+        game::{GameView, NotOrdered, TestGamesView},
+        tournament_sheet::TournamentSheet,
+    },
+};
+use axum::{
+    Json,
+    extract::State,
+    http::{StatusCode, header},
+    response::{AppendHeaders, IntoResponse},
+};
+use faceoff_store::{Game, StoreError};
+use faceoff_types::{TeamId, TournamentId};
+use jiff::{Timestamp, tz::TimeZone};
+
+/// Plays what teams have active against the baseline: a team its own, within its quota of the day; an organiser anybody's
+/// who is in the tournament, without one.
+#[utoipa::path(
+    post, path = "/tournaments/{id}/test-games", tag = "team", security(("team" = []), ("organiser" = [])),
+    params(("id" = TournamentId, Path)),
+    request_body(content = Option<NewTestGames>, content_type = "application/json"),
+    responses(
+        (status = 201, body = TestGamesView),
+        (status = 404),
+        (status = 409, description = "a round is under way, there is no baseline, nothing valid is active, or not in the tournament, or that is closed"),
+        (status = 422),
+        (status = 429, description = "the team has asked for as many games today as it may"),
+    )
+)]
+pub(crate) async fn order_test_games(
+    caller: Caller,
+    State(app): State<App>,
+    PathParam(id): PathParam<TournamentId>,
+    OptionalJson(wanted): OptionalJson<NewTestGames>,
+) -> Result<(StatusCode, Json<TestGamesView>), Problem> {
+    let sheet = TournamentSheet::unscored(&app, id).await?;
+    let asked_by = caller.team().map(|team| team.id);
+    let baselines = baselines_team(&app, &sheet).await?;
+    let teams = match (asked_by, wanted.teams) {
+        (None, None) => {
+            let entrants = sheet.entrants.iter();
+            let tested = entrants.filter(|one| one.left.is_none() && Some(one.team) != baselines);
+            tested.map(|entrant| entrant.team).collect()
+        }
+        (None, Some(names)) => entering::named(&app, "teams", &names).await?,
+        (Some(own), None) => vec![own],
+        (Some(own), Some(names)) => {
+            let teams = entering::named(&app, "teams", &names).await?;
+            if teams != [own] {
+                return Err(Problem::new(
+                    ProblemKind::Forbidden,
+                    "teams: a team has its own agent tested alone; leave it out",
+                ));
+            }
+            teams
+        }
+    };
+    if let Some(own) = teams.iter().find(|team| Some(**team) == baselines) {
+        let detail = format!(
+            "{}: the baseline is its own, and a team cannot play itself",
+            sheet.name(*own)?
+        );
+        return Err(Problem::new(ProblemKind::Conflict, detail));
+    }
+    let now = app.config.clock.now();
+    let (mut ordered, mut not_ordered) = (Vec::new(), Vec::new());
+    for team in teams {
+        let game = app
+            .store
+            .order_test_game(caller.actor(), id, team, asked_by, now);
+        match game.await {
+            Ok(game) => ordered.push(GameView::of(&sheet, Viewer::of(&caller), &game)?),
+            // What keeps one team from it keeps no other from it.
+            Err(StoreError::Conflict(reason)) if asked_by.is_none() => {
+                let team_name = sheet.name(team)?;
+                not_ordered.push(NotOrdered {
+                    team,
+                    team_name,
+                    reason,
+                });
+            }
+            Err(error) => return Err(refused(error, now)),
+        }
+    }
+    if let (true, Some(first)) = (ordered.is_empty(), not_ordered.first()) {
+        let detail = format!("no game was queued. {}: {}", first.team_name, first.reason);
+        return Err(Problem::new(ProblemKind::Conflict, detail));
+    }
+    tracing::info!(tournament = %id, actor = %caller.actor(), games = ordered.len(), "test games ordered");
+    let view = TestGamesView {
+        ordered,
+        not_ordered,
+    };
+    Ok((StatusCode::CREATED, Json(view)))
+}
+
+/// Whose the baseline is.
+async fn baselines_team(app: &App, sheet: &TournamentSheet) -> Result<Option<TeamId>, Problem> {
+    Ok(match sheet.tournament.baseline {
+        Some(submission) => Some(app.store.submission(submission).await?.team),
+        None => None,
+    })
+}
+
+/// Plays what the caller's team has active, at home, against what another team has.
+#[utoipa::path(
+    post, path = "/tournaments/{id}/friendly-games", tag = "team", security(("team" = [])),
+    params(("id" = TournamentId, Path)), request_body = NewFriendlyGame,
+    responses(
+        (status = 201, body = GameView),
+        (status = 404),
+        (status = 409, description = "a round is under way, the opponent declines such games, one of them has nothing valid active or is not in the tournament, or that is closed"),
+        (status = 422),
+        (status = 429, description = "the team has asked for as many games today as it may"),
+    )
+)]
+pub(crate) async fn order_friendly_game(
+    caller: TeamCaller,
+    State(app): State<App>,
+    PathParam(id): PathParam<TournamentId>,
+    Body(NewFriendlyGame { opponent }): Body<NewFriendlyGame>,
+) -> Result<impl IntoResponse, Problem> {
+    let sheet = TournamentSheet::unscored(&app, id).await?;
+    let opponent = entering::named(&app, "opponent", &[opponent]).await?[0];
+    let own = caller.team.id;
+    if opponent == own {
+        return Err(Problem::invalid(
+            "opponent",
+            "a team does not play against itself; name another one",
+        ));
+    }
+    let now = app.config.clock.now();
+    let game: Game = app
+        .store
+        .order_friendly_game(caller.actor(), id, own, opponent, now)
+        .await
+        .map_err(|error| refused(error, now))?;
+    tracing::info!(tournament = %id, game = %game.id, team = %caller.team.name, "friendly game ordered");
+    let view = GameView::of(&sheet, Viewer::Team(own), &game)?;
+    let location = [(header::LOCATION, paths::game(game.id))];
+    Ok((StatusCode::CREATED, AppendHeaders(location), Json(view)))
+}
+
+/// The games that do not count: a team's own, an organiser all, the newest first.
+#[utoipa::path(
+    get, path = "/tournaments/{id}/free-games", tag = "team", security(("team" = []), ("organiser" = [])),
+    params(("id" = TournamentId, Path)),
+    responses((status = 200, body = Vec<GameView>), (status = 404))
+)]
+pub(crate) async fn list_free_games(
+    caller: Caller,
+    State(app): State<App>,
+    PathParam(id): PathParam<TournamentId>,
+) -> Result<Json<Vec<GameView>>, Problem> {
+    GameView::free(&app, Viewer::of(&caller), id)
+        .await
+        .map(Json)
+}
+
+/// Says when a day's quota begins anew.
+fn refused(error: StoreError, now: Timestamp) -> Problem {
+    let is_of_day = matches!(error, StoreError::FreeGamesSpent { .. });
+    let problem = Problem::from(error);
+    let tomorrow = now
+        .to_zoned(TimeZone::UTC)
+        .tomorrow()
+        .and_then(|tomorrow| tomorrow.start_of_day());
+    match tomorrow {
+        Ok(tomorrow) if is_of_day => {
+            let seconds = tomorrow.timestamp().duration_since(now).as_secs();
+            problem.retry_after(seconds.unsigned_abs().max(1))
+        }
+        _ => problem,
+    }
+}

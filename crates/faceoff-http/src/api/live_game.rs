@@ -1,0 +1,79 @@
+//! A game as it is played, by server-sent events.
+
+use crate::{
+    app::App,
+    ending::Ending,
+    extract::PathParam,
+    live_reader::{LiveReader, parse_mark},
+    problem::{Problem, ProblemKind},
+    viewer::Viewer,
+    views::game,
+};
+use axum::{
+    Extension,
+    extract::State,
+    http::{HeaderMap, HeaderName},
+    response::{
+        AppendHeaders, IntoResponse,
+        sse::{KeepAlive, Sse},
+    },
+};
+use faceoff_types::GameId;
+use futures::{StreamExt as _, stream};
+use std::{convert::Infallible, sync::Arc, time::Duration};
+
+const LAST_EVENT_ID: &str = "last-event-id";
+/// Proxies close what says nothing for a minute.
+const KEEP_ALIVE: Duration = Duration::from_secs(15);
+
+/// Follows a game: `snapshot` (how it stands), then every `happening` in order, and `position` ten times a second at
+/// most, of which only the newest is told; `waiting` while no slot plays it; at the end `over`, and the stream ends.
+///
+/// The id of a happening is `ATTEMPT.NUMBER`. Who comes again with the header `Last-Event-ID` gets a snapshot and all
+/// that happened since; of another attempt everything. Streams end after an hour at most, and when the server ends.
+#[utoipa::path(
+    get, path = "/games/{id}/live", tag = "public",
+    params(
+        ("id" = GameId, Path),
+        ("Last-Event-ID" = Option<String>, Header, description = "the id of the last event that came", example = "1.17"),
+    ),
+    responses(
+        (status = 200, body = String, content_type = "text/event-stream"),
+        (status = 400, description = "the header is none of this stream's ids"),
+        (status = 404),
+        (status = 503, description = "as many readers as may be are following games"),
+    )
+)]
+pub(crate) async fn watch_game(
+    viewer: Viewer,
+    State(app): State<App>,
+    PathParam(id): PathParam<GameId>,
+    ending: Option<Extension<Ending>>,
+    headers: HeaderMap,
+) -> Result<impl IntoResponse, Problem> {
+    game::known(&app, viewer, id).await?;
+    let seen = headers
+        .get(LAST_EVENT_ID)
+        .map(|value| parse_mark(value.to_str().unwrap_or_default()))
+        .transpose()?;
+    let Ok(place) = Arc::clone(&app.watching).try_acquire_owned() else {
+        return Err(Problem::new(
+            ProblemKind::Busy,
+            format!(
+                "{} readers follow games, and more may not at a time; try again, or ask GET /api/v1/games/{id} now and then",
+                app.config.limits.live_readers
+            ),
+        ));
+    };
+    let ending = ending.map(|Extension(ending)| ending);
+    let reader = LiveReader::new(app, id, seen, ending, place);
+    let batches = stream::unfold(reader, |mut reader| async {
+        let batch = reader.next().await?;
+        Some((batch, reader))
+    });
+    let events = batches.flat_map(stream::iter).map(Ok::<_, Infallible>);
+    let events = Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE));
+    // A proxy that collects answers would hold what is told now.
+    let unbuffered = [(HeaderName::from_static("x-accel-buffering"), "no")];
+    Ok((AppendHeaders(unbuffered), events))
+}

@@ -1,0 +1,14 @@
+//! Tournaments over HTTP: opened, drawn, played by a stand-in for the slots, ruled over, watched and downloaded. Results
+//! are committed to the real store as a slot does.
+
+mod archived;
+mod cup;
+mod files;
+mod formats;
+mod free_games;
+mod live;
+mod paper;
+mod replays;
+mod rulings;
+pub mod slot;
+mod wrong;

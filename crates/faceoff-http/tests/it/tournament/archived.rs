@@ -1,0 +1,47 @@
+//! A tournament in the archive of its season.
+
+use super::cup::{Cup, first_by_name_wins};
+use crate::{
+    archive::{exported, imported, read},
+    site::ADMIN,
+};
+use serde_json::json;
+
+#[tokio::test]
+async fn an_archive_shows_a_tournament_as_it_was() {
+    let rules = json!({ "format": { "kind": "round_robin", "rounds": 1 } });
+    let cup = Cup::open(&["A", "B", "C"], json!({ "rules": rules })).await;
+    cup.start_round().await;
+    let game = cup.play_next(first_by_name_wins).await.unwrap();
+    cup.play(first_by_name_wins).await;
+    let recording = format!("/api/v1/games/{}/recording", game.id);
+    for (edition, token) in [("public", None), ("organiser", Some(ADMIN))] {
+        let exported = exported(&cup.site, edition).await;
+        let mut shown = Vec::new();
+        for (file, path) in [
+            ("tournament.json", cup.path.clone()),
+            ("games.json", format!("{}/games", cup.path)),
+        ] {
+            let answer = cup.site.get(&path, token).await;
+            let file = format!("results/tournament-1-cup/{file}");
+            assert_eq!(read(&exported.0, &file), answer.body, "{edition}");
+            shown.push((path, answer.body));
+        }
+        let server = imported(exported).await;
+        for (path, before) in shown {
+            assert_eq!(server.get(&path, token).await.body, before, "{edition}");
+        }
+        let ratings = format!("{}/ratings", cup.path);
+        let before = cup.site.get(&ratings, None).await.json(200);
+        assert_eq!(server.get(&ratings, None).await.json(200), before);
+        // Recordings go with the organiser's edition; nobody else had been given them.
+        let asked = server.get(&recording, token).await;
+        assert_eq!(
+            asked.status.as_u16(),
+            if token.is_some() { 200 } else { 401 }
+        );
+        let rounds = format!("{}/rounds", cup.path);
+        let start = server.post(&rounds, Some(ADMIN), &json!({})).await;
+        start.problem(403, "read-only", &["archive"]);
+    }
+}

@@ -1,0 +1,273 @@
+//! Who meets whom: round robins with byes, groups with a final, Swiss, mirrored pairs.
+
+use super::{
+    cup::{Cup, by_tournament, first_by_name_wins},
+    slot::Went,
+};
+use crate::site::{ADMIN, Site, result, text};
+use serde_json::{Value, json};
+use std::collections::{BTreeMap, BTreeSet};
+
+fn meetings(games: &[Value], round: u32) -> BTreeSet<(String, String)> {
+    let of_round = games.iter().filter(|game| game["round"] == round);
+    of_round.map(by_tournament).collect()
+}
+
+fn turned(pairs: &BTreeSet<(String, String)>) -> BTreeSet<(String, String)> {
+    let pairs = pairs.iter().cloned();
+    pairs.map(|(home, away)| (away, home)).collect()
+}
+
+#[tokio::test]
+async fn a_round_robin_twice_of_an_odd_number_has_byes_and_swaps_sides() {
+    let names = ["A", "B", "C", "D", "E"];
+    let cup = Cup::open(&names, json!({})).await;
+    for round in 1..=2 {
+        let started = cup.start_round().await;
+        let byes = started["byes"].as_array().unwrap();
+        let with_bye: BTreeSet<String> = byes.iter().map(|bye| text(&bye["team_name"])).collect();
+        assert_eq!(with_bye, names.map(str::to_owned).into());
+        assert_eq!(started["number"], round);
+        // Matchday by matchday.
+        let mut last = 0;
+        while let Some(game) = cup.play_next(first_by_name_wins).await {
+            let matchday = game.purpose.meeting().unwrap().matchday;
+            assert!(matchday >= last, "{matchday} after {last}");
+            last = matchday;
+        }
+        assert_eq!(last, 5);
+    }
+    let games = cup.games().await;
+    assert_eq!(games.len(), 20);
+    let (first, second) = (meetings(&games, 1), meetings(&games, 2));
+    assert_eq!(first.len(), 10);
+    assert_eq!(second, turned(&first));
+    let view = cup.view().await;
+    let standings = view["tables"][0]["standings"].as_array().unwrap();
+    let points: Vec<&Value> = standings
+        .iter()
+        .map(|row| &row["points_per_round"])
+        .collect();
+    assert_eq!(
+        points,
+        [
+            &json!([12, 12]),
+            &json!([9, 9]),
+            &json!([6, 6]),
+            &json!([3, 3]),
+            &json!([0, 0])
+        ]
+    );
+    cup.post("rounds", json!({}))
+        .await
+        .problem(409, "conflict", &["all 2 rounds", "close it"]);
+}
+
+#[tokio::test]
+async fn a_game_tells_what_its_seed_follows_from_and_not_the_seed() {
+    let cup = Cup::open(&["A", "B", "C", "D"], json!({})).await;
+    cup.start_round().await;
+    let games = cup.games().await;
+    let labels: Vec<String> = games.iter().map(|game| text(&game["seed_label"])).collect();
+    assert_eq!(labels[0], "tournament/1/round/1/meeting/1");
+    let distinct: BTreeSet<&String> = labels.iter().collect();
+    assert_eq!(distinct.len(), 6);
+    cup.play(first_by_name_wins).await;
+    let path = format!("{}/games", cup.path);
+    let organisers = cup.site.get(&path, Some(ADMIN)).await.json(200);
+    let public = cup.site.get(&path, Some(cup.token("A"))).await.body;
+    for game in organisers.as_array().unwrap() {
+        let seed = text(&game["result"]["recording"]["seed"]);
+        assert!(!public.contains(&seed), "{seed} is in {public}");
+    }
+}
+
+#[tokio::test]
+async fn groups_send_their_best_to_a_final_that_counts_alone() {
+    let names = ["A", "B", "C", "D", "E", "F"];
+    let format = json!({ "kind": "groups", "groups": 2, "advance": 1 });
+    let cup = Cup::open(&names, json!({ "rules": { "format": format } })).await;
+    let started = cup.start_round().await;
+    let groups = started["groups"].as_array().unwrap().clone();
+    assert_eq!(
+        groups
+            .iter()
+            .map(|group| group.as_array().unwrap().len())
+            .collect::<Vec<_>>(),
+        [3, 3]
+    );
+    assert_eq!(cup.play(first_by_name_wins).await, 6);
+    let best_of = |group: &Value| {
+        let names = group.as_array().unwrap().iter();
+        names.map(text).min().unwrap()
+    };
+    let finalists: BTreeSet<String> = groups.iter().map(best_of).collect();
+    let last = cup.start_round().await;
+    let of_final: BTreeSet<String> = last["submissions"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|one| text(&one["team_name"]))
+        .collect();
+    assert_eq!(of_final, finalists);
+    // In the final the other one wins.
+    let upset =
+        |game: &faceoff_store::Game, names: [&str; 2]| first_by_name_wins(game, names).turned();
+    assert_eq!(cup.play(upset).await, 1);
+    let view = cup.view().await;
+    let of: Vec<&Value> = view["tables"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|table| &table["of"])
+        .collect();
+    assert_eq!(
+        of,
+        [&json!("final"), &json!({"group": 1}), &json!({"group": 2})]
+    );
+    assert_eq!(view["champion"], json!(finalists.last().unwrap()));
+    cup.post("entrants", json!({ "teams": ["A"] }))
+        .await
+        .problem(409, "conflict", &["groups are drawn"]);
+}
+
+#[tokio::test]
+async fn a_swiss_tournament_pairs_neighbours_and_gives_points_for_a_bye() {
+    let names = ["A", "B", "C", "D", "E"];
+    let format = json!({ "kind": "swiss", "rounds": 3 });
+    let cup = Cup::open(&names, json!({ "rules": { "format": format } })).await;
+    let mut met = BTreeMap::<BTreeSet<String>, u32>::new();
+    for _ in 0..3 {
+        let started = cup.start_round().await;
+        assert_eq!(started["progress"]["games"], 2);
+        assert_eq!(started["byes"].as_array().unwrap().len(), 1);
+        cup.play(first_by_name_wins).await;
+    }
+    for game in cup.games().await {
+        let (home, away) = by_tournament(&game);
+        *met.entry([home, away].into()).or_default() += 1;
+    }
+    assert!(met.values().all(|times| *times == 1), "{met:?}");
+    let view = cup.view().await;
+    let standings = view["tables"][0]["standings"].as_array().unwrap();
+    let byes: u64 = standings
+        .iter()
+        .map(|row| row["byes"].as_u64().unwrap_or(0))
+        .sum();
+    assert_eq!(byes, 3);
+    let points: u64 = standings
+        .iter()
+        .map(|row| row["points"].as_u64().unwrap())
+        .sum();
+    assert_eq!(points, 3 * (2 * 3 + 3), "three for each win and each bye");
+    assert_eq!(view["champion"], "A");
+}
+
+#[tokio::test]
+async fn a_mirrored_meeting_is_two_games_of_one_seed_with_sides_swapped() {
+    let rules = json!({ "mirrored": true, "format": { "kind": "round_robin", "rounds": 1 } });
+    let cup = Cup::open(&["A", "B", "C"], json!({ "rules": rules })).await;
+    cup.start_round().await;
+    let one = cup.play_next(first_by_name_wins).await.unwrap();
+    assert_eq!(cup.play(first_by_name_wins).await, 5);
+    let games = cup.games().await;
+    for halves in games.chunks(2) {
+        assert_eq!(halves[0]["seed_label"], halves[1]["seed_label"]);
+        assert_eq!(halves[0]["meeting"], halves[1]["meeting"]);
+        assert_eq!(
+            [&halves[0]["second_half"], &halves[1]["second_half"]],
+            [false, true]
+        );
+        let (home, away) = by_tournament(&halves[0]);
+        assert_eq!(by_tournament(&halves[1]), (away, home));
+    }
+    assert_eq!(one.purpose.meeting().unwrap().meeting, 1);
+    let standings = cup.view().await["tables"][0]["standings"].clone();
+    assert_eq!(standings[0]["points"], 12, "each half counts");
+    let ratings = cup
+        .site
+        .get(&format!("{}/ratings", cup.path), None)
+        .await
+        .json(200);
+    assert_eq!(
+        ratings["results"][0]["units"], 3,
+        "the pair is the piece of evidence"
+    );
+}
+
+#[tokio::test]
+async fn who_enters_by_default_stands_on_the_board_and_is_safe_enough() {
+    let site = Site::start().await;
+    site.ranked_teams(&[
+        ("Deployable", result([0.5; 3], 10.0)),
+        ("Improvable", result([0.5; 3], 900.0)),
+        ("Unsafe", result([0.9; 3], 2000.0)),
+    ])
+    .await;
+    site.team("Without").await;
+    for (name, body) in [
+        ("By default", json!({})),
+        ("By name", json!({ "stage": "qualifying" })),
+        ("By id", json!({ "stage": site.stage().await })),
+    ] {
+        let mut body = body;
+        body["name"] = json!(name);
+        let opened = site
+            .post("/api/v1/tournaments", Some(ADMIN), &body)
+            .await
+            .json(201);
+        let names: Vec<String> = opened["entrants"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|one| text(&one["team_name"]))
+            .collect();
+        assert_eq!(names, ["Deployable", "Improvable"]);
+        assert_eq!(opened["stage"], json!(site.stage().await));
+    }
+    let list = site.get("/api/v1/tournaments", None).await.json(200);
+    let numbers: Vec<&Value> = list
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|one| &one["number"])
+        .collect();
+    assert_eq!(numbers, [&json!(1), &json!(2), &json!(3)]);
+}
+
+#[tokio::test]
+async fn a_team_without_a_valid_agent_holds_a_round_up_by_name() {
+    let mut cup = Cup::open(&["A", "B"], json!({})).await;
+    let late = cup.site.team("Late").await;
+    cup.teams.insert("Late".to_owned(), late);
+    cup.post("entrants", json!({ "teams": ["late"] }))
+        .await
+        .json(200);
+    cup.post("rounds", json!({}))
+        .await
+        .problem(409, "conflict", &["Late", "Wait for them"]);
+    assert_eq!(cup.view().await["phase"], "open", "nothing was done");
+    // Withdrawn it holds nothing up.
+    let out = json!({ "team": "Late", "as": "withdrawn", "reason": "no agent", "confirm": "Late" });
+    let view = cup.post("departures", out).await.json(200);
+    assert_eq!(view["entrants"].as_array().unwrap().len(), 2);
+    cup.start_round().await;
+    assert_eq!(cup.play(|_, _| Went::goals(1, 1)).await, 1);
+}
+
+#[tokio::test]
+async fn of_two_rounds_started_at_once_one_is() {
+    let cup = Cup::open(&["A", "B", "C"], json!({})).await;
+    let (one, other) = tokio::join!(cup.post("rounds", json!({})), cup.post("rounds", json!({})));
+    let mut statuses = [one.status.as_u16(), other.status.as_u16()];
+    statuses.sort_unstable();
+    assert_eq!(statuses, [201, 409], "{} {}", one.body, other.body);
+    let refused = if one.status == 409 { one } else { other };
+    refused.problem(409, "conflict", &[]);
+    assert_eq!(cup.games().await.len(), 3);
+    cup.post("rounds", json!({})).await.problem(
+        409,
+        "conflict",
+        &["round 1 is under way: 3 of its games"],
+    );
+}

@@ -1,0 +1,115 @@
+//! How sure the champion is: the schedule played again.
+
+use super::{
+    cup::{Cup, first_by_name_wins},
+    slot::Went,
+};
+use crate::site::{ADMIN, Answer, text};
+use faceoff_store::GamePurpose;
+use reqwest::Method;
+use serde_json::{Value, json};
+
+async fn certainty(cup: &Cup) -> Value {
+    cup.site
+        .get(&format!("{}/certainty", cup.path), None)
+        .await
+        .json(200)
+}
+
+#[tokio::test]
+async fn the_schedule_played_again_says_how_often_each_team_would_have_been_champion() {
+    let rules = json!({ "format": { "kind": "round_robin", "rounds": 1 } });
+    let cup = Cup::open(&["A", "B", "C"], json!({ "rules": rules })).await;
+    let none = certainty(&cup).await;
+    assert_eq!(
+        (&none["replays"], &none["champions"]),
+        (&json!(0), &json!([]))
+    );
+    cup.post("replays", json!({ "times": 1 }))
+        .await
+        .problem(409, "conflict", &["have a result"]);
+    cup.start_round().await;
+    cup.play(first_by_name_wins).await;
+    let before = cup.view().await;
+    let ordered = cup.post("replays", json!({ "times": 5 })).await.json(201);
+    assert_eq!(
+        (&ordered["replays"], &ordered["complete"], &ordered["games"]),
+        (&json!(5), &json!(0), &json!(15))
+    );
+    // In every other of them B wins everything.
+    let went = |game: &faceoff_store::Game, names: [&str; 2]| {
+        let GamePurpose::Replay { replay, .. } = game.purpose else {
+            panic!("expected a replay");
+        };
+        match names {
+            ["B", _] if replay % 2 == 0 => Went::goals(9, 0),
+            [_, "B"] if replay % 2 == 0 => Went::goals(0, 9),
+            _ => first_by_name_wins(game, names),
+        }
+    };
+    for _ in 0..12 {
+        cup.play_next(went).await.unwrap();
+    }
+    let most = certainty(&cup).await;
+    assert_eq!(
+        (&most["complete"], &most["games_played"]),
+        (&json!(4), &json!(12))
+    );
+    let request = cup.site.request(
+        Method::DELETE,
+        &format!("{}/replays", cup.path),
+        Some(ADMIN),
+    );
+    let off = Answer::of(request.send().await.unwrap()).await.json(200);
+    assert_eq!((&off["given_up"], &off["games"]), (&json!(1), &json!(12)));
+    assert!(cup.claim().await.is_none());
+    let all = certainty(&cup).await;
+    let shares: Vec<(String, &Value)> = all["champions"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|one| (text(&one["team"]), &one["first_places"]))
+        .collect();
+    assert_eq!(
+        shares,
+        [("A".to_owned(), &json!(2)), ("B".to_owned(), &json!(2))]
+    );
+    let interval = &all["champions"][0]["share_ci95"];
+    assert!(interval[0].as_f64().unwrap() < 0.5 && interval[1].as_f64().unwrap() > 0.5);
+    // Nothing of it counts, and no file of it is kept.
+    assert_eq!(cup.view().await["tables"], before["tables"]);
+    assert_eq!(cup.games().await.len(), 3);
+    for wrong in [0, 1001] {
+        cup.post("replays", json!({ "times": wrong }))
+            .await
+            .problem(422, "invalid-content", &["times", "1 to 1000"]);
+    }
+    cup.post("replays", json!({ "times": 1000 }))
+        .await
+        .problem(409, "conflict", &["times"]);
+}
+
+#[tokio::test]
+async fn a_game_of_a_replay_is_public_and_has_no_recording() {
+    let rules = json!({ "format": { "kind": "round_robin", "rounds": 1 } });
+    let cup = Cup::open(&["A", "B"], json!({ "rules": rules })).await;
+    cup.start_round().await;
+    let played = cup.play_next(first_by_name_wins).await.unwrap();
+    cup.post("replays", json!({ "times": 1 })).await.json(201);
+    let again = cup.play_next(first_by_name_wins).await.unwrap();
+    assert_ne!(played.seed, again.seed);
+    let path = format!("/api/v1/games/{}", again.id);
+    let view = cup.site.get(&path, None).await.json(200);
+    assert_eq!(
+        (
+            &view["purpose"],
+            &view["replay"],
+            &view["result"]["recording"]
+        ),
+        (&json!("replay"), &json!(1), &Value::Null)
+    );
+    cup.site
+        .get(&format!("{path}/recording"), Some(ADMIN))
+        .await
+        .problem(409, "conflict", &["no recording is kept"]);
+}
