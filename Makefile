@@ -15,6 +15,7 @@ RELEASE    := $(TARGET_DIR)/release
 
 help:
 	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
+	@echo "make agents   bundle striker and baseline: $(TARGET_DIR)/bundles"
 	@echo "make test   run everything that proves that it works"
 	@echo "make fuzz   feed the readers what is nearly valid: MINUTES=$(MINUTES)"
 	@echo "make busy   play beside hogs, floods and bursts of processes"
@@ -29,19 +30,21 @@ setup:
 setup-test:
 	@docker/setup.sh test
 
-# The bundles that the demo uploads: folders a team could copy. Built by itself, striker needs other
-# features of its dependencies than beside the server: the demo builds both at once.
+# The bundles of the compiled agents: folders a team could copy. The demo uploads striker; baseline is for test games.
+# Built by themselves, they need other features of their dependencies than beside the server: the demo builds all at once.
 agents: setup
-	$(CARGO) build --release --locked --package striker
+	$(CARGO) build --release --locked --package striker --package baseline
 	$(PACK_AGENTS)
 
 define PACK_AGENTS
-mkdir -p $(TARGET_DIR)/bundles/striker
-cp agents/striker/agent.toml $(RELEASE)/striker $(TARGET_DIR)/bundles/striker/
+for agent in striker baseline; do \
+    mkdir -p $(TARGET_DIR)/bundles/$$agent && \
+    cp agents/$$agent/agent.toml $(RELEASE)/$$agent $(TARGET_DIR)/bundles/$$agent/ || exit 1; \
+done
 endef
 
 demo: setup
-	$(CARGO) build --release --locked --package faceoff --package striker
+	$(CARGO) build --release --locked --package faceoff --package striker --package baseline
 	$(PACK_AGENTS)
 	$(RELEASE)/faceoff demo --episodes $(EPISODES) --listen $(LISTEN) --data-dir $(DEMO_DIR) \
 	    --bundle agents/hold --bundle $(TARGET_DIR)/bundles/striker --bundle agents/reckless \

@@ -21,6 +21,7 @@ mod runtimes;
 mod soak;
 mod strangers;
 mod told_text;
+mod tournament;
 mod undisturbed;
 mod upgrade;
 mod uploads;

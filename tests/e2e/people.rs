@@ -35,7 +35,7 @@ fn id(value: &Value) -> String {
 
 /// Invites as the arguments say, and joins by the link; the person's token.
 #[track_caller]
-fn joined(server: &Server, invite: &[&str], name: &str) -> String {
+pub fn joined(server: &Server, invite: &[&str], name: &str) -> String {
     let invited = admin(server, &[&["people"], invite].concat()).done();
     assert!(invited.contains("It is not shown again"), "{invited}");
     let link = word(&invited, "/join/fo_invite_");

@@ -2,10 +2,13 @@
 
 mod archive;
 mod bundle_file;
+mod game;
 mod http;
 mod kept;
 mod people;
 mod proposals;
+mod sse;
+mod tournament;
 
 use anyhow::{Context, bail};
 use bundle_file::BundleFile;
@@ -35,7 +38,8 @@ use http::http;
 use indicatif::ProgressBar;
 use jiff::civil::Date;
 use reqwest::{Method, RequestBuilder, Response, StatusCode, header};
-use serde::{Deserialize, de::DeserializeOwned};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+pub use sse::ServerEvent;
 use std::{path::Path, time::Duration};
 use tokio_util::io::ReaderStream;
 
@@ -413,6 +417,20 @@ impl Client {
 
     async fn get<T: DeserializeOwned>(&self, path: &str) -> anyhow::Result<T> {
         read(self.send(self.request(Method::GET, path)).await?).await
+    }
+
+    async fn tell<T: DeserializeOwned>(
+        &self,
+        method: Method,
+        path: &str,
+        body: &impl Serialize,
+    ) -> anyhow::Result<T> {
+        let request = self.request(method, path).json(body);
+        read(self.send(request).await?).await
+    }
+
+    async fn act<T: DeserializeOwned>(&self, method: Method, path: &str) -> anyhow::Result<T> {
+        read(self.send(self.request(method, path)).await?).await
     }
 
     async fn send(&self, request: RequestBuilder) -> anyhow::Result<Response> {

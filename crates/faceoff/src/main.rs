@@ -52,6 +52,8 @@ enum Command {
     Join(commands::join::JoinCommand),
     Whoami(commands::whoami::WhoamiCommand),
     Team(commands::team::TeamCommand),
+    Tournament(commands::tournament::TournamentCommand),
+    Game(commands::game::GameCommand),
     Token(commands::token::TokenCommand),
     /// Organise a running competition.
     Admin(commands::admin::AdminCommand),
@@ -79,6 +81,8 @@ fn main() -> ExitCode {
         Command::Join(command) => command.run(),
         Command::Whoami(command) => command.run(),
         Command::Team(command) => command.run(),
+        Command::Tournament(command) => command.run(),
+        Command::Game(command) => command.run(),
         Command::Token(command) => command.run(),
         Command::Admin(command) => command.run(),
         Command::Import(command) => command.run(),

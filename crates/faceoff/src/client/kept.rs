@@ -45,7 +45,7 @@ impl Client {
         self.get(&format!("/teams/{id}/storage")).await
     }
 
-    async fn download(&self, path: &str, file: &Path) -> anyhow::Result<u64> {
+    pub(super) async fn download(&self, path: &str, file: &Path) -> anyhow::Result<u64> {
         let response = self.send(self.request(Method::GET, path)).await?;
         let announced = response.content_length();
         // A download that breaks off must not leave a file that looks whole.

@@ -1,6 +1,6 @@
 //! What a client asks about people, their teams and their tokens.
 
-use super::{Client, read};
+use super::Client;
 use faceoff_http::{
     requests::{
         Confirmation, Join, NewAnnouncement, NewAnswer, NewInvitation, NewQuestion, NewTerms,
@@ -17,23 +17,8 @@ use faceoff_http::{
 };
 use faceoff_types::{InvitationId, PersonId, QuestionId, RegistrationId, TeamId, TokenId};
 use reqwest::Method;
-use serde::{Serialize, de::DeserializeOwned};
 
 impl Client {
-    async fn tell<T: DeserializeOwned>(
-        &self,
-        method: Method,
-        path: &str,
-        body: &impl Serialize,
-    ) -> anyhow::Result<T> {
-        let request = self.request(method, path).json(body);
-        read(self.send(request).await?).await
-    }
-
-    async fn act<T: DeserializeOwned>(&self, method: Method, path: &str) -> anyhow::Result<T> {
-        read(self.send(self.request(method, path)).await?).await
-    }
-
     /// Who we are.
     pub async fn whoami(&self) -> anyhow::Result<WhoView> {
         self.get("/whoami").await

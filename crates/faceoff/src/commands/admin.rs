@@ -11,6 +11,7 @@ mod season;
 mod stage;
 mod storage;
 mod teams;
+mod tournament;
 
 use super::{
     output::{or_none, print},
@@ -123,6 +124,11 @@ enum Action {
     Stage {
         #[command(subcommand)]
         action: stage::StageAction,
+    },
+    /// Open, play and close tournaments: rounds of games between the teams' agents
+    Tournament {
+        #[command(subcommand)]
+        action: Box<tournament::TournamentAction>,
     },
     /// Play an evaluation again that was cancelled, voided or failed by the server's fault: same agent, same episodes
     Rerun {
@@ -253,6 +259,7 @@ impl AdminCommand {
             Action::Day(action) => day::act(&client, self.json, action).await,
             Action::Proposal { action } => proposal::act(&client, self.json, action).await,
             Action::Stage { action } => stage::act(&client, self.json, action).await,
+            Action::Tournament { action } => tournament::act(&client, self.json, *action).await,
             Action::StartDay { stage } => {
                 let stage = match stage {
                     Some(stage) => Some(stage::find(&client, &stage).await?.id),

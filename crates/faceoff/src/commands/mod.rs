@@ -2,11 +2,13 @@
 
 pub mod activate;
 pub mod admin;
+mod any_server;
 pub mod compare;
 pub mod dataset;
 pub mod demo;
 pub mod doctor;
 pub mod eval;
+pub mod game;
 pub mod import;
 pub mod init;
 pub mod join;
@@ -24,6 +26,7 @@ pub mod submit;
 pub mod team;
 mod team_server;
 pub mod token;
+pub mod tournament;
 pub mod verify;
 pub mod whoami;
 

@@ -2,7 +2,7 @@
 
 mod lines;
 mod scored;
-mod table;
+pub(super) mod table;
 mod tournament;
 
 use crate::terminal;

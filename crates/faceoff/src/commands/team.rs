@@ -43,6 +43,9 @@ enum Action {
         /// Its page; empty: none
         #[arg(long, value_name = "URL")]
         link: Option<String>,
+        /// Does it play no friendly games that other teams ask for?
+        #[arg(long, value_name = "true|false")]
+        declines_friendly_games: Option<bool>,
     },
     /// Show how much room its submissions and datasets take
     Storage,
@@ -123,6 +126,7 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
             rename,
             affiliation,
             link,
+            declines_friendly_games,
         } => {
             let or_null = |text: String| Some(text).filter(|text| !text.trim().is_empty());
             let change = TeamChange {
@@ -130,6 +134,7 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
                 affiliation: affiliation.map(or_null),
                 link: link.map(or_null),
                 division: None,
+                declines_friendly_games,
             };
             let team = client.change_team(own_team(client).await?, &change).await?;
             print(json, &team, || team_text(&team))

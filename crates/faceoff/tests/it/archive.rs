@@ -153,6 +153,7 @@ async fn played(store: &Store) -> EvaluationId {
             panic!("the day is not over");
         };
         match work {
+            Work::Game { .. } => panic!("no game is queued"),
             Work::Smoke { .. } => {
                 let outcome = SmokeOutcome::Valid {
                     runtime: "native".into(),

@@ -204,3 +204,81 @@ fn what_cannot_be_played_is_refused_with_a_reason() {
     );
     refused([&hold, &hold], &["--seed", "lucky"], "not a seed");
 }
+
+#[test]
+fn mirrored_pairs_have_one_seed_each_swapped_sides_and_recordings_that_verify() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("out");
+    let hold = hold();
+    let args = ["--steps", "50", "--pairs", "2", "--seed", "5", "--json"];
+    let output = play([&hold, &hold], &out, &args);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert_eq!(output.stdout, fs::read(out.join("results.json")).unwrap());
+    let told: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(
+        (&told["series"], &told["wanted"], &told["draws"]),
+        (&"mirrored_pairs".into(), &2.into(), &4.into())
+    );
+    let mean = &told["goal_difference"];
+    assert_eq!((&mean["of"], &mean["mean"]), (&2.into(), &0.0.into()));
+    assert!(mean["mean_ci95"].is_null(), "two pairs make no interval");
+    let spread = &told["spread"];
+    assert_eq!(spread["of_independent_games"], 0.0);
+    assert!(spread["ratio"].is_null(), "nothing varied");
+    let games = told["games"].as_array().unwrap();
+    let of = |key: &str| -> Vec<_> { games.iter().map(|game| game[key].clone()).collect() };
+    assert_eq!(of("home"), [0, 1, 0, 1]);
+    assert_eq!(of("pair"), [1, 1, 2, 2]);
+    let seeds = of("seed");
+    assert_eq!((&seeds[0], &seeds[2]), (&seeds[1], &seeds[3]));
+    assert_ne!(seeds[0], seeds[2]);
+    for game in games {
+        let folder = out.join(game["folder"].as_str().unwrap());
+        let verified = faceoff(&["verify", "--json"], &[&folder]);
+        assert!(verified.status.success(), "{}", text(&verified.stderr));
+        let verified: serde_json::Value = serde_json::from_slice(&verified.stdout).unwrap();
+        assert_eq!(verified["result"]["seed"], game["seed"]);
+    }
+    // Another series is not mixed with what is left of this one.
+    let output = play([&hold, &hold], &out, &args);
+    assert!(!output.status.success());
+    let stderr = text(&output.stderr);
+    assert!(stderr.contains("an earlier series"), "{stderr}");
+    assert!(out.join("results.json").exists());
+}
+
+#[test]
+fn a_series_of_games_changes_sides_and_counts_goals_for_the_agent_who_ever_is_at_home() {
+    let dir = tempfile::tempdir().unwrap();
+    let broken = dir.path().join("broken");
+    fs::create_dir(&broken).unwrap();
+    let manifest =
+        "name = \"broken\"\ncommand = [\"python3\", \"agent.py\"]\nruntime = \"python3\"\n";
+    fs::write(broken.join("agent.toml"), manifest).unwrap();
+    fs::write(broken.join("agent.py"), "import torch_of_olympia").unwrap();
+    let out = dir.path().join("out");
+    let hold = hold();
+    // Eleven faults take 7,520 steps: a rally of a side that holds ends with a foul.
+    let args = ["--steps", "9000", "--games", "2", "--profile", "ideal"];
+    let output = play([&hold, &broken], &out, &args);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let said = text(&output.stdout);
+    assert!(said.contains("hold won 2 games, drew 0, lost 0"), "{said}");
+    assert!(
+        said.contains("by game: mean +10.00, variance 0.00"),
+        "{said}"
+    );
+    let told: serde_json::Value =
+        serde_json::from_slice(&fs::read(out.join("results.json")).unwrap()).unwrap();
+    assert!(told.get("spread").is_none(), "no pairs");
+    let games = told["games"].as_array().unwrap();
+    assert_ne!(games[0]["seed"], games[1]["seed"]);
+    for (number, game) in games.iter().enumerate() {
+        assert_eq!(game["home"], number);
+        assert_eq!(game["score"], serde_json::json!([10, 0]));
+        assert_eq!(game["winner"], 0);
+        assert_eq!(game["won_by"], "forfeit");
+    }
+    let refused = play([&hold, &hold], &out, &["--pairs", "1", "--games", "1"]);
+    assert!(text(&refused.stderr).contains("cannot be used with"));
+}

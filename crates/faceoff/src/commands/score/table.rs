@@ -15,6 +15,22 @@ pub fn write(out: &mut impl Write, scored: &ScoredTournament) -> anyhow::Result<
     out.write_all(text.as_bytes()).context("standard output")
 }
 
+/// Standings alone.
+pub(in crate::commands) fn of_standings(rows: &[Standing]) -> String {
+    let mut out = String::new();
+    standings(&mut out, rows).expect("writing to memory cannot fail");
+    out
+}
+
+/// How strong submissions are, and each two teams' record.
+pub(in crate::commands) fn strengths(of: &Ratings, records: &[HeadToHead]) -> String {
+    let mut out = String::new();
+    self::records(&mut out, records)
+        .and_then(|()| ratings(&mut out, of))
+        .expect("writing to memory cannot fail");
+    out.trim().to_owned()
+}
+
 fn tables(out: &mut String, scored: &ScoredTournament) -> std::fmt::Result {
     games(out, &scored.tournament.games)?;
     standings(out, &scored.tournament.standings)?;

@@ -1,0 +1,83 @@
+//! What a client asks about single games.
+
+use super::{
+    Client,
+    sse::{self, ServerEvent},
+};
+use anyhow::Context;
+use faceoff_http::{
+    requests::Decision,
+    views::{attempt::AttemptView, game::GameView},
+};
+use faceoff_types::{GameId, Side};
+use futures::{Stream, StreamExt};
+use reqwest::{Method, header};
+use std::path::Path;
+
+impl Client {
+    /// One game.
+    pub async fn game(&self, id: GameId) -> anyhow::Result<GameView> {
+        self.get(&format!("/games/{id}")).await
+    }
+
+    /// Team or organiser: calls off a game that does not count.
+    pub async fn cancel_game(&self, id: GameId) -> anyhow::Result<GameView> {
+        self.act(Method::DELETE, &format!("/games/{id}")).await
+    }
+
+    /// Organiser: each time that a slot began it.
+    pub async fn attempts(&self, id: GameId) -> anyhow::Result<Vec<AttemptView>> {
+        self.get(&format!("/games/{id}/attempts")).await
+    }
+
+    /// Organiser: has its result count no more; `confirm` is `HOME - AWAY`.
+    pub async fn void_game(&self, id: GameId, decision: &Decision) -> anyhow::Result<GameView> {
+        let path = format!("/games/{id}/void");
+        self.tell(Method::POST, &path, decision).await
+    }
+
+    /// Organiser: has it played again.
+    pub async fn rerun_game(&self, id: GameId) -> anyhow::Result<GameView> {
+        self.act(Method::POST, &format!("/games/{id}/rerun")).await
+    }
+
+    /// Downloads a side's own file; returns its size in bytes.
+    pub async fn download_side(&self, id: GameId, side: Side, file: &Path) -> anyhow::Result<u64> {
+        self.download(&format!("/games/{id}/sides/{}", side.number()), file)
+            .await
+    }
+
+    /// Downloads the recording of both sides; returns its size in bytes.
+    pub async fn download_recording(&self, id: GameId, file: &Path) -> anyhow::Result<u64> {
+        self.download(&format!("/games/{id}/recording"), file).await
+    }
+
+    /// Team or organiser: the end of what a side's agent wrote.
+    pub async fn game_log(&self, id: GameId, side: Side) -> anyhow::Result<String> {
+        let path = format!("/games/{id}/sides/{}/log", side.number());
+        let response = self.send(self.request(Method::GET, &path)).await?;
+        response.text().await.context("reading the server's answer")
+    }
+
+    /// What happens in a game, from after the event of that id on. The stream ends when the server ends it, and with an
+    /// error if the connection does.
+    pub async fn watch_game(
+        &self,
+        id: GameId,
+        last: Option<&str>,
+    ) -> anyhow::Result<impl Stream<Item = anyhow::Result<ServerEvent>> + use<>> {
+        let mut request = self
+            .request(Method::GET, &format!("/games/{id}/live"))
+            .header(header::ACCEPT, "text/event-stream");
+        if let Some(last) = last {
+            request = request.header("last-event-id", last);
+        }
+        let response = self.send(request).await?;
+        let pieces = response.bytes_stream();
+        Ok(sse::events(pieces.map(|piece| {
+            piece
+                .map_err(reqwest::Error::without_url)
+                .context("reading the server's answer")
+        })))
+    }
+}

@@ -1,0 +1,60 @@
+use anyhow::Context;
+use faceoff_episode::{GameStepRow, RallyRow};
+use faceoff_runner::GameObserver;
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// A bar on standard error, if that is a terminal.
+pub(super) struct Bar {
+    bar: ProgressBar,
+    /// What stands before the score.
+    title: String,
+}
+
+impl Bar {
+    /// Of one game, or of several after each other.
+    pub(super) fn steps(steps: u32) -> anyhow::Result<Self> {
+        let style = ProgressStyle::with_template(
+            "{msg:9} {bar:40} {pos}/{len} steps, {per_sec}, {eta} left",
+        )
+        .context("the progress bar's template")?;
+        let bar = ProgressBar::new(u64::from(steps)).with_style(style);
+        bar.set_message("0 : 0");
+        Ok(Self {
+            bar,
+            title: String::new(),
+        })
+    }
+
+    /// A game of several begins: `done` steps are behind it, those of an attempt that broke not among them.
+    pub(super) fn next(&mut self, title: &str, done: u64, all: u64) {
+        self.title = format!("{title} ");
+        self.bar.set_length(all);
+        self.bar.set_position(done);
+        self.bar.set_message(format!("{title} 0 : 0"));
+    }
+
+    /// Prints a line above it.
+    pub(super) fn above(&self, line: impl FnOnce()) {
+        self.bar.suspend(line);
+    }
+
+    pub(super) fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+impl GameObserver for Bar {
+    fn stepped(&mut self, _: &GameStepRow<'_>) {
+        self.bar.inc(1);
+    }
+
+    fn rally_over(&mut self, row: &RallyRow<'_>) {
+        let [first, second] = row.score;
+        self.bar
+            .set_message(format!("{}{first} : {second}", self.title));
+    }
+
+    fn cancelled(&self) -> bool {
+        false
+    }
+}
