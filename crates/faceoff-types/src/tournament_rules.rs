@@ -86,7 +86,7 @@ pub enum InvalidTournament {
     #[error("runtimes: {0}")]
     Runtimes(#[from] crate::InvalidRuntimes),
     /// A quota that is none.
-    #[error("free_games_per_day: expected at most {MAX_FREE_GAMES}, got {0}")]
+    #[error("free_games_per_day: expected 0 to {MAX_FREE_GAMES}, got {0}")]
     FreeGames(u32),
 }
 

@@ -145,6 +145,14 @@ fn check_confirmed(
             GameState::Played(_) | GameState::Cancelled { .. }
         )
     });
+    if sheet.rounds.is_empty() {
+        let what = format!(
+            "{} would be out of the tournament, of which no round was started, and its test and friendly games that are \
+             not over would be called off; it may enter again",
+            entrant.name
+        );
+        return Problem::check_confirmed(confirm, entrant.name.as_str(), &what);
+    }
     let how = match leaving.left_as {
         LeftAs::Withdrawn => "be withdrawn",
         LeftAs::Disqualified => "be disqualified, and stand below all others",
@@ -154,7 +162,7 @@ fn check_confirmed(
         None => String::new(),
     };
     let what = format!(
-        "{} would {how} for good; {} of its games would not be played, and games with it of the round that is under way or \
+        "{} would {how} for good; {} of its games, and its test and friendly games that are not over, would not be played, and games with it of the round that is under way or \
          next{earlier} count for nobody, with the reason {:?} for everybody to read",
         entrant.name,
         open.count(),

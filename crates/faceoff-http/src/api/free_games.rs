@@ -82,7 +82,13 @@ pub(crate) async fn order_test_games(
         match game.await {
             Ok(game) => ordered.push(GameView::of(&sheet, Viewer::of(&caller), &game)?),
             // What keeps one team from it keeps no other from it.
-            Err(StoreError::Conflict(reason)) if asked_by.is_none() => {
+            Err(
+                error @ (StoreError::Conflict(_)
+                | StoreError::Disqualified { .. }
+                | StoreError::Retired { .. }
+                | StoreError::TermsOwed { .. }),
+            ) if asked_by.is_none() => {
+                let reason = error.to_string();
                 let team_name = sheet.name(team)?;
                 not_ordered.push(NotOrdered {
                     team,

@@ -420,15 +420,17 @@ fn next(sheet: &TournamentSheet, game: &Game) -> &'static str {
         GameState::Queued if sheet.tournament.paused.is_some() => {
             "It waits until the tournament goes on, which is paused."
         }
-        GameState::Queued => "It is played as soon as a slot is free, in the order of matchdays.",
+        GameState::Queued => {
+            "It is played as soon as a slot is free; games of rounds come first, in the order of matchdays."
+        }
         GameState::Running { .. } => "It is played to its end; then its result is told at once.",
         GameState::Played(_) => "Nothing more: its result stays.",
         GameState::Broken { .. } if counts => {
-            "It counts for nobody; the organiser has it played again, on the same seed, before the next round."
+            "It counts for nobody; the organiser has it played again, on the same seed, before the tournament goes on."
         }
         GameState::Broken { .. } => "Nothing more, unless the organiser has it played again.",
         GameState::Void { .. } => {
-            "Its result counts no more; the organiser has it played again, on the same seed, before the next round."
+            "Its result counts no more; the organiser has it played again, on the same seed, before the tournament goes on."
         }
         GameState::Cancelled { .. } => "Nothing more: it is not played.",
     }

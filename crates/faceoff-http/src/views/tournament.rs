@@ -363,14 +363,19 @@ fn under_way(sheet: &TournamentSheet) -> String {
         None => String::new(),
     };
     text += &format!(
-        "{all} games have no result yet: {} are played, {} wait for a slot",
+        "Without a result: {all}; under way: {}, waiting for a slot: {}",
         progress.running, progress.queued
     );
     if progress.to_be_rerun > 0 {
         text += &format!(
-            ", {} are void or broken and wait for the organiser to have them played again",
+            ", void or broken, which the organiser has played again: {}",
             progress.to_be_rerun
         );
     }
-    text + ". The next round waits for all of them."
+    let last = sheet.tournament.rules.format.last_round();
+    if sheet.rounds.len() < last.get() as usize {
+        text + ". The next round waits for them."
+    } else {
+        text + ". The tournament can be closed then."
+    }
 }

@@ -29,7 +29,7 @@ pub struct AttemptEnd {
     pub at: Timestamp,
     /// What.
     pub how: AttemptOutcome,
-    /// What went wrong, or why it was called off; in words for the teams.
+    /// What went wrong, or why it was called off or its result voided; in words for the teams.
     pub reason: Option<String>,
 }
 
@@ -113,6 +113,25 @@ pub(crate) async fn end(
         how,
         reason,
         id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Says why the result of an attempt counts no more.
+pub(crate) async fn set_voided(
+    connection: &mut SqliteConnection,
+    game: GameId,
+    attempt: u32,
+    reason: &str,
+) -> Result<()> {
+    let id = Text(game);
+    sqlx::query!(
+        "UPDATE game_attempts SET reason = ? WHERE game_id = ? AND number = ?",
+        reason,
+        id,
+        attempt,
     )
     .execute(connection)
     .await?;

@@ -25,9 +25,11 @@ async fn the_schedule_played_again_says_how_often_each_team_would_have_been_cham
         (&none["replays"], &none["champions"]),
         (&json!(0), &json!([]))
     );
-    cup.post("replays", json!({ "times": 1 }))
-        .await
-        .problem(409, "conflict", &["have a result"]);
+    cup.post("replays", json!({ "times": 1 })).await.problem(
+        409,
+        "conflict",
+        &["0 of 1 rounds were started"],
+    );
     cup.start_round().await;
     cup.play(first_by_name_wins).await;
     let before = cup.view().await;

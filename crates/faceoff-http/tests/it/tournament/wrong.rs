@@ -69,7 +69,7 @@ async fn what_cannot_be_opened_says_why() {
         ),
         (
             json!({ "name": "Cup", "settings": { "free_games_per_day": 1001 } }),
-            &["settings", "at most 1000"],
+            &["settings", "expected 0 to 1000"],
         ),
         (
             json!({ "name": "Cup", "settings": { "publishes": "soon" } }),

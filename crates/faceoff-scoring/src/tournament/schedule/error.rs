@@ -6,6 +6,11 @@ pub enum ScheduleError {
     /// A game needs two.
     #[error("a tournament needs at least two teams, there are {0}; enter more")]
     TooFew(usize),
+    /// Of those who reached it too few are left.
+    #[error(
+        "a final needs at least two teams, there are {0} left of those who reached it; nothing more is to be played"
+    )]
+    TooFewFinalists(usize),
     /// More than anybody could wait for.
     #[error("a tournament has at most {most} teams, there are {got}; divide them")]
     TooMany {

@@ -73,7 +73,7 @@ impl Schedule for TournamentFormat {
                 Some(first) => {
                     let through = finalists(progress, first, *advance as usize);
                     if through.len() < 2 {
-                        return Err(ScheduleError::TooFew(through.len()));
+                        return Err(ScheduleError::TooFewFinalists(through.len()));
                     }
                     let mut teams = playing;
                     teams.retain(|team| through.contains(team));

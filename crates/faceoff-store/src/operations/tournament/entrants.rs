@@ -36,7 +36,7 @@ async fn check_enterable(tx: &mut Tx, tournament: &Tournament, playing: &[Entran
     let is_drawn = rounds::count(tx, tournament.id).await? > 0;
     if is_drawn && matches!(tournament.rules.format, TournamentFormat::Groups { .. }) {
         return Err(StoreError::Conflict(
-            "the groups are drawn: nobody enters any more".into(),
+            "the groups are drawn: nobody enters any more; open another tournament".into(),
         ));
     }
     let games = games::of_rounds(tx, tournament.id).await?;
@@ -77,19 +77,22 @@ async fn call_off(tx: &mut Tx, id: TournamentId, team: TeamId, reason: &str) -> 
     Ok(())
 }
 
-/// The round that a team leaves from that leaves now: the first one with an open game, else the next.
+/// The round that a team leaves from that leaves now: the newest if a result of it is owed, else the next. That a game of
+/// an earlier one is to be played again makes nothing of what was finished unfinished.
 async fn round_under_way(
     tx: &mut Tx,
     id: TournamentId,
     playing: &[Entrant],
 ) -> Result<RoundNumber> {
     let games = games::of_rounds(tx, id).await?;
-    let open = owed(&games, playing);
-    match open.first().and_then(|game| game.purpose.meeting()) {
-        Some(meeting) => Ok(meeting.round),
-        None => RoundNumber::try_from(rounds::count(tx, id).await? + 1)
-            .map_err(|_| StoreError::Conflict("all rounds that there can be were played".into())),
-    }
+    let newest = rounds::count(tx, id).await?;
+    let is_under_way = owed(&games, playing).iter().any(|game| {
+        game.purpose
+            .meeting()
+            .is_some_and(|of| of.round.get() == newest)
+    });
+    RoundNumber::try_from(if is_under_way { newest } else { newest + 1 })
+        .map_err(|_| StoreError::Conflict("all rounds that there can be were played".into()))
 }
 
 impl Store {

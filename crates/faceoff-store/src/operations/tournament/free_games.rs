@@ -36,14 +36,17 @@ async fn between_rounds(tx: &mut Tx, id: TournamentId, teams: &[TeamId]) -> Resu
     for team in teams {
         if !playing.iter().any(|entrant| entrant.team == *team) {
             let team = teams::find(tx, *team).await?;
-            return conflict(format!("{} is not in the tournament", team.name));
+            return conflict(format!(
+                "{} is not in the tournament: an organiser enters it",
+                team.name
+            ));
         }
         teams::check_may_play(tx, *team).await?;
     }
     let of_rounds = games::of_rounds(tx, id).await?;
     if !owed(&of_rounds, &playing).is_empty() {
         return conflict(
-            "a round is under way: games that do not count are played before and between rounds",
+            "a round is under way, and games that do not count are played before and between rounds: ask again when it is over",
         );
     }
     Ok(tournament)
@@ -60,7 +63,7 @@ async fn ready(tx: &mut Tx, tournament: &Tournament, team: TeamId) -> Result<Sub
         None => {
             let team = teams::find(tx, team).await?;
             conflict(format!(
-                "{} has no active, valid submission that the tournament takes",
+                "{} has no active, valid submission that the tournament takes: upload one, or activate another",
                 team.name
             ))
         }
@@ -100,7 +103,9 @@ impl Store {
         self.write(actor, now, async |tx| {
             let tournament = between_rounds(tx, id, &[team]).await?;
             let Some(baseline) = tournament.baseline else {
-                return conflict("the organisers have named no baseline to test against");
+                return conflict(
+                    "the organisers have named no baseline to test against: ask them, or play a friendly game",
+                );
             };
             if let Some(asking) = asked_by {
                 check_quota(tx, &tournament, asking).await?;
@@ -148,7 +153,10 @@ impl Store {
             let tournament = between_rounds(tx, id, &[asked_by, opponent]).await?;
             if games::declines_friendlies(tx, opponent).await? {
                 let opponent = teams::find(tx, opponent).await?;
-                return conflict(format!("{} plays no friendly games", opponent.name));
+                return conflict(format!(
+                    "{} plays no friendly games: ask another team",
+                    opponent.name
+                ));
             }
             check_quota(tx, &tournament, asked_by).await?;
             let id = GameId::new();

@@ -145,7 +145,7 @@ impl Store {
             }
             if after.rules != before.rules && rounds::count(tx, id).await? > 0 {
                 return Err(StoreError::Conflict(
-                    "rules: a round was started, and all rounds are played by the same rules"
+                    "rules: a round was started, and all rounds are played by the same rules: open another tournament"
                         .into(),
                 ));
             }
@@ -175,7 +175,7 @@ impl Store {
             let mut tournament = tournaments::find_open(tx, id).await?;
             if tournament.paused.is_some() {
                 return Err(StoreError::Conflict(
-                    "the tournament is paused already".into(),
+                    "the tournament is paused already: resume it first".into(),
                 ));
             }
             let reason = reason.to_owned();
@@ -200,7 +200,9 @@ impl Store {
         self.write(actor, now, async |tx| {
             let mut tournament = tournaments::find_open(tx, id).await?;
             if tournament.paused.take().is_none() {
-                return Err(StoreError::Conflict("the tournament is not paused".into()));
+                return Err(StoreError::Conflict(
+                    "the tournament is not paused: its games begin as slots are free".into(),
+                ));
             }
             tournaments::update(tx, &tournament).await?;
             for game in games::open(tx, id).await? {

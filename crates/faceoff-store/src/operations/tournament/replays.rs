@@ -13,7 +13,7 @@ use crate::{
     store::Store,
     tables::{
         games::{self, Game, GamePurpose, GameState},
-        season, tournaments,
+        rounds, season, tournaments,
     },
 };
 use faceoff_types::{GameId, GameSeed, TournamentId};
@@ -24,7 +24,7 @@ pub const MAX_REPLAYS: u32 = 1000;
 
 impl Store {
     /// Queues all games of all rounds `times` times more, with the same submissions and fresh seeds; they do not count and
-    /// keep no recordings. Returns how many games. [`StoreError::Conflict`] if no round was played, one is under way, or
+    /// keep no recordings. Returns how many games. [`StoreError::Conflict`] if a round is to come or under way, or
     /// more than [`MAX_REPLAYS`] came of it.
     pub async fn order_replays(
         &self,
@@ -38,10 +38,17 @@ impl Store {
             let tournament = tournaments::find_open(tx, id).await?;
             let playing = playing(tx, id).await?;
             let schedule = games::of_rounds(tx, id).await?;
-            if schedule.is_empty() || !owed(&schedule, &playing).is_empty() {
-                return Err(StoreError::Conflict(
-                    "a schedule is played again when all games of its rounds have a result".into(),
-                ));
+            let (started, all) = (rounds::count(tx, id).await?, tournament.rules.format.last_round());
+            if started < all.get() {
+                return Err(StoreError::Conflict(format!(
+                    "a schedule is played again when all of it was played: {started} of {all} rounds were started"
+                )));
+            }
+            let owed = owed(&schedule, &playing).len();
+            if owed > 0 {
+                return Err(StoreError::Conflict(format!(
+                    "a schedule is played again when all of it was played: {owed} games have no result yet"
+                )));
             }
             let last = games::last_replay(tx, id).await?;
             if times == 0 || times > MAX_REPLAYS - last.min(MAX_REPLAYS) {

@@ -46,7 +46,9 @@ async fn check_next(
     let number = drawn.number;
     let started = rounds::count(tx, tournament.id).await?;
     if number.get() <= started {
-        return conflict(format!("round {number} was started already"));
+        return conflict(format!(
+            "round {number} was started already: look how far it is"
+        ));
     }
     if number.get() > started + 1 || number > tournament.rules.format.last_round() {
         return conflict(format!(
@@ -94,7 +96,7 @@ fn check_teams(
         );
     }
     if with_games.is_empty() {
-        return conflict("a round needs two teams at least");
+        return conflict("a round needs two teams at least: enter more");
     }
     Ok(with_games)
 }

@@ -7,6 +7,7 @@ use crate::{
     },
     store::Store,
     tables::{
+        game_attempts,
         games::{self, Game, GamePurpose, GameState, NoResult},
         season, tournaments,
     },
@@ -27,11 +28,13 @@ impl Store {
         self.write(actor, now, async |tx| {
             let game = games::find(tx, id).await?;
             tournaments::find_open(tx, game.tournament).await?;
-            let (GamePurpose::Round(_), GameState::Played(_)) = (game.purpose, &game.state) else {
+            let (GamePurpose::Round(_), GameState::Played(played)) = (game.purpose, &game.state)
+            else {
                 return Err(StoreError::Conflict(
-                    "only a game of a round that has a result is voided".into(),
+                    "only a game of a round that has a result is voided: one that is queued or running is waited for".into(),
                 ));
             };
+            game_attempts::set_voided(tx, id, played.attempt, reason).await?;
             games::set_without_result(tx, id, NoResult::Void, reason, now).await?;
             let reason = reason.to_owned();
             tx.record(Subject::Game(id), Event::GameVoided { reason });
@@ -52,7 +55,7 @@ impl Store {
                 GameState::Void { .. } | GameState::Broken { .. }
             ) {
                 return Err(StoreError::Conflict(
-                    "only a game that was voided, or that we could not play, is played again"
+                    "only a game that was voided, or that we could not play, is played again: void its result first"
                         .into(),
                 ));
             }

@@ -127,7 +127,7 @@ impl Told {
                     let [goals, conceded] = stands.score;
                     let minutes = f64::from(stands.steps) * CONTROL_STEP_S / 60.0;
                     format!(
-                        "{home} - {away}, attempt {}, {minutes:.1} minutes: {goals} : {conceded}",
+                        "{home} - {away}, attempt {} of a game of {minutes:.1} minutes: {goals} : {conceded} so far",
                         stands.attempt
                     )
                 })
@@ -273,7 +273,7 @@ mod tests {
         assert!(line(&waiting).is_some());
         assert_eq!(line(&waiting), None);
         let first = line(&snapshot(1)).unwrap();
-        assert_eq!(first, "Ajax - Zed, attempt 1, 15.0 minutes: 1 : 0");
+        assert_eq!(first, "Ajax - Zed, attempt 1 of a game of 15.0 minutes: 1 : 0 so far");
         assert_eq!(line(&snapshot(1)), None);
         assert_eq!(line(&event("position", &json!({}))), None);
         assert!(line(&snapshot(2)).is_some());

@@ -68,6 +68,9 @@ pub(in crate::commands) fn whole(tournament: &TournamentView) -> String {
             .as_ref()
             .map(|paused| format!("  paused    since {}: {}", time(paused.at), paused.reason)),
     );
+    if tournament.entrants.is_empty() {
+        lines.push("  teams     none: `faceoff admin tournament enter` takes them in".to_owned());
+    }
     for (number, entrant) in tournament.entrants.iter().enumerate() {
         let title = if number == 0 { "teams" } else { "" };
         lines.push(format!("  {title:<8}  {}", self::entrant(entrant)));
