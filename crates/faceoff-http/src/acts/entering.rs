@@ -6,6 +6,7 @@ use crate::{
     requests::BoardQuery,
     views::{board::BoardView, sight::Sight},
 };
+use faceoff_scoring::tournament::schedule::MAX_ENTRANTS;
 use faceoff_store::Stage;
 use faceoff_types::{TeamId, TeamName, Tier};
 use std::collections::{BTreeMap, BTreeSet};
@@ -36,6 +37,16 @@ pub(crate) async fn named(
         found.push(*id);
     }
     Ok(found)
+}
+
+/// Refuses more teams than a schedule is drawn for; those that left count.
+pub(crate) fn check_count(teams: usize) -> Result<(), Problem> {
+    if teams > MAX_ENTRANTS {
+        let detail =
+            format!("a tournament has at most {MAX_ENTRANTS} teams, got {teams}; divide them");
+        return Err(Problem::invalid("teams", detail));
+    }
+    Ok(())
 }
 
 /// The teams that a stage's board has as deployable or improvable, the organiser's board, by the newest rules: those

@@ -38,13 +38,14 @@ pub(crate) async fn enter_teams(
             "expected at least one name, got none",
         ));
     }
-    app.store.tournament(id).await?;
-    let entering = entering::named(&app, "teams", &teams).await?;
+    let sheet = TournamentSheet::unscored(&app, id).await?;
+    let new = entering::named(&app, "teams", &teams).await?;
+    entering::check_count(sheet.entrants.len() + new.len())?;
     let now = app.config.clock.now();
     app.store
-        .enter_tournament(organiser.actor(), id, &entering, now)
+        .enter_tournament(organiser.actor(), id, &new, now)
         .await?;
-    tracing::info!(tournament = %id, teams = entering.len(), "teams entered");
+    tracing::info!(tournament = %id, teams = new.len(), "teams entered");
     TournamentView::find(&app, id).await.map(Json)
 }
 

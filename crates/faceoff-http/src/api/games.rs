@@ -15,7 +15,7 @@ use crate::{
     },
 };
 use axum::{Json, extract::State};
-use faceoff_store::GamePurpose;
+use faceoff_store::{GamePurpose, GameState};
 use faceoff_types::{GameId, TournamentId};
 
 /// The games of a tournament's rounds, in the order of play, each with what it came to and why.
@@ -53,7 +53,7 @@ pub(crate) async fn game(
     responses(
         (status = 200, body = GameView),
         (status = 403), (status = 404),
-        (status = 409, description = "it counts, or is over"),
+        (status = 409, description = "it counts, is over, or, for a team, is under way"),
     )
 )]
 pub(crate) async fn cancel_game(
@@ -87,6 +87,12 @@ pub(crate) async fn cancel_game(
             ));
         }
     };
+    if caller.team().is_some() && matches!(game.state, GameState::Running { .. }) {
+        return Err(Problem::new(
+            ProblemKind::Conflict,
+            "the game is under way, and the other side is to have what it is about: wait for its end",
+        ));
+    }
     let now = app.config.clock.now();
     let cancelled = app
         .store

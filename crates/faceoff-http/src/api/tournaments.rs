@@ -79,6 +79,7 @@ pub(crate) async fn open_tournament(
         (None, Some(stage)) => entering::by_tier(&app, stage).await?,
         (None, None) => Vec::new(),
     };
+    entering::check_count(entrants.len())?;
     let wanted = faceoff_store::NewTournament {
         name,
         stage: stage.map(|stage| stage.id),

@@ -1,6 +1,6 @@
 //! The schedule of a tournament, played again with fresh seeds: who would have been its champion.
 
-use super::{certainty::CertaintyView, tournament_sheet::TournamentSheet};
+use super::{certainty::CertaintyView, tournament::first_place, tournament_sheet::TournamentSheet};
 use crate::{app::App, problem::Problem};
 use faceoff_scoring::tournament::champions;
 use faceoff_store::{Game, GamePurpose, GameState, GamesOf};
@@ -48,8 +48,7 @@ fn of(sheet: &TournamentSheet, games: &[Game]) -> Result<CertaintyView, Problem>
             given_up += 1;
         } else if !awaits {
             let tables = sheet.tables(&sheet.results(of_replay.iter().copied())?);
-            let first = tables.first().and_then(|table| table.standings.first());
-            first_places.extend(first.map(|first| first.team.clone()));
+            first_places.extend(tables.first().and_then(first_place));
         }
     }
     let played = games

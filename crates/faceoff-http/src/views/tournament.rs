@@ -317,7 +317,9 @@ fn phase(sheet: &TournamentSheet) -> TournamentPhase {
         TournamentPhase::Closed
     } else if sheet.rounds.is_empty() {
         TournamentPhase::Open
-    } else if sheet.games.iter().any(|game| sheet.is_awaited(game)) {
+    } else if sheet.games.iter().any(|game| sheet.is_awaited(game))
+        || sheet.rounds.iter().any(|round| round.over_at.is_none())
+    {
         TournamentPhase::Round
     } else if sheet.rounds.len() < last.get() as usize {
         TournamentPhase::Between
@@ -326,12 +328,21 @@ fn phase(sheet: &TournamentSheet) -> TournamentPhase {
     }
 }
 
+/// Who is first of a table, and has not left.
+pub(super) fn first_place(table: &Table) -> Option<TeamName> {
+    let mut standings = table.standings.iter();
+    let first = standings.find(|standing| standing.left.is_none())?;
+    Some(first.team.clone())
+}
+
 fn champion(sheet: &TournamentSheet, tables: &[Table]) -> Option<TeamName> {
     let last = sheet.tournament.rules.format.last_round();
+    // Of a round that was not over by then an archive has a part.
+    let are_over = sheet.rounds.iter().all(|round| round.over_at.is_some());
     let is_over = sheet.rounds.len() >= last.get() as usize
+        && are_over
         && !sheet.games.iter().any(|game| sheet.is_awaited(game));
-    let first = tables.first().filter(|_| is_over)?.standings.first()?;
-    Some(first.team.clone())
+    first_place(tables.first().filter(|_| is_over)?)
 }
 
 /// What comes next, in words for everybody.

@@ -3,20 +3,24 @@
 use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::ends,
+    operations::{
+        ends,
+        tournament::entrants::{Leaving, leave},
+    },
     reads,
     store::Store,
     tables::{
-        days, entries,
+        days, entrants, entries,
         evaluations::{Evaluation, Failure},
         finalised,
         rulings::Ruling,
         standings,
         teams::{self, Team},
+        tournaments,
     },
     write::Tx,
 };
-use faceoff_types::{EvaluationId, StageDay, TeamId};
+use faceoff_types::{EvaluationId, LeftAs, StageDay, TeamId};
 use jiff::Timestamp;
 
 pub(crate) async fn void(tx: &mut Tx, id: EvaluationId, reason: &str) -> Result<()> {
@@ -27,6 +31,26 @@ pub(crate) async fn void(tx: &mut Tx, id: EvaluationId, reason: &str) -> Result<
     standings::set_voided(tx, id, &ruling).await?;
     let reason = ruling.reason;
     tx.record(Subject::Evaluation(id), Event::EvaluationVoided { reason });
+    Ok(())
+}
+
+/// Disqualifies a team from the tournaments that are not closed.
+async fn leave_tournaments(tx: &mut Tx, team: TeamId, reason: &str) -> Result<()> {
+    let leaving = Leaving {
+        team,
+        left_as: LeftAs::Disqualified,
+        from_round: None,
+        reason: reason.to_owned(),
+    };
+    for tournament in tournaments::all(tx).await? {
+        let entrants = entrants::all(tx, tournament.id).await?;
+        let is_in = entrants
+            .iter()
+            .any(|one| one.team == team && one.left.is_none());
+        if tournament.closed_at.is_none() && is_in {
+            leave(tx, tournament.id, &leaving).await?;
+        }
+    }
     Ok(())
 }
 
@@ -94,7 +118,8 @@ impl Store {
         .await
     }
 
-    /// Disqualifies a team at once: what it plays is cancelled, it is on no board, at no cut, and uploads nothing.
+    /// Disqualifies a team at once: what it plays is cancelled, it is on no board, at no cut, and uploads nothing; out of
+    /// tournaments that are not closed it is for good.
     /// [`StoreError::Conflict`] if it is disqualified.
     pub async fn disqualify_team(
         &self,
@@ -118,6 +143,7 @@ impl Store {
             for (evaluation, run) in standings::open_of_team(tx, id).await? {
                 ends::fail_evaluation(tx, evaluation, run, Failure::Cancelled(&why)).await?;
             }
+            leave_tournaments(tx, id, &why).await?;
             let reason = ruling.reason;
             tx.record(Subject::Team(id), Event::TeamDisqualified { reason });
             teams::find(tx, id).await

@@ -81,6 +81,14 @@ const STEPS: &[(For, &str)] = &[
     (For::Public, "DELETE FROM game_attempts WHERE NOT EXISTS
         (SELECT 1 FROM games g WHERE g.id = game_attempts.game_id AND g.attempt = game_attempts.number)"),
     (For::Public, "UPDATE game_attempts SET worker = '', home_log = '', away_log = ''"),
+    // With its seed a side's view of a game is everybody's: where that is not published it is zeros.
+    (For::Public, "UPDATE game_attempts SET score = json_set(score, '$.seed', lower(hex(zeroblob(32))))
+        WHERE score ->> '$.seed' IS NOT NULL AND NOT EXISTS
+        (SELECT 1 FROM games g JOIN tournaments t ON t.id = g.tournament_id
+         LEFT JOIN rounds r ON r.tournament_id = g.tournament_id AND r.number = g.round
+         WHERE g.id = game_attempts.game_id AND g.purpose = 'round'
+           AND CASE t.settings ->> '$.publishes' WHEN 'at_release' THEN r.over_at IS NOT NULL
+                    WHEN 'at_close' THEN t.closed_at IS NOT NULL ELSE 0 END)"),
     (For::Public, "UPDATE tournaments SET baseline_id = NULL"),
     (For::Both, "DELETE FROM runs WHERE id NOT IN (SELECT run_id FROM evaluations)
         AND id NOT IN (SELECT run_id FROM drafts) AND id NOT IN (SELECT run_id FROM ablation_runs)"),

@@ -3,7 +3,7 @@ use crate::{
     event::{Actor, Event, Subject},
     operations::finalise_stage::final_is_owed,
     store::Store,
-    tables::{drafts, evaluations, games, season, stages},
+    tables::{drafts, evaluations, games, season, stages, tournaments},
 };
 use jiff::Timestamp;
 
@@ -39,6 +39,13 @@ impl Store {
                 return Err(StoreError::Conflict(format!(
                     "{games} games are queued or running, and closing the season publishes their seeds: wait until they \
                      are over, or call them off"
+                )));
+            }
+            let open = tournaments::all(tx).await?;
+            if let Some(open) = open.iter().find(|one| one.closed_at.is_none()) {
+                return Err(StoreError::Conflict(format!(
+                    "the tournament {:?} is not closed, and no game is played in a closed season: close it first",
+                    open.name.as_str()
                 )));
             }
             if under_way > 0 {

@@ -11,7 +11,7 @@ pub use lease::Claim;
 pub(crate) use lease::{
     Hold, hold, mark_done, park, release, renew, renew_all, requeue_failed, unpark,
 };
-pub(crate) use shares::{Lane, account};
+pub(crate) use shares::{Account, Lane, account};
 pub(crate) use units::{
     Leased, NewUnit, Standing, claim_next, drop_units, end_leases_of, goes_on, insert, standing,
 };

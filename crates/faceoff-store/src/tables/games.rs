@@ -562,7 +562,8 @@ pub(crate) async fn set_without_result(
     Ok(())
 }
 
-/// How many that do not count a team has asked for since an instant, called-off ones left out.
+/// How many that do not count a team has asked for since an instant, called-off ones included: each is a row, and a
+/// unit.
 pub(crate) async fn count_asked(
     connection: &mut SqliteConnection,
     team: TeamId,
@@ -571,8 +572,7 @@ pub(crate) async fn count_asked(
     let (team, since) = (Text(team), Instant(since));
     Ok(sqlx::query_scalar!(
         r#"SELECT COUNT(*) AS "count!: u32" FROM games
-           WHERE asked_by = ? AND created_at >= ? AND NOT (state = 'cancelled' AND NOT EXISTS
-               (SELECT 1 FROM game_attempts a WHERE a.game_id = games.id))"#,
+           WHERE asked_by = ? AND created_at >= ?"#,
         team,
         since,
     )

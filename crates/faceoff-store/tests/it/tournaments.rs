@@ -484,7 +484,7 @@ async fn who_leaves_takes_its_open_games_along() {
                 f.now,
             )
             .await,
-        &["has left it"],
+        &["has left the tournament already"],
     );
     assert!(matches!(
         state(&f, running).await,
@@ -566,6 +566,68 @@ async fn a_game_that_is_to_be_played_again_makes_no_earlier_round_unfinished() {
 }
 
 #[tokio::test]
+async fn nobody_escapes_a_disqualification_by_leaving_first_or_by_the_season() {
+    let f = Fixture::new().await;
+    let (cup, teams) = opened(&f, &["A", "B", "C"], TournamentRules::default()).await;
+    let [a, b, c] = teams[..] else { panic!() };
+    let first = drawn(1, &[&[[a, b]], &[[b, c]], &[[c, a]]], &[c, a, b]);
+    start(&f, cup.id, &first).await.unwrap();
+    for _ in 0..3 {
+        play_next(&f).await;
+    }
+    let leave = async |leaving: Leaving| {
+        f.store
+            .leave_tournament(Actor::Organiser, cup.id, &leaving, f.now)
+            .await
+    };
+    let out = leave(leaving(c, LeftAs::Withdrawn, None)).await.unwrap();
+    assert_eq!(out.unwrap().from_round, round(2));
+    refused(
+        leave(leaving(c, LeftAs::Disqualified, Some(round(3)))).await,
+        &["from_round: expected 1 to 2"],
+    );
+    let out = leave(leaving(c, LeftAs::Disqualified, Some(round(1))))
+        .await
+        .unwrap();
+    assert_eq!(out.unwrap().left_as, LeftAs::Disqualified);
+    refused(
+        leave(leaving(c, LeftAs::Disqualified, None)).await,
+        &["has left the tournament already"],
+    );
+    // A game that a team had played before it left is played again if it is voided; one that counts no more is not.
+    let games = record(&f, cup.id).await.games;
+    for game in &games[..2] {
+        f.store
+            .void_game(Actor::Organiser, game.id, WHY, f.now)
+            .await
+            .unwrap();
+    }
+    refused(
+        f.store
+            .rerun_game(Actor::Organiser, games[1].id, f.now)
+            .await,
+        &["by its round"],
+    );
+    f.store
+        .rerun_game(Actor::Organiser, games[0].id, f.now)
+        .await
+        .unwrap();
+    // Out of the season is out of its tournaments.
+    f.store
+        .disqualify_team(Actor::Organiser, b, WHY, f.now)
+        .await
+        .unwrap();
+    assert!(f.claim().await.is_none(), "what waited is called off");
+    let entrants = record(&f, cup.id).await.entrants;
+    let of_b = entrants.iter().find(|one| one.team == b).unwrap();
+    assert_eq!(of_b.left.as_ref().unwrap().left_as, LeftAs::Disqualified);
+    refused(
+        f.store.close_season(Actor::Organiser, f.now).await,
+        &["Cup", "close it first"],
+    );
+}
+
+#[tokio::test]
 async fn games_that_do_not_count_have_a_quota_and_wait_for_rounds() {
     let mut f = Fixture::new().await;
     let (cup, teams) = opened(&f, &["A", "B", "Base"], TournamentRules::default()).await;
@@ -586,7 +648,7 @@ async fn games_that_do_not_count_have_a_quota_and_wait_for_rounds() {
     let change = TournamentChange {
         baseline: Some(Some(baseline)),
         settings: Some(TournamentSettings {
-            free_games_per_day: 2,
+            free_games_per_day: 3,
             ..TournamentSettings::default()
         }),
         ..TournamentChange::default()
@@ -612,11 +674,15 @@ async fn games_that_do_not_count_have_a_quota_and_wait_for_rounds() {
         .cancel_game(Actor::Team(a), called_off.id, "not now", f.now)
         .await
         .unwrap();
-    assert_eq!(f.store.free_games_used(a, f.now).await.unwrap(), 1);
+    assert_eq!(
+        f.store.free_games_used(a, f.now).await.unwrap(),
+        2,
+        "called off or not"
+    );
     friendly(&f, a, b).await.unwrap();
     assert!(matches!(
         friendly(&f, a, b).await,
-        Err(StoreError::FreeGamesSpent { limit: 2, used: 2 })
+        Err(StoreError::FreeGamesSpent { limit: 3, used: 3 })
     ));
     test(&f, None).await.unwrap();
     f.store

@@ -131,8 +131,8 @@ impl Store {
 
     /// A team leaves for good: its games that have no result are called off, and no game with it counts from the round on
     /// that is under way, or, between rounds, from the next; a disqualified one may lose earlier ones, too
-    /// (`from_round`). Before the first round it is just out (`None`), and may enter again. [`StoreError::Conflict`] if it has left,
-    /// or is not in it, or the tournament is closed.
+    /// (`from_round`). Before the first round it is just out (`None`), and may enter again. Who withdrew may be disqualified afterwards.
+    /// [`StoreError::Conflict`] if it has left otherwise, or is not in it, or the tournament is closed.
     pub async fn leave_tournament(
         &self,
         actor: Actor,
@@ -140,61 +140,78 @@ impl Store {
         leaving: &Leaving,
         now: Timestamp,
     ) -> Result<Option<Leave>> {
-        let Leaving {
-            team,
-            left_as,
-            from_round,
-            ref reason,
-        } = *leaving;
         self.write(actor, now, async |tx| {
             tournaments::find_open(tx, id).await?;
-            let playing = playing(tx, id).await?;
-            let Some(entrant) = playing.iter().find(|entrant| entrant.team == team) else {
-                return Err(StoreError::Conflict(
-                    "the team is not in the tournament, or has left it".into(),
-                ));
-            };
-            let called_off = format!("{} has left the tournament", entrant.name);
-            if rounds::count(tx, id).await? == 0 {
-                entrants::remove(tx, id, team).await?;
-                call_off(tx, id, team, &called_off).await?;
-                let reason = reason.clone();
-                tx.record(Subject::Tournament(id), Event::TeamOut { team, reason });
-                return Ok(None);
-            }
-            let current = round_under_way(tx, id, &playing).await?;
-            let from_round = match (from_round, left_as) {
-                (None, _) => current,
-                (Some(from), LeftAs::Disqualified) if from <= current => from,
-                (Some(from), LeftAs::Withdrawn) if from == current => from,
-                (Some(from), LeftAs::Withdrawn) => {
-                    return Err(StoreError::Conflict(format!(
-                        "from_round: who withdraws keeps what was played before round {current}; got {from}"
-                    )));
-                }
-                (Some(from), LeftAs::Disqualified) => {
-                    return Err(StoreError::Conflict(format!(
-                        "from_round: expected 1 to {current}, the round that is under way or next; got {from}"
-                    )));
-                }
-            };
-            let leave = Leave {
-                left_as,
-                from_round,
-                at: now,
-                reason: reason.clone(),
-            };
-            entrants::set_left(tx, id, team, &leave).await?;
-            call_off(tx, id, team, &called_off).await?;
-            let event = Event::TeamLeftTournament {
-                team,
-                left_as,
-                from_round,
-                reason: reason.clone(),
-            };
-            tx.record(Subject::Tournament(id), event);
-            Ok(Some(leave))
+            leave(tx, id, leaving).await
         })
         .await
     }
+}
+
+/// Takes a team out of a tournament that is not closed.
+pub(crate) async fn leave(
+    tx: &mut Tx,
+    id: TournamentId,
+    leaving: &Leaving,
+) -> Result<Option<Leave>> {
+    let Leaving {
+        team,
+        left_as,
+        from_round,
+        ref reason,
+    } = *leaving;
+    let all = entrants::all(tx, id).await?;
+    let Some(entrant) = all.iter().find(|entrant| entrant.team == team) else {
+        return Err(StoreError::Conflict(
+            "the team is not in the tournament".into(),
+        ));
+    };
+    let called_off = format!("{} has left the tournament", entrant.name);
+    let latest = match (&entrant.left, left_as) {
+        (None, _) if rounds::count(tx, id).await? == 0 => {
+            entrants::remove(tx, id, team).await?;
+            call_off(tx, id, team, &called_off).await?;
+            let reason = reason.clone();
+            tx.record(Subject::Tournament(id), Event::TeamOut { team, reason });
+            return Ok(None);
+        }
+        (None, _) => {
+            let playing = playing(tx, id).await?;
+            round_under_way(tx, id, &playing).await?
+        }
+        // Nobody escapes by going first.
+        (Some(left), LeftAs::Disqualified) if left.left_as == LeftAs::Withdrawn => left.from_round,
+        (Some(_), _) => {
+            return Err(StoreError::Conflict(format!(
+                "{} has left the tournament already",
+                entrant.name
+            )));
+        }
+    };
+    let from_round = from_round.unwrap_or(latest);
+    if from_round > latest || left_as == LeftAs::Withdrawn && from_round < latest {
+        let expected = match left_as {
+            LeftAs::Withdrawn => format!("{latest}: who withdraws keeps what was finished before"),
+            LeftAs::Disqualified => format!("1 to {latest}"),
+        };
+        return Err(StoreError::Conflict(format!(
+            "from_round: expected {expected}; got {from_round}"
+        )));
+    }
+    let leave = Leave {
+        left_as,
+        from_round,
+        at: tx.now,
+        reason: reason.clone(),
+    };
+    entrants::set_left(tx, id, team, &leave).await?;
+    call_off(tx, id, team, &called_off).await?;
+    let event = Event::TeamLeftTournament {
+        team,
+        left_as,
+        from_round,
+        reason: reason.clone(),
+    };
+    tx.record(Subject::Tournament(id), event);
+    Ok(Some(leave))
 }

@@ -230,8 +230,8 @@ impl Store {
         .await
     }
 
-    /// How many games that do not count a team has asked for on the UTC day of `now`, in all tournaments; those that were
-    /// called off before a slot began them do not count.
+    /// How many games that do not count a team has asked for on the UTC day of `now`, in all tournaments, those that
+    /// were called off included.
     pub async fn free_games_used(&self, team: TeamId, now: Timestamp) -> Result<u32> {
         let mut connection = self.database.read.acquire().await?;
         games::count_asked(&mut connection, team, day_begins(now)).await

@@ -9,7 +9,7 @@ use crate::{
         tournament::playing::{owed, playing},
         work::{RunSeeds, Work},
     },
-    queue::{self, Claim, NewUnit},
+    queue::{self, Account, Claim, NewUnit},
     store::Store,
     tables::{
         bundles,
@@ -23,11 +23,9 @@ use faceoff_types::{BundleRef, GameId, RoundNumber, TournamentId};
 use jiff::Timestamp;
 use uuid::Uuid;
 
-/// What waits in the queue for a game. Games of a round wait matchday by matchday.
-async fn unit(tx: &mut Tx, game: &Game, waiting: NewUnit) -> Result<Uuid> {
-    for submission in game.submissions {
-        bundles::check_kept(tx, submission).await?;
-    }
+/// Whose slot time the games of a tournament, or those that a team asked for, take. To be asked once for many: the
+/// answer looks at all that waits.
+pub(super) async fn account(tx: &mut Tx, game: &Game, waiting: NewUnit) -> Result<Account> {
     let holder = match game.purpose {
         GamePurpose::Round(_)
         | GamePurpose::Replay { .. }
@@ -37,24 +35,43 @@ async fn unit(tx: &mut Tx, game: &Game, waiting: NewUnit) -> Result<Uuid> {
         }
         | GamePurpose::Friendly { asked_by: team } => team.to_string(),
     };
+    queue::account(tx, waiting.lane, &holder).await
+}
+
+/// What waits in the queue for a game. Games of a round wait matchday by matchday.
+async fn unit(tx: &mut Tx, game: &Game, waiting: NewUnit, account: Account) -> Result<Uuid> {
+    for submission in game.submissions {
+        bundles::check_kept(tx, submission).await?;
+    }
     let batch = match game.purpose {
         GamePurpose::Round(meeting) => i64::from(meeting.matchday),
         GamePurpose::Replay { replay, .. } => i64::from(replay),
         GamePurpose::Test { .. } | GamePurpose::Friendly { .. } => 0,
     };
-    let account = queue::account(tx, waiting.lane, &holder).await?;
     queue::insert(tx, NewUnit { batch, ..waiting }, account).await
 }
 
 /// Adds a game and queues it. [`StoreError::Conflict`] if the archive of a side was removed.
 pub(super) async fn enqueue(tx: &mut Tx, game: &Game, waiting: NewUnit) -> Result<()> {
-    let unit = unit(tx, game, waiting).await?;
+    let account = account(tx, game, waiting).await?;
+    enqueue_for(tx, game, waiting, account).await
+}
+
+/// As [`enqueue`], for an account that was looked up.
+pub(super) async fn enqueue_for(
+    tx: &mut Tx,
+    game: &Game,
+    waiting: NewUnit,
+    account: Account,
+) -> Result<()> {
+    let unit = unit(tx, game, waiting, account).await?;
     games::insert(tx, game, unit).await
 }
 
 /// Queues a game that has no result once more.
 pub(super) async fn enqueue_again(tx: &mut Tx, game: &Game, waiting: NewUnit) -> Result<()> {
-    let unit = unit(tx, game, waiting).await?;
+    let account = account(tx, game, waiting).await?;
+    let unit = unit(tx, game, waiting, account).await?;
     games::set_queued_again(tx, game.id, unit).await
 }
 
@@ -113,13 +130,20 @@ pub(crate) async fn give_back(
 
 /// Our fault, given up: it has no result until an organiser has it played again.
 pub(crate) async fn give_up(tx: &mut Tx, id: GameId, reason: &str) -> Result<()> {
-    let game = games::find(tx, id).await?;
     let now = tx.now;
     game_attempts::end(tx, id, AttemptOutcome::Lost, Some(reason), now).await?;
     games::set_without_result(tx, id, NoResult::Broken, reason, now).await?;
     let reason = reason.to_owned();
     tx.record(Subject::Game(id), Event::GameBroken { reason });
-    end_round_if_its(tx, &game).await
+    match games::find(tx, id).await {
+        Ok(game) => end_round_if_its(tx, &game).await,
+        // It must end all the same: it would hold up the queue.
+        Err(StoreError::Damaged(what)) => {
+            tracing::error!(game = %id, what, "a damaged game has ended");
+            Ok(())
+        }
+        Err(error) => Err(error),
+    }
 }
 
 /// Takes a game out of the queue, whoever plays it.

@@ -12,20 +12,43 @@ use crate::{
     },
     store::Store,
     tables::{
+        entrants,
         games::{self, Game, GamePurpose, GameState},
         rounds, season, tournaments,
     },
+    write::Tx,
 };
-use faceoff_types::{GameId, GameSeed, TournamentId};
+use faceoff_types::{GameId, GameSeed, RoundNumber, TeamId, TournamentId};
 use jiff::Timestamp;
+use std::collections::BTreeMap;
 
 /// The most times that a schedule is played again.
 pub const MAX_REPLAYS: u32 = 1000;
 
+/// The most games that a tournament's replays have in all: they are queued at once, and read at once.
+pub const MAX_REPLAYED_GAMES: u32 = 10_000;
+
+/// The games that count: with a result, and of teams that had not left by their round.
+async fn counting(tx: &mut Tx, id: TournamentId, mut games: Vec<Game>) -> Result<Vec<Game>> {
+    let left: BTreeMap<TeamId, RoundNumber> = entrants::all(tx, id)
+        .await?
+        .into_iter()
+        .filter_map(|entrant| Some((entrant.team, entrant.left?.from_round)))
+        .collect();
+    games.retain(|game| {
+        let is_out = |team: &TeamId| {
+            let of = game.purpose.meeting().zip(left.get(team));
+            of.is_some_and(|(of, from)| of.round >= *from)
+        };
+        matches!(game.state, GameState::Played(_)) && !game.teams.iter().any(is_out)
+    });
+    Ok(games)
+}
+
 impl Store {
     /// Queues all games of all rounds `times` times more, with the same submissions and fresh seeds; they do not count and
     /// keep no recordings. Returns how many games. [`StoreError::Conflict`] if a round is to come or under way, or
-    /// more than [`MAX_REPLAYS`] came of it.
+    /// more than [`MAX_REPLAYS`], or [`MAX_REPLAYED_GAMES`], came of it.
     pub async fn order_replays(
         &self,
         actor: Actor,
@@ -57,12 +80,19 @@ impl Store {
                     MAX_REPLAYS.saturating_sub(last)
                 )));
             }
-            let mut count = 0;
+            let schedule = counting(tx, id, schedule).await?;
+            let queued = u32::try_from(schedule.len()).unwrap_or(u32::MAX);
+            let games = queued.saturating_mul(last.saturating_add(times));
+            if games > MAX_REPLAYED_GAMES {
+                return Err(StoreError::Conflict(format!(
+                    "times: {queued} games {} times are {games}, at most {MAX_REPLAYED_GAMES} are played again in all",
+                    last.saturating_add(times)
+                )));
+            }
+            let (mut count, mut account) = (0, None);
             for replay in last + 1..=last + times {
                 for played in &schedule {
-                    let (GamePurpose::Round(of), GameState::Played(_)) =
-                        (played.purpose, &played.state)
-                    else {
+                    let Some(of) = played.purpose.meeting() else {
                         continue;
                     };
                     let game = Game {
@@ -78,7 +108,11 @@ impl Store {
                         state: GameState::Queued,
                         ..played.clone()
                     };
-                    play::enqueue(tx, &game, purpose::REPLAY_GAME).await?;
+                    let account = match account {
+                        Some(known) => known,
+                        None => *account.insert(play::account(tx, &game, purpose::REPLAY_GAME).await?),
+                    };
+                    play::enqueue_for(tx, &game, purpose::REPLAY_GAME, account).await?;
                     count += 1;
                 }
             }

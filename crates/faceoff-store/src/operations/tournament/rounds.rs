@@ -144,7 +144,7 @@ async fn queue_games(
     } else {
         &[false]
     };
-    let (mut meeting, mut count) = (0, 0);
+    let (mut meeting, mut count, mut account) = (0, 0, None);
     for (matchday, day) in (1..).zip(&drawn.matchdays) {
         for pair in &day.games {
             meeting += 1;
@@ -172,7 +172,11 @@ async fn queue_games(
                     created_at: tx.now,
                     state: GameState::Queued,
                 };
-                play::enqueue(tx, &game, purpose::ROUND_GAME).await?;
+                let account = match account {
+                    Some(known) => known,
+                    None => *account.insert(play::account(tx, &game, purpose::ROUND_GAME).await?),
+                };
+                play::enqueue_for(tx, &game, purpose::ROUND_GAME, account).await?;
                 count += 1;
             }
         }

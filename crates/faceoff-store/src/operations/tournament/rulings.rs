@@ -1,12 +1,10 @@
 use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::{
-        purpose,
-        tournament::{play, playing::playing},
-    },
+    operations::{purpose, tournament::play},
     store::Store,
     tables::{
+        entrants::{self, Entrant},
         game_attempts,
         games::{self, Game, GamePurpose, GameState, NoResult},
         season, tournaments,
@@ -26,6 +24,7 @@ impl Store {
         now: Timestamp,
     ) -> Result<Game> {
         self.write(actor, now, async |tx| {
+            season::check_open(tx).await?;
             let game = games::find(tx, id).await?;
             tournaments::find_open(tx, game.tournament).await?;
             let (GamePurpose::Round(_), GameState::Played(played)) = (game.purpose, &game.state)
@@ -44,7 +43,7 @@ impl Store {
     }
 
     /// Queues a game again that was voided or broken by us: same submissions, same seed. [`StoreError::Conflict`] of any
-    /// other, and if one of its teams has left.
+    /// other, and if one of its teams had left by its round.
     pub async fn rerun_game(&self, actor: Actor, id: GameId, now: Timestamp) -> Result<Game> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
@@ -60,17 +59,24 @@ impl Store {
                 ));
             }
             let lane = match game.purpose {
-                GamePurpose::Round(_) => {
-                    let playing = playing(tx, game.tournament).await?;
-                    let plays = |team| playing.iter().any(|entrant| entrant.team == team);
-                    if !game.teams.into_iter().all(plays) {
+                GamePurpose::Round(meeting) => {
+                    let has_left = |entrant: &Entrant| {
+                        let left = entrant.left.as_ref();
+                        game.teams.contains(&entrant.team)
+                            && left.is_some_and(|left| left.from_round <= meeting.round)
+                    };
+                    if entrants::all(tx, game.tournament).await?.iter().any(has_left) {
                         return Err(StoreError::Conflict(
-                            "one of its teams has left the tournament".into(),
+                            "one of its teams has left the tournament by its round: it counts for nobody".into(),
                         ));
                     }
                     purpose::ROUND_GAME
                 }
-                GamePurpose::Test { .. } | GamePurpose::Friendly { .. } => purpose::FREE_GAME,
+                GamePurpose::Test { .. } | GamePurpose::Friendly { .. } => {
+                    return Err(StoreError::Conflict(
+                        "a game that does not count is not played again: ask for another one".into(),
+                    ));
+                }
                 GamePurpose::Replay { .. } => purpose::REPLAY_GAME,
             };
             play::enqueue_again(tx, &game, lane).await?;

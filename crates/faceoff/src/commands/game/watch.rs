@@ -273,7 +273,10 @@ mod tests {
         assert!(line(&waiting).is_some());
         assert_eq!(line(&waiting), None);
         let first = line(&snapshot(1)).unwrap();
-        assert_eq!(first, "Ajax - Zed, attempt 1 of a game of 15.0 minutes: 1 : 0 so far");
+        assert_eq!(
+            first,
+            "Ajax - Zed, attempt 1 of a game of 15.0 minutes: 1 : 0 so far"
+        );
         assert_eq!(line(&snapshot(1)), None);
         assert_eq!(line(&event("position", &json!({}))), None);
         assert!(line(&snapshot(2)).is_some());
