@@ -79,7 +79,7 @@ struct Hold(PathBuf);
 
 impl Hold {
     fn in_scratch(scratch: &Path) -> Self {
-        Self(scratch.join("slot-0/bundle/unpacked/hold"))
+        Self(scratch.join("slot-0/bundle-1/unpacked/hold"))
     }
 
     /// Appears whole.

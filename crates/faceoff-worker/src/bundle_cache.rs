@@ -60,7 +60,8 @@ impl BundleCache {
                 found = Some(bundle);
             } else if beside.is_none_or(|beside| place.holds(beside).is_none()) {
                 place.forget()?;
-                free = Some(place);
+                // The first that is free: one agent alone is always in the same place.
+                free = free.or(Some(place));
             }
         }
         match (found, free) {
