@@ -38,7 +38,7 @@ const TOLD: [&str; 12] = [
     "0.511",
     "59.98",
     "60.0 ",
-    "777",
+    "777.5",
     "told_apart",
 ];
 
@@ -53,7 +53,7 @@ fn tells_nothing(answer: &Answer) {
 async fn nobody_but_the_organiser_learns_how_anybody_did() {
     let site = Site::start().await;
     let ([alpha, beta], [of_alpha, of_beta]) = blind_day(&site).await;
-    site.finish(&result([0.511, 0.622, 0.733], 777.0)).await;
+    site.finish(&result([0.511, 0.622, 0.733], 777.5)).await;
     site.finish(&result([0.1, 0.2, 0.3], 10.0)).await;
     let ids = [&of_alpha, &of_beta].map(|path| path.rsplit('/').next().unwrap().to_owned());
     let compared = format!("{of_alpha}/compare/{}", ids[1]);
@@ -190,7 +190,7 @@ async fn nobody_but_the_organiser_learns_how_anybody_did() {
     let own = site.get(&of_alpha, Some(&alpha.token)).await.json(200);
     assert_eq!(
         (own.get("blind"), &own["result"]["penalty_points"]),
-        (None, &json!(777.0))
+        (None, &json!(777.5))
     );
     let dataset = site
         .get(&format!("{of_alpha}/dataset"), Some(&alpha.token))

@@ -185,7 +185,7 @@ async fn a_void_game_counts_for_nobody_and_is_played_again_on_the_same_seed() {
     assert_eq!(view["phase"], "round");
     assert_eq!(view["rounds"][0]["progress"]["to_be_rerun"], 1);
     assert!(
-        text(&view["next"]).contains("1 are void or broken"),
+        text(&view["next"]).contains("void or broken, which the organiser has played again: 1"),
         "{view}"
     );
     cup.post("rounds", json!({})).await.problem(
