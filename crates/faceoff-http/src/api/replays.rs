@@ -20,7 +20,7 @@ use faceoff_types::TournamentId;
     responses(
         (status = 201, body = CertaintyView),
         (status = 404),
-        (status = 409, description = "no round is over, one is under way, there would be more than 1000, or the season is closed"),
+        (status = 409, description = "a round is to come or under way, there would be more than 1000 replays or 10,000 games, or tournament or season is closed"),
         (status = 422),
     )
 )]
