@@ -1,0 +1,1 @@
+"""Develop, train and evaluate agents for the robot air hockey competition."""
