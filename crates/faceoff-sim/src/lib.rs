@@ -25,6 +25,7 @@ pub mod perturbation;
 pub mod robot;
 pub mod stream;
 pub mod table;
+mod together;
 pub mod world;
 
 pub use batch::{Batch, BatchOutcome, BatchSetup};
@@ -38,4 +39,5 @@ pub use game::{Game, GameSetup, GameState, GameStep, referee::RallyEnd};
 // Actions and joint states are in terms of these.
 pub use faceoff_types::{Interpolation, JOINTS, PerturbationSettings, SUBSTEPS};
 pub use robot::plant::Plant;
+pub use together::step_together;
 pub use world::{Bounds, Divergence, MalletState, Runaway, World};
