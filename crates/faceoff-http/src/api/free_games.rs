@@ -22,7 +22,6 @@ use axum::{
 };
 use faceoff_store::{Game, StoreError};
 use faceoff_types::{TeamId, TournamentId};
-use jiff::{Timestamp, tz::TimeZone};
 
 /// Plays what teams have active against the baseline: a team its own, within its quota of the day; an organiser anybody's
 /// who is in the tournament, without one.
@@ -96,7 +95,7 @@ pub(crate) async fn order_test_games(
                     reason,
                 });
             }
-            Err(error) => return Err(refused(error, now)),
+            Err(error) => return Err(Problem::of_day(error, now)),
         }
     }
     if let (true, Some(first)) = (ordered.is_empty(), not_ordered.first()) {
@@ -151,7 +150,7 @@ pub(crate) async fn order_friendly_game(
         .store
         .order_friendly_game(caller.actor(), id, own, opponent, now)
         .await
-        .map_err(|error| refused(error, now))?;
+        .map_err(|error| Problem::of_day(error, now))?;
     tracing::info!(tournament = %id, game = %game.id, team = %caller.team.name, "friendly game ordered");
     let view = GameView::of(&sheet, Viewer::Team(own), &game)?;
     let location = [(header::LOCATION, paths::game(game.id))];
@@ -172,21 +171,4 @@ pub(crate) async fn list_free_games(
     GameView::free(&app, Viewer::of(&caller), id)
         .await
         .map(Json)
-}
-
-/// Says when a day's quota begins anew.
-fn refused(error: StoreError, now: Timestamp) -> Problem {
-    let is_of_day = matches!(error, StoreError::FreeGamesSpent { .. });
-    let problem = Problem::from(error);
-    let tomorrow = now
-        .to_zoned(TimeZone::UTC)
-        .tomorrow()
-        .and_then(|tomorrow| tomorrow.start_of_day());
-    match tomorrow {
-        Ok(tomorrow) if is_of_day => {
-            let seconds = tomorrow.timestamp().duration_since(now).as_secs();
-            problem.retry_after(seconds.unsigned_abs().max(1))
-        }
-        _ => problem,
-    }
 }

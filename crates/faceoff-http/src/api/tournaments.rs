@@ -206,8 +206,8 @@ pub(crate) async fn close_tournament(
     PathParam(id): PathParam<TournamentId>,
     Body(Confirmation { confirm }): Body<Confirmation>,
 ) -> Result<Json<TournamentView>, Problem> {
-    let tournament = app.store.tournament(id).await?;
-    let rounds = app.store.tournament_record(id).await?.rounds.len();
+    let record = app.store.tournament_record(id).await?;
+    let (tournament, rounds) = (record.tournament, record.rounds.len());
     let what = format!(
         "nothing of the tournament {:?} would change any more, {rounds} of {} rounds were started, and the recordings of \
          their games would come out as its settings say",

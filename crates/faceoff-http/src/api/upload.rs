@@ -20,7 +20,7 @@ use axum::{
 };
 use faceoff_store::{Actor, StoreError, Submission, Team, UploadQuota, UploadUsage};
 use faceoff_types::{ArchiveFormat, BundleRef};
-use jiff::{Timestamp, tz::TimeZone};
+use jiff::Timestamp;
 use serde::Deserialize;
 use utoipa::IntoParams;
 use uuid::Uuid;
@@ -163,27 +163,10 @@ fn allowance(app: &App, quota: UploadQuota, used: UploadUsage, now: Timestamp) -
         beyond: Box::new(move |announced| {
             let bytes = announced.unwrap_or(left.saturating_add(1));
             match quota.check(used, bytes) {
-                Err(spent) if left < largest => over_quota(spent, now),
+                Err(spent) if left < largest => Problem::of_day(spent, now),
                 _ => bundle_stream::too_large(largest, announced),
             }
         }),
-    }
-}
-
-/// Says when a day's quota begins anew.
-fn over_quota(error: StoreError, now: Timestamp) -> Problem {
-    let is_of_day = matches!(error, StoreError::DayQuotaSpent { .. });
-    let problem = Problem::from(error);
-    let tomorrow = now
-        .to_zoned(TimeZone::UTC)
-        .tomorrow()
-        .and_then(|tomorrow| tomorrow.start_of_day());
-    match tomorrow {
-        Ok(tomorrow) if is_of_day => {
-            let seconds = tomorrow.timestamp().duration_since(now).as_secs();
-            problem.retry_after(seconds.unsigned_abs().max(1))
-        }
-        _ => problem,
     }
 }
 
@@ -227,7 +210,7 @@ async fn store(
             if let Err(left) = artifacts.delete(&key).await {
                 tracing::warn!(key, %left, "an artifact without a submission is left behind");
             }
-            Err(over_quota(error, now))
+            Err(Problem::of_day(error, now))
         }
     }
 }

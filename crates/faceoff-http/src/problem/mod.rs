@@ -6,6 +6,7 @@
 mod details;
 mod from_store;
 mod kind;
+mod quota;
 
 pub use details::Problem;
 pub(crate) use details::ProblemBody;

@@ -3,6 +3,7 @@ use crate::{
     store::Store,
     tables::{
         entrants::{self, Entrant},
+        friendly_games_declined,
         game_attempts::{self, GameAttempt},
         games::{self, Game},
         rounds::{self, TournamentRound},
@@ -84,6 +85,6 @@ impl Store {
 
     /// Does a team play no friendly games that others ask for?
     pub async fn declines_friendly_games(&self, team: TeamId) -> Result<bool> {
-        games::declines_friendlies(&mut *self.database.read.acquire().await?, team).await
+        friendly_games_declined::has(&mut *self.database.read.acquire().await?, team).await
     }
 }

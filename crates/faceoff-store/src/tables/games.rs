@@ -337,6 +337,40 @@ pub(crate) async fn of_rounds(
     games(rows.fetch_all(connection).await?)
 }
 
+/// A game of a round that has no result and can still get one: neither of its teams has left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Owed {
+    pub game: GameId,
+    pub round: RoundNumber,
+}
+
+/// The owed games of all rounds, in the order of play.
+pub(crate) async fn owed(
+    connection: &mut SqliteConnection,
+    tournament: TournamentId,
+) -> Result<Vec<Owed>> {
+    let id = Text(tournament);
+    let rows = sqlx::query!(
+        r#"SELECT g.id AS "game: Text<GameId>", g.round AS "round!: u32"
+           FROM games g
+           JOIN entrants home ON home.tournament_id = g.tournament_id AND home.team_id = g.home_team_id
+           JOIN entrants away ON away.tournament_id = g.tournament_id AND away.team_id = g.away_team_id
+           WHERE g.tournament_id = ? AND g.purpose = 'round' AND g.state <> 'played'
+             AND home.left_as IS NULL AND away.left_as IS NULL
+           ORDER BY g.round, g.meeting, g.second_half"#,
+        id
+    );
+    let owed = rows.fetch_all(connection).await?.into_iter().map(|row| {
+        let round = RoundNumber::try_from(row.round)
+            .map_err(|error| StoreError::Damaged(format!("game {}: {error}", row.game.0)))?;
+        Ok(Owed {
+            game: row.game.0,
+            round,
+        })
+    });
+    owed.collect()
+}
+
 /// Those of the schedule played again, in order.
 pub(crate) async fn of_replays(
     connection: &mut SqliteConnection,
@@ -463,105 +497,6 @@ pub(crate) async fn insert(
     Ok(())
 }
 
-/// Another unit is to play it.
-pub(crate) async fn set_queued_again(
-    connection: &mut SqliteConnection,
-    id: GameId,
-    unit: Uuid,
-) -> Result<()> {
-    let (id, unit) = (Text(id), Text(unit));
-    sqlx::query!(
-        "UPDATE games SET state = 'queued', unit_id = ?, attempt = NULL, ended_at = NULL, reason = NULL WHERE id = ?",
-        unit,
-        id,
-    )
-    .execute(connection)
-    .await?;
-    Ok(())
-}
-
-/// Its unit waits for a slot again.
-pub(crate) async fn set_waiting(connection: &mut SqliteConnection, id: GameId) -> Result<()> {
-    let id = Text(id);
-    sqlx::query!(
-        "UPDATE games SET state = 'queued', attempt = NULL WHERE id = ? AND state = 'running'",
-        id
-    )
-    .execute(connection)
-    .await?;
-    Ok(())
-}
-
-/// A slot plays it.
-pub(crate) async fn set_running(
-    connection: &mut SqliteConnection,
-    id: GameId,
-    attempt: u32,
-) -> Result<()> {
-    let id = Text(id);
-    sqlx::query!(
-        "UPDATE games SET state = 'running', attempt = ? WHERE id = ?",
-        attempt,
-        id
-    )
-    .execute(connection)
-    .await?;
-    Ok(())
-}
-
-/// The result of this attempt counts.
-pub(crate) async fn set_played(
-    connection: &mut SqliteConnection,
-    id: GameId,
-    attempt: u32,
-    now: Timestamp,
-) -> Result<()> {
-    let (id, now) = (Text(id), Instant(now));
-    sqlx::query!(
-        "UPDATE games SET state = 'played', attempt = ?, ended_at = ? WHERE id = ?",
-        attempt,
-        now,
-        id,
-    )
-    .execute(connection)
-    .await?;
-    Ok(())
-}
-
-/// Why a game has no result.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum NoResult {
-    Broken,
-    Void,
-    Cancelled,
-}
-
-/// It has no result.
-pub(crate) async fn set_without_result(
-    connection: &mut SqliteConnection,
-    id: GameId,
-    why: NoResult,
-    reason: &str,
-    now: Timestamp,
-) -> Result<()> {
-    let state = match why {
-        NoResult::Broken => "broken",
-        NoResult::Void => "void",
-        NoResult::Cancelled => "cancelled",
-    };
-    let (id, now) = (Text(id), Instant(now));
-    sqlx::query!(
-        "UPDATE games SET state = ?, attempt = NULL, ended_at = ?, reason = ? WHERE id = ?",
-        state,
-        now,
-        reason,
-        id,
-    )
-    .execute(connection)
-    .await?;
-    Ok(())
-}
-
 /// How many that do not count a team has asked for since an instant, called-off ones included: each is a row, and a
 /// unit.
 pub(crate) async fn count_asked(
@@ -621,42 +556,4 @@ pub(crate) async fn needs(
     )
     .fetch_one(connection)
     .await?)
-}
-
-/// Does a team play no friendly games that others ask for?
-pub(crate) async fn declines_friendlies(
-    connection: &mut SqliteConnection,
-    team: TeamId,
-) -> Result<bool> {
-    let team = Text(team);
-    Ok(sqlx::query_scalar!(
-        r#"SELECT EXISTS (SELECT 1 FROM friendly_games_declined WHERE team_id = ?) AS "declines!: bool""#,
-        team
-    )
-    .fetch_one(connection)
-    .await?)
-}
-
-pub(crate) async fn set_declines_friendlies(
-    connection: &mut SqliteConnection,
-    team: TeamId,
-    declines: bool,
-) -> Result<()> {
-    let team = Text(team);
-    if declines {
-        sqlx::query!(
-            "INSERT OR IGNORE INTO friendly_games_declined (team_id) VALUES (?)",
-            team
-        )
-        .execute(connection)
-        .await?;
-    } else {
-        sqlx::query!(
-            "DELETE FROM friendly_games_declined WHERE team_id = ?",
-            team
-        )
-        .execute(connection)
-        .await?;
-    }
-    Ok(())
 }

@@ -1,7 +1,6 @@
 use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::tournament::playing::{owed, playing},
     store::Store,
     tables::{
         games,
@@ -28,12 +27,10 @@ impl Store {
                     "{open} games are queued or running: wait for their end, or call off those that do not count"
                 )));
             }
-            let playing = playing(tx, id).await?;
-            let games = games::of_rounds(tx, id).await?;
-            if let Some(game) = owed(&games, &playing).first() {
+            if let Some(owed) = games::owed(tx, id).await?.first() {
                 return Err(StoreError::Conflict(format!(
                     "game {} has no result: play it again, or let one of its teams leave",
-                    game.id
+                    owed.game
                 )));
             }
             tournament.closed_at = Some(now);

@@ -1,13 +1,10 @@
 use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::tournament::{
-        play,
-        playing::{owed, playing},
-    },
+    operations::tournament::play,
     store::Store,
     tables::{
-        entrants::{self, Entrant, Leave},
+        entrants::{self, Leave},
         games::{self, GamePurpose, GameState},
         rounds, season, teams,
         tournaments::{self, Tournament},
@@ -32,15 +29,14 @@ pub struct Leaving {
 }
 
 /// Refuses who would enter while a round is under way, or when the groups are drawn.
-async fn check_enterable(tx: &mut Tx, tournament: &Tournament, playing: &[Entrant]) -> Result<()> {
+async fn check_enterable(tx: &mut Tx, tournament: &Tournament) -> Result<()> {
     let is_drawn = rounds::count(tx, tournament.id).await? > 0;
     if is_drawn && matches!(tournament.rules.format, TournamentFormat::Groups { .. }) {
         return Err(StoreError::Conflict(
             "the groups are drawn: nobody enters any more; open another tournament".into(),
         ));
     }
-    let games = games::of_rounds(tx, tournament.id).await?;
-    if !owed(&games, playing).is_empty() {
+    if !games::owed(tx, tournament.id).await?.is_empty() {
         return Err(StoreError::Conflict(
             "a round is under way: teams enter before the first round, or between two".into(),
         ));
@@ -79,18 +75,10 @@ async fn call_off(tx: &mut Tx, id: TournamentId, team: TeamId, reason: &str) -> 
 
 /// The round that a team leaves from that leaves now: the newest if a result of it is owed, else the next. That a game of
 /// an earlier one is to be played again makes nothing of what was finished unfinished.
-async fn round_under_way(
-    tx: &mut Tx,
-    id: TournamentId,
-    playing: &[Entrant],
-) -> Result<RoundNumber> {
-    let games = games::of_rounds(tx, id).await?;
+async fn round_under_way(tx: &mut Tx, id: TournamentId) -> Result<RoundNumber> {
     let newest = rounds::count(tx, id).await?;
-    let is_under_way = owed(&games, playing).iter().any(|game| {
-        game.purpose
-            .meeting()
-            .is_some_and(|of| of.round.get() == newest)
-    });
+    let owed = games::owed(tx, id).await?;
+    let is_under_way = owed.iter().any(|owed| owed.round.get() == newest);
     RoundNumber::try_from(if is_under_way { newest } else { newest + 1 })
         .map_err(|_| StoreError::Conflict("all rounds that there can be were played".into()))
 }
@@ -108,8 +96,7 @@ impl Store {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
             let tournament = tournaments::find_open(tx, id).await?;
-            let playing = playing(tx, id).await?;
-            check_enterable(tx, &tournament, &playing).await?;
+            check_enterable(tx, &tournament).await?;
             let all = entrants::all(tx, id).await?;
             for team in new {
                 let team = teams::find(tx, *team).await?;
@@ -175,10 +162,7 @@ pub(crate) async fn leave(
             tx.record(Subject::Tournament(id), Event::TeamOut { team, reason });
             return Ok(None);
         }
-        (None, _) => {
-            let playing = playing(tx, id).await?;
-            round_under_way(tx, id, &playing).await?
-        }
+        (None, _) => round_under_way(tx, id).await?,
         // Nobody escapes by going first.
         (Some(left), LeftAs::Disqualified) if left.left_as == LeftAs::Withdrawn => left.from_round,
         (Some(_), _) => {

@@ -5,14 +5,11 @@ use crate::{
     event::{Actor, Event, Subject},
     operations::{
         purpose,
-        tournament::{
-            play,
-            playing::{owed, playing},
-            rounds,
-        },
+        tournament::{play, playing::playing, rounds},
     },
     store::Store,
     tables::{
+        friendly_games_declined,
         games::{self, Game, GamePurpose, GameState},
         season,
         submissions::{self, Submission},
@@ -43,8 +40,7 @@ async fn between_rounds(tx: &mut Tx, id: TournamentId, teams: &[TeamId]) -> Resu
         }
         teams::check_may_play(tx, *team).await?;
     }
-    let of_rounds = games::of_rounds(tx, id).await?;
-    if !owed(&of_rounds, &playing).is_empty() {
+    if !games::owed(tx, id).await?.is_empty() {
         return conflict(
             "a round is under way, and games that do not count are played before and between rounds: ask again when it is over",
         );
@@ -151,7 +147,7 @@ impl Store {
                 return conflict("opponent: a team cannot play itself");
             }
             let tournament = between_rounds(tx, id, &[asked_by, opponent]).await?;
-            if games::declines_friendlies(tx, opponent).await? {
+            if friendly_games_declined::has(tx, opponent).await? {
                 let opponent = teams::find(tx, opponent).await?;
                 return conflict(format!(
                     "{} plays no friendly games: ask another team",
@@ -218,8 +214,8 @@ impl Store {
     ) -> Result<()> {
         self.write(actor, now, async |tx| {
             teams::find(tx, team).await?;
-            if games::declines_friendlies(tx, team).await? != declines {
-                games::set_declines_friendlies(tx, team, declines).await?;
+            if friendly_games_declined::has(tx, team).await? != declines {
+                friendly_games_declined::set(tx, team, declines).await?;
                 tx.record(
                     Subject::Team(team),
                     Event::FriendlyGamesDeclined { declines },

@@ -6,7 +6,6 @@ use crate::{
     operations::{
         commit::{Committed, other_work},
         purpose::Purpose,
-        tournament::playing::{owed, playing},
         work::{RunSeeds, Work},
     },
     queue::{self, Account, Claim, NewUnit},
@@ -14,7 +13,8 @@ use crate::{
     tables::{
         bundles,
         game_attempts::{self, AttemptOutcome},
-        games::{self, Game, GameCommit, GamePurpose, NoResult},
+        game_transitions::{self, NoResult},
+        games::{self, Game, GameCommit, GamePurpose},
         rounds, season, submissions, tournaments,
     },
     write::Tx,
@@ -72,7 +72,7 @@ pub(super) async fn enqueue_for(
 pub(super) async fn enqueue_again(tx: &mut Tx, game: &Game, waiting: NewUnit) -> Result<()> {
     let account = account(tx, game, waiting).await?;
     let unit = unit(tx, game, waiting, account).await?;
-    games::set_queued_again(tx, game.id, unit).await
+    game_transitions::set_queued_again(tx, game.id, unit).await
 }
 
 /// A slot has claimed a game: what it is to do. `None` if the tournament is paused: then the unit is not to be begun.
@@ -87,7 +87,7 @@ pub(crate) async fn begin(
     let now = tx.now;
     // Whoever had it is dead, or its lease would not have been given away.
     game_attempts::end(tx, id, AttemptOutcome::Lost, None, now).await?;
-    games::set_waiting(tx, id).await?;
+    game_transitions::set_waiting(tx, id).await?;
     if tournament.paused.is_some() {
         return Ok(None);
     }
@@ -100,7 +100,7 @@ pub(crate) async fn begin(
         return Err(StoreError::NotFound("submission"));
     };
     let attempt = game_attempts::begin(tx, id, worker, now).await?;
-    games::set_running(tx, id, attempt).await?;
+    game_transitions::set_running(tx, id, attempt).await?;
     tx.record(Subject::Game(id), Event::GameBegun { attempt });
     Ok(Some(Work::Game {
         game: id,
@@ -125,14 +125,14 @@ pub(crate) async fn give_back(
 ) -> Result<()> {
     let now = tx.now;
     game_attempts::end(tx, id, how, reason, now).await?;
-    games::set_waiting(tx, id).await
+    game_transitions::set_waiting(tx, id).await
 }
 
 /// Our fault, given up: it has no result until an organiser has it played again.
 pub(crate) async fn give_up(tx: &mut Tx, id: GameId, reason: &str) -> Result<()> {
     let now = tx.now;
     game_attempts::end(tx, id, AttemptOutcome::Lost, Some(reason), now).await?;
-    games::set_without_result(tx, id, NoResult::Broken, reason, now).await?;
+    game_transitions::set_without_result(tx, id, NoResult::Broken, reason, now).await?;
     let reason = reason.to_owned();
     tx.record(Subject::Game(id), Event::GameBroken { reason });
     match games::find(tx, id).await {
@@ -152,7 +152,7 @@ pub(super) async fn call_off(tx: &mut Tx, game: &Game, reason: &str) -> Result<(
     queue::drop_units(tx, &[unit]).await?;
     let now = tx.now;
     game_attempts::end(tx, game.id, AttemptOutcome::CalledOff, Some(reason), now).await?;
-    games::set_without_result(tx, game.id, NoResult::Cancelled, reason, now).await?;
+    game_transitions::set_without_result(tx, game.id, NoResult::Cancelled, reason, now).await?;
     let reason = reason.to_owned();
     tx.record(Subject::Game(game.id), Event::GameCancelled { reason });
     Ok(())
@@ -173,11 +173,8 @@ pub(super) async fn end_round_if_over(
     id: TournamentId,
     round: RoundNumber,
 ) -> Result<()> {
-    let playing = playing(tx, id).await?;
-    let games = games::of_rounds(tx, id).await?;
-    let is_owed = owed(&games, &playing)
-        .into_iter()
-        .any(|game| game.purpose.meeting().is_some_and(|of| of.round == round));
+    let owed = games::owed(tx, id).await?;
+    let is_owed = owed.iter().any(|owed| owed.round == round);
     let now = tx.now;
     if !is_owed && rounds::set_over(tx, id, round, now).await? {
         tx.record(Subject::Tournament(id), Event::RoundOver { round });
@@ -205,7 +202,7 @@ impl Store {
                 ));
             }
             let attempt = game_attempts::commit(tx, id, commit, now).await?;
-            games::set_played(tx, id, attempt, now).await?;
+            game_transitions::set_played(tx, id, attempt, now).await?;
             tx.record(Subject::Game(id), Event::GamePlayed { attempt });
             end_round_if_its(tx, &game).await
         })

@@ -3,13 +3,7 @@
 use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
-    operations::{
-        purpose,
-        tournament::{
-            play,
-            playing::{owed, playing},
-        },
-    },
+    operations::{purpose, tournament::play},
     store::Store,
     tables::{
         entrants,
@@ -59,7 +53,6 @@ impl Store {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
             let tournament = tournaments::find_open(tx, id).await?;
-            let playing = playing(tx, id).await?;
             let schedule = games::of_rounds(tx, id).await?;
             let (started, all) = (rounds::count(tx, id).await?, tournament.rules.format.last_round());
             if started < all.get() {
@@ -67,7 +60,7 @@ impl Store {
                     "a schedule is played again when all of it was played: {started} of {all} rounds were started"
                 )));
             }
-            let owed = owed(&schedule, &playing).len();
+            let owed = games::owed(tx, id).await?.len();
             if owed > 0 {
                 return Err(StoreError::Conflict(format!(
                     "a schedule is played again when all of it was played: {owed} games have no result yet"

@@ -3,10 +3,7 @@ use crate::{
     event::{Actor, Event, Subject},
     operations::{
         purpose,
-        tournament::{
-            play,
-            playing::{owed, playing},
-        },
+        tournament::{play, playing::playing},
     },
     store::Store,
     tables::{
@@ -37,12 +34,7 @@ pub(super) fn takes(tournament: &Tournament, submission: &Submission) -> bool {
 }
 
 /// Refuses a round that is not the next one, or whose predecessor is not over.
-async fn check_next(
-    tx: &mut Tx,
-    tournament: &Tournament,
-    drawn: &DrawnRound,
-    playing: &[Entrant],
-) -> Result<()> {
+async fn check_next(tx: &mut Tx, tournament: &Tournament, drawn: &DrawnRound) -> Result<()> {
     let number = drawn.number;
     let started = rounds::count(tx, tournament.id).await?;
     if number.get() <= started {
@@ -56,14 +48,13 @@ async fn check_next(
             tournament.rules.format.last_round()
         ));
     }
-    let games = games::of_rounds(tx, tournament.id).await?;
-    let owed = owed(&games, playing);
+    let owed = games::owed(tx, tournament.id).await?;
     if let Some(first) = owed.first() {
         return conflict(format!(
             "{} games of earlier rounds have no result, the first is game {}: wait for them, play them again, or let a \
              team leave",
             owed.len(),
-            first.id
+            first.game
         ));
     }
     Ok(())
@@ -200,7 +191,7 @@ impl Store {
             season::check_open(tx).await?;
             let tournament = tournaments::find_open(tx, id).await?;
             let playing = playing(tx, id).await?;
-            check_next(tx, &tournament, drawn, &playing).await?;
+            check_next(tx, &tournament, drawn).await?;
             let teams = check_teams(&tournament, drawn, &playing)?;
             let frozen = freeze(tx, &tournament, &teams, &playing).await?;
             let byes = (1..).zip(&drawn.matchdays).flat_map(|(matchday, day)| {

@@ -6,7 +6,8 @@ use crate::{
     tables::{
         entrants::{self, Entrant},
         game_attempts,
-        games::{self, Game, GamePurpose, GameState, NoResult},
+        game_transitions::{self, NoResult},
+        games::{self, Game, GamePurpose, GameState},
         season, tournaments,
     },
 };
@@ -34,7 +35,7 @@ impl Store {
                 ));
             };
             game_attempts::set_voided(tx, id, played.attempt, reason).await?;
-            games::set_without_result(tx, id, NoResult::Void, reason, now).await?;
+            game_transitions::set_without_result(tx, id, NoResult::Void, reason, now).await?;
             let reason = reason.to_owned();
             tx.record(Subject::Game(id), Event::GameVoided { reason });
             games::find(tx, id).await

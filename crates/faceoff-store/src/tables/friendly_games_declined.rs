@@ -1,0 +1,40 @@
+//! The teams that play no friendly games which others ask for.
+
+use crate::error::Result;
+use faceoff_types::TeamId;
+use sqlx::{SqliteConnection, types::Text};
+
+/// Does a team play none?
+pub(crate) async fn has(connection: &mut SqliteConnection, team: TeamId) -> Result<bool> {
+    let team = Text(team);
+    Ok(sqlx::query_scalar!(
+        r#"SELECT EXISTS (SELECT 1 FROM friendly_games_declined WHERE team_id = ?) AS "declines!: bool""#,
+        team
+    )
+    .fetch_one(connection)
+    .await?)
+}
+
+pub(crate) async fn set(
+    connection: &mut SqliteConnection,
+    team: TeamId,
+    declines: bool,
+) -> Result<()> {
+    let team = Text(team);
+    if declines {
+        sqlx::query!(
+            "INSERT OR IGNORE INTO friendly_games_declined (team_id) VALUES (?)",
+            team
+        )
+        .execute(connection)
+        .await?;
+    } else {
+        sqlx::query!(
+            "DELETE FROM friendly_games_declined WHERE team_id = ?",
+            team
+        )
+        .execute(connection)
+        .await?;
+    }
+    Ok(())
+}
