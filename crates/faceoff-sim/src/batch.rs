@@ -6,13 +6,15 @@
 
 use crate::{
     channel::observation::OBSERVATION_WITH_OPPONENT_LEN,
+    dynamics::path::LanePath,
     episode::{Episode, StepOutcome},
     robot::plant::Plant,
+    together::step_together_by,
 };
 use faceoff_types::{Factors, Interpolation, PerturbationSettings, Seed, Task};
 use rayon::prelude::*;
 
-/// Worlds that a thread takes at a time: below this, handing out work costs more than it gains.
+/// Worlds that a thread takes at a time, and steps together.
 const WORLDS_AT_A_TIME: usize = 4;
 
 /// What is played in a batch.
@@ -41,6 +43,7 @@ pub struct Batch {
     worlds: Vec<World>,
     observations: Vec<f64>,
     outcomes: Vec<BatchOutcome>,
+    path: LanePath,
 }
 
 #[derive(Debug, Clone)]
@@ -63,6 +66,14 @@ pub struct BatchOutcome {
 }
 
 impl BatchOutcome {
+    /// Before the first step.
+    const NONE: Self = Self {
+        episode: 0,
+        step: StepOutcome::NONE,
+        success: false,
+        last_observation: [0.0; OBSERVATION_WITH_OPPONENT_LEN],
+    };
+
     /// The observation after the step, of the task's length or longer: 23 numbers, the opponent's zero
     /// where there is none.
     #[must_use]
@@ -84,11 +95,19 @@ impl Batch {
             observations.extend_from_slice(world.episode.observation());
         }
         Self {
+            outcomes: vec![BatchOutcome::NONE; worlds.len()],
             setup,
             worlds,
             observations,
-            outcomes: Vec::new(),
+            path: LanePath::fastest(),
         }
+    }
+
+    /// The same batch by another path: all give the same bits.
+    #[must_use]
+    pub fn by(mut self, path: LanePath) -> Self {
+        self.path = path;
+        self
     }
 
     /// Numbers in one observation.
@@ -122,18 +141,32 @@ impl Batch {
             "expected an action of {action_len} numbers for each of {} worlds",
             self.worlds.len()
         );
-        let setup = &self.setup;
-        self.worlds
-            .par_iter_mut()
-            .zip(actions.par_chunks_exact(action_len))
-            .zip(self.observations.par_chunks_exact_mut(observation_len))
-            .with_min_len(WORLDS_AT_A_TIME)
-            .map(|((world, action), observation)| {
-                let outcome = world.step(setup, action);
-                observation.copy_from_slice(world.episode.observation());
-                outcome
-            })
-            .collect_into_vec(&mut self.outcomes);
+        let (setup, path) = (&self.setup, self.path);
+        let worlds = self.worlds.par_chunks_mut(WORLDS_AT_A_TIME);
+        let actions = actions.par_chunks(WORLDS_AT_A_TIME * action_len);
+        let observations = self
+            .observations
+            .par_chunks_mut(WORLDS_AT_A_TIME * observation_len);
+        let outcomes = self.outcomes.par_chunks_mut(WORLDS_AT_A_TIME);
+        worlds
+            .zip(actions)
+            .zip(observations)
+            .zip(outcomes)
+            .for_each(|(((worlds, actions), observations), outcomes)| {
+                let mut steps = [StepOutcome::NONE; WORLDS_AT_A_TIME];
+                let steps = &mut steps[..worlds.len()];
+                let mut episodes: Vec<&mut Episode> =
+                    worlds.iter_mut().map(|world| &mut world.episode).collect();
+                let actions: Vec<&[f64]> = actions.chunks_exact(action_len).collect();
+                step_together_by(path, &mut episodes, &actions, steps);
+                let rows = observations.chunks_exact_mut(observation_len);
+                for (((world, step), row), outcome) in
+                    worlds.iter_mut().zip(steps).zip(rows).zip(outcomes)
+                {
+                    *outcome = world.end_step(setup, *step);
+                    row.copy_from_slice(world.episode.observation());
+                }
+            });
         &self.outcomes
     }
 }
@@ -158,8 +191,8 @@ impl BatchSetup {
 }
 
 impl World {
-    fn step(&mut self, setup: &BatchSetup, action: &[f64]) -> BatchOutcome {
-        let step = self.episode.step(action);
+    /// What a step led to; after an end the next episode starts.
+    fn end_step(&mut self, setup: &BatchSetup, step: StepOutcome) -> BatchOutcome {
         let mut last_observation = [0.0; OBSERVATION_WITH_OPPONENT_LEN];
         let observation = self.episode.observation();
         last_observation[..observation.len()].copy_from_slice(observation);

@@ -37,7 +37,8 @@ pub use episode::{
 };
 pub use game::{Game, GameSetup, GameState, GameStep, referee::RallyEnd};
 // Actions and joint states are in terms of these.
+pub use dynamics::path::LanePath;
 pub use faceoff_types::{Interpolation, JOINTS, PerturbationSettings, SUBSTEPS};
 pub use robot::plant::Plant;
-pub use together::step_together;
+pub use together::{step_together, step_together_by};
 pub use world::{Bounds, Divergence, MalletState, Runaway, World};

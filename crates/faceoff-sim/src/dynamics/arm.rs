@@ -142,7 +142,7 @@ impl<T: Lanes> Bodies<T> {
 
     /// The bodies of the plant: `scale` multiplies the masses of links 1…7, end effector and mallet.
     #[inline(always)]
-    pub fn plant(&self, scale: &[f64; 9]) -> PlantBodies<T> {
+    pub fn plant(&self, scale: &[T; 9]) -> PlantBodies<T> {
         let mut links = self.links;
         for i in 0..JOINTS {
             links[i] = links[i].scaled(scale[i]);
@@ -189,7 +189,7 @@ pub fn controller_torques<T: Lanes>(
         acceleration =
             acceleration + kinematics.axes[i].scale(ddq[i]) + velocity.cross_motion(joint_velocity);
         velocity = velocity + joint_velocity;
-        forces[i] = bodies[i].mul(acceleration) + velocity.cross_force(bodies[i].mul(velocity));
+        forces[i] = force_of(&bodies[i], velocity, acceleration);
     }
     let mut total = Force::zero();
     let mut torques = [T::splat(0.0); JOINTS];
@@ -198,6 +198,12 @@ pub fn controller_torques<T: Lanes>(
         torques[i] = kinematics.axes[i].dot(total) + T::splat(LINKS[i].armature_kg_m2) * ddq[i];
     }
     torques
+}
+
+/// The force that moves a body so.
+#[inline(always)]
+fn force_of<T: Lanes>(body: &Inertia<T>, velocity: Motion<T>, acceleration: Motion<T>) -> Force<T> {
+    body.mul(acceleration) + velocity.cross_force(body.mul(velocity))
 }
 
 /// Gravity, centrifugal and Coriolis torques of the nine-joint plant by recursive Newton–Euler, N m.
@@ -218,12 +224,10 @@ pub fn plant_bias<T: Lanes>(
         let joint_velocity = kinematics.axes[i].scale(dq[i]);
         acceleration = acceleration + velocity.cross_motion(joint_velocity);
         velocity = velocity + joint_velocity;
-        let force =
-            |body: &Inertia<T>| body.mul(acceleration) + velocity.cross_force(body.mul(velocity));
         if i < JOINTS {
-            forces[i] = force(&bodies.links[i]);
+            forces[i] = force_of(&bodies.links[i], velocity, acceleration);
         } else if i == MALLET {
-            total = force(&bodies.mallet);
+            total = force_of(&bodies.mallet, velocity, acceleration);
         }
     }
     let mut torques = [T::splat(0.0); DOFS];
@@ -262,10 +266,10 @@ pub fn mass_matrix<T: Lanes>(
 
 /// `M + h D`: the matrix of the semi-implicit Euler step with implicit joint damping.
 #[inline(always)]
-pub fn damped<T: Lanes>(mass: &[[T; DOFS]; DOFS], damping: &[f64; JOINTS]) -> [[T; DOFS]; DOFS] {
+pub fn damped<T: Lanes>(mass: &[[T; DOFS]; DOFS], damping: &[T; JOINTS]) -> [[T; DOFS]; DOFS] {
     let mut m = *mass;
     for i in 0..JOINTS {
-        m[i][i] += T::splat(SUBSTEP_S * damping[i]);
+        m[i][i] += T::splat(SUBSTEP_S) * damping[i];
     }
     m
 }

@@ -1,6 +1,10 @@
-//! The dynamics of an arm, for one arm or two at once.
+//! The dynamics of an arm, for one arm or several at once.
 
+pub mod angles;
 pub mod arm;
+#[cfg(target_arch = "x86_64")]
+mod avx;
 pub mod lanes;
 pub mod ldlt;
+pub mod path;
 pub mod spatial;

@@ -377,10 +377,9 @@ impl<T: Lanes> Inertia<T> {
         }
     }
 
-    /// A body of the same shape with `factor` times the mass.
+    /// A body of the same shape with `s` times the mass.
     #[inline(always)]
-    pub fn scaled(&self, factor: f64) -> Self {
-        let s = T::splat(factor);
+    pub fn scaled(&self, s: T) -> Self {
         let r = self.rotational;
         Self {
             mass: self.mass * s,

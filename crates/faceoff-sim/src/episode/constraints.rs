@@ -29,6 +29,14 @@ pub struct ConstraintValues {
 }
 
 impl ConstraintValues {
+    /// Of no instant.
+    pub(crate) const ZERO: Self = Self {
+        joint_pos: 0.0,
+        joint_vel: 0.0,
+        ee: 0.0,
+        link: 0.0,
+    };
+
     /// Of a robot (0 or 1) now.
     #[must_use]
     pub fn of(world: &World, robot: usize) -> Self {

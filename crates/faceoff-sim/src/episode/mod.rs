@@ -13,6 +13,7 @@ use crate::{
     perturbation::table_factors::TableFactors,
     robot::plant::Plant,
     stream::Stream,
+    table::puck::Puck,
     world::{Bounds, Divergence, World},
 };
 use constraints::ConstraintValues;
@@ -92,12 +93,30 @@ impl Episode {
     /// be called after an end. A world that diverges ends as [`EpisodeEnd::AgentFault`]: nothing but the
     /// agent's commands can bring it so far.
     pub fn step(&mut self, action: &[f64]) -> StepOutcome {
+        self.command(action);
+        let (world, air) = self.moving();
+        world.control_step(air);
+        self.observe()
+    }
+
+    /// A control step's beginning: the commands of all robots.
+    pub(crate) fn command(&mut self, action: &[f64]) {
         self.channel.command(&mut self.world, Command::Act(action));
         if let Some(opponent) = &mut self.opponent {
             self.world
                 .command(1, Interpolation::LinearBoth, &opponent.action());
         }
-        let lost = self.table.control_step(&mut self.world);
+    }
+
+    /// What moves in a control step, and the force of the air on the puck, N.
+    pub(crate) fn moving(&mut self) -> (&mut World, impl FnMut(&Puck) -> [f64; 2]) {
+        let table = &mut self.table;
+        (&mut self.world, |puck: &Puck| table.force(puck))
+    }
+
+    /// A control step's end: what the agent is told, and what the step led to.
+    pub(crate) fn observe(&mut self) -> StepOutcome {
+        let lost = self.table.is_lost();
         self.channel.look(&self.world, lost);
         self.steps += 1;
 
@@ -172,6 +191,14 @@ pub struct StepOutcome {
     pub end: Option<EpisodeEnd>,
     /// Constraint values at this step.
     pub constraints: ConstraintValues,
+}
+
+impl StepOutcome {
+    /// Of no step.
+    pub(crate) const NONE: Self = Self {
+        end: None,
+        constraints: ConstraintValues::ZERO,
+    };
 }
 
 /// True state, recorded per step. SI units, radians; the puck in the table frame.

@@ -127,7 +127,7 @@ fn static_error(plant: &Plant, desired: &[f64; JOINTS]) -> f64 {
     for _ in 0..SAG_ROUNDS {
         let kinematics = Kinematics::new(&q);
         let ee = &kinematics.end_effector;
-        let universal = vertical(ee.x.lane(0), ee.y.lane(0), [q[7], q[8]]);
+        let universal = vertical(ee.x, ee.y, [q[7], q[8]]);
         let bodies = Bodies::new(&kinematics);
         let feed_forward = controller_torques(
             &kinematics,

@@ -57,6 +57,11 @@ impl TableFactors {
     /// Advances the world by a control step; tells whether the puck is lost at its end.
     pub fn control_step(&mut self, world: &mut World) -> bool {
         world.control_step(|puck| self.force(puck));
+        self.is_lost()
+    }
+
+    /// Whether the puck is lost at the end of a control step. To be asked once per control step.
+    pub fn is_lost(&mut self) -> bool {
         self.tracking_loss
             .as_mut()
             .is_some_and(TrackingLoss::advance)

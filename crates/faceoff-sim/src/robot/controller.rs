@@ -1,7 +1,10 @@
 //! The 1 kHz torque controller with its safety limiter (MODEL, "Controller").
 
-use super::{plant::Plant, trajectory::Setpoint};
-use crate::model::{JOINTS, LINKS, SUBSTEP_S};
+use super::{plant::PlantLanes, trajectory::Setpoint};
+use crate::{
+    dynamics::lanes::{Lanes, gather, row},
+    model::{JOINTS, LINKS, SUBSTEP_S},
+};
 
 /// How fast the limiter lets a joint approach its stop, 1/s (ref).
 const LIMITER_GAIN: f64 = 20.0;
@@ -12,41 +15,60 @@ const FILTER_OLD: f64 = 0.726;
 
 /// Keeps commands within position and velocity limits.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Limiter {
+pub struct Limiter<T = f64> {
     /// The previously commanded position, rad.
-    commanded: [f64; JOINTS],
+    commanded: [T; JOINTS],
 }
 
 /// A setpoint within the limits: position, rad, and velocity, rad/s.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LimitedSetpoint {
-    position: [f64; JOINTS],
-    velocity: [f64; JOINTS],
+pub struct LimitedSetpoint<T> {
+    position: [T; JOINTS],
+    velocity: [T; JOINTS],
 }
 
-impl Limiter {
+impl<T: Lanes> Limiter<T> {
     /// Starts at the joints' initial position.
-    pub fn new(q: [f64; JOINTS]) -> Self {
+    pub fn new(q: [T; JOINTS]) -> Self {
         Self { commanded: q }
+    }
+
+    /// Those of several arms.
+    #[inline(always)]
+    pub fn gather<'a>(of: impl Fn(usize) -> &'a Limiter) -> Self {
+        Self {
+            commanded: gather(|lane| &of(lane).commanded),
+        }
+    }
+
+    /// That of one arm.
+    pub fn lane(&self, lane: usize) -> Limiter {
+        Limiter {
+            commanded: row(&self.commanded, lane),
+        }
     }
 
     /// Limits the desired motion of one substep.
     #[inline(always)]
-    pub fn limit(&mut self, desired: &Setpoint) -> LimitedSetpoint {
+    pub fn limit(&mut self, desired: &Setpoint<T>) -> LimitedSetpoint<T> {
+        let zero = T::splat(0.0);
         let mut command = LimitedSetpoint {
-            position: [0.0; JOINTS],
-            velocity: [0.0; JOINTS],
+            position: [zero; JOINTS],
+            velocity: [zero; JOINTS],
         };
+        let (gain, step) = (T::splat(-LIMITER_GAIN), T::splat(SUBSTEP_S));
         for i in 0..JOINTS {
-            let (q_max, v_max) = (LINKS[i].range_rad, LINKS[i].velocity_limit_rad_s);
+            let q_max = T::splat(LINKS[i].range_rad);
+            let v_max = LINKS[i].velocity_limit_rad_s;
             let p = self.commanded[i];
-            let slowest = clamp(-LIMITER_GAIN * (p + q_max), -v_max, v_max);
-            let fastest = clamp(-LIMITER_GAIN * (p - q_max), -v_max, v_max);
-            command.velocity[i] = clamp(or(desired.velocity[i], 0.0), slowest, fastest);
+            let within = |v: T| clamp(v, T::splat(-v_max), T::splat(v_max));
+            let slowest = within(gain * (p + q_max));
+            let fastest = within(gain * (p - q_max));
+            command.velocity[i] = clamp(or(desired.velocity[i], zero), slowest, fastest);
             command.position[i] = clamp(
                 or(desired.position[i], p),
-                p + SUBSTEP_S * slowest,
-                p + SUBSTEP_S * fastest,
+                p + step * slowest,
+                p + step * fastest,
             );
         }
         self.commanded = command.position;
@@ -57,38 +79,41 @@ impl Limiter {
 /// Torques of the driven joints, N m: feedback on position and filtered velocity plus the
 /// feed-forward of the nominal model, within the drives' limits.
 #[inline(always)]
-pub fn torque(
-    plant: &Plant,
-    command: &LimitedSetpoint,
-    q: &[f64],
-    dq_filtered: &[f64; JOINTS],
-    feed_forward: &[f64; JOINTS],
-) -> [f64; JOINTS] {
+pub fn torque<T: Lanes>(
+    plant: &PlantLanes<T>,
+    command: &LimitedSetpoint<T>,
+    q: &[T],
+    dq_filtered: &[T; JOINTS],
+    feed_forward: &[T; JOINTS],
+) -> [T; JOINTS] {
     std::array::from_fn(|i| {
         let feedback = plant.kp[i] * (command.position[i] - q[i])
             + plant.kd[i] * (command.velocity[i] - dq_filtered[i]);
         let limit = LINKS[i].torque_limit_n_m;
-        clamp(or(feedback + feed_forward[i], 0.0), -limit, limit)
+        clamp(
+            or(feedback + feed_forward[i], T::splat(0.0)),
+            T::splat(-limit),
+            T::splat(limit),
+        )
     })
 }
 
 /// One step of the joint velocity filter.
 #[inline(always)]
-pub fn filter_velocity(dq_filtered: &mut [f64; JOINTS], dq: &[f64]) {
+pub fn filter_velocity<T: Lanes>(dq_filtered: &mut [T; JOINTS], dq: &[T]) {
     for i in 0..JOINTS {
-        dq_filtered[i] = FILTER_NEW * dq[i] + FILTER_OLD * dq_filtered[i];
+        dq_filtered[i] = T::splat(FILTER_NEW) * dq[i] + T::splat(FILTER_OLD) * dq_filtered[i];
     }
 }
 
 /// A desired value that is not a number is none: the joint stays, or is left alone.
 #[inline(always)]
-fn or(x: f64, otherwise: f64) -> f64 {
-    if x.is_nan() { otherwise } else { x }
+fn or<T: Lanes>(x: T, otherwise: T) -> T {
+    T::choose(x.within(x), x, otherwise)
 }
 
 /// `f64::clamp` without its panic; the bounds are in order by construction.
 #[inline(always)]
-fn clamp(x: f64, low: f64, high: f64) -> f64 {
-    let x = if x < low { low } else { x };
-    if x > high { high } else { x }
+fn clamp<T: Lanes>(x: T, low: T, high: T) -> T {
+    x.at_least(low).at_most(high)
 }

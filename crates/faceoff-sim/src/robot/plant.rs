@@ -3,6 +3,7 @@
 use crate::{
     dynamics::{
         arm::{Bodies, Kinematics, mass_matrix},
+        lanes::{Lanes, gather},
         ldlt::Ldlt,
     },
     model::{DOFS, JOINTS, LINKS},
@@ -63,6 +64,28 @@ impl Plant {
             damping,
             friction,
             inverse_inertia,
+        }
+    }
+}
+
+/// What moves several arms, which may be different ones.
+#[derive(Debug, Clone, Copy)]
+pub struct PlantLanes<T> {
+    pub(crate) mass_scale: [T; 9],
+    pub(crate) kp: [T; JOINTS],
+    pub(crate) kd: [T; JOINTS],
+    pub(crate) damping: [T; JOINTS],
+}
+
+impl<T: Lanes> PlantLanes<T> {
+    /// Of the plant of each arm.
+    #[inline(always)]
+    pub fn gather<'a>(of: impl Fn(usize) -> &'a Plant) -> Self {
+        Self {
+            mass_scale: gather(|lane| &of(lane).mass_scale),
+            kp: gather(|lane| &of(lane).kp),
+            kd: gather(|lane| &of(lane).kd),
+            damping: gather(|lane| &of(lane).damping),
         }
     }
 }

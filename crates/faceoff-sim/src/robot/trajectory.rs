@@ -1,17 +1,32 @@
 //! From actions at 50 Hz to a trajectory at 1 kHz (MODEL, "Interpolation").
 
-use crate::model::{CONTROL_STEP_S as T, JOINTS, SUBSTEP_S, SUBSTEPS};
+use crate::{
+    dynamics::lanes::{Lanes, gather},
+    model::{CONTROL_STEP_S as T, JOINTS, SUBSTEP_S, SUBSTEPS},
+};
 use faceoff_types::Interpolation;
 
 /// Desired motion at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Setpoint {
+pub struct Setpoint<L = f64> {
     /// rad.
-    pub position: [f64; JOINTS],
+    pub position: [L; JOINTS],
     /// rad/s.
-    pub velocity: [f64; JOINTS],
+    pub velocity: [L; JOINTS],
     /// rad/s².
-    pub acceleration: [f64; JOINTS],
+    pub acceleration: [L; JOINTS],
+}
+
+impl<L: Lanes> Setpoint<L> {
+    /// Those of several arms.
+    #[inline(always)]
+    pub fn gather<'a>(of: impl Fn(usize) -> &'a Setpoint) -> Self {
+        Self {
+            position: gather(|lane| &of(lane).position),
+            velocity: gather(|lane| &of(lane).velocity),
+            acceleration: gather(|lane| &of(lane).acceleration),
+        }
+    }
 }
 
 impl Setpoint {

@@ -1,5 +1,10 @@
 //! The controller of the universal joint, which keeps the mallet vertical (MODEL, "Universal joint").
 
+use crate::dynamics::{
+    angles,
+    lanes::{Lanes, gather, row},
+    spatial::Vec3,
+};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Proportional gain, N m/rad (ref).
@@ -15,88 +20,92 @@ const FILTER_NEW: f64 = 0.273;
 const FILTER_OLD: f64 = 0.727;
 
 /// State of the controller: the filtered hinge velocities, rad/s.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct UniversalJoint {
-    velocity_filtered: [f64; 2],
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UniversalJoint<T = f64> {
+    velocity_filtered: [T; 2],
 }
 
-impl UniversalJoint {
+impl<T: Lanes> UniversalJoint<T> {
+    /// At rest.
+    pub fn at_rest() -> Self {
+        Self {
+            velocity_filtered: [T::splat(0.0); 2],
+        }
+    }
+
+    /// Those of several arms.
+    #[inline(always)]
+    pub fn gather<'a>(of: impl Fn(usize) -> &'a UniversalJoint) -> Self {
+        Self {
+            velocity_filtered: gather(|lane| &of(lane).velocity_filtered),
+        }
+    }
+
+    /// That of one arm.
+    pub fn lane(&self, lane: usize) -> UniversalJoint {
+        UniversalJoint {
+            velocity_filtered: row(&self.velocity_filtered, lane),
+        }
+    }
+
     /// Torques of one substep, N m. `x` and `y` are the first two columns of the end effector's
     /// rotation, `angle` and `velocity` those of the hinges.
     #[inline(always)]
-    pub fn torque(
-        &mut self,
-        x: [f64; 3],
-        y: [f64; 3],
-        angle: [f64; 2],
-        velocity: [f64; 2],
-    ) -> [f64; 2] {
+    pub fn torque(&mut self, x: Vec3<T>, y: Vec3<T>, angle: [T; 2], velocity: [T; 2]) -> [T; 2] {
         let target = vertical(x, y, angle);
+        let limit = T::splat(TORQUE_LIMIT);
         std::array::from_fn(|i| {
             let filtered = &mut self.velocity_filtered[i];
-            *filtered = FILTER_NEW * velocity[i] + FILTER_OLD * *filtered;
-            let torque = KP * (target[i] - angle[i]) - KD * *filtered;
-            torque.clamp(-TORQUE_LIMIT, TORQUE_LIMIT)
+            *filtered = T::splat(FILTER_NEW) * velocity[i] + T::splat(FILTER_OLD) * *filtered;
+            let torque = T::splat(KP) * (target[i] - angle[i]) - T::splat(KD) * *filtered;
+            torque.at_least(-limit).at_most(limit)
         })
     }
 }
 
 /// The hinge angles, rad, at which the mallet is vertical, the turn nearest to `previous`.
 #[inline(always)]
-pub fn vertical(x: [f64; 3], y: [f64; 3], previous: [f64; 2]) -> [f64; 2] {
-    let level_x = [-y[1], y[0], 0.0];
+pub fn vertical<T: Lanes>(x: Vec3<T>, y: Vec3<T>, previous: [T; 2]) -> [T; 2] {
+    let zero = T::splat(0.0);
+    let range = T::splat(RANGE);
+    let within_range = |angle: T| angle.at_least(-range).at_most(range);
+    let level_x = Vec3::new(-y.y, y.x, zero);
     let first = signed_angle(x, level_x, y);
     let x = ref_rotate(y, first, x);
-    let level_y = [x[1], -x[0], 0.0];
+    let level_y = Vec3::new(x.y, -x.x, zero);
     let second = signed_angle(y, level_y, x);
     [
-        unwrap(first, previous[0]).clamp(-RANGE, RANGE),
-        unwrap(second, previous[1]).clamp(-RANGE, RANGE),
+        within_range(unwrap(first, previous[0])),
+        within_range(unwrap(second, previous[1])),
     ]
 }
 
-fn unwrap(angle: f64, previous: f64) -> f64 {
-    if angle - previous > PI {
-        angle - TAU
-    } else if angle - previous < -PI {
-        angle + TAU
-    } else {
-        angle
-    }
+#[inline(always)]
+fn unwrap<T: Lanes>(angle: T, previous: T) -> T {
+    let (pi, turn) = (T::splat(PI), T::splat(TAU));
+    let apart = angle - previous;
+    let behind = T::choose(apart.below(-pi), angle + turn, angle);
+    T::choose(pi.below(apart), angle - turn, behind)
 }
 
 /// Angle from `a` to `b` about `axis`, rad.
 #[inline(always)]
-fn signed_angle(a: [f64; 3], b: [f64; 3], axis: [f64; 3]) -> f64 {
-    libm::atan2(dot(cross(a, b), axis), dot(a, b))
+fn signed_angle<T: Lanes>(a: Vec3<T>, b: Vec3<T>, axis: Vec3<T>) -> T {
+    angles::atan2(a.cross(b).dot(axis), a.dot(b))
 }
 
 /// The reference's rotation of `v` about `axis`: Rodrigues' formula, but with the cross-product
 /// matrix squared entry by entry instead of multiplied with itself. Kept, because agents were
 /// tuned on the mallet's resulting tilt.
 #[inline(always)]
-fn ref_rotate(axis: [f64; 3], angle: f64, v: [f64; 3]) -> [f64; 3] {
-    let (sin, cos) = libm::sincos(angle);
-    let (w, c) = (cross(axis, v), 1.0 - cos);
-    let [xx, yy, zz] = [axis[0] * axis[0], axis[1] * axis[1], axis[2] * axis[2]];
-    let squared = [
-        zz * v[1] + yy * v[2],
-        zz * v[0] + xx * v[2],
-        yy * v[0] + xx * v[1],
-    ];
-    std::array::from_fn(|i| v[i] + sin * w[i] + c * squared[i])
-}
-
-#[inline(always)]
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
-
-#[inline(always)]
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+fn ref_rotate<T: Lanes>(axis: Vec3<T>, angle: T, v: Vec3<T>) -> Vec3<T> {
+    let (sin, cos) = angles::sin_cos(angle);
+    let (w, c) = (axis.cross(v), T::splat(1.0) - cos);
+    let [xx, yy, zz] = [axis.x * axis.x, axis.y * axis.y, axis.z * axis.z];
+    let squared = Vec3::new(
+        zz * v.y + yy * v.z,
+        zz * v.x + xx * v.z,
+        yy * v.x + xx * v.y,
+    );
+    v + w.scale(sin) + squared.scale(c)
 }

@@ -179,11 +179,24 @@ pub fn rims(puck: [f64; 2], mut found: impl FnMut(Touch)) {
     }
 }
 
+/// The broad phase of a mallet, given by its centre, and the puck.
+#[inline(always)]
+pub fn mallet_near_puck([x, y, _]: [f64; 3], puck: [f64; 2]) -> bool {
+    within([x, y], puck, FARTHEST_M + PUCK.radius_m).is_some()
+}
+
+/// The broad phase of two mallets, given by their centres.
+#[inline(always)]
+pub fn mallets_near([x_1, y_1, _]: [f64; 3], [x_2, y_2, _]: [f64; 3]) -> bool {
+    within([x_1, y_1], [x_2, y_2], 2.0 * FARTHEST_M).is_some()
+}
+
 /// Contact of a mallet with the puck, normal into the puck. A leaning cylinder meets the puck first at
 /// the puck's upper or lower edge, and pushes at right angles to its axis.
 pub fn mallet_and_puck(mallet: &MalletCylinder, puck: [f64; 2]) -> Option<Touch> {
-    let [x, y, _] = mallet.centre;
-    within([x, y], puck, FARTHEST_M + PUCK.radius_m)?;
+    if !mallet_near_puck(mallet.centre, puck) {
+        return None;
+    }
     let [low, high] = mallet.heights();
     deepest_of([low.max(0.0), high.min(PUCK.height_m)], |z| {
         let axis = mallet.at(z);
@@ -198,8 +211,9 @@ pub fn mallet_and_puck(mallet: &MalletCylinder, puck: [f64; 2]) -> Option<Touch>
 
 /// Contact of the two mallets, normal into the second.
 pub fn mallets(first: &MalletCylinder, second: &MalletCylinder) -> Option<Touch> {
-    let ([x_1, y_1, _], [x_2, y_2, _]) = (first.centre, second.centre);
-    within([x_1, y_1], [x_2, y_2], 2.0 * FARTHEST_M)?;
+    if !mallets_near(first.centre, second.centre) {
+        return None;
+    }
     let ([low_1, high_1], [low_2, high_2]) = (first.heights(), second.heights());
     deepest_of([low_1.max(low_2), high_1.min(high_2)], |z| {
         let (a, b) = (first.at(z), second.at(z));

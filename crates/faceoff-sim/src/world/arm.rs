@@ -38,7 +38,7 @@ impl Arm {
     pub fn new(plant: &Plant, joints: &[f64; JOINTS]) -> Self {
         let mut q = full(joints);
         let ee = Kinematics::new(&q).end_effector;
-        let universal = vertical(ee.x.lane(0), ee.y.lane(0), [0.0; 2]);
+        let universal = vertical(ee.x, ee.y, [0.0; 2]);
         q[JOINTS..].copy_from_slice(&universal);
         Self {
             q,
@@ -47,7 +47,7 @@ impl Arm {
             torque: [0.0; JOINTS],
             trajectory: [Setpoint::at_rest(*joints); SUBSTEPS],
             limiter: Limiter::new(*joints),
-            universal: UniversalJoint::default(),
+            universal: UniversalJoint::at_rest(),
             constraints: JointConstraints::new(plant),
             ee_before: ee.origin.lane(0),
             coasted: 0,

@@ -1,8 +1,9 @@
 //! Where a world stops being one: beyond these bounds a millisecond is too long a step, and numbers
 //! grow without limit or stop being numbers.
 
-use super::arm::Arm;
+use super::{arm::Arm, arm_lanes::MotionLanes};
 use crate::{
+    dynamics::lanes::Lanes,
     model::{DOFS, JOINTS, LINKS},
     table::puck::Puck,
 };
@@ -76,15 +77,24 @@ impl Bounds {
 
 /// Is everything about an arm as it is in ordinary play? The one question of every substep.
 #[inline(always)]
-pub(super) fn is_ordinary(arm: &Arm) -> bool {
-    let mut ordinary = true;
-    for i in 0..JOINTS {
-        ordinary &= arm.dq[i].abs() <= RUNAWAY * LINKS[i].velocity_limit_rad_s
-            && arm.q[i].abs() <= LINKS[i].range_rad + FRAC_PI_2;
-    }
-    for i in JOINTS..DOFS {
-        ordinary &=
-            arm.dq[i].abs() <= Bounds::WIDE.joint_rad_s && arm.q[i].abs() <= 2.0 * FRAC_PI_2;
+pub(super) fn is_ordinary<T: Lanes>(motion: &MotionLanes<T>) -> T::Mask {
+    let limits = |i: usize| match LINKS.get(i) {
+        Some(link) => (
+            RUNAWAY * link.velocity_limit_rad_s,
+            link.range_rad + FRAC_PI_2,
+        ),
+        None => (Bounds::WIDE.joint_rad_s, 2.0 * FRAC_PI_2),
+    };
+    let joint = |i: usize| {
+        let (fastest, farthest) = limits(i);
+        T::both(
+            motion.dq[i].abs().within(T::splat(fastest)),
+            motion.q[i].abs().within(T::splat(farthest)),
+        )
+    };
+    let mut ordinary = joint(0);
+    for i in 1..DOFS {
+        ordinary = T::both(ordinary, joint(i));
     }
     ordinary
 }

@@ -3,6 +3,8 @@
 //! A constraint's force is `stiffness · (target − acceleration)`, held within its bounds. Which
 //! constraints are at a bound hardly changes between substeps, so the set is remembered; given the
 //! set, all forces follow from one linear solve, and the set is corrected until it agrees with them.
+//! Here is the set of one arm, with all that may be in it; `friction.rs` has the ordinary case, dry
+//! friction alone, in lanes.
 
 use crate::{
     model::{DOFS, JOINTS, LINKS},
@@ -17,7 +19,7 @@ const LINE_SEARCH_TOLERANCE: f64 = 1e-14;
 
 /// Where a dry friction's force is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Friction {
+pub(super) enum Friction {
     Inside,
     AtUpper,
     AtLower,
@@ -38,10 +40,11 @@ struct Stop {
 /// The joint constraints of one arm in one substep.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointConstraints {
-    friction: [Friction; JOINTS],
-    friction_stiffness: [f64; JOINTS],
-    friction_bound: [f64; JOINTS],
-    friction_target: [f64; JOINTS],
+    pub(super) friction: [Friction; JOINTS],
+    pub(super) friction_stiffness: [f64; JOINTS],
+    pub(super) friction_bound: [f64; JOINTS],
+    /// Desired acceleration, rad/s².
+    pub(super) friction_target: [f64; JOINTS],
     stops: [Option<Stop>; DOFS],
     any_stop: bool,
 }
@@ -62,22 +65,14 @@ impl JointConstraints {
         }
     }
 
-    /// Sets up a substep from positions (rad) and velocities (rad/s).
-    #[inline(always)]
-    pub fn prepare(&mut self, plant: &Plant, q: &[f64; DOFS], dq: &[f64; DOFS]) {
-        for i in 0..JOINTS {
-            self.friction_target[i] = -JOINT.damping_per_s * dq[i];
-        }
-        let beyond = (0..JOINTS).any(|i| q[i].abs() > LINKS[i].range_rad)
-            || q[7].abs() > FRAC_PI_2
-            || q[8].abs() > FRAC_PI_2;
-        if beyond || self.any_stop {
-            self.prepare_stops(plant, q, dq);
-        }
+    /// Was a joint beyond its stop in the last substep?
+    pub fn any_stop(&self) -> bool {
+        self.any_stop
     }
 
+    /// Sets up a substep's stops from positions (rad) and velocities (rad/s).
     #[cold]
-    fn prepare_stops(&mut self, plant: &Plant, q: &[f64; DOFS], dq: &[f64; DOFS]) {
+    pub fn prepare_stops(&mut self, plant: &Plant, q: &[f64; DOFS], dq: &[f64; DOFS]) {
         self.any_stop = false;
         for i in 0..DOFS {
             let range = if i < JOINTS {
@@ -104,7 +99,6 @@ impl JointConstraints {
 
     /// What the constraints inside their bounds add to the inertia's diagonal, and all constraints
     /// to the load: `(M + diag) a = load`.
-    #[inline(always)]
     pub fn assemble(&self) -> ([f64; DOFS], [f64; DOFS]) {
         let (mut diagonal, mut load) = ([0.0; DOFS], [0.0; DOFS]);
         for i in 0..JOINTS {
@@ -127,7 +121,6 @@ impl JointConstraints {
     }
 
     /// Sets which constraints are at their bounds from accelerations. Returns whether the set changed.
-    #[inline(always)]
     pub fn classify(&mut self, acceleration: &[f64; DOFS]) -> bool {
         let mut changed = false;
         for i in 0..JOINTS {
@@ -215,7 +208,6 @@ impl JointConstraints {
     }
 
     /// The constraints' torques at the solution's accelerations, N m.
-    #[inline(always)]
     pub fn torques(&self, acceleration: &[f64; DOFS]) -> [f64; DOFS] {
         let mut torques = [0.0; DOFS];
         for i in 0..JOINTS {

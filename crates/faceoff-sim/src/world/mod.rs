@@ -1,12 +1,20 @@
 //! The physical world: a puck, and one or two arms around it.
 
+mod apart;
 mod arm;
+mod arm_lanes;
 mod bounds;
 mod cone;
 mod contacts;
+mod divergence;
+mod friction;
 mod joints;
+mod lone_puck;
+mod seats;
 mod solver;
 mod substep;
+mod together;
+mod touching;
 
 use crate::{
     dynamics::arm::Kinematics,

@@ -1,17 +1,17 @@
-//! Finds accelerations, joint constraint torques and contact forces that agree with each other.
+//! Finds one arm's accelerations and joint constraint torques, and contact forces, that agree with each
+//! other.
 //!
 //! Without contacts, the joint constraints minimise a convex, piecewise quadratic function (as in the
 //! reference engine). Newton's method with the remembered set of bounds is exact when the set is
-//! right, which it nearly always is; otherwise an exact line search leads to the right one.
+//! right, which it nearly always is, and which is seen in lanes; what is here is for the other times, an
+//! exact line search that leads to the right set.
 
 use super::{
     arm::Arm,
     contacts::{ContactForces, Contacts},
+    joints::JointConstraints,
 };
-use crate::{
-    dynamics::{lanes::Lanes, ldlt::Ldlt},
-    model::DOFS,
-};
+use crate::{dynamics::ldlt::Ldlt, model::DOFS};
 
 /// Newton steps before the last one is taken as it is; two or three are usual where one is not
 /// enough.
@@ -20,100 +20,77 @@ const NEWTON_ROUNDS: usize = 50;
 /// Rounds between joint constraints and contacts.
 const CONTACT_ROUNDS: usize = 20;
 
-/// A matrix per lane, lower triangle.
+/// A matrix, lower triangle.
 pub type Mass<T> = [[T; DOFS]; DOFS];
 
-/// Accelerations under `load` and the joint constraints, where nothing touches. The arms remember
-/// which constraints are at their bounds.
-#[inline(always)]
-pub fn joint_accelerations<T: Lanes>(
-    arms: &mut [Arm],
-    mass: &Mass<T>,
-    load: &[[f64; DOFS]; 2],
-) -> [[f64; DOFS]; 2] {
-    let solution = newton_step(arms, mass, load);
-    let mut changed = false;
-    let mut acceleration = [[0.0; DOFS]; 2];
-    for (a, arm) in arms.iter_mut().enumerate() {
-        acceleration[a] = std::array::from_fn(|i| solution[i].lane(a));
-        changed |= arm.constraints.classify(&acceleration[a]);
-    }
-    if changed {
-        search(arms, mass, load, &mut acceleration);
+/// What is solved for one arm.
+#[derive(Debug, Clone, Copy)]
+pub struct Problem {
+    /// The plant's inertia, kg m².
+    pub mass: Mass<f64>,
+    /// Torques but for the constraints and contacts, N m.
+    pub load: [f64; DOFS],
+}
+
+/// Accelerations where nothing touches. The constraints remember which of them are at their bounds.
+#[cold]
+pub fn accelerations(constraints: &mut JointConstraints, problem: &Problem) -> [f64; DOFS] {
+    let (_, mut acceleration) = newton_step(constraints, problem);
+    if constraints.classify(&acceleration) {
+        search(constraints, problem, &mut acceleration);
     }
     acceleration
 }
 
-/// The accelerations that the present sets of bounds lead to.
-#[inline(always)]
-fn newton_step<T: Lanes>(arms: &[Arm], mass: &Mass<T>, load: &[[f64; DOFS]; 2]) -> [T; DOFS] {
-    let mut matrix = *mass;
-    let mut rhs = *load;
-    let mut diagonal = [[0.0; DOFS]; 2];
-    for (a, arm) in arms.iter().enumerate() {
-        let (stiffness, torque) = arm.constraints.assemble();
-        diagonal[a] = stiffness;
-        add(&mut rhs[a], &torque);
-    }
+/// The accelerations that the present set of bounds leads to.
+fn newton_step(constraints: &JointConstraints, problem: &Problem) -> (Ldlt<f64>, [f64; DOFS]) {
+    let mut matrix = problem.mass;
+    let mut rhs = problem.load;
+    let (stiffness, torque) = constraints.assemble();
+    add(&mut rhs, &torque);
     for i in 0..DOFS {
-        matrix[i][i] += T::from_fn(|a| diagonal[a][i]);
+        matrix[i][i] += stiffness[i];
     }
-    let rhs: [T; DOFS] = std::array::from_fn(|i| T::from_fn(|a| rhs[a][i]));
-    Ldlt::new(&matrix).solve(&rhs)
+    let factor = Ldlt::new(&matrix);
+    (factor, factor.solve(&rhs))
 }
 
-/// Newton's method with line search from accelerations whose sets of bounds are set.
+/// Newton's method with line search from accelerations whose set of bounds is set.
 #[cold]
-fn search<T: Lanes>(
-    arms: &mut [Arm],
-    mass: &Mass<T>,
-    load: &[[f64; DOFS]; 2],
-    acceleration: &mut [[f64; DOFS]; 2],
+pub fn search(
+    constraints: &mut JointConstraints,
+    problem: &Problem,
+    acceleration: &mut [f64; DOFS],
 ) {
     for _ in 0..NEWTON_ROUNDS {
-        let solution = newton_step(arms, mass, load);
-        let mut changed = false;
-        for (a, arm) in arms.iter_mut().enumerate() {
-            let full: [f64; DOFS] = std::array::from_fn(|i| solution[i].lane(a));
-            if !arm.constraints.classify(&full) {
-                acceleration[a] = full;
-                continue;
-            }
-            changed = true;
-            let from = acceleration[a];
-            let direction: [f64; DOFS] = std::array::from_fn(|i| full[i] - from[i]);
-            let mut residual = multiply(mass, a, &from);
-            for i in 0..DOFS {
-                residual[i] -= load[a][i];
-            }
-            let along = multiply(mass, a, &direction);
-            let curvature = (0..DOFS).map(|i| along[i] * direction[i]).sum();
-            let t = arm
-                .constraints
-                .line_search(&from, &direction, &residual, curvature);
-            acceleration[a] = std::array::from_fn(|i| from[i] + t * direction[i]);
-            arm.constraints.classify(&acceleration[a]);
-        }
-        if !changed {
+        let (_, full) = newton_step(constraints, problem);
+        if !constraints.classify(&full) {
+            *acceleration = full;
             break;
         }
+        let from = *acceleration;
+        let direction: [f64; DOFS] = std::array::from_fn(|i| full[i] - from[i]);
+        let mut residual = multiply(&problem.mass, &from);
+        for i in 0..DOFS {
+            residual[i] -= problem.load[i];
+        }
+        let along = multiply(&problem.mass, &direction);
+        let curvature = (0..DOFS).map(|i| along[i] * direction[i]).sum();
+        let t = constraints.line_search(&from, &direction, &residual, curvature);
+        *acceleration = std::array::from_fn(|i| from[i] + t * direction[i]);
+        constraints.classify(acceleration);
     }
 }
 
-/// Accelerations and contact forces together: with the set of joint constraints at their bounds, the
-/// contacts see arms whose inertia includes the other ones.
+/// Accelerations of one or two arms and contact forces together: with the set of joint constraints at
+/// their bounds, the contacts see arms whose inertia includes the other ones.
 #[cold]
-pub fn accelerations_in_contact<T: Lanes>(
+pub fn accelerations_in_contact(
     arms: &mut [Arm],
-    mass: &Mass<T>,
-    load: &[[f64; DOFS]; 2],
+    problems: &[Problem; 2],
     contacts: &Contacts,
     puck_acceleration: &[f64; 3],
 ) -> ([[f64; DOFS]; 2], ContactForces) {
-    let masses: [Mass<f64>; 2] = std::array::from_fn(|a| {
-        let lane = a.min(T::COUNT - 1);
-        std::array::from_fn(|i| std::array::from_fn(|j| mass[i][j].lane(lane)))
-    });
     let mut acceleration = [[0.0; DOFS]; 2];
     let mut forces = ContactForces {
         puck: [0.0; 3],
@@ -121,16 +98,9 @@ pub fn accelerations_in_contact<T: Lanes>(
     };
     for _ in 0..CONTACT_ROUNDS {
         let factors: [Ldlt<f64>; 2] = std::array::from_fn(|a| {
-            let arm = &arms[a.min(T::COUNT - 1)];
-            let mut matrix = masses[a];
-            let (stiffness, torque) = arm.constraints.assemble();
-            for i in 0..DOFS {
-                matrix[i][i] += stiffness[i];
-            }
-            let factor = Ldlt::new(&matrix);
-            let mut rhs = load[a];
-            add(&mut rhs, &torque);
-            acceleration[a] = factor.solve(&rhs);
+            let arm = &arms[a.min(arms.len() - 1)];
+            let (factor, free) = newton_step(&arm.constraints, &problems[a]);
+            acceleration[a] = free;
             factor
         });
         forces = contacts.solve(puck_acceleration, &acceleration, |arm, torque| {
@@ -141,12 +111,9 @@ pub fn accelerations_in_contact<T: Lanes>(
             add(&mut acceleration[a], &factors[a].solve(&forces.arms[a]));
             if arm.constraints.classify(&acceleration[a]) {
                 changed = true;
-                let mut load = load[a];
-                add(&mut load, &forces.arms[a]);
-                let single = std::slice::from_mut(arm);
-                let mut from = [acceleration[a], [0.0; DOFS]];
-                search(single, &masses[a], &[load, [0.0; DOFS]], &mut from);
-                acceleration[a] = from[0];
+                let mut pushed = problems[a];
+                add(&mut pushed.load, &forces.arms[a]);
+                search(&mut arm.constraints, &pushed, &mut acceleration[a]);
             }
         }
         if !changed {
@@ -156,17 +123,12 @@ pub fn accelerations_in_contact<T: Lanes>(
     (acceleration, forces)
 }
 
-/// One lane's matrix, given by its lower triangle, times a vector.
-fn multiply<T: Lanes>(matrix: &Mass<T>, lane: usize, v: &[f64; DOFS]) -> [f64; DOFS] {
-    std::array::from_fn(|i| {
-        (0..DOFS)
-            .map(|j| matrix[i.max(j)][i.min(j)].lane(lane) * v[j])
-            .sum()
-    })
+/// A matrix, given by its lower triangle, times a vector.
+fn multiply(matrix: &Mass<f64>, v: &[f64; DOFS]) -> [f64; DOFS] {
+    std::array::from_fn(|i| (0..DOFS).map(|j| matrix[i.max(j)][i.min(j)] * v[j]).sum())
 }
 
-#[inline(always)]
-pub fn add(a: &mut [f64; DOFS], b: &[f64; DOFS]) {
+fn add(a: &mut [f64; DOFS], b: &[f64; DOFS]) {
     for i in 0..DOFS {
         a[i] += b[i];
     }

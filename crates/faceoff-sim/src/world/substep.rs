@@ -1,307 +1,239 @@
-//! One millisecond of arms and puck.
+//! One millisecond of the arms of one world, or of several worlds in lanes.
+//!
+//! What every arm goes through in every substep is computed in lanes, with masks for what only some of them
+//! do. What is rare is done arm by arm or world by world: contacts, joints at their stops, frictions whose
+//! set of bounds has changed, states that are no ordinary ones.
 
 use super::{
-    Divergence, Runaway, World,
-    bounds::{is_ordinary, is_ordinary_puck, is_runaway},
-    contacts::{Contacts, MalletMotion, Pair},
-    solver::{accelerations_in_contact, add, joint_accelerations},
+    apart::{Apart, Prepared, stop_apart, touch_apart},
+    arm::Arm,
+    arm_lanes::{ArmLanes, MotionLanes},
+    bounds::{is_ordinary, is_ordinary_puck},
+    seats::{Seat, seat_of},
+    solver::search,
+    touching::may_touch,
 };
 use crate::{
     dynamics::{
         arm::{Bodies, Kinematics, controller_torques, damped, mass_matrix, plant_bias},
-        lanes::Lanes,
+        lanes::{Lanes, row, set_row},
         ldlt::Ldlt,
-        spatial::Vec3,
     },
-    model::{DOFS, JOINTS, SUBSTEP_S, SUBSTEPS},
-    robot::controller::{filter_velocity, torque},
-    table::{
-        contact_finder::{self, Touch},
-        contact_law::{MALLET, MALLETS, RIM},
-        frames::{robot_from_table, side, table_from_robot},
-        mallet_cylinder::MalletCylinder,
-        puck::Puck,
+    model::{DOFS, JOINTS, LINKS, SUBSTEP_S},
+    robot::{
+        controller::{filter_velocity, torque},
+        trajectory::Setpoint,
     },
+    table::puck::Puck,
 };
-use wide::f64x2;
+use std::f64::consts::FRAC_PI_2;
 
-impl World {
-    /// Advances by a control step, 20 substeps. `air` is called before each of them.
-    pub fn control_step(&mut self, mut air: impl FnMut(&Puck) -> [f64; 2]) {
-        for _ in 0..SUBSTEPS {
-            self.air_n = air(&self.puck);
-            self.substep();
-        }
+/// One substep of all arms in the lanes, and of their pucks.
+#[inline(always)]
+pub fn substep<T: Lanes, A>(arms: &mut ArmLanes<T>, seats: &mut [Seat<'_, A>], apart: &mut Apart) {
+    let before = arms.motion;
+    let prepared = prepare(arms, seats);
+    apart.clear();
+    meet(arms, seats, &prepared, apart);
+
+    let mut acceleration = ordinary_accelerations(arms, seats, &prepared, apart);
+    let mut constraint = [T::splat(0.0); DOFS];
+    constraint[..JOINTS].copy_from_slice(&arms.friction.torques(&acceleration));
+    let mut load = prepared.load;
+    if apart.lanes != 0 {
+        apart.insert(&mut acceleration, &mut constraint, &mut load);
+    }
+    for i in 0..DOFS {
+        load[i] += constraint[i];
     }
 
-    /// Advances by one substep, 1 ms. After 20 of them a new action is due; without one the last
-    /// trajectory would be repeated, so [`World::command`] or [`World::hold`] first. A world that has come
-    /// to the end of its bounds stands still.
-    pub fn substep(&mut self) {
-        if self.divergence.is_some() {
-            return;
-        }
-        if self.imposed.is_some() {
-            self.substep_imposed();
-        } else {
-            match self.arms.len() {
-                0 => self.advance_puck_alone(),
-                1 => self.substep_lanes::<f64>(),
-                _ => self.substep_lanes::<f64x2>(),
-            }
-        }
-        self.substep = (self.substep + 1) % SUBSTEPS;
+    // Semi-implicit Euler, joint damping implicit.
+    let acceleration = Ldlt::new(&damped(&prepared.mass, &arms.plant.damping)).solve(&load);
+    let motion = &mut arms.motion;
+    let step = T::splat(SUBSTEP_S);
+    for i in 0..DOFS {
+        motion.dq[i] += step * acceleration[i];
+        motion.q[i] += step * motion.dq[i];
     }
-
-    /// One substep of all arms, `T::COUNT` of them, and the puck.
-    fn substep_lanes<T: Lanes>(&mut self) {
-        let arms = &mut self.arms;
-        let plant = &self.plant;
-        let q: [T; DOFS] = std::array::from_fn(|i| T::from_fn(|a| arms[a].q[i]));
-        let dq: [T; DOFS] = std::array::from_fn(|i| T::from_fn(|a| arms[a].dq[i]));
-        let dq_filtered: [T; JOINTS] =
-            std::array::from_fn(|i| T::from_fn(|a| arms[a].dq_filtered[i]));
-        let ddq: [T; JOINTS] = std::array::from_fn(|i| {
-            T::from_fn(|a| arms[a].trajectory[self.substep].acceleration[i])
-        });
-
-        // One forward pass serves controller and plant.
-        let kinematics = Kinematics::new(&q);
-        let bodies = Bodies::new(&kinematics);
-        let feed_forward =
-            controller_torques(&kinematics, &bodies.controller(), &dq_filtered, &ddq);
-        let bodies = bodies.plant(&plant.mass_scale);
-        let bias = plant_bias(&kinematics, &bodies, &dq);
-        let mass = mass_matrix(&kinematics, &bodies);
-
-        // Torques of the controllers, less bias and damping.
-        let mut load = [[0.0; DOFS]; 2];
-        for (a, arm) in arms.iter_mut().enumerate() {
-            let command = arm.limiter.limit(&arm.trajectory[self.substep]);
-            let feed_forward = std::array::from_fn(|i| feed_forward[i].lane(a));
-            arm.torque = torque(plant, &command, &arm.q, &arm.dq_filtered, &feed_forward);
-            let ee = &kinematics.end_effector;
-            let universal = arm.universal.torque(
-                ee.x.lane(a),
-                ee.y.lane(a),
-                [arm.q[7], arm.q[8]],
-                [arm.dq[7], arm.dq[8]],
-            );
-            for i in 0..JOINTS {
-                load[a][i] = arm.torque[i] - bias[i].lane(a) - plant.damping[i] * arm.dq[i];
-            }
-            for i in 0..2 {
-                load[a][7 + i] = universal[i] - bias[7 + i].lane(a);
-            }
-            arm.constraints.prepare(plant, &arm.q, &arm.dq);
-            arm.ee_before = ee.origin.lane(a);
+    filter_velocity(&mut motion.dq_filtered, &motion.dq);
+    let ordinary = T::bits(is_ordinary(motion));
+    for seat in seats.iter_mut().filter(|seat| seat.moves) {
+        let puck = seat.world.puck;
+        seat.world.advance_puck(seat.puck_force.take());
+        if ordinary & seat.lanes() != seat.lanes() || !is_ordinary_puck(&seat.world.puck) {
+            look_closer(arms, seat, &before, puck);
         }
-
-        // Friction, stops and contacts.
-        let contacts = find_contacts(&kinematics, &dq, &self.puck);
-        let pushed = contacts.as_ref().map_or([false; 2], Contacts::pushed);
-        if pushed != [false; 2] {
-            self.pushed = pushed;
-        }
-        let free = || self.puck.free_acceleration(&self.puck_damping, self.air_n);
-        let puck_force;
-        let accelerations = match &contacts {
-            Some(contacts) if pushed != [false; 2] => {
-                let (accelerations, forces) =
-                    accelerations_in_contact(arms, &mass, &load, contacts, &free());
-                for (load, force) in load.iter_mut().zip(&forces.arms) {
-                    add(load, force);
-                }
-                puck_force = Some(forces.puck);
-                accelerations
-            }
-            contacts => {
-                puck_force = contacts
-                    .as_ref()
-                    .map(|contacts| contacts.solve_puck(&free()));
-                joint_accelerations(arms, &mass, &load)
-            }
-        };
-        for (a, arm) in arms.iter().enumerate() {
-            add(&mut load[a], &arm.constraints.torques(&accelerations[a]));
-        }
-
-        // Semi-implicit Euler, joint damping implicit.
-        let load: [T; DOFS] = std::array::from_fn(|i| T::from_fn(|a| load[a][i]));
-        let acceleration = Ldlt::new(&damped(&mass, &plant.damping)).solve(&load);
-        for (a, arm) in arms.iter_mut().enumerate() {
-            for i in 0..DOFS {
-                arm.dq[i] += SUBSTEP_S * acceleration[i].lane(a);
-                arm.q[i] += SUBSTEP_S * arm.dq[i];
-            }
-            filter_velocity(&mut arm.dq_filtered, &arm.dq);
-        }
-        let puck = self.puck;
-        self.advance_puck(puck_force);
-        let ordinary = self.arms.iter().all(is_ordinary) && is_ordinary_puck(&self.puck);
-        if !ordinary && let Some(what) = self.extraordinary() {
-            // Back to where all were inside.
-            self.puck = puck;
-            for (a, arm) in self.arms.iter_mut().enumerate() {
-                arm.q = std::array::from_fn(|i| q[i].lane(a));
-                arm.dq = std::array::from_fn(|i| dq[i].lane(a));
-                arm.dq_filtered = std::array::from_fn(|i| dq_filtered[i].lane(a));
-            }
-            self.diverge(what);
-        }
-    }
-
-    /// Looks closer at a state that is not an ordinary one: who is to blame if it gets worse, and whether
-    /// it is out of bounds.
-    #[cold]
-    fn extraordinary(&mut self) -> Option<Runaway> {
-        self.note_runaway(|_, arm| is_runaway(arm));
-        let beyond = |(robot, arm)| {
-            let joint = self.bounds.joint_beyond(arm)?;
-            Some(Runaway::Joint { robot, joint })
-        };
-        let joint = self.arms.iter().enumerate().find_map(beyond);
-        joint.or_else(|| self.bounds.puck_beyond(&self.puck).then_some(Runaway::Puck))
-    }
-
-    fn diverge(&mut self, what: Runaway) {
-        let by = self.runaway.unwrap_or_else(|| match what {
-            Runaway::Joint { robot, .. } => [0, 1].map(|a| a == robot),
-            Runaway::Puck => self.pushed,
-        });
-        self.divergence = Some(Divergence { by, what });
-    }
-
-    fn advance_puck_alone(&mut self) {
-        let mut contacts = Contacts::none();
-        self.add_rims(&mut contacts);
-        let force = (!contacts.is_empty()).then(|| {
-            contacts.solve_puck(&self.puck.free_acceleration(&self.puck_damping, self.air_n))
-        });
-        self.advance_puck(force);
-    }
-
-    fn substep_imposed(&mut self) {
-        let mut contacts = Contacts::none();
-        self.add_rims(&mut contacts);
-        if let Some(mallet) = self.imposed {
-            let cylinder = MalletCylinder::upright(mallet.position);
-            let puck = [self.puck.pose[0], self.puck.pose[1]];
-            if let Some(touch) = contact_finder::mallet_and_puck(&cylinder, puck) {
-                let motion = MalletMotion {
-                    jacobian: None,
-                    velocity: [mallet.velocity[0], mallet.velocity[1], 0.0],
-                };
-                contacts.add(
-                    touch,
-                    &MALLET,
-                    Pair::Mallet {
-                        robot: 0,
-                        mallet: &motion,
-                        puck: &self.puck.velocity,
-                    },
-                );
-            }
-        }
-        let force = (!contacts.is_empty()).then(|| {
-            contacts.solve_puck(&self.puck.free_acceleration(&self.puck_damping, self.air_n))
-        });
-        self.advance_puck(force);
-    }
-
-    fn add_rims(&self, contacts: &mut Contacts) {
-        contact_finder::rims([self.puck.pose[0], self.puck.pose[1]], |touch| {
-            contacts.add(
-                touch,
-                &RIM,
-                Pair::Rim {
-                    puck: &self.puck.velocity,
-                },
-            );
-        });
-    }
-
-    fn advance_puck(&mut self, contact: Option<[f64; 3]>) {
-        let mut force = [self.air_n[0], self.air_n[1], 0.0];
-        if let Some(contact) = contact {
-            for i in 0..3 {
-                force[i] += contact[i];
-            }
-        }
-        self.puck.advance(&self.puck_damping, force);
     }
 }
 
-/// Contacts of this substep, `None` where nothing touches.
+/// Controllers and inertias.
 #[inline(always)]
-fn find_contacts<T: Lanes>(
-    kinematics: &Kinematics<T>,
-    dq: &[T; DOFS],
-    puck: &Puck,
-) -> Option<Contacts> {
-    let centre = kinematics.cylinder_centre();
-    let puck_xy = [puck.pose[0], puck.pose[1]];
-    let axis = kinematics.mallet_axis;
-    let cylinders: [MalletCylinder; 2] = std::array::from_fn(|robot| {
-        let lane = robot.min(T::COUNT - 1);
-        let ([x, y, z], side) = (axis.lane(lane), side(lane));
-        let centre = table_from_robot(lane, centre.lane(lane));
-        MalletCylinder::along(centre, [side * x, side * y, z])
+fn prepare<T: Lanes, A>(arms: &mut ArmLanes<T>, seats: &[Seat<'_, A>]) -> Prepared<T> {
+    let desired = Setpoint::gather(|lane| {
+        let (seat, arm) = seat_of(seats, lane);
+        &seat.world.arms[arm].trajectory[seat.world.substep]
     });
-    let touches: [Option<_>; 2] = std::array::from_fn(|robot| {
-        (robot < T::COUNT)
-            .then(|| contact_finder::mallet_and_puck(&cylinders[robot], puck_xy))
-            .flatten()
-    });
-    let between_mallets = (T::COUNT == 2)
-        .then(|| contact_finder::mallets(&cylinders[0], &cylinders[1]))
-        .flatten();
-    let mallets_touch = between_mallets.is_some() || touches != [None, None];
-    if !mallets_touch && !contact_finder::near_rims(puck_xy) {
-        return None;
+    let MotionLanes { q, dq, dq_filtered } = &arms.motion;
+    let plant = &arms.plant;
+
+    // One forward pass serves controller and plant.
+    let kinematics = Kinematics::new(q);
+    let bodies = Bodies::new(&kinematics);
+    let feed_forward = controller_torques(
+        &kinematics,
+        &bodies.controller(),
+        dq_filtered,
+        &desired.acceleration,
+    );
+    let bodies = bodies.plant(&plant.mass_scale);
+    let bias = plant_bias(&kinematics, &bodies, dq);
+    let mass = mass_matrix(&kinematics, &bodies);
+
+    let command = arms.limiter.limit(&desired);
+    arms.torque = torque(plant, &command, q, dq_filtered, &feed_forward);
+    let ee = &kinematics.end_effector;
+    let universal = arms
+        .universal
+        .torque(ee.x, ee.y, [q[7], q[8]], [dq[7], dq[8]]);
+    let mut load = [T::splat(0.0); DOFS];
+    for i in 0..JOINTS {
+        load[i] = arms.torque[i] - bias[i] - plant.damping[i] * dq[i];
     }
-    let mut contacts = Contacts::none();
-    contact_finder::rims(puck_xy, |touch| {
-        contacts.add(
-            touch,
-            &RIM,
-            Pair::Rim {
-                puck: &puck.velocity,
-            },
-        );
-    });
-    if !mallets_touch {
-        return (!contacts.is_empty()).then_some(contacts);
+    for i in 0..2 {
+        load[7 + i] = universal[i] - bias[7 + i];
     }
-    let mallet = |a: usize, touch: &Touch| {
-        let lane = a.min(T::COUNT - 1);
-        let side = side(lane);
-        let [x, y, z] = robot_from_table(lane, touch.point);
-        let jacobian = kinematics.jacobian_at(Vec3::splat([x, y, z]));
-        let rows: [[f64; DOFS]; 3] = [
-            std::array::from_fn(|i| side * jacobian[i].x.lane(lane)),
-            std::array::from_fn(|i| side * jacobian[i].y.lane(lane)),
-            std::array::from_fn(|i| jacobian[i].z.lane(lane)),
-        ];
-        let velocity = rows.map(|row| (0..DOFS).map(|i| row[i] * dq[i].lane(lane)).sum());
-        MalletMotion {
-            jacobian: Some(rows),
-            velocity,
+    arms.friction.prepare(dq);
+    arms.ee_before = ee.origin;
+    Prepared {
+        kinematics,
+        mass,
+        load,
+    }
+}
+
+/// Solves contacts and joints at their stops, apart from the ordinary arms.
+#[inline(always)]
+fn meet<T: Lanes, A>(
+    arms: &ArmLanes<T>,
+    seats: &mut [Seat<'_, A>],
+    prepared: &Prepared<T>,
+    apart: &mut Apart,
+) {
+    let centre = prepared.kinematics.cylinder_centre();
+    let beyond = T::bits(is_beyond(&arms.motion.q));
+    for seat in seats.iter_mut().filter(|seat| seat.moves) {
+        let lanes = [seat.first, (seat.first + 1).min(T::COUNT - 1)];
+        let centres = lanes.map(|lane| centre.lane(lane));
+        let robots = seat.world.arms.len();
+        if may_touch(&centres[..robots], &seat.world.puck) {
+            touch_apart(arms, seat, prepared, &centres, apart);
         }
+        let stopped = |arm: &Arm| arm.constraints.any_stop();
+        if beyond & seat.lanes() != 0 || seat.world.arms.iter().any(stopped) {
+            stop_apart(arms, seat, prepared, beyond, apart);
+        }
+    }
+}
+
+/// Is a joint beyond its stop?
+#[inline(always)]
+fn is_beyond<T: Lanes>(q: &[T; DOFS]) -> T::Mask {
+    let joint = |i: usize| {
+        let range = LINKS.get(i).map_or(FRAC_PI_2, |link| link.range_rad);
+        T::splat(range).below(q[i].abs())
     };
-    for (robot, touch) in touches.into_iter().enumerate() {
-        if let Some(touch) = touch {
-            let pair = Pair::Mallet {
-                robot,
-                mallet: &mallet(robot, &touch),
-                puck: &puck.velocity,
-            };
-            contacts.add(touch, &MALLET, pair);
+    let mut beyond = joint(0);
+    for i in 1..DOFS {
+        beyond = T::either(beyond, joint(i));
+    }
+    beyond
+}
+
+/// Accelerations under the load and dry friction: by the remembered set of bounds, and where that has
+/// changed by a search for the right one. Lanes that were solved apart are left as they are.
+#[inline(always)]
+fn ordinary_accelerations<T: Lanes, A>(
+    arms: &mut ArmLanes<T>,
+    seats: &mut [Seat<'_, A>],
+    prepared: &Prepared<T>,
+    apart: &Apart,
+) -> [T; DOFS] {
+    let mut matrix = prepared.mass;
+    let mut rhs = prepared.load;
+    let (diagonal, torque) = arms.friction.assemble();
+    for i in 0..DOFS {
+        rhs[i] += torque.get(i).copied().unwrap_or(T::splat(0.0));
+    }
+    for i in 0..JOINTS {
+        matrix[i][i] += diagonal[i];
+    }
+    let mut acceleration = Ldlt::new(&matrix).solve(&rhs);
+    let set = arms.friction.classify(&acceleration);
+    if set.changed | apart.lanes != 0 {
+        arms.friction.accept(&set);
+        let changed = set.changed & !apart.lanes;
+        correct(
+            arms,
+            seats,
+            prepared,
+            changed,
+            apart.lanes,
+            &mut acceleration,
+        );
+    }
+    acceleration
+}
+
+/// Searches for the sets of bounds of some arms, and takes over those of arms that were solved apart.
+#[cold]
+#[inline(never)]
+fn correct<T: Lanes, A>(
+    arms: &mut ArmLanes<T>,
+    seats: &mut [Seat<'_, A>],
+    prepared: &Prepared<T>,
+    changed: u32,
+    apart: u32,
+    acceleration: &mut [T; DOFS],
+) {
+    for seat in seats.iter_mut().filter(|seat| seat.moves) {
+        for (a, arm) in seat.world.arms.iter_mut().enumerate() {
+            let lane = seat.first + a;
+            let constraints = &mut arm.constraints;
+            if changed >> lane & 1 == 1 {
+                arms.friction.store(lane, constraints);
+                let mut found = row(acceleration, lane);
+                search(constraints, &prepared.problem(lane), &mut found);
+                set_row(acceleration, lane, &found);
+                arms.friction.load(lane, constraints);
+            } else if apart >> lane & 1 == 1 {
+                arms.friction.load(lane, constraints);
+            }
         }
     }
-    if let Some(touch) = between_mallets {
-        let mallets = [&mallet(0, &touch), &mallet(1, &touch)];
-        contacts.add(touch, &MALLETS, Pair::Mallets { mallets });
+}
+
+/// Looks closer at a world whose state is not an ordinary one; it goes back to where all was inside of its
+/// bounds, and stands still, if it has left them.
+#[cold]
+#[inline(never)]
+fn look_closer<T: Lanes, A>(
+    arms: &mut ArmLanes<T>,
+    seat: &mut Seat<'_, A>,
+    before: &MotionLanes<T>,
+    puck: Puck,
+) {
+    let world = &mut *seat.world;
+    for (a, arm) in world.arms.iter_mut().enumerate() {
+        arms.store(seat.first + a, arm);
     }
-    Some(contacts)
+    let Some(what) = world.extraordinary() else {
+        return;
+    };
+    world.puck = puck;
+    for (a, arm) in world.arms.iter_mut().enumerate() {
+        let lane = seat.first + a;
+        arms.motion.replace(lane, before);
+        before.store(lane, arm);
+    }
+    world.diverge(what);
 }

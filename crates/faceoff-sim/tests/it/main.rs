@@ -26,3 +26,4 @@ mod policy;
 mod puck;
 mod reference;
 mod replay;
+mod together;

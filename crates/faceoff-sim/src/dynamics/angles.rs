@@ -1,0 +1,257 @@
+//! `libm`'s arc tangent, sine and cosine, lane by lane the same bits as the scalar functions.
+//!
+//! Where four lanes are all in the range of play, they are computed at once, in the order of operations of
+//! fdlibm, which `libm` follows; elsewhere, and for fewer lanes, each is `libm`'s own.
+
+use super::lanes::{Lanes, MAX_LANES, PIO2_HEAD, PIO2_TAIL, turned};
+use std::f64::consts::PI;
+
+/// Angle of the point (x, y), rad, as `libm::atan2`.
+#[inline(always)]
+pub fn atan2<T: Lanes>(y: T, x: T) -> T {
+    if T::COUNT <= 2 {
+        return T::from_fn(|lane| libm::atan2(y.lane(lane), x.lane(lane)));
+    }
+    let ratio = (y / x).abs();
+    // Leaves out what has no ratio: no numbers, infinities, both zero.
+    if T::bits(ratio.within(T::splat(STEEPEST))) != T::ALL {
+        return atan2_lane_by_lane(&y, &x);
+    }
+    let z = arc_tangent(ratio);
+    let left = x.below(T::splat(0.0));
+    let z = T::choose(left, T::splat(PI) - (z - T::splat(PI_TAIL)), z);
+    z.with_sign_of(y)
+}
+
+/// Sine and cosine of an angle in rad, as `libm::sincos`.
+#[inline(always)]
+pub fn sin_cos<T: Lanes>(angle: T) -> (T, T) {
+    if T::COUNT <= 2 {
+        return sin_cos_lane_by_lane(&angle);
+    }
+    let size = angle.abs();
+    // Near to quarter and half a turn more digits of π are needed, and beyond more turns.
+    let near_quarter = T::unequal(
+        T::splat(QUARTER.0).within(size),
+        T::splat(QUARTER.1).within(size),
+    );
+    let far = T::splat(HALF).within(size);
+    if T::bits(T::either(near_quarter, far)) != 0 || T::bits(size.within(size)) != T::ALL {
+        return sin_cos_lane_by_lane(&angle);
+    }
+    let quarters = T::choose(
+        T::splat(TWO_QUARTERS).within(size),
+        T::splat(2.0),
+        T::choose(
+            T::splat(ONE_QUARTER).within(size),
+            T::splat(1.0),
+            T::splat(0.0),
+        ),
+    );
+    let signed = quarters.with_sign_of(angle);
+    let z = angle - signed * T::splat(PIO2_HEAD);
+    let x = z - signed * T::splat(PIO2_TAIL);
+    let tail = (z - x) - signed * T::splat(PIO2_TAIL);
+    let [s1, s2, s3, s4, s5, s6] = SINE.map(T::splat);
+    let [c1, c2, c3, c4, c5, c6] = COSINE.map(T::splat);
+    let z = x * x;
+    let w = z * z;
+    let r = s2 + z * (s3 + z * s4) + z * w * (s5 + z * s6);
+    let v = z * x;
+    let half = T::splat(0.5);
+    let whole = T::choose(
+        half.below(quarters),
+        x - ((z * (half * tail - v * r) - tail) - v * s1),
+        x + v * (s1 + z * r),
+    );
+    // Keeps the sign of a zero.
+    let sin = T::choose(size.below(T::splat(TINY)), angle, whole);
+    let r = z * (c1 + z * (c2 + z * c3)) + w * w * (c4 + z * (c5 + z * c6));
+    let half_square = half * z;
+    let one = T::splat(1.0);
+    let w = one - half_square;
+    let cos = w + (((one - w) - half_square) + (z * r - x * tail));
+    turned(signed, sin, cos)
+}
+
+/// Arc tangent of a ratio that is not negative.
+#[inline(always)]
+fn arc_tangent<T: Lanes>(ratio: T) -> T {
+    let one = T::splat(1.0);
+    // The angle less a known one: 0, atan ½, π/4, atan 1½, π/2.
+    let [half, quarter, steep, upright] = ARC_BOUNDS.map(|bound| T::splat(bound).within(ratio));
+    let pick = |of: [T; 5]| {
+        let low = T::choose(half, of[1], of[0]);
+        let middle = T::choose(quarter, of[2], low);
+        T::choose(upright, of[4], T::choose(steep, of[3], middle))
+    };
+    let over = pick([
+        ratio,
+        T::splat(2.0) * ratio - one,
+        ratio - one,
+        ratio - T::splat(1.5),
+        -one,
+    ]);
+    let under = pick([
+        one,
+        T::splat(2.0) + ratio,
+        ratio + one,
+        one + T::splat(1.5) * ratio,
+        ratio,
+    ]);
+    let x = over / under;
+    let z = x * x;
+    let w = z * z;
+    let a = ARC_TANGENT.map(T::splat);
+    let odd = z * (a[0] + w * (a[2] + w * (a[4] + w * (a[6] + w * (a[8] + w * a[10])))));
+    let even = w * (a[1] + w * (a[3] + w * (a[5] + w * (a[7] + w * a[9]))));
+    pick(ARC_HEAD.map(T::splat)) - (x * (odd + even) - pick(ARC_TAIL.map(T::splat)) - x)
+}
+
+#[cold]
+#[inline(never)]
+fn atan2_lane_by_lane<T: Lanes>(y: &T, x: &T) -> T {
+    T::from_fn(|lane| libm::atan2(y.lane(lane), x.lane(lane)))
+}
+
+#[inline(never)]
+fn sin_cos_lane_by_lane<T: Lanes>(angle: &T) -> (T, T) {
+    let (mut sines, mut cosines) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
+    for lane in 0..T::COUNT {
+        (sines[lane], cosines[lane]) = libm::sincos(angle.lane(lane));
+    }
+    (T::from_fn(|i| sines[i]), T::from_fn(|i| cosines[i]))
+}
+
+/// Ratios up to this have an arc tangent of their own; beyond it is π/2.
+const STEEPEST: f64 = 1_152_921_504_606_846_976.0;
+/// π less its nearest number.
+const PI_TAIL: f64 = 1.224_646_799_147_353_2e-16;
+/// Where `libm` takes one and two quarter turns off, rad.
+const ONE_QUARTER: f64 = f64::from_bits(0x3fe9_21fc_0000_0000);
+const TWO_QUARTERS: f64 = f64::from_bits(0x4002_d97d_0000_0000);
+/// What is near to a quarter turn; from where on an angle is near to half a turn or beyond, rad.
+const QUARTER: (f64, f64) = (
+    f64::from_bits(0x3ff9_21fb_0000_0000),
+    f64::from_bits(0x3ff9_21fc_0000_0000),
+);
+const HALF: f64 = f64::from_bits(0x4009_21fb_0000_0000);
+/// Below this an angle is its own sine, rad.
+const TINY: f64 = f64::from_bits(0x3e46_a09e_0000_0000);
+/// Ratios from which the next known angle is nearer.
+const ARC_BOUNDS: [f64; 4] = [0.4375, 0.6875, 1.1875, 2.4375];
+
+/// The published constants (fdlibm).
+const SINE: [f64; 6] = [
+    -0.166_666_666_666_666_32,
+    0.008_333_333_333_322_49,
+    -0.000_198_412_698_298_579_5,
+    2.755_731_370_707_006_8e-06,
+    -2.505_076_025_340_686_3e-08,
+    1.589_690_995_211_55e-10,
+];
+const COSINE: [f64; 6] = [
+    0.041_666_666_666_666_6,
+    -0.001_388_888_888_887_411,
+    2.480_158_728_947_673e-05,
+    -2.755_731_435_139_066_3e-07,
+    2.087_572_321_298_175e-09,
+    -1.135_964_755_778_819_5e-11,
+];
+const ARC_TANGENT: [f64; 11] = [
+    0.333_333_333_333_329_3,
+    -0.199_999_999_998_764_83,
+    0.142_857_142_725_034_66,
+    -0.111_111_104_054_623_56,
+    0.090_908_871_334_365_07,
+    -0.076_918_762_050_448_3,
+    0.066_610_731_373_875_31,
+    -0.058_335_701_337_905_735,
+    0.049_768_779_946_159_324,
+    -0.036_531_572_744_216_916,
+    0.016_285_820_115_365_782,
+];
+/// The known angles, and what their numbers leave out, rad.
+const ARC_HEAD: [f64; 5] = [
+    0.0,
+    0.463_647_609_000_806_1,
+    0.785_398_163_397_448_3,
+    0.982_793_723_247_329,
+    1.570_796_326_794_896_6,
+];
+const ARC_TAIL: [f64; 5] = [
+    0.0,
+    2.269_877_745_296_168_7e-17,
+    3.061_616_997_868_383e-17,
+    1.390_331_103_123_099_8e-17,
+    6.123_233_995_736_766e-17,
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wide::f64x4;
+
+    fn assert_same(ours: f64, theirs: f64, of: &str) {
+        let same = ours.to_bits() == theirs.to_bits() || (ours.is_nan() && theirs.is_nan());
+        assert!(same, "{of}: {ours:e} and {theirs:e}");
+    }
+
+    /// Numbers of all sizes and signs, and those at which a formula begins.
+    fn numbers() -> Vec<f64> {
+        let mut all = vec![0.0, f64::INFINITY, f64::NAN, f64::MIN_POSITIVE, 5e-324];
+        let edges = [
+            ONE_QUARTER,
+            TWO_QUARTERS,
+            QUARTER.0,
+            QUARTER.1,
+            HALF,
+            TINY,
+            STEEPEST,
+        ];
+        for edge in edges
+            .into_iter()
+            .chain(ARC_BOUNDS)
+            .chain([std::f64::consts::FRAC_PI_4, 1.0])
+        {
+            all.extend([edge.next_down(), edge, edge.next_up()]);
+        }
+        for k in 0..400 {
+            all.push(0.008 * f64::from(k) + 1e-5 * f64::from(k * k % 97));
+        }
+        for exponent in -330..308 {
+            all.push(1.7 * libm::pow(10.0, f64::from(exponent)));
+        }
+        let negative: Vec<f64> = all.iter().map(|x| -x).collect();
+        all.extend(negative);
+        all
+    }
+
+    #[test]
+    fn sine_and_cosine_are_libms() {
+        // Each beside an ordinary one, so that lanes are computed together where they can be.
+        for x in numbers() {
+            let (sines, cosines) = sin_cos(f64x4::new([x, 0.3, -1.2, 2.9]));
+            for (lane, angle) in [x, 0.3, -1.2, 2.9].into_iter().enumerate() {
+                let (sin, cos) = libm::sincos(angle);
+                assert_same(sines.lane(lane), sin, &format!("sine of {angle:e}"));
+                assert_same(cosines.lane(lane), cos, &format!("cosine of {angle:e}"));
+            }
+        }
+    }
+
+    #[test]
+    fn arc_tangent_is_libms() {
+        let numbers = numbers();
+        for (i, &x) in numbers.iter().enumerate() {
+            for &y in numbers.iter().skip(i % 7).step_by(7) {
+                let (ys, xs) = ([y, 0.1, x, -2.0], [x, 1.0, y, 0.5]);
+                let angles = atan2(f64x4::new(ys), f64x4::new(xs));
+                for lane in 0..4 {
+                    let of = format!("angle of ({:e}, {:e})", xs[lane], ys[lane]);
+                    assert_same(angles.lane(lane), libm::atan2(ys[lane], xs[lane]), &of);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! Which registers four lanes are computed in.
+
+#[cfg(target_arch = "x86_64")]
+use super::avx::Avx;
+use super::lanes::Lanes;
+use wide::f64x4;
+
+/// How four arms are computed at once. All ways give the same bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LanePath(Registers);
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Registers {
+    Plain,
+    #[cfg(target_arch = "x86_64")]
+    Avx(Avx),
+}
+
+impl LanePath {
+    /// In the registers that every machine of this kind has: of two numbers each on x86-64.
+    pub const PLAIN: Self = Self(Registers::Plain);
+
+    /// In the 256-bit registers of AVX; none on a machine without them.
+    #[must_use]
+    pub fn avx() -> Option<Self> {
+        #[cfg(target_arch = "x86_64")]
+        return Avx::detect().map(|avx| Self(Registers::Avx(avx)));
+        #[cfg(not(target_arch = "x86_64"))]
+        None
+    }
+
+    /// The fastest one that this machine has.
+    #[must_use]
+    pub fn fastest() -> Self {
+        Self::avx().unwrap_or(Self::PLAIN)
+    }
+
+    /// Does something in four lanes.
+    pub(crate) fn run<I: InLanes>(self, work: I) -> I::Output {
+        match self.0 {
+            Registers::Plain => work.run::<f64x4>(),
+            #[cfg(target_arch = "x86_64")]
+            Registers::Avx(avx) => avx.run(work),
+        }
+    }
+}
+
+/// Something to be done in lanes. What it calls has to be inlined wherever it computes with lanes, since
+/// functions are compiled for the registers that every machine has.
+pub(crate) trait InLanes {
+    /// What comes of it.
+    type Output;
+
+    /// Does it. To be marked `#[inline(always)]`.
+    fn run<T: Lanes>(self) -> Self::Output;
+}

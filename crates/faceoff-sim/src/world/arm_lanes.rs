@@ -1,0 +1,85 @@
+//! The state of several arms, one in each lane, while they are moved.
+
+use super::{arm::Arm, friction::FrictionLanes};
+use crate::{
+    dynamics::{
+        lanes::{Lanes, gather, row, set_row},
+        spatial::Vec3,
+    },
+    model::{DOFS, JOINTS},
+    robot::{
+        controller::Limiter,
+        plant::{Plant, PlantLanes},
+        universal_joint::UniversalJoint,
+    },
+};
+
+/// Several arms with their controllers and plants.
+#[derive(Debug)]
+pub struct ArmLanes<T: Lanes> {
+    pub motion: MotionLanes<T>,
+    pub torque: [T; JOINTS],
+    pub limiter: Limiter<T>,
+    pub universal: UniversalJoint<T>,
+    pub friction: FrictionLanes<T>,
+    pub ee_before: Vec3<T>,
+    pub plant: PlantLanes<T>,
+}
+
+/// Positions and velocities.
+#[derive(Debug, Clone, Copy)]
+pub struct MotionLanes<T> {
+    pub q: [T; DOFS],
+    pub dq: [T; DOFS],
+    pub dq_filtered: [T; JOINTS],
+}
+
+impl<T: Lanes> ArmLanes<T> {
+    /// Takes arms into the lanes; each lane's arm is `of` its index.
+    #[inline(always)]
+    pub fn gather<'a>(of: impl Fn(usize) -> (&'a Arm, &'a Plant)) -> Self {
+        let arm = |lane: usize| of(lane).0;
+        Self {
+            motion: MotionLanes {
+                q: gather(|lane| &arm(lane).q),
+                dq: gather(|lane| &arm(lane).dq),
+                dq_filtered: gather(|lane| &arm(lane).dq_filtered),
+            },
+            torque: gather(|lane| &arm(lane).torque),
+            limiter: Limiter::gather(|lane| &arm(lane).limiter),
+            universal: UniversalJoint::gather(|lane| &arm(lane).universal),
+            friction: FrictionLanes::gather(|lane| &arm(lane).constraints),
+            ee_before: {
+                let [x, y, z] = gather(|lane| &arm(lane).ee_before);
+                Vec3::new(x, y, z)
+            },
+            plant: PlantLanes::gather(|lane| of(lane).1),
+        }
+    }
+
+    /// Gives an arm back what became of it.
+    pub fn store(&self, lane: usize, arm: &mut Arm) {
+        self.motion.store(lane, arm);
+        arm.torque = row(&self.torque, lane);
+        arm.limiter = self.limiter.lane(lane);
+        arm.universal = self.universal.lane(lane);
+        self.friction.store(lane, &mut arm.constraints);
+        arm.ee_before = self.ee_before.lane(lane);
+    }
+}
+
+impl<T: Lanes> MotionLanes<T> {
+    /// Gives an arm its positions and velocities.
+    pub fn store(&self, lane: usize, arm: &mut Arm) {
+        arm.q = row(&self.q, lane);
+        arm.dq = row(&self.dq, lane);
+        arm.dq_filtered = row(&self.dq_filtered, lane);
+    }
+
+    /// Takes one arm's from another moment.
+    pub fn replace(&mut self, lane: usize, by: &Self) {
+        set_row(&mut self.q, lane, &row(&by.q, lane));
+        set_row(&mut self.dq, lane, &row(&by.dq, lane));
+        set_row(&mut self.dq_filtered, lane, &row(&by.dq_filtered, lane));
+    }
+}
