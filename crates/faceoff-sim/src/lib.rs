@@ -19,6 +19,7 @@ pub mod batch;
 pub mod channel;
 pub mod dynamics;
 pub mod episode;
+pub mod export;
 pub mod game;
 pub mod model;
 pub mod perturbation;

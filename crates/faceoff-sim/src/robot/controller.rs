@@ -7,10 +7,10 @@ use crate::{
 };
 
 /// How fast the limiter lets a joint approach its stop, 1/s (ref).
-const LIMITER_GAIN: f64 = 20.0;
+pub(crate) const LIMITER_GAIN: f64 = 20.0;
 
 /// Weight of the newest joint velocity in the low-pass filter, and of the older ones (ref).
-const FILTER_NEW: f64 = 0.274;
+pub(crate) const FILTER_NEW: f64 = 0.274;
 const FILTER_OLD: f64 = 0.726;
 
 /// Keeps commands within position and velocity limits.

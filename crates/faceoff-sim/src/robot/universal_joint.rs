@@ -8,15 +8,15 @@ use crate::dynamics::{
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Proportional gain, N m/rad (ref).
-const KP: f64 = 4.0;
+pub(crate) const KP: f64 = 4.0;
 /// Derivative gain, N m s/rad (ref).
-const KD: f64 = 0.31;
+pub(crate) const KD: f64 = 0.31;
 /// Torque limit ±, N m (ref).
-const TORQUE_LIMIT: f64 = 10.0;
+pub(crate) const TORQUE_LIMIT: f64 = 10.0;
 /// Desired angles stay within this, rad (ref).
-const RANGE: f64 = 0.95 * FRAC_PI_2;
+pub(crate) const RANGE: f64 = 0.95 * FRAC_PI_2;
 /// Weight of the newest hinge velocity in the filter, and of the older ones (ref).
-const FILTER_NEW: f64 = 0.273;
+pub(crate) const FILTER_NEW: f64 = 0.273;
 const FILTER_OLD: f64 = 0.727;
 
 /// State of the controller: the filtered hinge velocities, rad/s.

@@ -18,7 +18,7 @@ pub struct Material {
 }
 
 /// Penetration at which the impedance is full, m.
-const WIDTH_M: f64 = 0.001;
+pub(crate) const WIDTH_M: f64 = 0.001;
 
 /// Inverse inertia of the puck in the regularisation, 1/kg: 1/m averaged over three axes, along one
 /// of which the puck cannot move (the reference engine's estimate).

@@ -1,12 +1,14 @@
-//! `faceoff sim`: the simulator alone, for comparison with other simulators and for measuring it.
+//! `faceoff sim`: the simulator alone, for comparison with other simulators, for other programs, and for measuring it.
 
 mod bench;
+mod export;
+mod kinematics;
 mod scenario;
 mod trace;
 
 use clap::{Args, Subcommand};
 
-/// Simulate open loop, or measure the simulator.
+/// Simulate open loop, export the model, or measure the simulator.
 #[derive(Debug, Args)]
 pub struct SimCommand {
     #[command(subcommand)]
@@ -21,6 +23,14 @@ enum What {
     /// "profile", "seed", "robots", "joints", "interpolation", "actions", "mallet" and "every_ms".
     /// SI units, table frame.
     Trace,
+    /// Read poses from standard input, write positions, Jacobian, mass matrix and bias, one JSON object a line
+    ///
+    /// Input, a line per pose: {"q": [7]} and optionally "dq": [7]; 9 numbers with the universal joint's, which
+    /// are otherwise those that keep the mallet upright, at rest. SI units, robot's base frame. The answer has
+    /// the controller's model, and under "plant" what moves.
+    Kinematics,
+    /// Write the ideal model of robot, table and puck for other programs: URDF, MJCF, Python
+    Export(export::ExportArgs),
     /// Measure control steps and substeps per second on one core: a held arm, no agent process
     Bench(bench::BenchArgs),
 }
@@ -29,11 +39,13 @@ impl SimCommand {
     /// Runs the simulator.
     ///
     /// # Errors
-    /// If the scenario is not one, naming the field and what was expected; if reading or writing
+    /// If a scenario or a pose is not one, naming the field and what was expected; if reading or writing
     /// fails.
     pub fn run(self) -> anyhow::Result<()> {
         match self.what {
             What::Trace => trace::run(),
+            What::Kinematics => kinematics::run(),
+            What::Export(args) => args.run(),
             What::Bench(args) => args.run(),
         }
     }

@@ -1,0 +1,362 @@
+//! MJCF: the arm, the table and the puck, with the contacts' constants.
+
+use super::{
+    numbers::{spaced, tidy},
+    parts::{Model, end_of_link, level, quaternion, shown_radius_m, vector},
+};
+use crate::{
+    model::{GRAVITY_M_S2, INITIAL_Q, JOINTS, LINKS, SUBSTEP_S, TOOL},
+    robot::universal_joint::TORQUE_LIMIT,
+    table::{
+        contact_law::{JOINT, MALLET, Material, RIM, WIDTH_M},
+        frames::table_from_robot,
+        geometry::{PUCK, TABLE},
+    },
+};
+use std::{f64::consts::FRAC_PI_2, fmt::Write as _};
+
+/// Robot 1, table and puck as MJCF, in the table frame. Joints in order: `joint_1` … `joint_7`, of the plant
+/// `universal_y` and `universal_x`, then `puck_x`, `puck_y`, `puck_yaw`; a motor (N m) for each joint of the
+/// arm; the key frame `start` has the arm in its start pose and the puck in the middle. SI units, radians.
+#[must_use]
+pub fn mjcf(model: Model) -> String {
+    let mut out = String::new();
+    write(model, &mut out).expect("writing to a string cannot fail");
+    out
+}
+
+fn write(model: Model, out: &mut String) -> std::fmt::Result {
+    writeln!(
+        out,
+        "<!-- Written by `faceoff sim export`. SI units, radians. -->"
+    )?;
+    writeln!(out, "<mujoco model=\"faceoff\">")?;
+    writeln!(
+        out,
+        "  <compiler angle=\"radian\" inertiafromgeom=\"false\"/>\n  \
+         <option timestep=\"{SUBSTEP_S}\" gravity=\"0 0 {}\" integrator=\"Euler\" cone=\"elliptic\"/>",
+        -GRAVITY_M_S2
+    )?;
+    // Nothing touches anything but what is paired below.
+    writeln!(
+        out,
+        "  <default>\n    <geom contype=\"0\" conaffinity=\"0\" rgba=\"0.6 0.6 0.65 1\"/>\n    \
+         <default class=\"driven\"><joint type=\"hinge\" axis=\"0 0 1\" limited=\"true\" {0}=\"{1}\" {2}=\"{3}\" \
+         {4}=\"{1}\" {5}=\"{3}\"/></default>\n    \
+         <default class=\"rim\"><geom rgba=\"0.35 0.25 0.2 1\"/></default>\n  </default>",
+        "solreffriction",
+        solref(&JOINT),
+        "solimpfriction",
+        solimp(&JOINT),
+        "solreflimit",
+        "solimplimit",
+    )?;
+    writeln!(out, "  <worldbody>")?;
+    writeln!(
+        out,
+        "    <light pos=\"0 0 3\" dir=\"0 0 -1\" directional=\"true\"/>"
+    )?;
+    let rims = table(out)?;
+    puck_behind_arm(model, out)?;
+    writeln!(out, "  </worldbody>")?;
+    pairs(model, &rims, out)?;
+    motors(model, out)?;
+    let mut pose = INITIAL_Q.to_vec();
+    if model == Model::Plant {
+        pose.extend(level(&INITIAL_Q));
+    }
+    pose.extend([0.0; 3]);
+    writeln!(
+        out,
+        "  <keyframe>\n    <key name=\"start\" qpos=\"{}\"/>\n  </keyframe>\n</mujoco>",
+        spaced(&pose)
+    )
+}
+
+/// The surface and the rims; the names of the rims' parts.
+fn table(out: &mut String) -> Result<Vec<String>, std::fmt::Error> {
+    const SURFACE_HALF_THICKNESS_M: f64 = 0.01;
+    let (half_length, half_width) = (TABLE.half_length_m(), TABLE.half_width_m());
+    let (thickness, post) = (TABLE.rim_thickness_m, TABLE.post_radius_m);
+    let outer_x = half_length + thickness;
+    let half_height = PUCK.height_m;
+    writeln!(
+        out,
+        "    <geom name=\"surface\" type=\"box\" pos=\"0 0 {}\" size=\"{}\" rgba=\"0.9 0.9 0.92 1\"/>",
+        -SURFACE_HALF_THICKNESS_M,
+        spaced(&[
+            tidy(outer_x),
+            tidy(half_width + thickness),
+            SURFACE_HALF_THICKNESS_M
+        ]),
+    )?;
+    let mut names = Vec::new();
+    let mut rim = |out: &mut String, name: String, kind: &str, at: [f64; 2], size: &[f64]| {
+        let mut size = size.to_vec();
+        size.push(half_height);
+        let [x, y] = at;
+        let written = writeln!(
+            out,
+            "    <geom name=\"{name}\" class=\"rim\" type=\"{kind}\" pos=\"{}\" size=\"{}\"/>",
+            spaced(&[x, y, half_height].map(tidy)),
+            spaced(&size.into_iter().map(tidy).collect::<Vec<_>>()),
+        );
+        names.push(name);
+        written
+    };
+    for (side, word) in [(1.0, "left"), (-1.0, "right")] {
+        let y = side * (half_width + thickness / 2.0);
+        rim(
+            out,
+            format!("rim_{word}"),
+            "box",
+            [0.0, y],
+            &[outer_x, thickness / 2.0],
+        )?;
+    }
+    // A short rim's end at the goal is rounded: a box, a smaller one before it, and a cylinder at each corner.
+    let mouth = TABLE.goal_width_m / 2.0;
+    let (box_y, box_half) = middle_and_half(mouth + post, half_width);
+    for (end, near) in [(1.0, "far"), (-1.0, "near")] {
+        for (side, word) in [(1.0, "left"), (-1.0, "right")] {
+            let name = |part: &str| format!("rim_{near}_{word}{part}");
+            let x = end * (half_length + thickness / 2.0);
+            rim(
+                out,
+                name(""),
+                "box",
+                [x, side * box_y],
+                &[thickness / 2.0, box_half],
+            )?;
+            let lip = [thickness / 2.0 - post, post / 2.0];
+            rim(
+                out,
+                name("_lip"),
+                "box",
+                [x, side * (mouth + post / 2.0)],
+                &lip,
+            )?;
+            for (part, x) in [
+                ("_post", end * (half_length + post)),
+                ("_post_outside", end * (outer_x - post)),
+            ] {
+                rim(
+                    out,
+                    name(part),
+                    "cylinder",
+                    [x, side * (mouth + post)],
+                    &[post],
+                )?;
+            }
+        }
+    }
+    Ok(names)
+}
+
+fn middle_and_half(from: f64, to: f64) -> (f64, f64) {
+    ((from + to) / 2.0, (to - from) / 2.0)
+}
+
+/// The arm first, so that its joints come first; then the puck.
+fn puck_behind_arm(model: Model, out: &mut String) -> std::fmt::Result {
+    let base = table_from_robot(0, [0.0; 3]).map(tidy);
+    writeln!(out, "    <body name=\"base\" pos=\"{}\">", spaced(&base))?;
+    shown(out, vector(LINKS[0].offset), shown_radius_m(0))?;
+    for (i, link) in LINKS.iter().enumerate() {
+        writeln!(
+            out,
+            "    <body name=\"link_{}\" pos=\"{}\" quat=\"{}\">",
+            i + 1,
+            spaced(&vector(link.offset)),
+            spaced(&quaternion(link.mount)),
+        )?;
+        writeln!(
+            out,
+            "      <joint name=\"joint_{}\" class=\"driven\" range=\"{} {}\" damping=\"{}\" frictionloss=\"{}\" \
+             armature=\"{}\"/>",
+            i + 1,
+            -link.range_rad,
+            link.range_rad,
+            link.damping,
+            link.friction_n_m,
+            link.armature_kg_m2,
+        )?;
+        writeln!(
+            out,
+            "      <inertial pos=\"{}\" mass=\"{}\" fullinertia=\"{}\"/>",
+            spaced(&link.centre_m),
+            link.mass_kg,
+            spaced(&link.inertia_kg_m2),
+        )?;
+        shown(out, end_of_link(i), shown_radius_m(i))?;
+    }
+    let ee = end_of_link(JOINTS - 1);
+    writeln!(
+        out,
+        "    <body name=\"end_effector\" pos=\"{}\">",
+        spaced(&ee)
+    )?;
+    isotropic(
+        out,
+        0.0,
+        TOOL.end_effector_mass_kg,
+        TOOL.end_effector_inertia_kg_m2,
+    )?;
+    writeln!(out, "      <site name=\"end_effector\" size=\"0.01\"/>")?;
+    if model == Model::Plant {
+        mallet(out)?;
+    }
+    writeln!(out, "    {}", "</body>".repeat(JOINTS + 2))?;
+    puck(out)
+}
+
+fn mallet(out: &mut String) -> std::fmt::Result {
+    writeln!(out, "    <body name=\"mallet\">")?;
+    for (name, axis) in [("universal_y", "0 1 0"), ("universal_x", "1 0 0")] {
+        writeln!(
+            out,
+            "      <joint name=\"{name}\" type=\"hinge\" axis=\"{axis}\" limited=\"true\" range=\"{} {FRAC_PI_2}\" \
+             solreflimit=\"{}\" solimplimit=\"{}\"/>",
+            -FRAC_PI_2,
+            solref(&JOINT),
+            solimp(&JOINT),
+        )?;
+    }
+    isotropic(
+        out,
+        TOOL.mallet_centre_z_m,
+        TOOL.mallet_mass_kg,
+        TOOL.mallet_inertia_kg_m2,
+    )?;
+    writeln!(
+        out,
+        "      <geom name=\"mallet\" type=\"cylinder\" pos=\"0 0 {}\" size=\"{} {}\" rgba=\"0.8 0.2 0.2 1\"/>",
+        TOOL.cylinder_centre_z_m, TOOL.cylinder_radius_m, TOOL.cylinder_half_height_m
+    )?;
+    writeln!(out, "    </body>")
+}
+
+/// It neither rises nor tips: of its inertia only that of the yaw is of any account.
+fn puck(out: &mut String) -> std::fmt::Result {
+    writeln!(out, "    <body name=\"puck\">")?;
+    for (name, kind, axis, damping) in [
+        ("puck_x", "slide", "1 0 0", PUCK.damping),
+        ("puck_y", "slide", "0 1 0", PUCK.damping),
+        ("puck_yaw", "hinge", "0 0 1", PUCK.yaw_damping),
+    ] {
+        writeln!(
+            out,
+            "      <joint name=\"{name}\" type=\"{kind}\" axis=\"{axis}\" damping=\"{damping}\"/>"
+        )?;
+    }
+    isotropic(out, 0.0, PUCK.mass_kg, PUCK.inertia_kg_m2)?;
+    let half_height = PUCK.height_m / 2.0;
+    writeln!(
+        out,
+        "      <geom name=\"puck\" type=\"cylinder\" pos=\"0 0 {half_height}\" size=\"{} {half_height}\" \
+         rgba=\"0.1 0.1 0.1 1\"/>",
+        PUCK.radius_m
+    )?;
+    writeln!(out, "    </body>")
+}
+
+fn isotropic(out: &mut String, z: f64, mass: f64, inertia: f64) -> std::fmt::Result {
+    writeln!(
+        out,
+        "      <inertial pos=\"0 0 {z}\" mass=\"{mass}\" diaginertia=\"{inertia} {inertia} {inertia}\"/>"
+    )
+}
+
+fn shown(out: &mut String, end: [f64; 3], radius: f64) -> std::fmt::Result {
+    writeln!(
+        out,
+        "      <geom type=\"capsule\" fromto=\"0 0 0 {}\" size=\"{radius}\"/>",
+        spaced(&end)
+    )
+}
+
+fn pairs(model: Model, rims: &[String], out: &mut String) -> std::fmt::Result {
+    writeln!(out, "  <contact>")?;
+    let mut pair = |other: &str, material: &Material| {
+        let mu = material.friction;
+        writeln!(
+            out,
+            "    <pair geom1=\"{other}\" geom2=\"puck\" condim=\"3\" friction=\"{mu} {mu}\" solref=\"{}\" \
+             solimp=\"{}\"/>",
+            solref(material),
+            solimp(material)
+        )
+    };
+    for name in rims {
+        pair(name, &RIM)?;
+    }
+    if model == Model::Plant {
+        pair("mallet", &MALLET)?;
+    }
+    writeln!(out, "  </contact>")
+}
+
+fn motors(model: Model, out: &mut String) -> std::fmt::Result {
+    writeln!(out, "  <actuator>")?;
+    let mut motor = |joint: &str, limit: f64| {
+        writeln!(
+            out,
+            "    <motor name=\"{joint}\" joint=\"{joint}\" ctrllimited=\"true\" ctrlrange=\"{} {limit}\"/>",
+            -limit
+        )
+    };
+    for (i, link) in LINKS.iter().enumerate() {
+        motor(&format!("joint_{}", i + 1), link.torque_limit_n_m)?;
+    }
+    if model == Model::Plant {
+        motor("universal_y", TORQUE_LIMIT)?;
+        motor("universal_x", TORQUE_LIMIT)?;
+    }
+    writeln!(out, "  </actuator>")
+}
+
+/// A material's time constant, s, and damping ratio, from which MuJoCo gets its damping and stiffness.
+fn solref(material: &Material) -> String {
+    let full = material.impedance_1;
+    let time_constant_s = 2.0 / (full * material.damping_per_s);
+    let damping_ratio = 1.0 / (full * time_constant_s * material.stiffness_per_s2.sqrt());
+    spaced(&[time_constant_s, damping_ratio].map(tidy))
+}
+
+/// Impedance at no and at full penetration, the depth of the latter, and the shape of the way between: a
+/// quadratic spline around its middle.
+fn solimp(material: &Material) -> String {
+    spaced(&[
+        material.impedance_0,
+        material.impedance_1,
+        WIDTH_M,
+        0.5,
+        2.0,
+    ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn materials_are_told_in_the_engines_words() {
+        assert_eq!(solref(&RIM), "0.0075 0.1");
+        assert_eq!(solref(&MALLET), "0.02 0.3");
+        assert_eq!(solref(&JOINT), "0.02 1");
+        assert_eq!(solimp(&RIM), "0.99 0.999 0.001 0.5 2");
+    }
+
+    #[test]
+    fn without_its_mallet_the_arm_has_seven_joints() {
+        let (plant, controller) = (mjcf(Model::Plant), mjcf(Model::Controller));
+        assert!(plant.contains("universal_x") && plant.contains("geom1=\"mallet\""));
+        assert!(!controller.contains("universal") && !controller.contains("mallet"));
+        for text in [plant, controller] {
+            assert_eq!(
+                text.matches("<body").count(),
+                text.matches("</body>").count()
+            );
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! What all formats say of the arm, in the words of each.
+
+use super::numbers::tidy;
+use crate::{
+    dynamics::arm::Kinematics,
+    model::{JOINTS, LINKS, Mount, Offset, TOOL},
+    robot::{inverse_kinematics::full, universal_joint::vertical},
+};
+use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI};
+
+/// Which arm is exported.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Model {
+    /// What moves: seven driven joints, the two of the universal joint, the mallet.
+    #[default]
+    Plant,
+    /// What the controller believes, and what recordings call the robot's model: seven joints and the end
+    /// effector, no mallet.
+    Controller,
+}
+
+/// Quaternion (w, x, y, z) of a mount.
+pub(super) fn quaternion(mount: Mount) -> [f64; 4] {
+    const H: f64 = FRAC_1_SQRT_2;
+    match mount {
+        Mount::Aligned => [1.0, 0.0, 0.0, 0.0],
+        Mount::HalfTurnYz => [0.0, 0.0, H, H],
+        Mount::QuarterTurnX => [H, H, 0.0, 0.0],
+    }
+}
+
+/// Roll, pitch and yaw of a mount, rad.
+pub(super) fn roll_pitch_yaw(mount: Mount) -> [f64; 3] {
+    match mount {
+        Mount::Aligned => [0.0; 3],
+        Mount::HalfTurnYz => [FRAC_PI_2, 0.0, PI],
+        Mount::QuarterTurnX => [FRAC_PI_2, 0.0, 0.0],
+    }
+}
+
+/// Rows of a mount's rotation matrix.
+pub(super) fn rotation(mount: Mount) -> [[f64; 3]; 3] {
+    match mount {
+        Mount::Aligned => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        Mount::HalfTurnYz => [[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]],
+        Mount::QuarterTurnX => [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
+    }
+}
+
+/// An offset as a vector in the parent's frame, m.
+pub(super) fn vector(offset: Offset) -> [f64; 3] {
+    match offset {
+        Offset::Y(y) => [0.0, y, 0.0],
+        Offset::Z(z) => [0.0, 0.0, z],
+    }
+}
+
+/// Where what follows on link `i` (0…6) sits in its frame, m: the next joint, or the end effector.
+pub(super) fn end_of_link(i: usize) -> [f64; 3] {
+    match LINKS.get(i + 1) {
+        Some(next) => vector(next.offset),
+        None => [0.0, 0.0, TOOL.end_effector_z_m],
+    }
+}
+
+/// Radius with which link `i` (0…6) is shown, m. The last one ends in a rod.
+pub(super) fn shown_radius_m(i: usize) -> f64 {
+    const SHOWN: [f64; JOINTS] = [0.075, 0.07, 0.065, 0.06, 0.055, 0.05, 0.015];
+    SHOWN[i]
+}
+
+/// Angles of the universal joint, rad, with which the mallet is vertical at a pose.
+pub(super) fn level(q: &[f64; JOINTS]) -> [f64; 2] {
+    let ee = Kinematics::new(&full(q)).end_effector;
+    vertical(ee.x.lane(0), ee.y.lane(0), [0.0; 2]).map(tidy)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The mount of a link in the three notations, held to the dynamics' own.
+    #[test]
+    fn the_notations_of_a_mount_agree_with_the_dynamics() {
+        let frames = Kinematics::new(&[0.0; 9]).links;
+        let mut parent = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        for (link, frame) in LINKS.iter().zip(frames) {
+            let mount = rotation(link.mount);
+            parent = times(parent, mount);
+            assert_eq!(parent.concat(), frame.rotation(0));
+            let near = |other: [[f64; 3]; 3]| {
+                let pairs = other.concat().into_iter().zip(mount.concat());
+                assert!(
+                    pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-15),
+                    "{other:?}"
+                );
+            };
+            near(of_quaternion(quaternion(link.mount)));
+            near(of_roll_pitch_yaw(roll_pitch_yaw(link.mount)));
+        }
+    }
+
+    fn times(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
+        a.map(|row| std::array::from_fn(|j| (0..3).map(|k| row[k] * b[k][j]).sum()))
+    }
+
+    fn of_quaternion([w, x, y, z]: [f64; 4]) -> [[f64; 3]; 3] {
+        [
+            [
+                1.0 - 2.0 * (y * y + z * z),
+                2.0 * (x * y - w * z),
+                2.0 * (x * z + w * y),
+            ],
+            [
+                2.0 * (x * y + w * z),
+                1.0 - 2.0 * (x * x + z * z),
+                2.0 * (y * z - w * x),
+            ],
+            [
+                2.0 * (x * z - w * y),
+                2.0 * (y * z + w * x),
+                1.0 - 2.0 * (x * x + y * y),
+            ],
+        ]
+    }
+
+    fn of_roll_pitch_yaw([r, p, y]: [f64; 3]) -> [[f64; 3]; 3] {
+        let ((sr, cr), (sp, cp), (sy, cy)) = (libm::sincos(r), libm::sincos(p), libm::sincos(y));
+        let roll = [[1.0, 0.0, 0.0], [0.0, cr, -sr], [0.0, sr, cr]];
+        let pitch = [[cp, 0.0, sp], [0.0, 1.0, 0.0], [-sp, 0.0, cp]];
+        let yaw = [[cy, -sy, 0.0], [sy, cy, 0.0], [0.0, 0.0, 1.0]];
+        times(yaw, times(pitch, roll))
+    }
+}

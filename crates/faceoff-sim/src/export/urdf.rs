@@ -1,0 +1,203 @@
+//! URDF: the arm alone, on its base frame.
+
+use super::{
+    numbers::{spaced, tidy},
+    parts::{Model, end_of_link, roll_pitch_yaw, shown_radius_m, vector},
+};
+use crate::{
+    model::{JOINTS, LINKS, TOOL},
+    robot::universal_joint::TORQUE_LIMIT,
+};
+use std::{f64::consts::FRAC_PI_2, fmt::Write as _};
+
+/// The arm as URDF 1.0: links `base`, `link_1` … `link_7`, `end_effector` and, of the plant, `mallet`; joints
+/// `joint_1` … `joint_7`, `universal_y`, `universal_x`. Its root is the robot's base frame. SI units, radians.
+///
+/// URDF has no word for rotor inertia: [`crate::model::Link::armature_kg_m2`] of joint 7 is told in a comment.
+#[must_use]
+pub fn urdf(model: Model) -> String {
+    let mut out = String::new();
+    write(model, &mut out).expect("writing to a string cannot fail");
+    out
+}
+
+fn write(model: Model, out: &mut String) -> std::fmt::Result {
+    writeln!(out, "<?xml version=\"1.0\"?>")?;
+    writeln!(
+        out,
+        "<!-- Written by `faceoff sim export`. SI units, radians. -->"
+    )?;
+    for (i, link) in LINKS.iter().enumerate() {
+        if link.armature_kg_m2 != 0.0 {
+            writeln!(
+                out,
+                "<!-- Not told by URDF: the rotor of joint_{} adds {} kg m² to the inertia about it. -->",
+                i + 1,
+                link.armature_kg_m2
+            )?;
+        }
+    }
+    writeln!(out, "<robot name=\"faceoff_iiwa\">")?;
+    writeln!(out, "  <link name=\"base\">")?;
+    stick(out, vector(LINKS[0].offset), shown_radius_m(0))?;
+    writeln!(out, "  </link>")?;
+    for i in 0..JOINTS {
+        driven_joint(out, i)?;
+        link(out, i)?;
+    }
+    writeln!(out, "  <joint name=\"tool\" type=\"fixed\">")?;
+    origin(out, end_of_link(JOINTS - 1), [0.0; 3])?;
+    ends(out, "link_7", "end_effector")?;
+    writeln!(out, "  </joint>")?;
+    writeln!(out, "  <link name=\"end_effector\">")?;
+    let ee = TOOL.end_effector_inertia_kg_m2;
+    inertial(
+        out,
+        TOOL.end_effector_mass_kg,
+        [0.0; 3],
+        [ee, ee, ee, 0.0, 0.0, 0.0],
+    )?;
+    writeln!(out, "  </link>")?;
+    if model == Model::Plant {
+        universal_joint(out)?;
+    }
+    writeln!(out, "</robot>")
+}
+
+fn driven_joint(out: &mut String, i: usize) -> std::fmt::Result {
+    let link = &LINKS[i];
+    let parent = match i {
+        0 => "base".to_owned(),
+        _ => format!("link_{i}"),
+    };
+    writeln!(out, "  <joint name=\"joint_{}\" type=\"revolute\">", i + 1)?;
+    origin(out, vector(link.offset), roll_pitch_yaw(link.mount))?;
+    ends(out, &parent, &format!("link_{}", i + 1))?;
+    writeln!(out, "    <axis xyz=\"0 0 1\"/>")?;
+    limit(
+        out,
+        link.range_rad,
+        link.torque_limit_n_m,
+        link.velocity_limit_rad_s,
+    )?;
+    writeln!(
+        out,
+        "    <dynamics damping=\"{}\" friction=\"{}\"/>",
+        link.damping, link.friction_n_m
+    )?;
+    writeln!(out, "  </joint>")
+}
+
+fn link(out: &mut String, i: usize) -> std::fmt::Result {
+    let link = &LINKS[i];
+    writeln!(out, "  <link name=\"link_{}\">", i + 1)?;
+    inertial(out, link.mass_kg, link.centre_m, link.inertia_kg_m2)?;
+    stick(out, end_of_link(i), shown_radius_m(i))?;
+    writeln!(out, "  </link>")
+}
+
+/// A hinge about the end effector's y carries nothing but a hinge about the turned x, which carries the mallet.
+fn universal_joint(out: &mut String) -> std::fmt::Result {
+    for (axis, parent, child) in [
+        ("y", "end_effector", "universal"),
+        ("x", "universal", "mallet"),
+    ] {
+        writeln!(out, "  <joint name=\"universal_{axis}\" type=\"revolute\">")?;
+        origin(out, [0.0; 3], [0.0; 3])?;
+        ends(out, parent, child)?;
+        let direction = if axis == "y" { "0 1 0" } else { "1 0 0" };
+        writeln!(out, "    <axis xyz=\"{direction}\"/>")?;
+        // Nothing bounds its speed; URDF asks for a number.
+        limit(out, FRAC_PI_2, TORQUE_LIMIT, 1000.0)?;
+        writeln!(out, "  </joint>")?;
+        if child == "universal" {
+            writeln!(out, "  <link name=\"universal\"/>")?;
+        }
+    }
+    writeln!(out, "  <link name=\"mallet\">")?;
+    let i = TOOL.mallet_inertia_kg_m2;
+    inertial(
+        out,
+        TOOL.mallet_mass_kg,
+        [0.0, 0.0, TOOL.mallet_centre_z_m],
+        [i, i, i, 0.0, 0.0, 0.0],
+    )?;
+    for kind in ["visual", "collision"] {
+        cylinder(
+            out,
+            kind,
+            [0.0, 0.0, TOOL.cylinder_centre_z_m],
+            [0.0; 3],
+            (TOOL.cylinder_radius_m, 2.0 * TOOL.cylinder_half_height_m),
+        )?;
+    }
+    writeln!(out, "  </link>")
+}
+
+fn origin(out: &mut String, xyz: [f64; 3], rpy: [f64; 3]) -> std::fmt::Result {
+    writeln!(
+        out,
+        "    <origin xyz=\"{}\" rpy=\"{}\"/>",
+        spaced(&xyz),
+        spaced(&rpy)
+    )
+}
+
+fn ends(out: &mut String, parent: &str, child: &str) -> std::fmt::Result {
+    writeln!(out, "    <parent link=\"{parent}\"/>")?;
+    writeln!(out, "    <child link=\"{child}\"/>")
+}
+
+fn limit(out: &mut String, range: f64, effort: f64, velocity: f64) -> std::fmt::Result {
+    writeln!(
+        out,
+        "    <limit lower=\"{}\" upper=\"{range}\" effort=\"{effort}\" velocity=\"{velocity}\"/>",
+        -range
+    )
+}
+
+/// `inertia` in the order of the model: xx, yy, zz, xy, xz, yz.
+fn inertial(out: &mut String, mass: f64, centre: [f64; 3], inertia: [f64; 6]) -> std::fmt::Result {
+    let [xx, yy, zz, xy, xz, yz] = inertia;
+    writeln!(out, "    <inertial>")?;
+    writeln!(
+        out,
+        "      <origin xyz=\"{}\" rpy=\"0 0 0\"/>",
+        spaced(&centre)
+    )?;
+    writeln!(out, "      <mass value=\"{mass}\"/>")?;
+    writeln!(
+        out,
+        "      <inertia ixx=\"{xx}\" iyy=\"{yy}\" izz=\"{zz}\" ixy=\"{xy}\" ixz=\"{xz}\" iyz=\"{yz}\"/>"
+    )?;
+    writeln!(out, "    </inertial>")
+}
+
+/// A cylinder from the origin to a point on y or z, to be looked at.
+fn stick(out: &mut String, end: [f64; 3], radius: f64) -> std::fmt::Result {
+    let along_y = end[1] != 0.0;
+    let rpy = [if along_y { FRAC_PI_2 } else { 0.0 }, 0.0, 0.0];
+    let middle = end.map(|x| tidy(x / 2.0));
+    cylinder(out, "visual", middle, rpy, (radius, end[1] + end[2]))
+}
+
+fn cylinder(
+    out: &mut String,
+    kind: &str,
+    centre: [f64; 3],
+    rpy: [f64; 3],
+    (radius, length): (f64, f64),
+) -> std::fmt::Result {
+    writeln!(out, "    <{kind}>")?;
+    writeln!(
+        out,
+        "      <origin xyz=\"{}\" rpy=\"{}\"/>",
+        spaced(&centre),
+        spaced(&rpy)
+    )?;
+    writeln!(
+        out,
+        "      <geometry><cylinder radius=\"{radius}\" length=\"{length}\"/></geometry>"
+    )?;
+    writeln!(out, "    </{kind}>")
+}

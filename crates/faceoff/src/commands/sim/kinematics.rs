@@ -1,0 +1,227 @@
+//! `faceoff sim kinematics`: positions, Jacobian and dynamics at given poses, for comparison with other programs.
+
+use anyhow::{Context as _, Result, bail, ensure};
+use faceoff_sim::{
+    ConstraintValues, JOINTS,
+    dynamics::arm::{Bodies, Kinematics, controller_torques, mass_matrix, plant_bias},
+    model::DOFS,
+    robot::{inverse_kinematics::full, universal_joint::vertical},
+};
+use serde::{Deserialize, Serialize};
+use std::io::{BufRead as _, IsTerminal as _, Read as _, Write};
+
+/// Angles and rates beyond this mean nothing.
+const NUMBER_LIMIT: f64 = 1e4;
+
+/// A line of the input is at most this long: far more than two lists of nine numbers take.
+const LINE_LIMIT_BYTES: u64 = 64 << 10;
+
+/// One line of the input.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Pose {
+    q: Vec<f64>,
+    dq: Option<Vec<f64>>,
+}
+
+/// One line of the output; the robot's base frame. Matrices are lists of rows.
+#[derive(Debug, Serialize)]
+struct Answer {
+    links: [[f64; 3]; JOINTS],
+    rotations: [[f64; 9]; JOINTS],
+    ee: [f64; 3],
+    jacobian: [[f64; JOINTS]; 6],
+    mass: [[f64; JOINTS]; JOINTS],
+    bias: [f64; JOINTS],
+    gravity: [f64; JOINTS],
+    constraints: Constraints,
+    plant: Plant,
+}
+
+#[derive(Debug, Serialize)]
+struct Constraints {
+    joint_pos: f64,
+    joint_vel: f64,
+    ee: f64,
+    link: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Plant {
+    q: [f64; DOFS],
+    mallet: [f64; 3],
+    mallet_axis: [f64; 3],
+    mass: [[f64; DOFS]; DOFS],
+    bias: [f64; DOFS],
+}
+
+/// Reads poses from standard input and writes a line about each to standard output.
+pub fn run() -> Result<()> {
+    let stdin = std::io::stdin();
+    ensure!(
+        !stdin.is_terminal(),
+        "expected poses on standard input, as in `faceoff sim kinematics < poses.jsonl`"
+    );
+    let mut input = stdin.lock();
+    let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+    let mut line = String::new();
+    for number in 1.. {
+        line.clear();
+        let length = (&mut input)
+            .take(LINE_LIMIT_BYTES + 1)
+            .read_line(&mut line)
+            .with_context(|| format!("line {number}: expected UTF-8"))? as u64;
+        if length == 0 {
+            break;
+        }
+        ensure!(
+            length <= LINE_LIMIT_BYTES,
+            "line {number}: expected at most {LINE_LIMIT_BYTES} bytes"
+        );
+        if !line.trim().is_empty() {
+            let answer = read(&line).with_context(|| format!("line {number}"))?;
+            serde_json::to_writer(&mut out, &answer).map_err(std::io::Error::from)?;
+            out.write_all(b"\n")?;
+        }
+    }
+    out.flush().context("standard output")
+}
+
+fn read(line: &str) -> Result<Answer> {
+    let pose: Pose = serde_json::from_str(line)
+        .context("expected a pose, as in {\"q\": [7 numbers], \"dq\": [7 numbers]}")?;
+    let q = match joints("q", &pose.q)? {
+        Joints::Driven(driven) => {
+            let ee = Kinematics::new(&full(&driven)).end_effector;
+            let universal = vertical(ee.x.lane(0), ee.y.lane(0), [0.0; 2]);
+            let mut q = full(&driven);
+            q[JOINTS..].copy_from_slice(&universal);
+            q
+        }
+        Joints::All(q) => q,
+    };
+    let dq = match pose.dq.as_deref().map(|dq| joints("dq", dq)).transpose()? {
+        None => [0.0; DOFS],
+        Some(Joints::Driven(driven)) => full(&driven),
+        Some(Joints::All(dq)) => dq,
+    };
+    Ok(answer(&q, &dq))
+}
+
+enum Joints {
+    Driven([f64; JOINTS]),
+    All([f64; DOFS]),
+}
+
+fn joints(field: &str, given: &[f64]) -> Result<Joints> {
+    if let Some(number) = given
+        .iter()
+        .find(|number| number.is_nan() || number.abs() > NUMBER_LIMIT)
+    {
+        bail!("{field}: expected numbers within ±{NUMBER_LIMIT}, got {number}");
+    }
+    if let Ok(driven) = given.try_into() {
+        Ok(Joints::Driven(driven))
+    } else if let Ok(all) = given.try_into() {
+        Ok(Joints::All(all))
+    } else {
+        bail!(
+            "{field}: expected {JOINTS} numbers, or {DOFS} with the universal joint's, got {}",
+            given.len()
+        )
+    }
+}
+
+fn answer(q: &[f64; DOFS], dq: &[f64; DOFS]) -> Answer {
+    let kinematics = Kinematics::new(q);
+    let ee = kinematics.end_effector.origin;
+    let mut jacobian = [[0.0; JOINTS]; 6];
+    for (joint, axis) in kinematics.axes.iter().take(JOINTS).enumerate() {
+        let (linear, angular) = (axis.at(ee).lane(0), axis.angular.lane(0));
+        for row in 0..3 {
+            jacobian[row][joint] = linear[row];
+            jacobian[row + 3][joint] = angular[row];
+        }
+    }
+    let bodies = Bodies::new(&kinematics);
+    let controller = bodies.controller();
+    let driven: [f64; JOINTS] = std::array::from_fn(|i| dq[i]);
+    let zero = [0.0; JOINTS];
+    let torques = |dq: &[f64; JOINTS], ddq: &[f64; JOINTS]| {
+        controller_torques(&kinematics, &controller, dq, ddq)
+    };
+    let gravity = torques(&zero, &zero);
+    let mut mass = [[0.0; JOINTS]; JOINTS];
+    for joint in 0..JOINTS {
+        // The torques of a unit acceleration, less gravity, are a column.
+        let mut unit = zero;
+        unit[joint] = 1.0;
+        let column = torques(&zero, &unit);
+        for row in 0..JOINTS {
+            mass[row][joint] = column[row] - gravity[row];
+        }
+    }
+    let plant = bodies.plant(&[1.0; DOFS]);
+    let lower = mass_matrix(&kinematics, &plant);
+    let positions: [f64; JOINTS] = std::array::from_fn(|i| q[i]);
+    let ConstraintValues {
+        joint_pos,
+        joint_vel,
+        ee: over_table,
+        link,
+    } = ConstraintValues::new(&positions, &driven, &kinematics);
+    Answer {
+        links: kinematics.links.map(|link| link.origin.lane(0)),
+        rotations: kinematics.links.map(|link| link.rotation(0)),
+        ee: ee.lane(0),
+        jacobian,
+        mass,
+        bias: torques(&driven, &zero),
+        gravity,
+        constraints: Constraints {
+            joint_pos,
+            joint_vel,
+            ee: over_table,
+            link,
+        },
+        plant: Plant {
+            q: *q,
+            mallet: kinematics.cylinder_centre().lane(0),
+            mallet_axis: kinematics.mallet_axis.lane(0),
+            mass: std::array::from_fn(|i| std::array::from_fn(|j| lower[i.max(j)][i.min(j)])),
+            bias: plant_bias(&kinematics, &plant, dq),
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_name_the_field_and_what_was_expected() {
+        for (line, expected) in [
+            (
+                r#"{"q": [0, 0]}"#,
+                "q: expected 7 numbers, or 9 with the universal joint's, got 2",
+            ),
+            (
+                r#"{"q": [0, 0, 0, 0, 0, 0, 20000]}"#,
+                "q: expected numbers within ±10000, got 20000",
+            ),
+            (
+                r#"{"q": [0, 0, 0, 0, 0, 0, 0], "dq": []}"#,
+                "dq: expected 7 numbers",
+            ),
+            (r#"{"dq": [0, 0, 0, 0, 0, 0, 0]}"#, "missing field `q`"),
+            (
+                r#"{"q": [0, 0, 0, 0, 0, 0, 0], "v": 1}"#,
+                "unknown field `v`",
+            ),
+            ("[", "expected a pose"),
+        ] {
+            let error = format!("{:#}", read(line).unwrap_err());
+            assert!(error.contains(expected), "{line}: {error}");
+        }
+    }
+}
