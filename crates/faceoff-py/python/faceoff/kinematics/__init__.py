@@ -1,0 +1,37 @@
+"""Kinematics of the arm: where the mallet is, which joints put it somewhere, and how it gets there in time.
+
+All functions take and return NumPy arrays with any leading dimensions, in the robot's own base frame, in SI units and
+radians. `faceoff.kinematics.plain` does the same for one pose with the standard library alone, in one file to be
+copied into a bundle. `faceoff.kinematics.model` has the numbers.
+
+The agent's model has seven joints. The mallet hangs on a universal joint that keeps it upright by itself, so that
+"where the mallet is" means the end effector, the rod's tip.
+"""
+
+from faceoff.kinematics.limits import Constraints, constraints, speed_share
+from faceoff.kinematics.poses import (
+    forward,
+    frames,
+    heights,
+    inverse,
+    jacobian,
+    posture_velocities,
+    velocities,
+)
+from faceoff.kinematics.trajectory import Trajectory, minimum_jerk, setpoints
+
+__all__ = [
+    "Constraints",
+    "Trajectory",
+    "constraints",
+    "forward",
+    "frames",
+    "heights",
+    "inverse",
+    "jacobian",
+    "minimum_jerk",
+    "posture_velocities",
+    "setpoints",
+    "speed_share",
+    "velocities",
+]

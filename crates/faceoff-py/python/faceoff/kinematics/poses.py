@@ -1,0 +1,225 @@
+"""Forward and inverse kinematics and velocities, for batches.
+
+Step for step the arithmetic of `faceoff.kinematics.plain`, whose text explains it, on arrays.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from faceoff.kinematics import model, plain
+from faceoff.kinematics.arrays import Floats, joints, points, together
+
+_OFFSETS = np.array(model.LINK_OFFSET_M)
+_MOUNTS = np.array(model.LINK_MOUNT)
+_BOUND = np.array(plain.JOINT_BOUND_RAD)
+_WEIGHT = np.array(model.VELOCITY_LIMIT_RAD_S) ** 2
+_HAND_START = plain.START_HAND_RAD
+_UPPER, _FOREARM, _HAND = plain.UPPER_ARM_M, plain.FOREARM_M, plain.HAND_M
+_HEIGHT = model.LINK_HEIGHT_M + plain.HEIGHT_MARGIN_M
+
+
+def forward(q: ArrayLike) -> Floats:
+    """The end effector at joint positions `q` (..., 7), rad: (..., 3), m, base frame."""
+    origins, _ = _chain(joints("q", q))
+    return origins[..., model.JOINTS, :]
+
+
+def jacobian(q: ArrayLike) -> Floats:
+    """How the end effector's x, y, z change with each joint at `q` (..., 7), rad: (..., 3, 7), m/rad."""
+    return _jacobian(*_chain(joints("q", q)))
+
+
+def heights(q: ArrayLike) -> Floats:
+    """Heights of elbow and wrist (the origins of links 4 and 7) at `q` (..., 7), rad: (..., 2), m."""
+    origins, _ = _chain(joints("q", q))
+    return origins[..., [3, 6], 2]
+
+
+def frames(q: ArrayLike) -> tuple[Floats, Floats]:
+    """Origins (..., 8, 3), m, and rotations (..., 8, 3, 3) of links 1…7 and the end effector at `q` (..., 7), rad.
+
+    The columns of a rotation are the frame's axes in the base frame; joint i turns about the third one.
+    """
+    origins, rotations = _frames(joints("q", q))
+    return origins, np.concatenate([rotations, rotations[..., -1:, :, :]], axis=-3)
+
+
+def inverse(target: ArrayLike, q0: ArrayLike | None = None) -> tuple[Floats, NDArray[np.bool_]]:
+    """Joint positions (..., 7), rad, that put the end effector at points, and (...) whether they do within bounds.
+
+    `target` is (..., 2), at the mallet's height, or (..., 3); m, base frame. Without `q0` the answer is the point's
+    own posture, in closed form; from `q0` (..., 7), rad, it is a pose near that one, by damped least squares. Bounds
+    are 95 % of the joints' range and the least height of elbow and wrist, with a margin. Where the second answer is
+    false, the first is the nearest that was found. `faceoff.kinematics.plain` tells the algorithm.
+    """
+    point = points("target", target, model.EE_DESIRED_HEIGHT_M)
+    if q0 is None:
+        q = _posture(point)
+    else:
+        point, start = together("target and q0", point, joints("q0", q0))
+        leading = point.shape[:-1]
+        q = _least_squares(point.reshape(-1, 3), start.reshape(-1, model.JOINTS))
+        q = q.reshape(*leading, model.JOINTS)
+    return q, _is_good(q, point)
+
+
+def posture_velocities(target: ArrayLike, velocity: ArrayLike) -> Floats:
+    """Joint velocities (..., 7), rad/s, that keep `inverse(target)` on points that move.
+
+    `target` as for `inverse`; `velocity` (..., 2), the height kept, or (..., 3), m/s.
+    """
+    point, speed = together(
+        "target and velocity",
+        points("target", target, model.EE_DESIRED_HEIGHT_M),
+        points("velocity", velocity, 0.0),
+    )
+    x, y = point[..., 0], point[..., 1]
+    vx, vy, vz = speed[..., 0], speed[..., 1], speed[..., 2]
+    reach = np.maximum(np.hypot(x, y), 1e-6)
+    outwards = (x * vx + y * vy) / reach
+    posture = _posture(point)
+    upper = posture[..., 1]
+    forearm = upper - posture[..., 3]
+    hand = forearm + posture[..., 5]
+    hand_rate = -plain.HAND_PER_REACH_RAD_M * outwards
+    ahead_rate = outwards - _HAND * np.cos(hand) * hand_rate
+    above_rate = vz + _HAND * np.sin(hand) * hand_rate
+    span = np.sin(upper - forearm)
+    span = np.copysign(np.maximum(np.abs(span), 1e-9), span)
+    upper_rate = -(np.sin(forearm) * ahead_rate + np.cos(forearm) * above_rate) / (_UPPER * span)
+    forearm_rate = (np.cos(upper) * above_rate + np.sin(upper) * ahead_rate) / (_FOREARM * span)
+    rates = np.zeros_like(posture)
+    rates[..., 0] = (x * vy - y * vx) / (reach * reach)
+    rates[..., 1] = upper_rate
+    rates[..., 3] = upper_rate - forearm_rate
+    rates[..., 5] = hand_rate - forearm_rate
+    return rates
+
+
+def velocities(q: ArrayLike, velocity: ArrayLike) -> Floats:
+    """Joint velocities (..., 7), rad/s, that move the end effector at `q` (..., 7), rad, with `velocity`, m/s.
+
+    `velocity` is (..., 2), the height kept, or (..., 3). The least ones, each weighted by its joint's limit.
+    """
+    pose, speed = together("q and velocity", joints("q", q), points("velocity", velocity, 0.0))
+    return _weighted(_jacobian(*_chain(pose)), speed, np.broadcast_to(_WEIGHT, pose.shape))
+
+
+def _frames(q: Floats) -> tuple[Floats, Floats]:
+    """Origins of links 1…7 and of the end effector, rotations of links 1…7."""
+    leading = q.shape[:-1]
+    origins = np.empty((*leading, model.JOINTS + 1, 3))
+    rotations = np.empty((*leading, model.JOINTS, 3, 3))
+    at = np.zeros((*leading, 3))
+    rotation = np.broadcast_to(np.eye(3), (*leading, 3, 3))
+    for joint in range(model.JOINTS):
+        at = at + rotation @ _OFFSETS[joint]
+        mounted = rotation @ _MOUNTS[joint]
+        sine, cosine = np.sin(q[..., joint, None]), np.cos(q[..., joint, None])
+        x, y = mounted[..., 0], mounted[..., 1]
+        rotation = np.stack([x * cosine + y * sine, y * cosine - x * sine, mounted[..., 2]], axis=-1)
+        origins[..., joint, :] = at
+        rotations[..., joint, :, :] = rotation
+    origins[..., model.JOINTS, :] = at + rotation[..., 2] * model.END_EFFECTOR_Z_M
+    return origins, rotations
+
+
+def _chain(q: Floats) -> tuple[Floats, Floats]:
+    """Origins (..., 8, 3) as in `_frames`, and the joints' axes (..., 7, 3)."""
+    origins, rotations = _frames(q)
+    axes: Floats = rotations[..., 2]
+    return origins, axes
+
+
+def _jacobian(origins: Floats, axes: Floats) -> Floats:
+    arms = origins[..., -1:, :] - origins[..., :-1, :]
+    rows: Floats = np.swapaxes(np.cross(axes, arms), -1, -2)
+    return rows
+
+
+def _posture(point: Floats) -> Floats:
+    x, y, z = point[..., 0], point[..., 1], point[..., 2]
+    reach = np.hypot(x, y)
+    hand = _HAND_START - plain.HAND_PER_REACH_RAD_M * (reach - _START_REACH)
+    ahead = reach - _HAND * np.sin(hand)
+    above = z - _HAND * np.cos(hand) - plain.SHOULDER_M
+    side = np.hypot(ahead, above)
+    elbow = _corner(side, _UPPER, _FOREARM)
+    upper = np.arctan2(ahead, above) - _corner(_FOREARM, _UPPER, np.maximum(side, 1e-9))
+    forearm = upper + np.pi - elbow
+    q = np.zeros((*reach.shape, model.JOINTS))
+    q[..., 0] = np.arctan2(y, x)
+    q[..., 1] = upper
+    q[..., 3] = upper - forearm
+    q[..., 5] = hand - forearm
+    return q
+
+
+def _corner(opposite: Floats | float, a: float, b: Floats | float) -> Floats:
+    cosine = (a * a + b * b - opposite * opposite) / (2.0 * a * b)
+    angle: Floats = np.arccos(np.clip(cosine, -1.0, 1.0))
+    return angle
+
+
+def _least_squares(point: Floats, q0: Floats) -> Floats:
+    """Of (n, 3) points from (n, 7) poses. Who has arrived takes no further part."""
+    q = np.clip(q0, -_BOUND, _BOUND)
+    going = np.arange(len(q))
+    for _ in range(plain.ITERATIONS):
+        here = q[going]
+        origins, axes = _chain(here)
+        error = point[going] - origins[:, -1]
+        deficit = _HEIGHT - origins[:, 6, 2]
+        left = (np.sqrt(np.sum(error * error, axis=-1)) >= plain.GOAL_M) | (deficit > 0.0)
+        if not left.any():
+            break
+        going, here, origins, axes = going[left], here[left], origins[left], axes[left]
+        error, deficit = error[left], deficit[left]
+        rows = _jacobian(origins, axes)
+        rise = np.cross(axes, origins[:, 6:7] - origins[:, :7])[..., 2]
+        step = _step(rows, rise, error, deficit, np.broadcast_to(_WEIGHT, here.shape))
+        stuck = (np.abs(here + step) > _BOUND) & (np.abs(here) >= _BOUND) & (here * step > 0.0)
+        kept = np.where(stuck, 0.0, _WEIGHT)
+        again = stuck.any(axis=-1)
+        if again.any():
+            step[again] = _step(rows[again], rise[again], error[again], deficit[again], kept[again])
+        length = np.sqrt(np.sum(step * step, axis=-1, keepdims=True))
+        share = np.minimum(1.0, plain.STEP_LIMIT_RAD / np.maximum(length, 1e-300))
+        q[going] = np.clip(here + share * step, -_BOUND, _BOUND)
+    return q
+
+
+def _step(rows: Floats, rise: Floats, error: Floats, deficit: Floats, weight: Floats) -> Floats:
+    step = _weighted(rows, error, weight)
+    wish = weight * rise
+    moved = np.einsum("nij,nj->ni", rows, wish)
+    free = wish - _weighted(rows, moved, weight)
+    gain = np.sum(rise * free, axis=-1)
+    share = np.maximum(deficit, 0.0) / np.maximum(gain, 1e-3)
+    risen: Floats = step + share[:, None] * free
+    return risen
+
+
+def _weighted(rows: Floats, wish: Floats, weight: Floats) -> Floats:
+    """W Jᵀ (J W Jᵀ + λ I)⁻¹ wish."""
+    scaled = rows * weight[..., None, :]
+    square = scaled @ np.swapaxes(rows, -1, -2) + plain.DAMPING * np.eye(3)
+    a, b, c = square[..., 0, :], square[..., 1, :], square[..., 2, :]
+    bc, ca, ab = np.cross(b, c), np.cross(c, a), np.cross(a, b)
+    determinant = np.sum(a * bc, axis=-1, keepdims=True)
+    columns = np.stack([bc, ca, ab], axis=-1)
+    force = np.einsum("...ij,...j->...i", columns, wish) / determinant
+    answer: Floats = np.einsum("...ij,...i->...j", scaled, force)
+    return answer
+
+
+def _is_good(q: Floats, point: Floats) -> NDArray[np.bool_]:
+    origins, _ = _chain(q)
+    error = point - origins[..., -1, :]
+    near = np.sum(error * error, axis=-1) <= plain.TOLERANCE_M**2
+    high = np.min(origins[..., [3, 6], 2], axis=-1) >= _HEIGHT - 1e-9
+    good: NDArray[np.bool_] = near & high & np.all(np.abs(q) <= _BOUND, axis=-1)
+    return good
+
+
+_START_REACH = float(np.hypot(*forward(model.START_Q)[:2]))

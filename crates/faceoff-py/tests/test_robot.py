@@ -1,0 +1,268 @@
+"""The exported model, loaded by others: pinocchio and MuJoCo find the same robot as the simulator.
+
+The simulator's numbers come from `faceoff sim kinematics` and `faceoff sim trace`.
+"""
+
+import math
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+from program import REPOSITORY, exported, faceoff, kinematics, trace
+
+from faceoff.kinematics import model as numbers
+
+FIELDS = ("plant", "controller")
+DRIVEN = numbers.JOINTS
+
+
+def poses(count, dofs, seed):
+    """Random joint positions and velocities within the limits, the start pose first."""
+    chance = np.random.default_rng(seed)
+    reach = np.array([*numbers.POSITION_LIMIT_RAD, 1.5, 1.5])[:dofs]
+    q = chance.uniform(-reach, reach, (count, dofs))
+    q[0] = [*numbers.START_Q, *numbers.START_UNIVERSAL_RAD][:dofs]
+    return q, chance.normal(0.0, 1.0, (count, dofs))
+
+
+def answers(q, dq):
+    return kinematics([{"q": a.tolist(), "dq": b.tolist()} for a, b in zip(q, dq)])
+
+
+def dofs_of(model):
+    return 9 if model == "plant" else 7
+
+
+def dynamics_of(answer, model):
+    """Mass matrix and bias."""
+    part = answer["plant"] if model == "plant" else answer
+    return np.array(part["mass"]), np.array(part["bias"])
+
+
+@pytest.mark.parametrize("model", FIELDS)
+class TestUrdfInPinocchio:
+    """pinocchio 4, which reads URDF: frames to 1e-12 m, mass matrix and bias to 1e-10."""
+
+    @pytest.fixture
+    def robot(self, model):
+        pin = pytest.importorskip("pinocchio")
+        robot = pin.buildModelFromXML(exported("urdf", model))
+        # URDF cannot tell of rotors.
+        armature = np.zeros(robot.nv)
+        armature[:DRIVEN] = numbers.ARMATURE_KG_M2
+        robot.armature = armature
+        return pin, robot, robot.createData()
+
+    def test_positions_mass_matrix_and_bias_agree(self, robot, model):
+        pin, robot, data = robot
+        assert robot.nq == dofs_of(model)
+        q, dq = poses(100, robot.nq, seed=1)
+        for pose, rate, answer in zip(q, dq, answers(q, dq)):
+            pin.framesForwardKinematics(robot, data, pose)
+
+            def frame(name):
+                return data.oMf[robot.getFrameId(name)]
+
+            for i in range(DRIVEN):
+                link = frame(f"link_{i + 1}")
+                np.testing.assert_allclose(link.translation, answer["links"][i], atol=1e-12)
+                rotation = np.reshape(answer["rotations"][i], (3, 3))
+                np.testing.assert_allclose(link.rotation, rotation, atol=1e-12)
+            np.testing.assert_allclose(frame("end_effector").translation, answer["ee"], atol=1e-12)
+            if model == "plant":
+                mallet = frame("mallet").act(np.array([0.0, 0.0, numbers.MALLET_CYLINDER_Z_M]))
+                np.testing.assert_allclose(mallet, answer["plant"]["mallet"], atol=1e-12)
+            mass, bias = dynamics_of(answer, model)
+            np.testing.assert_allclose(pin.crba(robot, data, pose), mass, atol=1e-10)
+            np.testing.assert_allclose(pin.nle(robot, data, pose, rate), bias, atol=1e-10)
+
+    def test_limits_and_friction_are_told(self, robot, model):
+        _, robot, _ = robot
+        np.testing.assert_array_equal(robot.upperPositionLimit[:DRIVEN], numbers.POSITION_LIMIT_RAD)
+        np.testing.assert_array_equal(-robot.lowerPositionLimit[:DRIVEN], numbers.POSITION_LIMIT_RAD)
+        np.testing.assert_array_equal(robot.upperVelocityLimit[:DRIVEN], numbers.VELOCITY_LIMIT_RAD_S)
+        np.testing.assert_array_equal(robot.upperEffortLimit[:DRIVEN], numbers.TORQUE_LIMIT_N_M)
+        np.testing.assert_array_equal(robot.damping[:DRIVEN], numbers.DAMPING_N_M_S)
+        np.testing.assert_array_equal(robot.friction[:DRIVEN], numbers.DRY_FRICTION_N_M)
+
+
+def load(model="plant"):
+    mujoco = pytest.importorskip("mujoco")
+    loaded = mujoco.MjModel.from_xml_string(exported("mjcf", model))
+    return mujoco, loaded, mujoco.MjData(loaded)
+
+
+@pytest.mark.parametrize("model", FIELDS)
+def test_mujoco_finds_the_same_positions_mass_matrix_and_bias(model):
+    """MuJoCo 4: positions to 1e-12 m, mass matrix and bias to 1e-10."""
+    mujoco, robot, data = load(model)
+    dofs = dofs_of(model)
+    base = np.array([-numbers.BASE_X_M, 0.0, numbers.BASE_Z_M])
+    assert robot.nq == dofs + 3, "the puck's x, y and yaw come last"
+    q, dq = poses(100, dofs, seed=2)
+    for pose, rate, answer in zip(q, dq, answers(q, dq)):
+        data.qpos[:dofs], data.qvel[:dofs] = pose, rate
+        mujoco.mj_forward(robot, data)
+        for i in range(DRIVEN):
+            link = data.body(f"link_{i + 1}")
+            np.testing.assert_allclose(link.xpos - base, answer["links"][i], atol=1e-12)
+            np.testing.assert_allclose(link.xmat, answer["rotations"][i], atol=1e-12)
+        np.testing.assert_allclose(data.site("end_effector").xpos - base, answer["ee"], atol=1e-12)
+        if model == "plant":
+            mallet = data.geom("mallet").xpos - base
+            np.testing.assert_allclose(mallet, answer["plant"]["mallet"], atol=1e-12)
+        mass, bias = dynamics_of(answer, model)
+        np.testing.assert_allclose(full_mass(mujoco, robot, data)[:dofs, :dofs], mass, atol=1e-10)
+        np.testing.assert_allclose(data.qfrc_bias[:dofs], bias, atol=1e-10)
+
+
+def full_mass(mujoco, robot, data):
+    """Column by column, by multiplication: the layout of MuJoCo's own matrix is its affair."""
+    columns = []
+    for unit in np.eye(robot.nv):
+        column = np.zeros(robot.nv)
+        mujoco.mj_mulM(robot, data, column, unit)
+        columns.append(column)
+    return np.array(columns)
+
+
+def test_the_key_frame_is_the_start_pose():
+    mujoco, robot, data = load()
+    mujoco.mj_resetDataKeyframe(robot, data, robot.key("start").id)
+    np.testing.assert_array_equal(data.qpos[:DRIVEN], numbers.START_Q)
+    mujoco.mj_forward(robot, data)
+    ee = data.site("end_effector").xpos + [numbers.BASE_X_M, 0.0, -numbers.BASE_Z_M]
+    np.testing.assert_allclose(ee, [0.65, 0.0, numbers.EE_DESIRED_HEIGHT_M], atol=1e-4)
+    np.testing.assert_allclose(data.geom("mallet").xmat.reshape(3, 3)[:, 2], [0, 0, -1], atol=1e-9)
+    state = trace({"puck": [0, 0, 0, 0, 0, 0], "duration_ms": 1})[0]
+    np.testing.assert_allclose(data.qpos[DRIVEN:9], state["universal"][0], atol=1e-9)
+
+
+class UniversalController:
+    """What keeps the mallet upright, as docs/robot.md tells it: torques from MuJoCo's state."""
+
+    def __init__(self):
+        self.filtered = np.zeros(2)
+
+    def torque(self, rotation, angle, rate):
+        new = numbers.UNIVERSAL_FILTER_NEW
+        self.filtered = new * rate + (1.0 - new) * self.filtered
+        wish = np.clip(self.upright(rotation), -numbers.UNIVERSAL_RANGE_RAD, numbers.UNIVERSAL_RANGE_RAD)
+        torque = numbers.UNIVERSAL_KP_N_M * (wish - angle) - numbers.UNIVERSAL_KD_N_M_S * self.filtered
+        limit = numbers.UNIVERSAL_TORQUE_LIMIT_N_M
+        return np.clip(torque, -limit, limit)
+
+    @staticmethod
+    def upright(rotation):
+        x, y = rotation[:, 0], rotation[:, 1]
+
+        def angle(a, b, axis):
+            return math.atan2(np.cross(a, b) @ axis, a @ b)
+
+        first = angle(x, np.array([-y[1], y[0], 0.0]), y)
+        cross = np.array([[0, -y[2], y[1]], [y[2], 0, -y[0]], [-y[1], y[0], 0]])
+        turned = x + math.sin(first) * cross @ x + (1 - math.cos(first)) * (cross * cross) @ x
+        return np.array([first, angle(y, np.array([turned[1], -turned[0], 0.0]), turned)])
+
+
+def test_an_arm_motion_in_mujoco_is_ours():
+    """One second under the torques of the simulator's controller: joints within 1e-6 rad, universal joint too."""
+    chance = np.random.default_rng(3)
+    steps, amplitude = 50, chance.uniform(0.1, 0.4, DRIVEN)
+    pace = chance.uniform(3.0, 6.0, DRIVEN)
+    t = 0.02 * np.arange(1, steps + 1)[:, None]
+    q = np.array(numbers.START_Q) + amplitude * (1 - np.cos(pace * t)) / 2
+    dq = amplitude * pace * np.sin(pace * t) / 2
+    scenario = {
+        "puck": [0.8, 0.4, 0, 0, 0, 0],
+        "duration_ms": 20 * steps,
+        "interpolation": [3],
+        "actions": [np.stack([q, dq], axis=1).tolist()],
+    }
+    ours = trace(scenario)
+    mujoco, robot, data = load()
+    mujoco.mj_resetDataKeyframe(robot, data, robot.key("start").id)
+    data.qpos[7:9] = ours[0]["universal"][0]
+    data.qpos[9:] = scenario["puck"][:3]
+    universal = UniversalController()
+    farthest = np.zeros(2)
+    for state in ours[1:]:
+        mujoco.mj_kinematics(robot, data)
+        rotation = data.body("end_effector").xmat.reshape(3, 3)
+        data.ctrl[:DRIVEN] = state["torque"][0]
+        data.ctrl[DRIVEN:] = universal.torque(rotation, data.qpos[7:9], data.qvel[7:9])
+        mujoco.mj_step(robot, data)
+        farthest[0] = max(farthest[0], np.abs(data.qpos[:7] - state["q"][0]).max())
+        farthest[1] = max(farthest[1], np.abs(data.qpos[7:9] - state["universal"][0]).max())
+    moved = np.abs(np.array(ours[-1]["q"][0]) - numbers.START_Q)
+    print("moved", moved, "differences", farthest)
+    assert moved.max() > 0.1
+    assert farthest.max() < 1e-6
+
+
+def test_a_sliding_puck_in_mujoco_is_ours():
+    """Free for half a second: within 1e-9 m."""
+    scenario = {"puck": [-0.4, 0.1, 0.2, 1.0, 0.3, 4.0], "duration_ms": 500}
+    last = trace(scenario)[-1]["puck"]
+    mujoco, robot, data = load()
+    data.qpos[9:], data.qvel[9:] = scenario["puck"][:3], scenario["puck"][3:]
+    for _ in range(500):
+        mujoco.mj_step(robot, data)
+    np.testing.assert_allclose([*data.qpos[9:], *data.qvel[9:]], last, atol=1e-9)
+
+
+@pytest.mark.parametrize("vy", [0.8, 1.5, 2.5])
+def test_a_bounce_off_a_long_rim_in_mujoco_is_near_ours(vy):
+    """The same law of contact: velocity after the bounce within 2 % of the speed before."""
+    scenario = {"puck": [0.2, 0.4, 0.0, 0.5, vy, 0.0], "duration_ms": 200}
+    ours = trace(scenario)[-1]["puck"]
+    mujoco, robot, data = load()
+    data.qpos[9:], data.qvel[9:] = scenario["puck"][:3], scenario["puck"][3:]
+    for _ in range(200):
+        mujoco.mj_step(robot, data)
+    assert ours[4] < 0.0, "it bounced"
+    difference = np.array(ours[3:5]) - data.qvel[9:11]
+    print(ours, data.qvel[9:], difference)
+    assert np.linalg.norm(difference) < 0.02 * math.hypot(0.5, vy)
+
+
+@pytest.mark.parametrize("model", FIELDS)
+@pytest.mark.parametrize("form", ["urdf", "mjcf"])
+def test_files_need_no_other_files(form, model):
+    tags = {element.tag for element in ET.fromstring(exported(form, model)).iter()}
+    assert not tags & {"mesh", "include", "texture", "asset"}
+
+
+def test_generated_files_are_what_the_program_writes():
+    """Who changes the model writes these anew: faceoff sim export --format … --out …"""
+    package = REPOSITORY / "crates" / "faceoff-py" / "python" / "faceoff" / "kinematics"
+    assert (package / "model.py").read_text() == exported("python")
+    assert (REPOSITORY / "docs" / "images" / "robot.svg").read_text() == exported("svg")
+    ET.fromstring(exported("svg"))
+
+
+def test_out_writes_what_is_otherwise_printed(tmp_path):
+    for form in ("urdf", "mjcf", "python", "svg"):
+        out = tmp_path / form
+        assert faceoff("sim", "export", "--format", form, "--out", str(out)) == ""
+        assert out.read_text() == exported(form)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--format", "stl"], "urdf, mjcf, python, svg"),
+        ([], "--format"),
+        (["--format", "urdf", "--model", "ideal"], "plant, controller"),
+        (["--format", "svg", "--model", "controller"], "expected --format urdf or mjcf"),
+        (["--format", "urdf", "--out", "/nowhere/robot.urdf"], "--out /nowhere/robot.urdf"),
+    ],
+)
+def test_wrong_options_are_told(options, words):
+    import subprocess
+
+    from program import PROGRAM
+
+    done = subprocess.run([PROGRAM, "sim", "export", *options], capture_output=True, text=True)
+    assert done.returncode != 0 and words in done.stderr, done.stderr
+    assert done.stdout == ""
