@@ -117,4 +117,15 @@ mod tests {
             assert_eq!(env["robot"]["base_frame"][1][0][3], -own_x);
         }
     }
+
+    #[test]
+    fn the_hello_of_the_document_is_the_real_one() {
+        let document = include_str!("../../../docs/robot.md");
+        let (_, rest) = document.split_once("```json\n").expect("a block of JSON");
+        let (quoted, _) = rest.split_once("```").expect("the block's end");
+        let quoted: serde_json::Value = serde_json::from_str(quoted).expect("JSON");
+        let contest = Contest::Task(Task::Defend);
+        let hello = Message::hello(contest, wire_env(contest));
+        assert_eq!(quoted, serde_json::to_value(hello).unwrap());
+    }
 }

@@ -27,3 +27,4 @@ mod puck;
 mod reference;
 mod replay;
 mod together;
+mod robot_document;
