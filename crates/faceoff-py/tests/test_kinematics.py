@@ -139,6 +139,13 @@ class TestInverse:
         _, ok = arm.inverse([2.0, 0.0], model.START_Q)
         assert not ok
 
+    def test_far_from_the_arm_poses_are_numbers_still(self):
+        far = [[1e4, 1e4, -1e4], [0.0, 0.0, 0.0], [-1e4, 0.0, 1e4], [1.4, 0.0, 0.1645]]
+        for q0 in (None, model.START_Q, [1e4] * 7):
+            q, _ = arm.inverse(far, q0)
+            assert np.isfinite(q).all()
+            assert np.isfinite([plain.inverse(point, q0)[0] for point in far]).all()
+
     def test_shapes_follow_the_arguments(self):
         q, ok = arm.inverse(np.full((2, 3, 2), [0.8, 0.1]))
         assert q.shape == (2, 3, 7) and ok.shape == (2, 3)
@@ -256,6 +263,9 @@ class TestTrajectories:
     def test_a_way_out_of_reach_or_over_the_rim_is_not_ok(self):
         assert not arm.minimum_jerk(self.start, (1.6, 0.0), duration_s=2.0).ok
         assert not arm.minimum_jerk(self.start, (0.65, 0.5), duration_s=2.0).ok
+        far = arm.minimum_jerk(self.start, (1e4, 0.0), end_velocity=(1e4, 0.0), duration_s=0.02)
+        assert not far.ok and np.isfinite(far.dense).all()
+        assert not arm.minimum_jerk(self.start, (1e4, 0.0)).ok
 
 
 @pytest.mark.parametrize(
@@ -264,9 +274,9 @@ class TestTrajectories:
         (lambda: arm.forward([0.0] * 6), "q: expected shape (..., 7), got (6,)"),
         (lambda: arm.forward(0.0), "q: expected shape (..., 7), got ()"),
         (lambda: arm.forward(["a"] * 7), "q: expected an array of numbers"),
-        (lambda: arm.jacobian([math.nan] * 7), "q: expected finite numbers, got nan"),
+        (lambda: arm.jacobian([math.nan] * 7), "q: expected numbers within ±10000, got nan"),
         (lambda: arm.inverse([0.8]), "target: expected shape (..., 2) or (..., 3), got (1,)"),
-        (lambda: arm.inverse([0.8, math.inf]), "target: expected finite numbers, got inf"),
+        (lambda: arm.inverse([0.8, math.inf]), "target: expected numbers within ±10000, got inf"),
         (lambda: arm.inverse([[0.8, 0.0]] * 3, [[0.0] * 7] * 2), "target and q0: expected leading"),
         (lambda: arm.constraints([0.0] * 7, [0.0] * 3), "dq: expected shape (..., 7), got (3,)"),
         (lambda: arm.minimum_jerk((0.7, 0.0), (0.8, 0.0), duration_s=-1.0), "duration_s: expected"),
@@ -275,9 +285,11 @@ class TestTrajectories:
         (lambda: arm.minimum_jerk([[0.7, 0.0]], (0.8, 0.0)), "start: expected shape (2,) or (3,)"),
         (lambda: arm.setpoints([0.0] * 7, [[0.0] * 7], 3), "actions: expected shape (n, 2, 7)"),
         (lambda: arm.setpoints([0.0] * 7, [[0.0] * 7], 7), "interpolation: expected one of"),
+        (lambda: arm.inverse([2e4, 0.0]), "target: expected numbers within ±10000, got 20000"),
+        (lambda: plain.inverse(0.8), "target: expected a sequence of numbers, got 0.8"),
         (lambda: plain.forward([0.0] * 8), "q: expected 7 numbers, got 8"),
-        (lambda: plain.inverse([math.nan, 0.0]), "target: expected finite numbers, got nan"),
-        (lambda: plain.inverse([0.0]), "target: expected x, y or x, y, z, got 1 numbers"),
+        (lambda: plain.inverse([math.nan, 0.0]), "target: expected numbers within ±10000, got nan"),
+        (lambda: plain.inverse([0.0]), "target: expected 2 or 3 numbers, got 1"),
     ],
 )
 def test_wrong_arguments_are_named(call, words):

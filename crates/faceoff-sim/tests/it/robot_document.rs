@@ -186,9 +186,8 @@ fn rim_bounces() -> (Vec<f64>, Vec<f64>) {
             let y = 0.4 + f64::from(k * 7 % 20) * 1e-4;
             let mut world =
                 World::with_robots(&Plant::nominal(), 1, [0.2, y, 0.0, 0.3, speed, 0.0]);
-            let is_free = |world: &World| {
-                world.puck().pose[1] + PUCK.radius_m < TABLE.half_width_m()
-            };
+            let is_free =
+                |world: &World| world.puck().pose[1] + PUCK.radius_m < TABLE.half_width_m();
             let mut before = *world.puck();
             let mut ms = 0;
             while world.puck().velocity[1] > 0.0 || !is_free(&world) {

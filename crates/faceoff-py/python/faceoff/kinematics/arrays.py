@@ -5,20 +5,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from faceoff.kinematics import model
+from faceoff.kinematics import model, plain
 
 Floats = NDArray[np.float64]
 
 
 def finite(name: str, given: ArrayLike) -> Floats:
-    """The argument as an array of finite float64, of any shape; ValueError that names it otherwise."""
+    """The argument as an array of float64 within ±10,000, of any shape; ValueError that names it otherwise."""
     try:
         array: NDArray[Any] = np.asarray(given, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name}: expected an array of numbers, got {given!r:.80}") from error
-    if not np.isfinite(array).all():
-        worst = array[~np.isfinite(array)].flat[0]
-        raise ValueError(f"{name}: expected finite numbers, got {worst}")
+    # Written so that a number that is none fails.
+    good = np.abs(array) <= plain.NUMBER_LIMIT
+    if not good.all():
+        worst = array[~good].flat[0]
+        raise ValueError(f"{name}: expected numbers within ±{plain.NUMBER_LIMIT:g}, got {worst}")
     return array
 
 

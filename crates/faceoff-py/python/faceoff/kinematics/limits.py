@@ -54,5 +54,10 @@ def constraints(q: ArrayLike, dq: ArrayLike) -> Constraints:
 
 def speed_share(dq: ArrayLike) -> Floats:
     """The largest of joint velocities (..., 7), rad/s, as a share (...) of what the rules allow; above 1 they do not."""
-    share: Floats = np.max(np.abs(joints("dq", dq)) / _VELOCITY, axis=-1)
+    return share_of(joints("dq", dq))
+
+
+def share_of(dq: Floats) -> Floats:
+    """`speed_share` of velocities that are not an argument of the user's, however large."""
+    share: Floats = np.max(np.abs(dq) / _VELOCITY, axis=-1)
     return share

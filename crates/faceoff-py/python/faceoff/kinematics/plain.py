@@ -43,6 +43,8 @@ TABLE_WIDTH_M = 1.038
 MALLET_RADIUS_M = 0.04815
 
 JOINTS = 7
+# Numbers beyond this mean nothing, as in the protocol.
+NUMBER_LIMIT = 1e4
 # What a command keeps from the bounds of the rules, for the controller's errors.
 JOINT_MARGIN_RAD = 0.01
 HEIGHT_MARGIN_M = 0.01
@@ -132,7 +134,7 @@ def posture_velocities(target: Sequence[float], velocity: Sequence[float]) -> li
     above_rate = vz + HAND_M * math.sin(hand) * hand_rate
     span = math.sin(upper - forearm)
     # Stretched out there is no speed that would do; a large one says so.
-    span = math.copysign(max(abs(span), 1e-9), span)
+    span = math.copysign(max(abs(span), 1e-6), span)
     upper_rate = -(math.sin(forearm) * ahead_rate + math.cos(forearm) * above_rate) / (
         UPPER_ARM_M * span
     )
@@ -310,26 +312,26 @@ def _is_good(q: Sequence[float], point: Vector) -> bool:
     )
 
 
-def _numbers(name: str, given: Sequence[float], count: int) -> list[float]:
-    numbers = [float(x) for x in given]
-    if len(numbers) != count:
-        raise ValueError(f"{name}: expected {count} numbers, got {len(numbers)}")
+def _numbers(name: str, given: Sequence[float], *counts: int) -> list[float]:
+    try:
+        numbers = [float(x) for x in given]
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name}: expected a sequence of numbers, got {given!r:.80}") from error
+    if len(numbers) not in counts:
+        expected = " or ".join(map(str, counts))
+        raise ValueError(f"{name}: expected {expected} numbers, got {len(numbers)}")
     for x in numbers:
-        if not math.isfinite(x):
-            raise ValueError(f"{name}: expected finite numbers, got {x}")
+        # Written so that a number that is none fails.
+        if not abs(x) <= NUMBER_LIMIT:
+            raise ValueError(f"{name}: expected numbers within ±{NUMBER_LIMIT:g}, got {x}")
     return numbers
 
 
 def _point(
     given: Sequence[float], name: str = "target", z: float = EE_DESIRED_HEIGHT_M
 ) -> Vector:
-    if len(given) == 2:
-        x, y = _numbers(name, given, 2)
-    elif len(given) == 3:
-        x, y, z = _numbers(name, given, 3)
-    else:
-        raise ValueError(f"{name}: expected x, y or x, y, z, got {len(given)} numbers")
-    return x, y, z
+    x, y, *rest = _numbers(name, given, 2, 3)
+    return x, y, rest[0] if rest else z
 
 
 def _sum(a: Vector, b: Vector) -> Vector:

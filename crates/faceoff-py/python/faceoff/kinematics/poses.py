@@ -54,13 +54,13 @@ def inverse(target: ArrayLike, q0: ArrayLike | None = None) -> tuple[Floats, NDA
     """
     point = points("target", target, model.EE_DESIRED_HEIGHT_M)
     if q0 is None:
-        q = _posture(point)
+        q = posture(point)
     else:
         point, start = together("target and q0", point, joints("q0", q0))
         leading = point.shape[:-1]
         q = _least_squares(point.reshape(-1, 3), start.reshape(-1, model.JOINTS))
         q = q.reshape(*leading, model.JOINTS)
-    return q, _is_good(q, point)
+    return q, is_good(q, point)
 
 
 def posture_velocities(target: ArrayLike, velocity: ArrayLike) -> Floats:
@@ -73,22 +73,27 @@ def posture_velocities(target: ArrayLike, velocity: ArrayLike) -> Floats:
         points("target", target, model.EE_DESIRED_HEIGHT_M),
         points("velocity", velocity, 0.0),
     )
+    return posture_rates(point, speed)
+
+
+def posture_rates(point: Floats, speed: Floats) -> Floats:
+    """`posture_velocities` of (..., 3) and (..., 3), however large."""
     x, y = point[..., 0], point[..., 1]
     vx, vy, vz = speed[..., 0], speed[..., 1], speed[..., 2]
     reach = np.maximum(np.hypot(x, y), 1e-6)
     outwards = (x * vx + y * vy) / reach
-    posture = _posture(point)
-    upper = posture[..., 1]
-    forearm = upper - posture[..., 3]
-    hand = forearm + posture[..., 5]
+    q = posture(point)
+    upper = q[..., 1]
+    forearm = upper - q[..., 3]
+    hand = forearm + q[..., 5]
     hand_rate = -plain.HAND_PER_REACH_RAD_M * outwards
     ahead_rate = outwards - _HAND * np.cos(hand) * hand_rate
     above_rate = vz + _HAND * np.sin(hand) * hand_rate
     span = np.sin(upper - forearm)
-    span = np.copysign(np.maximum(np.abs(span), 1e-9), span)
+    span = np.copysign(np.maximum(np.abs(span), 1e-6), span)
     upper_rate = -(np.sin(forearm) * ahead_rate + np.cos(forearm) * above_rate) / (_UPPER * span)
     forearm_rate = (np.cos(upper) * above_rate + np.sin(upper) * ahead_rate) / (_FOREARM * span)
-    rates = np.zeros_like(posture)
+    rates = np.zeros_like(q)
     rates[..., 0] = (x * vy - y * vx) / (reach * reach)
     rates[..., 1] = upper_rate
     rates[..., 3] = upper_rate - forearm_rate
@@ -137,7 +142,8 @@ def _jacobian(origins: Floats, axes: Floats) -> Floats:
     return rows
 
 
-def _posture(point: Floats) -> Floats:
+def posture(point: Floats) -> Floats:
+    """`inverse` of (..., 3) without a start: (..., 7)."""
     x, y, z = point[..., 0], point[..., 1], point[..., 2]
     reach = np.hypot(x, y)
     hand = _HAND_START - plain.HAND_PER_REACH_RAD_M * (reach - _START_REACH)
@@ -213,7 +219,8 @@ def _weighted(rows: Floats, wish: Floats, weight: Floats) -> Floats:
     return answer
 
 
-def _is_good(q: Floats, point: Floats) -> NDArray[np.bool_]:
+def is_good(q: Floats, point: Floats) -> NDArray[np.bool_]:
+    """Whether poses (..., 7) have the end effector at points (..., 3), within all bounds: (...)."""
     origins, _ = _chain(q)
     error = point - origins[..., -1, :]
     near = np.sum(error * error, axis=-1) <= plain.TOLERANCE_M**2

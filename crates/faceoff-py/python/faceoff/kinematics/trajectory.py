@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 
 from faceoff.kinematics import model
 from faceoff.kinematics.arrays import Floats, finite, joints, points
-from faceoff.kinematics.limits import constraints, speed_share
-from faceoff.kinematics.poses import inverse, posture_velocities
+from faceoff.kinematics.limits import constraints, share_of
+from faceoff.kinematics.poses import is_good, posture, posture_rates
 
 INTERPOLATIONS = (1, 2, 3, 4, 5, -1, None)
 """As the protocol numbers them."""
@@ -170,7 +170,7 @@ def _shortest(ends: list[Floats], share: float) -> int:
 
     def is_allowed(steps: int) -> bool:
         at, speed = _path(ends, steps, _times(steps))
-        return bool(speed_share(posture_velocities(at, speed)).max() <= share)
+        return bool(share_of(posture_rates(at, speed)).max() <= share)
 
     most = 1
     while most < _STEPS_MAX and not is_allowed(most):
@@ -210,15 +210,15 @@ def _path(ends: list[Floats], steps: int, t: Floats) -> tuple[Floats, Floats]:
 def _motion(ends: list[Floats], steps: int, share: float) -> Trajectory:
     t = _times(steps)
     at, speed = _path(ends, steps, t)
-    q, reached = inverse(at)
-    dq = posture_velocities(at, speed)
+    q = posture(at)
+    dq = posture_rates(at, speed)
     before, after = (
-        posture_velocities(*_path(ends, steps, t + instant)) for instant in (-_INSTANT_S, _INSTANT_S)
+        posture_rates(*_path(ends, steps, t + instant)) for instant in (-_INSTANT_S, _INSTANT_S)
     )
     ddq = (after - before) / (2.0 * _INSTANT_S)
     dense = np.stack([q, dq, ddq], axis=1).reshape(steps, model.SUBSTEPS, 3, model.JOINTS)
-    fastest = float(speed_share(dq).max())
-    worst = constraints(q, dq).worst()
+    fastest = float(share_of(dq).max())
+    worst = constraints(q, np.zeros_like(q)).worst()
     inside = all(bool((values <= 0.0).all()) for values in worst.values())
     knots = dense[:, -1]
     return Trajectory(
@@ -227,7 +227,7 @@ def _motion(ends: list[Floats], steps: int, share: float) -> Trajectory:
         ddq=knots[:, 2],
         dense=dense,
         speed_share=fastest,
-        ok=bool(reached.all()) and inside and fastest <= share,
+        ok=bool(is_good(q, at).all()) and inside and fastest <= share,
     )
 
 
