@@ -4,11 +4,12 @@ The simulator's numbers come from `faceoff sim kinematics` and `faceoff sim trac
 """
 
 import math
+import subprocess
 import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from program import REPOSITORY, exported, faceoff, kinematics, trace
+from program import PROGRAM, REPOSITORY, exported, faceoff, kinematics, trace
 
 from faceoff.kinematics import model as numbers
 
@@ -226,6 +227,37 @@ def test_a_bounce_off_a_long_rim_in_mujoco_is_near_ours(vy):
     assert np.linalg.norm(difference) < 0.02 * math.hypot(0.5, vy)
 
 
+DOCUMENT = (REPOSITORY / "docs" / "robot.md").read_text()
+
+
+def test_the_document_tells_the_universal_joints_controller():
+    """The rest of the page's numbers is held by the simulator's own tests."""
+    words = " ".join(DOCUMENT.split())
+    for sentence in (
+        f"{numbers.UNIVERSAL_KP_N_M:g} N m/rad times what is missing",
+        f"less {numbers.UNIVERSAL_KD_N_M_S:g} N m s/rad times the hinge's speed",
+        f"with {numbers.UNIVERSAL_FILTER_NEW:g} of the newest",
+        f"at most {numbers.UNIVERSAL_TORQUE_LIMIT_N_M:g} N m",
+        f"within ±{numbers.UNIVERSAL_RANGE_RAD / (math.pi / 2):g}·π/2",
+        f"{numbers.LIMITER_GAIN_PER_S:g} per second times the distance left to the stop",
+        f"Elbow and wrist (the origins of links 4 and 7): above {numbers.LINK_HEIGHT_M:g} m",
+        f"{100 * numbers.EE_HEIGHT_TOLERANCE_M:g} cm more or less",
+    ):
+        assert sentence in words, sentence
+
+
+def test_the_documents_programs_run(tmp_path, monkeypatch):
+    pytest.importorskip("pinocchio")
+    pytest.importorskip("mujoco")
+    (tmp_path / "robot.urdf").write_text(exported("urdf"))
+    (tmp_path / "robot.xml").write_text(exported("mjcf"))
+    monkeypatch.chdir(tmp_path)
+    programs = [part.split("```")[0] for part in DOCUMENT.split("```python\n")[1:]]
+    assert len(programs) == 2
+    for program in programs:
+        exec(compile(program, "docs/robot.md", "exec"), {})
+
+
 @pytest.mark.parametrize("model", FIELDS)
 @pytest.mark.parametrize("form", ["urdf", "mjcf"])
 def test_files_need_no_other_files(form, model):
@@ -259,10 +291,6 @@ def test_out_writes_what_is_otherwise_printed(tmp_path):
     ],
 )
 def test_wrong_options_are_told(options, words):
-    import subprocess
-
-    from program import PROGRAM
-
     done = subprocess.run([PROGRAM, "sim", "export", *options], capture_output=True, text=True)
     assert done.returncode != 0 and words in done.stderr, done.stderr
     assert done.stdout == ""
