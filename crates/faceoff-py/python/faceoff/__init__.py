@@ -1,1 +1,42 @@
-"""Develop, train and evaluate agents for the robot air hockey competition."""
+"""Develop, train and evaluate agents for the robot air hockey competition.
+
+Importing this package is cheap: what needs the simulator or another package is imported when it is used.
+
+- :mod:`faceoff.agent`: the protocol loop of an agent, standard library only.
+- :mod:`faceoff.kinematics`: the robot's geometry.
+- :mod:`faceoff.gym`: Gymnasium environments of the three tasks, one world or many.
+- :mod:`faceoff.game`: the game of two robots, for PettingZoo and self-play.
+- :mod:`faceoff.sb3`: the vector environment as Stable-Baselines3 expects it.
+- :mod:`faceoff.dataset`: recorded episodes.
+- :func:`faceoff.evaluate`: the competition's evaluator with a policy in this process.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from faceoff.errors import ArgumentError, ArgumentTypeError, ClosedError, Error, OrderError
+
+if TYPE_CHECKING:
+    from faceoff._evaluate import evaluate
+
+__all__ = [
+    "ArgumentError",
+    "ArgumentTypeError",
+    "ClosedError",
+    "Error",
+    "OrderError",
+    "evaluate",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "evaluate":
+        from faceoff._evaluate import evaluate
+
+        return evaluate
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("faceoff")
+    raise AttributeError(f"module 'faceoff' has no attribute {name!r}")

@@ -1,0 +1,162 @@
+"""Checks of what users pass in, and the setup that the native half reads."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from faceoff import _native
+from faceoff.errors import ArgumentError, ArgumentTypeError
+
+Task = Literal["hit", "defend", "prepare"]
+ActionMode = Literal["delta", "absolute", "raw"]
+
+TASKS: tuple[Task, ...] = ("hit", "defend", "prepare")
+ACTION_MODES: tuple[ActionMode, ...] = ("delta", "absolute", "raw")
+FACTORS = ("model_mismatch", "observation_noise", "disturbance", "tracking_loss", "delay")
+PROFILES: dict[str, tuple[str, ...]] = {
+    "ideal": (),
+    **{factor: (factor,) for factor in FACTORS},
+    "evaluation": FACTORS[:4],
+}
+#: Seeds are below this, so that they fit into arrays of NumPy.
+SEED_BOUND = 2**63
+
+
+def one_of(name: str, value: object, known: Iterable[str]) -> str:
+    """``value`` if it is one of the known words."""
+    words = list(known)
+    if not isinstance(value, str):
+        raise ArgumentTypeError(f"{name}: expected one of {', '.join(words)}, got {value!r}")
+    if value not in words:
+        raise ArgumentError(f"{name}: expected one of {', '.join(words)}, got {value!r}")
+    return value
+
+
+def integer(name: str, value: object, least: int, most: int) -> int:
+    """``value`` as an int in these bounds; a bool is none."""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
+        raise ArgumentTypeError(
+            f"{name}: expected a whole number from {least} to {most}, got {value!r}"
+        )
+    if not least <= value <= most:
+        raise ArgumentError(f"{name}: expected a whole number from {least} to {most}, got {value}")
+    return int(value)
+
+
+def seed_number(name: str, value: object) -> int:
+    """``value`` as a seed of an environment."""
+    return integer(name, value, 0, SEED_BOUND - 1)
+
+
+def numbers(name: str, value: object, shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
+    """``value`` as a contiguous array of this shape; numbers are not looked at."""
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise ArgumentError(f"{name}: expected an array of shape {shape}, got {error}") from None
+    if array.dtype.kind not in "fiu":
+        raise ArgumentTypeError(f"{name}: expected real numbers, got {array.dtype} ({value!r:.80})")
+    if array.shape != shape:
+        raise ArgumentError(f"{name}: expected an array of shape {shape}, got one of shape {array.shape}")
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def mask(name: str, value: object, length: int) -> npt.NDArray[np.bool_]:
+    """``value`` as a mask that is true somewhere."""
+    if not isinstance(value, np.ndarray) or value.dtype != np.bool_:
+        raise ArgumentTypeError(f"{name}: expected a NumPy array of bool, got {value!r:.80}")
+    if value.shape != (length,):
+        raise ArgumentError(f"{name}: expected an array of shape ({length},), got one of shape {value.shape}")
+    if not value.any():
+        raise ArgumentError(f"{name}: expected at least one true value, got none")
+    return np.ascontiguousarray(value)
+
+
+def interpolation_code(value: object) -> int | None:
+    """``value`` as the protocol's code of an interpolation."""
+    if value is None:
+        return None
+    code = integer("interpolation", value, -1, 5)
+    _native.action_shape(code)
+    return code
+
+
+def factor_names(profile: object) -> list[str]:
+    """The factors of a profile's name, or of a sequence of factors' names."""
+    if isinstance(profile, str):
+        return list(PROFILES[one_of("profile", profile, PROFILES)])
+    if not isinstance(profile, Iterable):
+        raise ArgumentTypeError(
+            f"profile: expected a profile's name or names of factors, got {profile!r}"
+        )
+    names = [one_of("profile", name, FACTORS) for name in profile]
+    return [factor for factor in FACTORS if factor in names]
+
+
+def perturbations_json(perturbations: object) -> Any:
+    """Magnitudes of perturbations, as JSON has them."""
+    if perturbations is None:
+        return {}
+    if not isinstance(perturbations, Mapping):
+        raise ArgumentTypeError(
+            f"perturbations: expected a mapping like {{'tracking_loss': {{'probability': 0.0}}}}, "
+            f"got {perturbations!r:.80}"
+        )
+    return dict(perturbations)
+
+
+def season_seed(value: object) -> str | None:
+    """A seed of the model mismatch: a number or 64 hexadecimal digits."""
+    if value is None:
+        return None
+    return any_seed("mismatch_seed", value)
+
+
+def any_seed(name: str, value: object) -> str:
+    """A seed as the command line takes it: a number below 2**64 or 64 hexadecimal digits."""
+    if isinstance(value, str):
+        if len(value) == 64 and all(digit in "0123456789abcdefABCDEF" for digit in value):
+            return value
+        raise ArgumentError(f"{name}: expected a number or 64 hexadecimal digits, got {value!r:.80}")
+    return str(integer(name, value, 0, 2**64 - 1))
+
+
+def write_setup(
+    *,
+    task: object,
+    interpolation: int | None,
+    action_mode: object,
+    clip_actions: object,
+    profile: object,
+    perturbations: object,
+    mismatch_seed: object,
+    max_episode_steps: object,
+) -> str:
+    """What the native half reads: checked, as JSON."""
+    steps = _native.EPISODE_STEPS
+    horizon = steps if max_episode_steps is None else max_episode_steps
+    setup = {
+        "task": one_of("task", task, TASKS),
+        "interpolation": interpolation_code(interpolation),
+        "action_mode": one_of("action_mode", action_mode, ACTION_MODES),
+        "clip_actions": bool(clip_actions),
+        "factors": factor_names(profile),
+        "perturbations": perturbations_json(perturbations),
+        "mismatch_seed": season_seed(mismatch_seed),
+        "max_episode_steps": integer("max_episode_steps", horizon, 1, steps),
+    }
+    try:
+        return json.dumps(setup, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise ArgumentError(f"perturbations: expected finite numbers in mappings, got {error}") from None
+
+
+def action_len(interpolation: int | None) -> int:
+    """Numbers in an action."""
+    return math.prod(_native.action_shape(interpolation))

@@ -1,0 +1,48 @@
+"""Gymnasium environments of the three qualifying tasks.
+
+Importing this module registers ``faceoff/AirHockey-Hit-v0``, ``faceoff/AirHockey-Defend-v0`` and
+``faceoff/AirHockey-Prepare-v0``::
+
+    import gymnasium, faceoff.gym
+    env = gymnasium.make("faceoff/AirHockey-Defend-v0", profile="evaluation")
+    envs = gymnasium.make_vec("faceoff/AirHockey-Defend-v0", num_envs=256)
+
+Arguments of ``make`` are those of :class:`AirHockeyEnv`, of ``make_vec`` those of :class:`AirHockeyVectorEnv`.
+"""
+
+from __future__ import annotations
+
+try:
+    import gymnasium
+except ImportError as error:  # pragma: no cover - depends on what is installed
+    from faceoff.errors import MissingError
+
+    raise MissingError("faceoff.gym needs gymnasium: pip install 'faceoff[gym]'") from error
+
+from faceoff.gym.env import AirHockeyEnv
+from faceoff.gym.reward import CONSTRAINTS, Reward, State, Transition
+from faceoff.gym.vector import AirHockeyVectorEnv
+
+__all__ = [
+    "CONSTRAINTS",
+    "AirHockeyEnv",
+    "AirHockeyVectorEnv",
+    "Reward",
+    "State",
+    "Transition",
+]
+
+
+def _register() -> None:
+    for task in ("hit", "defend", "prepare"):
+        identifier = f"faceoff/AirHockey-{task.capitalize()}-v0"
+        if identifier not in gymnasium.registry:
+            gymnasium.register(
+                identifier,
+                entry_point="faceoff.gym.env:AirHockeyEnv",
+                vector_entry_point="faceoff.gym.vector:AirHockeyVectorEnv",
+                kwargs={"task": task},
+            )
+
+
+_register()

@@ -1,0 +1,253 @@
+"""One world."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+import numpy.typing as npt
+
+from faceoff import _native
+from faceoff._arguments import ActionMode, Task, integer, numbers, one_of, seed_number, write_setup
+from faceoff.errors import ArgumentError, ArgumentTypeError, ClosedError
+from faceoff.gym.reward import Reward, State, Transition
+from faceoff.gym.rows import Rows
+from faceoff.gym.spaces import action_space, observation_space
+
+Observation = npt.NDArray[np.float32]
+
+#: What ``reset`` takes as options.
+OPTIONS = ("episode", "puck")
+
+
+class AirHockeyEnv(gymnasium.Env[Observation, npt.NDArray[np.floating[Any]]]):
+    """A task of the qualifying stage.
+
+    Args:
+        task: ``hit``, ``defend`` or ``prepare``.
+        interpolation: how actions become trajectories: 1, 2, 3, 4, 5, -1 or None (docs/protocol.md); the action has
+            7, 7, 14, 14, 21, 14 or 420 numbers.
+        action_mode: ``delta``, ``absolute`` or ``raw`` (docs/python.md, "Actions").
+        clip_actions: bring numbers that are too large to their bounds, instead of refusing them.
+        profile: what perturbs the world: a profile's name, or names of factors.
+        perturbations: magnitudes other than the ruleset's, as in ``{"tracking_loss": {"probability": 0.0}}``.
+        mismatch_seed: seed of the arm's deviation from its model, where that is switched on; left out, it follows from
+            the seed of ``reset``, so that another seed is another robot.
+        max_episode_steps: where an episode is cut off, at most 500.
+        reward: from a :class:`~faceoff.gym.reward.Transition` to a number, instead of the default reward.
+        render_mode: ``rgb_array``, ``human`` or None.
+
+    Episodes are those of the competition's evaluator: after ``reset(seed=s)`` the first is episode 0 of
+    ``faceoff eval --seed s``, each ``reset()`` plays the next one. ``options={"episode": 7}`` plays that one,
+    ``options={"puck": [x, y, yaw, vx, vy, yaw_rate]}`` (table's frame) starts with that puck.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+        "render_modes": ["rgb_array", "human"],
+        "render_fps": 50,
+    }
+
+    def __init__(
+        self,
+        task: Task = "defend",
+        *,
+        interpolation: int | None = 1,
+        action_mode: ActionMode = "delta",
+        clip_actions: bool = False,
+        profile: str | Sequence[str] = "ideal",
+        perturbations: Mapping[str, Any] | None = None,
+        mismatch_seed: int | str | None = None,
+        max_episode_steps: int | None = None,
+        reward: Reward | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        self._setup = write_setup(
+            task=task,
+            interpolation=interpolation,
+            action_mode=action_mode,
+            clip_actions=clip_actions,
+            profile=profile,
+            perturbations=perturbations,
+            mismatch_seed=mismatch_seed,
+            max_episode_steps=max_episode_steps,
+        )
+        if render_mode is not None:
+            one_of("render_mode", render_mode, self.metadata["render_modes"])
+        if reward is not None and not callable(reward):
+            raise ArgumentTypeError(f"reward: expected a function of a Transition, got {reward!r}")
+        self.task = task
+        self.render_mode = render_mode
+        self.observation_space = observation_space(task)
+        self.action_space = action_space(interpolation, action_mode)
+        self._action_shape = self.action_space.shape
+        self._reward = reward
+        self._window: Any = None
+        self._worlds: _native.Worlds | None = _native.Worlds(self._setup, 1, 1, "disabled")
+        self._is_started = False
+        self._rows = self._new_rows()
+
+    def _new_rows(self) -> Rows:
+        length = self.observation_space.shape[0]  # type: ignore[index]
+        return Rows.make(1, length, finals=False, states=self._reward is not None)
+
+    def _open(self) -> _native.Worlds:
+        if self._worlds is None:
+            raise ClosedError("expected an open environment, got one that was closed: make a new one")
+        return self._worlds
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begins an episode. Returns its first observation, and ``seed`` and ``episode_number`` as info."""
+        worlds = self._open()
+        if seed is not None:
+            seed_number("seed", seed)
+        number, puck = read_options(options)
+        super().reset(seed=seed)
+        if seed is None and not self._is_started:
+            seed = int(self.np_random.integers(2**63))
+        everything = np.ones(1, np.bool_)
+        worlds.reset(everything, [seed], number, puck, self._rows.arrays())
+        self._is_started = True
+        self._show()
+        return self._rows.observations[0].copy(), self._origin()
+
+    def step(
+        self, action: Any
+    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """One control step, 20 ms.
+
+        Info has ``constraints``, 4 values in the order of :data:`faceoff.gym.CONSTRAINTS`, and at an end ``success``,
+        ``end`` (why), ``violations`` (4 bools) and ``steps``.
+        """
+        worlds = self._open()
+        given = numbers("action", action, self._action_shape)  # type: ignore[arg-type]
+        rows = self._rows
+        before = None if self._reward is None else (rows.observations[0].copy(), rows.next_states[0].copy())
+        worlds.step(given.reshape(1, -1), rows.arrays())
+        terminated, truncated = bool(rows.terminated[0]), bool(rows.truncated[0])
+        info: dict[str, Any] = {"constraints": rows.constraints[0]}
+        if terminated or truncated:
+            info["success"] = bool(rows.success[0])
+            info["end"] = _native.ENDS[rows.ends[0]]
+            info["violations"] = rows.violations[0]
+            info["steps"] = int(rows.steps[0])
+        reward = float(rows.rewards[0])
+        if self._reward is not None and before is not None:
+            transition = Transition(
+                observation=before[0],
+                action=given,
+                next_observation=rows.observations[0].copy(),
+                state=State(before[1]),
+                next_state=State(rows.states[0].copy()),
+                constraints=info["constraints"],
+                violations=rows.violations[0],
+                success=rows.success[0],
+                terminated=rows.terminated[0],
+                truncated=rows.truncated[0],
+            )
+            reward = checked_reward(self._reward(transition))
+        self._show()
+        return rows.observations[0].copy(), reward, terminated, truncated, info
+
+    def save(self) -> _native.Snapshot:
+        """The exact state of the world; it can be pickled."""
+        return self._open().save(0)
+
+    def restore(self, state: _native.Snapshot) -> tuple[Observation, dict[str, Any]]:
+        """Brings the world back to a saved state, of this environment or of another one made alike.
+
+        Returns the observation there, and info as :meth:`reset` does.
+        """
+        if not isinstance(state, _native.Snapshot):
+            raise ArgumentTypeError(f"state: expected what save() returned, got {state!r:.80}")
+        self._open().restore(0, state, self._rows.arrays())
+        self._is_started = True
+        return self._rows.observations[0].copy(), self._origin()
+
+    @property
+    def state(self) -> State:
+        """The true state now."""
+        return State(np.array(self._open().state(0)))
+
+    def _origin(self) -> dict[str, Any]:
+        [(seed, number)] = self._open().origins()
+        return {"seed": seed, "episode_number": number}
+
+    def render(self) -> npt.NDArray[np.uint8] | None:  # type: ignore[override]
+        """(360, 640, 3) uint8 of the table from above for ``rgb_array``; a window for ``human``."""
+        if self.render_mode is None:
+            raise ArgumentError(
+                "render: expected an environment made with render_mode='rgb_array' or 'human', got None"
+            )
+        from faceoff.gym.render import draw
+
+        frame = draw(self.state, has_opponent=self.task == "hit")
+        if self.render_mode == "rgb_array":
+            return frame
+        if self._window is None:
+            from faceoff.gym.window import Window
+
+            self._window = Window(f"faceoff {self.task}", self.metadata["render_fps"])
+        self._window.show(frame)
+        return None
+
+    def _show(self) -> None:
+        if self.render_mode == "human":
+            self.render()
+
+    def close(self) -> None:
+        """Gives up the world and the window; may be called again."""
+        if self._worlds is not None:
+            self._worlds.close()
+            self._worlds = None
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        kept = self.__dict__.copy()
+        worlds = kept.pop("_worlds")
+        kept["_window"] = None
+        kept["_is_open"] = worlds is not None
+        kept["_saved"] = worlds.save(0) if worlds is not None and self._is_started else None
+        return kept
+
+    def __setstate__(self, kept: dict[str, Any]) -> None:
+        is_open, saved = kept.pop("_is_open"), kept.pop("_saved")
+        self.__dict__.update(kept)
+        self._worlds = _native.Worlds(self._setup, 1, 1, "disabled") if is_open else None
+        self._rows = self._new_rows()
+        if saved is not None:
+            self.restore(saved)
+
+
+def read_options(options: Mapping[str, Any] | None) -> tuple[int | None, list[float] | None]:
+    """The episode's number and the puck's first state, where they are given."""
+    if options is None:
+        return None, None
+    if not isinstance(options, Mapping):
+        raise ArgumentTypeError(f"options: expected a mapping, got {options!r:.80}")
+    unknown = [name for name in options if name not in OPTIONS]
+    if unknown:
+        raise ArgumentError(f"options: expected {' and '.join(OPTIONS)}, got {unknown[0]!r}")
+    number = options.get("episode")
+    if number is not None:
+        number = integer("options['episode']", number, 0, 2**32 - 1)
+    puck = options.get("puck")
+    if puck is not None:
+        puck = numbers("options['puck']", puck, (6,)).tolist()
+    return number, puck
+
+
+def checked_reward(value: Any) -> float:
+    """What a reward function returned, if it is a finite number."""
+    try:
+        reward = float(value)
+    except (TypeError, ValueError):
+        raise ArgumentTypeError(f"reward: expected a function that returns a number, got {value!r:.80}") from None
+    if not np.isfinite(reward):
+        raise ArgumentError(f"reward: expected a finite number, got {reward}")
+    return reward

@@ -1,0 +1,71 @@
+"""The table from above, drawn by NumPy alone."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from faceoff.gym.reward import State
+
+#: Pixels.
+HEIGHT, WIDTH = 360, 640
+#: Metres of a pixel: the table with a margin.
+SCALE = 2.16 / WIDTH
+
+HALF_LENGTH, HALF_WIDTH, HALF_GOAL = 0.974, 0.519, 0.125
+PUCK_RADIUS, MALLET_RADIUS = 0.03165, 0.04815
+#: The robots' bases, along x.
+BASE_X = 1.51
+
+FLOOR = (58, 64, 72)
+TABLE = (238, 241, 244)
+LINES = (176, 190, 204)
+GOALS = (208, 96, 72)
+PUCK = (24, 26, 30)
+OWN = (32, 110, 190)
+OTHER = (200, 120, 30)
+
+Picture = npt.NDArray[np.uint8]
+
+
+@lru_cache(maxsize=1)
+def _grid() -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """x of each column and y of each row, m."""
+    x = (np.arange(WIDTH) + 0.5 - WIDTH / 2) * SCALE
+    y = (HEIGHT / 2 - np.arange(HEIGHT) - 0.5) * SCALE
+    return x[None, :], y[:, None]
+
+
+@lru_cache(maxsize=1)
+def _table() -> Picture:
+    x, y = _grid()
+    picture = np.empty((HEIGHT, WIDTH, 3), np.uint8)
+    picture[:] = FLOOR
+    picture[(np.abs(x) <= HALF_LENGTH) & (np.abs(y) <= HALF_WIDTH)] = TABLE
+    middle = (np.abs(x) < SCALE) & (np.abs(y) <= HALF_WIDTH)
+    circle = np.abs(np.hypot(x, y) - 0.15) < SCALE
+    picture[middle | circle] = LINES
+    picture[(np.abs(np.abs(x) - HALF_LENGTH) < 3 * SCALE) & (np.abs(y) <= HALF_GOAL)] = GOALS
+    return picture
+
+
+def _disc(picture: Picture, x_m: float, y_m: float, radius_m: float, colour: tuple[int, int, int]) -> None:
+    x, y = _grid()
+    picture[np.hypot(x - x_m, y - y_m) <= radius_m] = colour
+
+
+def draw(state: State, *, has_opponent: bool) -> Picture:
+    """(360, 640, 3) uint8: the table, the puck with a mark that shows its yaw, and the mallets."""
+    picture = _table().copy()
+    own_x, own_y, _ = state.mallet
+    _disc(picture, own_x - BASE_X, own_y, MALLET_RADIUS, OWN)
+    if has_opponent:
+        x, y, _ = state.opponent
+        _disc(picture, BASE_X - x, -y, MALLET_RADIUS, OTHER)
+    x, y, yaw = state.puck[:3]
+    _disc(picture, x, y, PUCK_RADIUS, PUCK)
+    mark = 0.6 * PUCK_RADIUS
+    _disc(picture, x + mark * np.cos(yaw), y + mark * np.sin(yaw), 0.25 * PUCK_RADIUS, TABLE)
+    return picture

@@ -1,0 +1,199 @@
+//! Where a step's results are written: a row per world, of arrays that lie in Python's memory or in ours.
+
+use crate::{
+    observation,
+    setup::Setup,
+    world::{STATE_LEN, World},
+};
+use rayon::prelude::*;
+
+/// Numbers that are told of a world after a step; see [`write_facts`].
+pub const FACTS: usize = 12;
+
+/// Rows of all worlds, or of some that follow each other.
+pub struct Outputs<'a> {
+    /// Numbers in an observation.
+    pub observation_len: usize,
+    /// [worlds][observation]: what the agent is told next.
+    pub observations: &'a mut [f32],
+    /// [worlds][observation]: what the step led to, where a new episode has begun since; others are left as they
+    /// are. Empty if nobody asks.
+    pub final_observations: &'a mut [f32],
+    /// [worlds]
+    pub rewards: &'a mut [f64],
+    /// [worlds]
+    pub terminated: &'a mut [bool],
+    /// [worlds]
+    pub truncated: &'a mut [bool],
+    /// [worlds][[`FACTS`]]
+    pub facts: &'a mut [f64],
+    /// [worlds][[`STATE_LEN`]]: the true state that the step led to. Empty if nobody asks.
+    pub states: &'a mut [f64],
+    /// [worlds][[`STATE_LEN`]]: the true state now, of the new episode where one has begun. Empty if nobody asks.
+    pub next_states: &'a mut [f64],
+}
+
+impl<'a> Outputs<'a> {
+    /// Cut into pieces of `worlds` rows, in order.
+    pub fn pieces(self, worlds: usize) -> Vec<Outputs<'a>> {
+        let count = self.rewards.len().div_ceil(worlds);
+        let len = self.observation_len;
+        let mut observations = self.observations.chunks_mut(len * worlds);
+        let mut finals = self.final_observations.chunks_mut(len * worlds);
+        let mut rewards = self.rewards.chunks_mut(worlds);
+        let mut terminated = self.terminated.chunks_mut(worlds);
+        let mut truncated = self.truncated.chunks_mut(worlds);
+        let mut facts = self.facts.chunks_mut(FACTS * worlds);
+        let mut states = self.states.chunks_mut(STATE_LEN * worlds);
+        let mut next_states = self.next_states.chunks_mut(STATE_LEN * worlds);
+        (0..count)
+            .map(|_| Outputs {
+                observation_len: len,
+                observations: observations.next().unwrap_or_default(),
+                final_observations: finals.next().unwrap_or_default(),
+                rewards: rewards.next().unwrap_or_default(),
+                terminated: terminated.next().unwrap_or_default(),
+                truncated: truncated.next().unwrap_or_default(),
+                facts: facts.next().unwrap_or_default(),
+                states: states.next().unwrap_or_default(),
+                next_states: next_states.next().unwrap_or_default(),
+            })
+            .collect()
+    }
+
+    /// Writes what is told of a world that was reset, or restored.
+    pub fn write_start(&mut self, row: usize, world: &World) {
+        self.write_observation(row, world);
+        self.write_state(row, world);
+        self.write_next_state(row, world);
+        let values = world.episode.constraints();
+        let constraints = [values.ee, values.link, values.joint_pos, values.joint_vel];
+        write_facts(world, &constraints, &mut self.facts[row * FACTS..][..FACTS]);
+        self.rewards[row] = 0.0;
+        self.terminated[row] = false;
+        self.truncated[row] = false;
+    }
+
+    /// What the agent is told next.
+    pub fn write_observation(&mut self, row: usize, world: &World) {
+        let len = self.observation_len;
+        let place = &mut self.observations[row * len..][..len];
+        observation::write(world.episode.observation(), place);
+    }
+
+    /// What the step led to, before a new episode begins.
+    pub fn write_final_observation(&mut self, row: usize, world: &World) {
+        let len = self.observation_len;
+        if !self.final_observations.is_empty() {
+            let place = &mut self.final_observations[row * len..][..len];
+            observation::write(world.episode.observation(), place);
+        }
+    }
+
+    /// The state that the step led to.
+    pub fn write_state(&mut self, row: usize, world: &World) {
+        if !self.states.is_empty() {
+            self.states[row * STATE_LEN..][..STATE_LEN].copy_from_slice(&world.state());
+        }
+    }
+
+    /// The state now.
+    pub fn write_next_state(&mut self, row: usize, world: &World) {
+        if !self.next_states.is_empty() {
+            self.next_states[row * STATE_LEN..][..STATE_LEN].copy_from_slice(&world.state());
+        }
+    }
+}
+
+/// Writes what is told of a world: the code of its end (−1: under way), success, the episode's number, steps played, the
+/// values of the constraints ee, link, joint_pos and joint_vel, and whether each was broken in this episode.
+pub fn write_facts(world: &World, constraints: &[f64; 4], facts: &mut [f64]) {
+    let broken = world.episode.violations();
+    facts[0] = world.end.map_or(-1.0, |end| f64::from(end as u8));
+    facts[1] = f64::from(u8::from(world.succeeds()));
+    facts[2] = f64::from(world.origin.number);
+    facts[3] = f64::from(world.episode.steps());
+    facts[4..8].copy_from_slice(constraints);
+    for (fact, broken) in
+        facts[8..]
+            .iter_mut()
+            .zip([broken.ee, broken.link, broken.joint_pos, broken.joint_vel])
+    {
+        *fact = f64::from(u8::from(broken));
+    }
+}
+
+/// Rows in memory of our own, for a step that goes on while Python does something else.
+pub struct OwnRows {
+    observation_len: usize,
+    observations: Vec<f32>,
+    final_observations: Vec<f32>,
+    rewards: Vec<f64>,
+    terminated: Vec<bool>,
+    truncated: Vec<bool>,
+    facts: Vec<f64>,
+    states: Vec<f64>,
+    next_states: Vec<f64>,
+}
+
+impl OwnRows {
+    /// Of so many worlds; true states only if somebody asks.
+    pub fn new(setup: &Setup, worlds: usize, states: bool) -> Self {
+        let observation_len = setup.observation_len();
+        let states = if states { worlds * STATE_LEN } else { 0 };
+        Self {
+            observation_len,
+            observations: vec![0.0; worlds * observation_len],
+            final_observations: vec![0.0; worlds * observation_len],
+            rewards: vec![0.0; worlds],
+            terminated: vec![false; worlds],
+            truncated: vec![false; worlds],
+            facts: vec![0.0; worlds * FACTS],
+            states: vec![0.0; states],
+            next_states: vec![0.0; states],
+        }
+    }
+
+    /// To be written.
+    pub fn rows(&mut self) -> Outputs<'_> {
+        Outputs {
+            observation_len: self.observation_len,
+            observations: &mut self.observations,
+            final_observations: &mut self.final_observations,
+            rewards: &mut self.rewards,
+            terminated: &mut self.terminated,
+            truncated: &mut self.truncated,
+            facts: &mut self.facts,
+            states: &mut self.states,
+            next_states: &mut self.next_states,
+        }
+    }
+
+    /// Copies all to rows of the same lengths; true states and final observations only where they are asked for.
+    pub fn copy_to(&self, to: &mut Outputs<'_>) {
+        to.observations.copy_from_slice(&self.observations);
+        to.rewards.copy_from_slice(&self.rewards);
+        to.terminated.copy_from_slice(&self.terminated);
+        to.truncated.copy_from_slice(&self.truncated);
+        to.facts.copy_from_slice(&self.facts);
+        copy_if_asked(&self.final_observations, to.final_observations);
+        copy_if_asked(&self.states, to.states);
+        copy_if_asked(&self.next_states, to.next_states);
+    }
+}
+
+fn copy_if_asked<T: Copy>(from: &[T], to: &mut [T]) {
+    if !to.is_empty() && !from.is_empty() {
+        to.copy_from_slice(from);
+    }
+}
+
+/// Pieces with the worlds that they are of, to be worked on by several threads.
+pub fn with_worlds<'a, 'w>(
+    worlds: &'w mut [World],
+    outputs: Outputs<'a>,
+    at_a_time: usize,
+) -> impl IndexedParallelIterator<Item = (&'w mut [World], Outputs<'a>)> {
+    let pieces = outputs.pieces(at_a_time);
+    worlds.par_chunks_mut(at_a_time).zip(pieces.into_par_iter())
+}

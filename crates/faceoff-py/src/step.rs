@@ -1,0 +1,91 @@
+//! A control step of some worlds.
+
+use crate::{
+    outputs::{FACTS, Outputs, write_facts},
+    setup::Setup,
+    world::World,
+};
+use faceoff_sim::{ConstraintValues, Episode, StepOutcome, step_together};
+use faceoff_types::EpisodeEnd;
+use serde::Deserialize;
+
+/// What becomes of a world whose episode has ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Autoreset {
+    /// Its next step begins the next episode, whatever the action.
+    NextStep,
+    /// The step that ends it begins the next one.
+    SameStep,
+    /// It waits for a reset; a step before that is refused.
+    Disabled,
+}
+
+/// Steps worlds that follow each other; `actions` is [worlds][action], checked.
+pub fn step(
+    setup: &Setup,
+    autoreset: Autoreset,
+    worlds: &mut [World],
+    actions: &[f64],
+    outputs: &mut Outputs<'_>,
+) {
+    let reader = setup.actions();
+    let len = reader.len();
+    let mut commands = vec![0.0; worlds.len() * len];
+    let mut is_stepped = vec![true; worlds.len()];
+    for (row, world) in worlds.iter_mut().enumerate() {
+        if world.end.is_some() {
+            world.start_next(setup);
+            outputs.write_start(row, world);
+            is_stepped[row] = false;
+        } else {
+            let action = &actions[row * len..][..len];
+            world.actions.extend_from_slice(action);
+            let command = &mut commands[row * len..][..len];
+            reader.command(action, &mut world.commanded, command);
+        }
+    }
+    let outcomes = step_episodes(worlds, &is_stepped, &commands, len);
+    let stepped = worlds
+        .iter_mut()
+        .enumerate()
+        .filter(|(row, _)| is_stepped[*row]);
+    for ((row, world), outcome) in stepped.zip(&outcomes) {
+        let stepped = world.stepped(setup, outcome);
+        outputs.rewards[row] = stepped.reward;
+        outputs.terminated[row] = !matches!(world.end, None | Some(EpisodeEnd::Horizon));
+        outputs.truncated[row] = world.end == Some(EpisodeEnd::Horizon);
+        let facts = &mut outputs.facts[row * FACTS..][..FACTS];
+        write_facts(world, &stepped.constraints, facts);
+        outputs.write_state(row, world);
+        if world.end.is_some() && autoreset == Autoreset::SameStep {
+            outputs.write_final_observation(row, world);
+            world.start_next(setup);
+        }
+        outputs.write_observation(row, world);
+        outputs.write_next_state(row, world);
+    }
+}
+
+/// Steps the episodes of the worlds that are to be stepped; an outcome for each of those.
+fn step_episodes(
+    worlds: &mut [World],
+    is_stepped: &[bool],
+    commands: &[f64],
+    len: usize,
+) -> Vec<StepOutcome> {
+    let (mut episodes, commands): (Vec<&mut Episode>, Vec<&[f64]>) = worlds
+        .iter_mut()
+        .map(|world| &mut world.episode)
+        .zip(commands.chunks_exact(len))
+        .zip(is_stepped)
+        .filter_map(|(both, is_stepped)| is_stepped.then_some(both))
+        .unzip();
+    let unknown = StepOutcome {
+        end: None,
+        constraints: ConstraintValues::default(),
+    };
+    let mut outcomes = vec![unknown; episodes.len()];
+    step_together(&mut episodes, &commands, &mut outcomes);
+    outcomes
+}
