@@ -5,6 +5,8 @@
 
 mod actions;
 mod errors;
+mod evaluate;
+mod game;
 mod observation;
 mod outputs;
 mod pool;
@@ -21,12 +23,19 @@ use pyo3::prelude::*;
 /// `faceoff._native`; what users import is the Python package around it.
 #[pymodule]
 mod _native {
-    use crate::{errors::{argument, fenced}, observation::BOUNDS, outputs::FACTS, world::STATE_LEN};
+    use crate::{
+        errors::{argument, fenced},
+        observation::BOUNDS,
+        outputs::FACTS,
+        world::STATE_LEN,
+    };
     use faceoff_types::{EPISODE_STEPS, EpisodeEnd};
     use pyo3::prelude::*;
 
     #[pymodule_export]
     use crate::{
+        evaluate::{Evaluation, PolicyCourse},
+        game::Game,
         snapshot::{Snapshot, load_snapshot},
         worlds::Worlds,
     };
@@ -57,7 +66,8 @@ mod _native {
     #[pyfunction]
     fn action_shape(interpolation: Option<i64>) -> PyResult<Vec<usize>> {
         let known = faceoff_types::Interpolation::from_code(interpolation);
-        let known = known.map_err(|error| argument("interpolation", "1, 2, 3, 4, 5, -1 or None", error.0))?;
+        let known = known
+            .map_err(|error| argument("interpolation", "1, 2, 3, 4, 5, -1 or None", error.0))?;
         Ok(known.shape().to_vec())
     }
 

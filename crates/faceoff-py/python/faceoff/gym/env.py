@@ -15,6 +15,7 @@ from faceoff.errors import ArgumentError, ArgumentTypeError, ClosedError
 from faceoff.gym.reward import Reward, State, Transition
 from faceoff.gym.rows import Rows
 from faceoff.gym.spaces import action_space, observation_space
+from faceoff.gym.turn import Turn, alone
 
 Observation = npt.NDArray[np.float32]
 
@@ -85,6 +86,7 @@ class AirHockeyEnv(gymnasium.Env[Observation, npt.NDArray[np.floating[Any]]]):
         self._reward = reward
         self._window: Any = None
         self._worlds: _native.Worlds | None = _native.Worlds(self._setup, 1, 1, "disabled")
+        self._turn = Turn()
         self._is_started = False
         self._rows = self._new_rows()
 
@@ -97,6 +99,7 @@ class AirHockeyEnv(gymnasium.Env[Observation, npt.NDArray[np.floating[Any]]]):
             raise ClosedError("expected an open environment, got one that was closed: make a new one")
         return self._worlds
 
+    @alone
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
@@ -114,6 +117,7 @@ class AirHockeyEnv(gymnasium.Env[Observation, npt.NDArray[np.floating[Any]]]):
         self._show()
         return self._rows.observations[0].copy(), self._origin()
 
+    @alone
     def step(
         self, action: Any
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -152,10 +156,12 @@ class AirHockeyEnv(gymnasium.Env[Observation, npt.NDArray[np.floating[Any]]]):
         self._show()
         return rows.observations[0].copy(), reward, terminated, truncated, info
 
+    @alone
     def save(self) -> _native.Snapshot:
         """The exact state of the world; it can be pickled."""
         return self._open().save(0)
 
+    @alone
     def restore(self, state: _native.Snapshot) -> tuple[Observation, dict[str, Any]]:
         """Brings the world back to a saved state, of this environment or of another one made alike.
 

@@ -19,6 +19,7 @@ from faceoff.gym.env import AirHockeyEnv, read_options
 from faceoff.gym.reward import Reward, State, Transition
 from faceoff.gym.rows import Rows
 from faceoff.gym.spaces import action_space, observation_space
+from faceoff.gym.turn import Turn, alone
 
 try:
     from gymnasium.vector import AutoresetMode
@@ -106,6 +107,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._reward = reward
+        self._turn = Turn()
         self._is_started = False
         self._seeds = np.zeros(self.num_envs, np.int64)
         self._sent: tuple[Floats, npt.NDArray[np.float32], Floats] | None = None
@@ -131,6 +133,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
 
     # --- reset -------------------------------------------------------------------------------------------------
 
+    @alone
     def reset(
         self,
         *,
@@ -144,6 +147,8 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
             options: ``reset_mask``, and ``episode`` and ``puck`` as of :meth:`AirHockeyEnv.reset`, for all worlds.
         """
         worlds = self._open()
+        if options is not None and not isinstance(options, Mapping):
+            raise ArgumentTypeError(f"options: expected a mapping, got {options!r:.80}")
         options = dict(options or {})
         is_reset = np.ones(self.num_envs, np.bool_)
         if options.get("reset_mask") is not None:
@@ -191,6 +196,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
 
     # --- step --------------------------------------------------------------------------------------------------
 
+    @alone
     def step(self, actions: Any) -> Step:
         """One control step of every world, 20 ms; ``actions`` is (num_envs, n).
 
@@ -204,6 +210,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         worlds.step(given, rows.arrays())
         return self._result(given, before)
 
+    @alone
     def send(self, actions: Any) -> None:
         """Begins a step, which goes on in other threads; :meth:`recv` waits for it. Nothing else may be called before."""
         worlds = self._open()
@@ -211,6 +218,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         worlds.send(given, self._reward is not None)
         self._sent = (given, *self._before())
 
+    @alone
     def recv(self) -> Step:
         """Waits for the step that was sent, and returns what :meth:`step` would have."""
         worlds = self._open()
@@ -315,11 +323,13 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
 
     # --- state -------------------------------------------------------------------------------------------------
 
+    @alone
     def save(self) -> list[_native.Snapshot]:
         """The exact state of every world; they can be pickled, and restored into an :class:`AirHockeyEnv`, too."""
         worlds = self._open()
         return [worlds.save(world) for world in range(self.num_envs)]
 
+    @alone
     def restore(
         self, states: Sequence[_native.Snapshot]
     ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:

@@ -1,0 +1,181 @@
+"""The vector environment as Stable-Baselines3 expects it.
+
+Stable-Baselines3 has vector environments of its own kind, older than Gymnasium's. :func:`make_vec_env` makes one of
+ours::
+
+    from stable_baselines3 import PPO
+    import faceoff.sb3
+    envs = faceoff.sb3.make_vec_env("defend", 64, profile="evaluation", clip_actions=True)
+    PPO("MlpPolicy", envs).learn(1_000_000)
+
+It is not imported before that: it needs torch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from faceoff.errors import ArgumentError, ArgumentTypeError, MissingError
+from faceoff.gym.vector import AirHockeyVectorEnv
+
+#: What a step returns there: observations, rewards, dones, and infos of each world.
+Step = tuple[npt.NDArray[np.float32], npt.NDArray[np.float32], npt.NDArray[np.bool_], list[dict[str, Any]]]
+
+
+class VecEnvMethods:
+    """What Stable-Baselines3's ``VecEnv`` asks for, apart from that class itself.
+
+    A world whose episode has ended begins the next one in the same step; its info then has ``terminal_observation``,
+    ``TimeLimit.truncated`` (cut off, rather than ended) and ``is_success``, as Stable-Baselines3 reads them, and all
+    that :class:`faceoff.gym.AirHockeyEnv` tells.
+    """
+
+    envs: AirHockeyVectorEnv
+    num_envs: int
+    reset_infos: list[dict[str, Any]]
+    _seeds: list[int | None]
+
+    def __init__(self, envs: AirHockeyVectorEnv) -> None:
+        if not isinstance(envs, AirHockeyVectorEnv) or envs.autoreset_mode.name != "SAME_STEP":
+            raise ArgumentTypeError(
+                f"envs: expected an AirHockeyVectorEnv made with autoreset_mode='SameStep', got {envs!r:.80}"
+            )
+        self.envs = envs
+        self.num_envs = envs.num_envs
+        self.render_mode = envs.render_mode
+        # Stable-Baselines3's own constructor asks for attributes; without it these are all there is.
+        self._begin(envs)
+        self.reset_infos = [{} for _ in range(self.num_envs)]
+        self._seeds = [None] * self.num_envs
+
+    def _begin(self, envs: AirHockeyVectorEnv) -> None:
+        self.observation_space = envs.single_observation_space
+        self.action_space = envs.single_action_space
+
+    def seed(self, seed: int | None = None) -> list[int | None]:
+        """Seeds of the next reset: s, s + 1, …; drawn if left out."""
+        if seed is None:
+            seed = int(np.random.default_rng().integers(2**32))
+        self._seeds = list(self.envs._read_seeds(seed))
+        return list(self._seeds)
+
+    def reset(self) -> npt.NDArray[np.float32]:
+        """Begins an episode in every world; its infos are in ``reset_infos``."""
+        is_seeded = any(seed is not None for seed in self._seeds)
+        observations, infos = self.envs.reset(seed=self._seeds if is_seeded else None)
+        self._seeds = [None] * self.num_envs
+        self.reset_infos = split_infos(infos, self.num_envs)
+        return observations
+
+    def step_async(self, actions: Any) -> None:
+        """Begins a step, which goes on in other threads."""
+        self.envs.send(actions)
+
+    def step_wait(self) -> Step:
+        """Waits for it."""
+        observations, rewards, terminated, truncated, together = self.envs.recv()
+        dones = terminated | truncated
+        infos = split_infos(together, self.num_envs)
+        for world in np.flatnonzero(dones):
+            final = infos[world].pop("final_info")
+            self.reset_infos[world] = {
+                name: infos[world].pop(name) for name in ("seed", "episode_number")
+            }
+            infos[world] |= final
+            infos[world]["terminal_observation"] = infos[world].pop("final_obs")
+            infos[world]["is_success"] = final["success"]
+        for world, info in enumerate(infos):
+            info["TimeLimit.truncated"] = bool(truncated[world] and not terminated[world])
+        return observations, rewards.astype(np.float32), dones, infos
+
+    def close(self) -> None:
+        """Gives up worlds and threads."""
+        self.envs.close()
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """An attribute of the vector environment, for each of the worlds."""
+        return [getattr(self.envs, attr_name) for _ in self._indices(indices)]
+
+    def has_attr(self, attr_name: str) -> bool:
+        """Whether the vector environment has it."""
+        return hasattr(self.envs, attr_name)
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Refused: worlds are made alike and stay so."""
+        raise ArgumentError(
+            f"set_attr: expected no change to a world, got {attr_name!r}: make the environments with other arguments"
+        )
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
+        """Refused but for ``render``: worlds have no methods of their own."""
+        if method_name != "render":
+            raise ArgumentError(
+                f"env_method: expected render, since worlds have no other method of their own, got {method_name!r}"
+            )
+        frames = self.envs.render()
+        return [frames[index] for index in self._indices(indices)]
+
+    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
+        """Worlds are never wrapped."""
+        return [False for _ in self._indices(indices)]
+
+    def get_images(self) -> Sequence[npt.NDArray[np.uint8] | None]:
+        """A picture of each world, for ``rgb_array``."""
+        return self.envs.render() if self.render_mode == "rgb_array" else [None] * self.num_envs
+
+    def _indices(self, indices: None | int | Iterable[int]) -> list[int]:
+        if indices is None:
+            return list(range(self.num_envs))
+        return [indices] if isinstance(indices, int) else list(indices)
+
+
+def split_infos(together: dict[str, Any], count: int) -> list[dict[str, Any]]:
+    """From arrays with a mask each to a dictionary for each world."""
+    infos: list[dict[str, Any]] = [{} for _ in range(count)]
+    for name, values in together.items():
+        if name.startswith("_"):
+            continue
+        told = np.flatnonzero(together[f"_{name}"])
+        if isinstance(values, dict):
+            inner = split_infos(values, count)
+            for world in told:
+                infos[world][name] = inner[world]
+        else:
+            for world in told:
+                value = values[world]
+                infos[world][name] = value.item() if isinstance(value, np.generic) else value
+    return infos
+
+
+def make_vec_env(task: str = "defend", n_envs: int = 1, *, seed: int | None = None, **others: Any) -> Any:
+    """A ``stable_baselines3.common.vec_env.VecEnv`` of so many worlds.
+
+    Args:
+        task, others: as of :class:`faceoff.gym.AirHockeyVectorEnv`, but for ``autoreset_mode``.
+        n_envs: number of worlds.
+        seed: of the first reset: s, s + 1, …
+
+    Raises:
+        MissingError: if Stable-Baselines3 is not installed.
+    """
+    if "autoreset_mode" in others:
+        raise ArgumentError("autoreset_mode: expected to be left out, since Stable-Baselines3 knows one, got one")
+    try:
+        from stable_baselines3.common.vec_env import VecEnv
+    except ImportError as error:
+        raise MissingError("faceoff.sb3 needs Stable-Baselines3: pip install stable-baselines3") from error
+
+    class FaceoffVecEnv(VecEnvMethods, VecEnv):  # type: ignore[misc]
+        """Worlds of a task, for Stable-Baselines3."""
+
+        def _begin(self, envs: AirHockeyVectorEnv) -> None:
+            VecEnv.__init__(self, envs.num_envs, envs.single_observation_space, envs.single_action_space)
+
+    made = FaceoffVecEnv(AirHockeyVectorEnv(n_envs, task, autoreset_mode="SameStep", **others))  # type: ignore[arg-type]
+    if seed is not None:
+        made.seed(seed)
+    return made

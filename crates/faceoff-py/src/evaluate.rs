@@ -1,0 +1,218 @@
+//! The evaluator, for a policy in Python.
+
+use crate::{
+    actions::{ActionMode, Actions},
+    errors::{OrderError, argument, broken, fenced},
+};
+use faceoff_episode::{Answered, Arena, Course, Nowhere};
+use faceoff_scoring::{StepTimes, score_evaluation, score_task};
+use faceoff_sim::{Interpolation, JOINTS, PerturbationSettings, model::INITIAL_Q};
+use faceoff_types::{EpisodeOutcome, Phase, Profile, Ruleset, Seed, Task, TaskResult, Variation};
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use std::collections::BTreeMap;
+
+/// No time is measured in here: a policy in the same process is no agent.
+const UNTIMED: Answered = Answered {
+    computation_time_s: 0.0,
+    host_time_s: 0.0,
+    cpu_time_s: None,
+};
+
+/// What all episodes of an evaluation share.
+#[pyclass(frozen, module = "faceoff._native")]
+pub struct Evaluation {
+    arena: Arena,
+    profile: Profile,
+    seed: Seed,
+    variation: Variation,
+}
+
+#[pymethods]
+impl Evaluation {
+    /// Of a profile's name, a seed as on the command line, the season's seed of the mismatch if it is another than that
+    /// which follows, and magnitudes of perturbations in JSON.
+    #[new]
+    fn new(
+        py: Python<'_>,
+        profile: &str,
+        seed: &str,
+        mismatch_seed: Option<&str>,
+        perturbations: &str,
+    ) -> PyResult<Self> {
+        let profile: Profile = profile
+            .parse()
+            .map_err(|error| argument("profile", "a profile", error))?;
+        let read = |name, text: &str| -> PyResult<Seed> {
+            text.parse()
+                .map_err(|error: faceoff_types::ParseSeedError| argument(name, "a seed", error))
+        };
+        let seed = read("seed", seed)?;
+        let season = match mismatch_seed {
+            Some(text) => read("mismatch_seed", text)?,
+            None => seed.model_mismatch(),
+        };
+        let magnitudes: PerturbationSettings = serde_json::from_str(perturbations)
+            .map_err(|error| argument("perturbations", "magnitudes of factors", error))?;
+        magnitudes
+            .check()
+            .map_err(|error| argument("perturbations", "magnitudes that a world has", error))?;
+        let arena = py.detach(|| {
+            fenced(|| {
+                let ruleset = Ruleset::CURRENT;
+                Ok(Arena::by(ruleset, profile, &magnitudes, seed, season))
+            })
+        })?;
+        Ok(Self {
+            arena,
+            profile,
+            seed,
+            variation: Variation {
+                perturbations: Box::new(magnitudes),
+                ..Variation::default()
+            },
+        })
+    }
+
+    /// An episode at its start, for a policy of this interpolation and these actions.
+    fn begin(
+        &self,
+        task: &str,
+        episode: u32,
+        interpolation: Option<i64>,
+        action_mode: &str,
+        clip_actions: bool,
+    ) -> PyResult<PolicyCourse> {
+        let interpolation = Interpolation::from_code(interpolation)
+            .map_err(|error| argument("interpolation", "1, 2, 3, 4, 5, -1 or None", error.0))?;
+        let mode = match action_mode {
+            "delta" => ActionMode::Delta,
+            "absolute" => ActionMode::Absolute,
+            "raw" => ActionMode::Raw,
+            other => return Err(argument("action_mode", "delta, absolute or raw", other)),
+        };
+        let actions = Actions {
+            mode,
+            interpolation,
+            clip: clip_actions,
+        };
+        let task = task_named(task)?;
+        let course = fenced(|| {
+            let interpolation = Some(interpolation);
+            Ok(Course::begin(
+                &self.arena,
+                task,
+                episode,
+                interpolation,
+                Nowhere,
+            ))
+        })?;
+        Ok(PolicyCourse {
+            course,
+            actions,
+            commanded: INITIAL_Q,
+            command: vec![0.0; actions.len()],
+            is_over: false,
+        })
+    }
+
+    /// Scores outcomes, each as JSON and in any order: what `results.json` holds, as JSON.
+    fn score(&self, outcomes: Vec<String>) -> PyResult<String> {
+        let mut by_task = BTreeMap::<Task, Vec<EpisodeOutcome>>::new();
+        for outcome in &outcomes {
+            let outcome: EpisodeOutcome = serde_json::from_str(outcome)
+                .map_err(|error| argument("outcomes", "what episodes returned", error))?;
+            by_task.entry(outcome.task).or_default().push(outcome);
+        }
+        let result = fenced(|| {
+            let tasks: BTreeMap<Task, TaskResult> = by_task
+                .into_iter()
+                .map(|(task, mut outcomes)| {
+                    outcomes.sort_unstable_by_key(|outcome| outcome.episode);
+                    let steps = outcomes.iter().map(|outcome| u64::from(outcome.steps));
+                    let steps: u64 = steps.sum();
+                    let mut times = StepTimes::of(steps);
+                    (0..steps).for_each(|_| times.add(0.0));
+                    let bounds = &self.variation.tier_bounds;
+                    (task, score_task(&outcomes, &times, bounds))
+                })
+                .collect();
+            let ruleset = Ruleset::CURRENT;
+            Ok(score_evaluation(
+                ruleset,
+                self.profile,
+                self.seed,
+                &self.variation,
+                tasks,
+            ))
+        })?;
+        serde_json::to_string(&result).map_err(|error| broken(&error.to_string()))
+    }
+}
+
+/// An episode under way, played by a policy.
+#[pyclass(module = "faceoff._native")]
+pub struct PolicyCourse {
+    course: Course<Nowhere>,
+    actions: Actions,
+    commanded: [f64; JOINTS],
+    command: Vec<f64>,
+    is_over: bool,
+}
+
+#[pymethods]
+impl PolicyCourse {
+    /// What the policy is told: 23 numbers with an opponent on the table, 20 without, as the protocol has them.
+    fn observation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let question = self
+            .course
+            .question()
+            .map_err(|error| broken(&error.to_string()))?;
+        Ok(PyArray1::from_slice(py, question.observation))
+    }
+
+    /// Plays a control step. The outcome, as JSON, comes with the episode's end.
+    fn answer(
+        &mut self,
+        py: Python<'_>,
+        action: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<Option<String>> {
+        if self.is_over {
+            return Err(OrderError::new_err(
+                "expected an episode under way, got one that has ended",
+            ));
+        }
+        let action = action.as_slice()?;
+        if action.len() != self.actions.len() {
+            let expected = format!("{} numbers", self.actions.len());
+            return Err(argument("action", expected, action.len()));
+        }
+        self.actions.check(action, |_| String::new())?;
+        let Self {
+            course,
+            actions,
+            commanded,
+            command,
+            ..
+        } = self;
+        actions.command(action, commanded, command);
+        let outcome = py.detach(|| {
+            fenced(|| {
+                Ok(match course.answer(command, UNTIMED) {
+                    Ok(outcome) => outcome,
+                    Err(fault) => Some(course.failed(Phase::Step, fault, None)),
+                })
+            })
+        });
+        self.is_over = !matches!(outcome, Ok(None));
+        outcome?
+            .map(|outcome| serde_json::to_string(&outcome))
+            .transpose()
+            .map_err(|error| broken(&error.to_string()))
+    }
+}
+
+fn task_named(name: &str) -> PyResult<Task> {
+    name.parse()
+        .map_err(|_| argument("task", "hit, defend or prepare", name))
+}

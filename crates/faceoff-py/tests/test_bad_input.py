@@ -1,0 +1,350 @@
+"""What cannot be is refused by an exception that names the argument, what was expected and what came."""
+
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import faceoff
+import faceoff.gym
+from commands import diverging
+from faceoff import _native
+from faceoff.game import AirHockeyGame, SelfPlayEnv
+from faceoff.gym import AirHockeyEnv, AirHockeyVectorEnv
+
+ARGUMENTS: list[tuple[dict[str, Any], str]] = [
+    ({"task": "score"}, "task: expected one of hit, defend, prepare, got 'score'"),
+    ({"task": 3}, "task: expected"),
+    ({"interpolation": 6}, "interpolation: expected a whole number from -1 to 5, got 6"),
+    ({"interpolation": 0}, "interpolation: expected 1, 2, 3, 4, 5, -1 or None, got 0"),
+    ({"interpolation": "cubic"}, "interpolation: expected"),
+    ({"interpolation": True}, "interpolation: expected"),
+    ({"action_mode": "torque"}, "action_mode: expected one of delta, absolute, raw"),
+    ({"profile": "rehearsal"}, "profile: expected one of ideal"),
+    ({"profile": ["noise"]}, "profile: expected one of model_mismatch"),
+    ({"profile": 1}, "profile: expected"),
+    ({"perturbations": [1]}, "perturbations: expected a mapping"),
+    ({"perturbations": {"noise": {}}}, "unknown field"),
+    ({"perturbations": {"tracking_loss": {"probability": 2.0}}}, "expected a number from 0 to 1, got 2"),
+    ({"perturbations": {"tracking_loss": {"probability": float("nan")}}}, "perturbations: expected finite"),
+    ({"mismatch_seed": "ff"}, "mismatch_seed: expected a number or 64 hexadecimal digits"),
+    ({"mismatch_seed": -1}, "mismatch_seed: expected"),
+    ({"max_episode_steps": 0}, "max_episode_steps: expected a whole number from 1 to 500, got 0"),
+    ({"max_episode_steps": 501}, "got 501"),
+    ({"max_episode_steps": 2.5}, "max_episode_steps: expected"),
+    ({"reward": 3}, "reward: expected a function"),
+    ({"render_mode": "ansi"}, "render_mode: expected"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "words"), ARGUMENTS)
+@pytest.mark.parametrize("make", [AirHockeyEnv, lambda **given: AirHockeyVectorEnv(2, **given)])
+def test_arguments_of_environments(make: Callable[..., Any], arguments: dict[str, Any], words: str) -> None:
+    with pytest.raises(faceoff.Error) as caught:
+        make(**arguments)
+    assert words in str(caught.value)
+    assert isinstance(caught.value, (ValueError, TypeError))
+
+
+def test_magnitudes_that_no_robot_has_are_refused_at_once() -> None:
+    nowhere = {"model_mismatch": {"static_error_m": [0.9, 1.0]}}
+    with pytest.raises(faceoff.ArgumentError, match="static error"):
+        AirHockeyEnv(profile="model_mismatch", perturbations=nowhere)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"num_envs": 0}, "num_envs: expected a whole number from 1"),
+        ({"num_envs": 2.0}, "num_envs: expected"),
+        ({"threads": 0}, "threads: expected a whole number from 1"),
+        ({"autoreset_mode": "Later"}, "autoreset_mode: expected one of NextStep, SameStep, Disabled"),
+        ({"render_mode": "human"}, "render_mode: expected one of rgb_array"),
+    ],
+)
+def test_arguments_of_many_worlds(arguments: dict[str, Any], words: str) -> None:
+    with pytest.raises(faceoff.Error, match=words):
+        AirHockeyVectorEnv(**arguments)
+
+
+ACTIONS: list[tuple[Any, str]] = [
+    (np.zeros(6), "expected an array of shape"),
+    (np.zeros((7, 1)), "expected an array of shape"),
+    (0.0, "expected an array of shape"),
+    ([[1], [2, 3]], "expected an array of shape"),
+    ("seven", "expected real numbers"),
+    (None, "expected real numbers"),
+    (np.zeros(7, complex), "expected real numbers"),
+    (np.array([0, 0, np.nan, 0, 0, 0, 0]), "expected finite numbers, got NaN at index 2"),
+    (np.array([0, 0, 0, 0, 0, -np.inf, 0]), "expected finite numbers, got -inf at index 5"),
+    (np.array([0, 1.5, 0, 0, 0, 0, 0]), "expected numbers from -1 to 1, got 1.5 at index 1; clip it"),
+]
+
+
+@pytest.mark.parametrize(("action", "words"), ACTIONS)
+def test_actions_of_one_world(action: Any, words: str) -> None:
+    env = AirHockeyEnv("hit")
+    env.reset(seed=0)
+    before = env.save()
+    with pytest.raises(faceoff.Error) as caught:
+        env.step(action)
+    assert words in str(caught.value)
+    assert str(caught.value).startswith("action: ")
+    # Nothing has happened to the world.
+    assert pickle.dumps(env.save()) == pickle.dumps(before)
+
+
+def test_actions_of_many_worlds_name_the_world() -> None:
+    envs = AirHockeyVectorEnv(3, "hit")
+    envs.reset(seed=0)
+    actions = np.zeros((3, 7))
+    actions[2, 4] = np.nan
+    for call in (envs.step, envs.send):
+        with pytest.raises(faceoff.ArgumentError, match="got NaN at index 4 of world 2"):
+            call(actions)
+        with pytest.raises(faceoff.ArgumentError, match=r"expected an array of shape \(3, 7\)"):
+            call(actions[0])
+    envs.step(np.zeros((3, 7)))
+
+
+def test_numbers_out_of_bounds_can_be_clipped_but_no_nan() -> None:
+    env, other = AirHockeyEnv("hit", clip_actions=True), AirHockeyEnv("hit")
+    env.reset(seed=0)
+    other.reset(seed=0)
+    np.testing.assert_array_equal(env.step(np.full(7, -80.0))[0], other.step(np.full(7, -1.0))[0])
+    with pytest.raises(faceoff.ArgumentError, match="finite"):
+        env.step(np.full(7, np.inf))
+
+
+def test_raw_actions_are_bounded_as_on_the_server() -> None:
+    env = AirHockeyEnv("hit", action_mode="raw")
+    env.reset(seed=0)
+    with pytest.raises(faceoff.ArgumentError, match="expected numbers from -10000 to 10000, got 10001"):
+        env.step(np.full(7, 10001.0))
+
+
+def test_commands_that_make_the_world_diverge_end_the_episode() -> None:
+    env, actions = diverging()
+    for action in actions:
+        observation, reward, terminated, truncated, info = env.step(action)
+        assert observation in env.observation_space
+        assert np.isfinite(reward)
+    assert info["end"] == "agent_fault"
+    assert (terminated, truncated) == (True, False)
+    assert not info["success"]
+
+
+@pytest.mark.parametrize("make", [AirHockeyEnv, lambda: AirHockeyVectorEnv(2)])
+def test_calls_at_the_wrong_time(make: Callable[[], Any]) -> None:
+    env = make()
+    action = np.zeros(env.action_space.shape)
+    for call in (lambda: env.step(action), env.save, lambda: env.state):
+        with pytest.raises(faceoff.OrderError, match="reset"):
+            call()
+    env.reset(seed=0)
+    env.close()
+    env.close()
+    calls = (lambda: env.step(action), env.reset, env.save, lambda: env.state)
+    for call in calls:
+        with pytest.raises(faceoff.ClosedError, match="closed"):
+            call()
+
+
+def test_a_step_after_the_end_is_refused() -> None:
+    env = AirHockeyEnv("hit", max_episode_steps=1)
+    env.reset(seed=0)
+    env.step(np.zeros(7))
+    with pytest.raises(faceoff.OrderError, match=r"ended: call reset\(\) first"):
+        env.step(np.zeros(7))
+    env.reset()
+    env.step(np.zeros(7))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"seed": -1}, "seed: expected a whole number from 0"),
+        ({"seed": 2**63}, "seed: expected"),
+        ({"seed": 1.5}, "seed: expected"),
+        ({"options": {"speed": 1}}, "options: expected episode and puck, got 'speed'"),
+        ({"options": 3}, "options: expected a mapping"),
+        ({"options": {"episode": -1}}, "expected a whole number from 0"),
+        ({"options": {"puck": [0, 0]}}, r"expected an array of shape \(6,\)"),
+        ({"options": {"puck": [2.0, 0, 0, 0, 0, 0]}}, "puck: expected x, y"),
+        ({"options": {"puck": [0, 0, 0, np.nan, 0, 0]}}, "puck: expected x, y"),
+    ],
+)
+@pytest.mark.parametrize("make", [AirHockeyEnv, lambda: AirHockeyVectorEnv(2)])
+def test_resets(make: Callable[[], Any], arguments: dict[str, Any], words: str) -> None:
+    with pytest.raises(faceoff.Error, match=words):
+        make().reset(**arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"seed": [1]}, "one for each of 2 worlds, got 1"),
+        ({"seed": "12"}, "seed: expected"),
+        ({"seed": [1, "a"]}, r"seed\[1\]: expected"),
+        ({"seed": 2**63 - 1}, "seed"),
+        ({"options": {"reset_mask": [True, False]}}, "expected a NumPy array of bool"),
+        ({"options": {"reset_mask": np.array([True])}}, r"expected an array of shape \(2,\)"),
+        ({"options": {"reset_mask": np.array([False, False])}}, "at least one"),
+    ],
+)
+def test_resets_of_many_worlds(arguments: dict[str, Any], words: str) -> None:
+    envs = AirHockeyVectorEnv(2)
+    envs.reset(seed=0)
+    with pytest.raises(faceoff.Error, match=words):
+        envs.reset(**arguments)
+
+
+def test_the_first_reset_is_of_all_worlds() -> None:
+    mask = np.array([True, False])
+    with pytest.raises(faceoff.OrderError, match="all worlds first"):
+        AirHockeyVectorEnv(2).reset(options={"reset_mask": mask})
+
+
+def test_states_of_others_and_garbage() -> None:
+    env = AirHockeyEnv("hit")
+    env.reset(seed=0)
+    other = AirHockeyEnv("hit", interpolation=3)
+    with pytest.raises(faceoff.ArgumentError, match="same task, actions, interpolation"):
+        other.restore(env.save())
+    with pytest.raises(faceoff.ArgumentTypeError, match="state: expected what save"):
+        env.restore(b"state")  # type: ignore[arg-type]
+    (written,) = env.save().__reduce__()[1]
+    for garbage, words in [
+        (b"", "one that faceoff has pickled"),
+        (b"\x80\x04garbage", "one that faceoff has pickled"),
+        (written[: len(written) // 2], "one that faceoff has pickled"),
+        (written.replace(b'"seed":0', b'"seed":-1'), "one that faceoff has pickled"),
+        (written.replace(b'"faceoff":"', b'"faceoff":"9.'), "one pickled by this version"),
+        (written.replace(b'"actions":[]', b'"actions":[1.0]'), "actions of 7 numbers each"),
+        (written.replace(b'"actions":[]', b'"actions":[5,5,5,5,5,5,5]'), "expected numbers from -1 to 1"),
+        (written.replace(b'"puck":null', b'"puck":[9,0,0,0,0,0]'), "puck: expected"),
+        (written.replace(b'"max_episode_steps":500', b'"max_episode_steps":4000000'), "max_episode_steps"),
+    ]:
+        assert garbage != written
+        with pytest.raises(faceoff.ArgumentError, match=words):
+            _native.load_snapshot(garbage)
+
+
+@pytest.mark.parametrize("value", [np.nan, "much", None, np.zeros(2)])
+def test_rewards_of_one_world(value: Any) -> None:
+    env = AirHockeyEnv("hit", reward=lambda transition: value)
+    env.reset(seed=0)
+    with pytest.raises(faceoff.Error, match="reward: expected"):
+        env.step(np.zeros(7))
+
+
+@pytest.mark.parametrize("value", [1.0, np.zeros(3), np.full(2, np.inf), "much"])
+def test_rewards_of_many_worlds(value: Any) -> None:
+    envs = AirHockeyVectorEnv(2, "hit", reward=lambda transition: value)
+    envs.reset(seed=0)
+    with pytest.raises(faceoff.Error, match="reward: expected"):
+        envs.step(np.zeros((2, 7)))
+
+
+def test_a_picture_without_a_mode() -> None:
+    for env in (AirHockeyEnv("hit"), AirHockeyVectorEnv(2)):
+        env.reset(seed=0)
+        with pytest.raises(faceoff.ArgumentError, match="render_mode"):
+            env.render()
+
+
+def test_games() -> None:
+    for arguments, words in [
+        ({"max_steps": 0}, "max_steps"),
+        ({"interpolation": (1, 2, 3)}, "a pair"),
+        ({"interpolation": (1, 9)}, "interpolation: expected"),
+        ({"action_mode": "x"}, "action_mode"),
+        ({"profile": "x"}, "profile"),
+        ({"reward": 1}, "reward"),
+    ]:
+        with pytest.raises(faceoff.Error, match=words):
+            AirHockeyGame(**arguments)  # type: ignore[arg-type]
+    game = AirHockeyGame()
+    with pytest.raises(faceoff.OrderError, match="reset"):
+        game.step({})
+    game.reset(seed=0)
+    zeros = np.zeros(7)
+    for actions, words in [
+        ({"robot_1": zeros}, "got none for robot_2"),
+        ({"robot_1": zeros, "robot_2": zeros, "robot_3": zeros}, "got 'robot_3'"),
+        ({"robot_1": zeros, "robot_2": np.zeros(3)}, "action of robot_2: expected an array of shape"),
+        ({"robot_1": zeros, "robot_2": np.full(7, np.nan)}, "of robot 2"),
+        (None, "expected a mapping"),
+    ]:
+        with pytest.raises(faceoff.Error, match=words):
+            game.step(actions)  # type: ignore[arg-type]
+    with pytest.raises(faceoff.Error, match="agent: expected"):
+        game.observation_space("nobody")
+    game.close()
+    with pytest.raises(faceoff.ClosedError):
+        game.reset()
+
+
+def test_pools_of_opponents() -> None:
+    for pool, words in [([], "at least one"), ([3], r"opponents\[0\]: expected a function")]:
+        with pytest.raises(faceoff.Error, match=words):
+            SelfPlayEnv(pool)  # type: ignore[arg-type]
+    env = SelfPlayEnv([lambda observation: np.zeros(7)])
+    with pytest.raises(faceoff.ArgumentError, match="options"):
+        env.reset(options={"opponent": 1})
+
+
+def test_evaluations() -> None:
+    def hold(observation: np.ndarray) -> np.ndarray:
+        return np.zeros(7)
+
+    for arguments, words in [
+        ({"tasks": "score"}, "tasks: expected one of"),
+        ({"tasks": []}, "tasks: expected"),
+        ({"episodes": 0}, "episodes: expected"),
+        ({"profile": "x"}, "profile: expected"),
+        ({"seed": "x"}, "seed: expected"),
+        ({"seed": 2**64}, "seed: expected"),
+        ({"interpolation": 7}, "interpolation: expected"),
+        ({"action_mode": "x"}, "action_mode: expected"),
+        ({"workers": 0}, "workers: expected"),
+        ({"perturbations": {"x": 1}}, "perturbations: expected"),
+    ]:
+        with pytest.raises(faceoff.Error, match=words):
+            faceoff.evaluate(hold, **arguments)  # type: ignore[arg-type]
+    for policy, words in [
+        (3, "policy: expected a function"),
+        ({"hit": hold}, "got none for defend"),
+        (lambda observation: np.zeros(6), "action: expected an array of shape"),
+        (lambda observation: np.full(7, np.nan), "action: expected finite"),
+        (lambda observation: None, "action: expected"),
+    ]:
+        with pytest.raises(faceoff.Error, match=words):
+            faceoff.evaluate(policy, episodes=1)  # type: ignore[arg-type]
+
+
+def test_a_panic_becomes_an_error() -> None:
+    with pytest.raises(faceoff.Error, match="the simulator failed.*provoked"):
+        _native.provoke_panic()
+
+
+def test_every_error_can_be_caught_by_its_kind_or_as_any() -> None:
+    assert issubclass(faceoff.ArgumentError, (faceoff.Error, ValueError))
+    assert issubclass(faceoff.ArgumentError, faceoff.Error)
+    assert issubclass(faceoff.ArgumentTypeError, faceoff.Error)
+    assert issubclass(faceoff.ArgumentTypeError, TypeError)
+    assert issubclass(faceoff.OrderError, faceoff.Error)
+    assert issubclass(faceoff.ClosedError, faceoff.OrderError)
+
+
+def test_importing_the_package_imports_nothing_else() -> None:
+    script = (
+        "import sys, faceoff; "
+        "print([name for name in ('numpy', 'gymnasium', 'pettingzoo', 'faceoff._native') if name in sys.modules])"
+    )
+    told = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
+    assert told.stdout.strip() == "[]"

@@ -1,0 +1,177 @@
+"""The game of two robots, by PettingZoo's own book."""
+
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.wrappers import RecordEpisodeStatistics
+from commands import pump
+from pettingzoo.test import parallel_api_test, parallel_seed_test
+
+from faceoff.game import AGENTS, AirHockeyGame, GameTransition, SelfPlayEnv
+
+
+def rest(observation: np.ndarray) -> np.ndarray:
+    return np.zeros(7)
+
+
+def both(value: float = 0.0) -> dict[str, np.ndarray]:
+    return {agent: np.full(7, value) for agent in AGENTS}
+
+
+def test_pettingzoos_checks_have_nothing_to_say() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        parallel_api_test(AirHockeyGame(max_steps=120), num_cycles=300)
+        parallel_seed_test(lambda: AirHockeyGame(max_steps=60))
+
+
+def test_a_game_is_cut_off_for_both_who_leave_it() -> None:
+    game = AirHockeyGame(max_steps=3)
+    observations, infos = game.reset(seed=1)
+    assert infos["robot_2"] == {"seed": 1, "game_number": 0}
+    assert observations["robot_1"].shape == (23,)
+    for _ in range(2):
+        *_, truncations, _ = game.step(both())
+        assert truncations == {"robot_1": False, "robot_2": False}
+    _, _, terminations, truncations, _ = game.step(both())
+    assert terminations == {"robot_1": False, "robot_2": False}
+    assert truncations == {"robot_1": True, "robot_2": True}
+    assert game.agents == []
+
+
+def test_both_see_the_table_from_their_own_side() -> None:
+    game = AirHockeyGame()
+    observations, _ = game.reset(seed=1)
+    one, other = observations["robot_1"], observations["robot_2"]
+    np.testing.assert_allclose(one[0] + other[0], 2 * 1.51, rtol=1e-6)
+    np.testing.assert_allclose(one[1], -other[1], rtol=1e-6)
+
+
+def test_without_a_seed_another_game_of_the_same_seed_follows() -> None:
+    game, twin = AirHockeyGame(), AirHockeyGame()
+    first, _ = game.reset(seed=1)
+    second, infos = game.reset()
+    assert infos["robot_1"]["game_number"] == 1
+    assert not np.array_equal(first["robot_1"], second["robot_1"])
+    twin.reset(seed=1)
+    np.testing.assert_array_equal(twin.reset()[0]["robot_1"], second["robot_1"])
+
+
+def test_a_puck_that_nobody_plays_is_a_foul_and_the_next_rally_follows() -> None:
+    game = AirHockeyGame()
+    game.reset(seed=1)
+    for _ in range(800):
+        *_, infos = game.step(both())
+        if "rally_end" in infos["robot_1"]:
+            break
+    assert infos["robot_1"]["rally_end"] == "foul"
+    by = infos["robot_1"]["rally_end_by"]
+    assert infos["robot_2"]["fouls"] == ((1, 0) if by == "robot_1" else (0, 1))
+    game.step(both())
+
+
+def test_points_are_the_reward() -> None:
+    """Every third foul is a point for the other side."""
+    game = AirHockeyGame()
+    game.reset(seed=1)
+    total = {agent: 0.0 for agent in AGENTS}
+    for _ in range(6_000):
+        _, rewards, _, _, infos = game.step(both())
+        for agent in AGENTS:
+            total[agent] += rewards[agent]
+        if sum(infos["robot_1"]["score"]) > 0:
+            break
+    one, other = infos["robot_1"]["score"]
+    assert one + other == 1
+    assert (total["robot_1"], total["robot_2"]) == (one - other, other - one)
+
+
+def test_who_makes_the_world_diverge_is_out_and_the_other_plays_on() -> None:
+    game = AirHockeyGame(interpolation=(None, 1), action_mode=("raw", "delta"))
+    observations, _ = game.reset(seed=1)
+    for _ in range(1_500):
+        actions = {"robot_1": pump(*np.split(observations["robot_1"][6:20], 2)), "robot_2": np.zeros(7)}
+        observations, rewards, terminations, _, _ = game.step(actions)
+        if terminations["robot_1"]:
+            break
+    assert terminations == {"robot_1": True, "robot_2": False}
+    assert rewards["robot_1"] == -10.0
+    assert game.agents == ["robot_2"]
+    observations, *_ = game.step({"robot_2": np.zeros(7)})
+    assert list(observations) == ["robot_2"]
+
+
+def test_the_reward_can_be_replaced() -> None:
+    def reward(transition: GameTransition) -> tuple[float, float]:
+        return float(transition.puck[0]), float(transition.robots[1, 14])
+
+    game = AirHockeyGame(reward=reward)
+    game.reset(seed=1)
+    _, rewards, *_ = game.step(both())
+    assert -0.8 < rewards["robot_1"] < 0.8
+    assert rewards["robot_2"] == pytest.approx(0.65, abs=0.01)
+
+
+def test_pictures_show_both_robots() -> None:
+    game = AirHockeyGame(render_mode="rgb_array")
+    game.reset(seed=1)
+    before = game.render()
+    assert before is not None
+    for _ in range(20):
+        game.step(both(1.0))
+    after = game.render()
+    assert after is not None
+    changed = (before != after).any(axis=2)
+    assert changed[:, :320].any()
+    assert changed[:, 320:].any()
+
+
+@pytest.mark.parametrize("side", ["robot_1", "robot_2", "random"])
+def test_one_side_of_a_game_is_an_environment(side: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # Spaces, seeds and determinism; it was not made by its name, so that there is no spec.
+        warnings.filterwarnings("ignore", message=".*spec.*")
+        check_env(SelfPlayEnv([rest], side=side, max_steps=50), skip_render_check=True)
+
+
+def test_opponents_are_drawn_from_a_pool_that_may_grow() -> None:
+    class Named:
+        def __init__(self) -> None:
+            self.games = self.steps = 0
+
+        def reset(self) -> None:
+            self.games += 1
+
+        def __call__(self, observation: np.ndarray) -> np.ndarray:
+            assert observation.shape == (23,)
+            self.steps += 1
+            return np.zeros(7)
+
+    one, other, late = Named(), Named(), Named()
+    env = SelfPlayEnv([one, other], max_steps=5)
+    stats: Any = RecordEpisodeStatistics(env)
+    drawn = []
+    for game in range(12):
+        _, info = stats.reset(seed=3 if game == 0 else None)
+        drawn.append(info["opponent"])
+        ended = False
+        while not ended:
+            _, _, terminated, truncated, info = stats.step(np.zeros(7))
+            ended = terminated or truncated
+    assert info["episode"]["l"] == 5
+    assert set(drawn) == {0, 1}
+    assert (one.games, other.games) == (drawn.count(0), drawn.count(1))
+    assert one.steps + other.steps == 12 * 5
+    env.opponents.append(late)
+    assert env.reset(options={"opponent": 2})[1]["opponent"] == 2
+    assert late.games == 1
+
+
+def test_sides_are_drawn() -> None:
+    env = SelfPlayEnv([rest], side="random")
+    sides = {env.reset(seed=0 if game == 0 else None)[1]["side"] for game in range(12)}
+    assert sides == set(AGENTS)

@@ -1,0 +1,76 @@
+"""What Stable-Baselines3 asks of a vector environment, without it: it needs torch."""
+
+import numpy as np
+import pytest
+
+import faceoff
+from faceoff.gym import AirHockeyEnv, AirHockeyVectorEnv
+from faceoff.sb3 import VecEnvMethods, make_vec_env
+
+
+def make(worlds: int, **arguments: object) -> VecEnvMethods:
+    return VecEnvMethods(AirHockeyVectorEnv(worlds, autoreset_mode="SameStep", **arguments))  # type: ignore[arg-type]
+
+
+def test_spaces_are_those_of_one_world() -> None:
+    envs = make(3, task="hit")
+    assert envs.num_envs == 3
+    assert envs.observation_space.shape == (23,)
+    assert envs.action_space.shape == (7,)
+
+
+def test_an_end_tells_of_the_terminal_observation_and_of_a_cut() -> None:
+    envs = make(2, task="prepare", max_episode_steps=4)
+    assert envs.seed(6) == [6, 7]
+    envs.reset()
+    assert envs.reset_infos[1]["seed"] == 7
+    single = AirHockeyEnv("prepare", max_episode_steps=4)
+    single.reset(seed=7)
+    for step in range(4):
+        envs.step_async(np.zeros((2, 7)))
+        observations, rewards, dones, infos = envs.step_wait()
+        final, reward, *_, truncated, info = single.step(np.zeros(7))
+        assert rewards.dtype == np.float32
+        assert rewards[1] == np.float32(reward)
+        assert dones.tolist() == [truncated] * 2
+        assert infos[1]["TimeLimit.truncated"] == truncated
+    np.testing.assert_array_equal(infos[1]["terminal_observation"], final)
+    assert infos[1]["is_success"] == info["success"]
+    assert infos[1]["end"] == "horizon"
+    assert envs.reset_infos[1]["episode_number"] == 1
+    np.testing.assert_array_equal(observations[1], single.reset()[0])
+
+
+def test_an_episode_that_ends_by_itself_is_not_cut_off() -> None:
+    envs = make(4, task="defend")
+    envs.seed(0)
+    envs.reset()
+    seen = 0
+    while seen < 4:
+        envs.step_async(np.zeros((4, 7)))
+        _, _, dones, infos = envs.step_wait()
+        for done, info in zip(dones, infos, strict=True):
+            assert ("terminal_observation" in info) == done
+            if done and info["end"] != "horizon":
+                assert info["TimeLimit.truncated"] is False
+                seen += 1
+
+
+def test_attributes_and_methods_of_worlds() -> None:
+    envs = make(3, task="hit", render_mode="rgb_array")
+    envs.reset()
+    assert envs.get_attr("task") == ["hit"] * 3
+    assert envs.get_attr("render_mode", indices=1) == ["rgb_array"]
+    assert envs.env_is_wrapped(object, indices=[0, 2]) == [False, False]
+    assert len(envs.env_method("render", indices=[1])) == 1
+    assert len(envs.get_images()) == 3
+    for call in (lambda: envs.set_attr("task", "defend"), lambda: envs.env_method("save")):
+        with pytest.raises(faceoff.ArgumentError):
+            call()
+
+
+def test_other_modes_are_refused() -> None:
+    with pytest.raises(faceoff.ArgumentTypeError, match="SameStep"):
+        VecEnvMethods(AirHockeyVectorEnv(2))
+    with pytest.raises(faceoff.ArgumentError, match="autoreset_mode"):
+        make_vec_env("hit", 2, autoreset_mode="Disabled")
