@@ -11,12 +11,14 @@ CARGO      ?= cargo
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
 
-.PHONY: demo test fuzz busy soak steady lint format fidelity setup setup-test agents clean-demo help
+.PHONY: demo test wheel test-python fuzz busy soak steady lint format fidelity setup setup-test agents clean-demo help
 
 help:
 	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
 	@echo "make agents   bundle striker and baseline: $(TARGET_DIR)/bundles"
 	@echo "make test   run everything that proves that it works"
+	@echo "make wheel  the Python package: $(TARGET_DIR)/wheels"
+	@echo "make test-python   make it, install it where nothing else is, test it"
 	@echo "make fuzz   feed the readers what is nearly valid: MINUTES=$(MINUTES)"
 	@echo "make busy   play beside hogs, floods and bursts of processes"
 	@echo "make soak   upload, play, read, fill the disk and kill the server, all at once: MINUTES=$(MINUTES)"
@@ -55,11 +57,21 @@ demo: setup
 test: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
 	python3 agents/test_agents.py
+	TARGET_DIR=$(TARGET_DIR) crates/faceoff-py/test.sh test
 	if $(CARGO) nextest --version >/dev/null 2>&1; \
 	    then $(CARGO) nextest run --locked --workspace --no-fail-fast; \
 	    else $(CARGO) test --locked --workspace --no-fail-fast -- --test-threads 2; fi
 	@# The golden hashes again, as the released program computes them: the same bits.
 	$(CARGO) test --release --locked --package faceoff-sim --test it golden
+
+# The Python package, for every CPython from 3.11 on: one wheel.
+wheel: setup
+	TARGET_DIR=$(TARGET_DIR) crates/faceoff-py/test.sh wheel
+
+# The evaluator in Python is compared with the binary's.
+test-python: setup-test
+	$(CARGO) build --locked --workspace --bins --tests
+	TARGET_DIR=$(TARGET_DIR) crates/faceoff-py/test.sh test
 
 # The fuzz targets, all at once for so many minutes; FUZZ_SEED=N for other inputs than last time.
 fuzz: setup-test

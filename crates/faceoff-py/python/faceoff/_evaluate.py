@@ -97,13 +97,13 @@ def evaluate(
             outcomes += _play(evaluation, setup, policies[task], task, numbers_)
     else:
         with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-            results = [
+            shards = [
                 pool.submit(_play_elsewhere, setup, policies[task], task, numbers_)
                 for task, numbers_ in jobs
                 if len(numbers_) > 0
             ]
-            for result in results:
-                outcomes += result.result()
+            for shard in shards:
+                outcomes += shard.result()
     result: dict[str, Any] = json.loads(evaluation.score(outcomes))
     for scored in result["tasks"].values():
         scored["computation_time_s"] = None

@@ -76,7 +76,7 @@ def default_reward(transition: GameTransition) -> npt.NDArray[np.float64]:
     return gained - gained[::-1] - 10.0 * transition.diverged
 
 
-class AirHockeyGame(ParallelEnv[str, Observation, Any]):
+class AirHockeyGame(ParallelEnv[str, Observation, Any]):  # type: ignore[misc]
     """A game as the competition plays it, for agents ``robot_1`` and ``robot_2``.
 
     Each sees the table from its own side, (23,) float32. A rally that ends is followed by the next one with the next
@@ -299,7 +299,7 @@ class AirHockeyGame(ParallelEnv[str, Observation, Any]):
             self._window = None
 
 
-class SelfPlayEnv(gymnasium.Env[Observation, Any]):
+class SelfPlayEnv(gymnasium.Env[Any, Any]):
     """One side of a game, against an opponent drawn from a pool at each reset.
 
     Args:

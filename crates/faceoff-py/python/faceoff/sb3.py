@@ -88,8 +88,8 @@ class VecEnvMethods:
             infos[world] |= final
             infos[world]["terminal_observation"] = infos[world].pop("final_obs")
             infos[world]["is_success"] = final["success"]
-        for world, info in enumerate(infos):
-            info["TimeLimit.truncated"] = bool(truncated[world] and not terminated[world])
+        for index, info in enumerate(infos):
+            info["TimeLimit.truncated"] = bool(truncated[index] and not terminated[index])
         return observations, rewards.astype(np.float32), dones, infos
 
     def close(self) -> None:

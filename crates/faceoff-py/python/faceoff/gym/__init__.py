@@ -12,6 +12,8 @@ Arguments of ``make`` are those of :class:`AirHockeyEnv`, of ``make_vec`` those 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 try:
     import gymnasium
 except ImportError as error:  # pragma: no cover - depends on what is installed
@@ -23,14 +25,27 @@ from faceoff.gym.env import AirHockeyEnv
 from faceoff.gym.reward import CONSTRAINTS, Reward, State, Transition
 from faceoff.gym.vector import AirHockeyVectorEnv
 
+if TYPE_CHECKING:
+    from faceoff.gym.mallet import MalletPlane, MalletPlaneVector
+
 __all__ = [
     "CONSTRAINTS",
     "AirHockeyEnv",
     "AirHockeyVectorEnv",
+    "MalletPlane",
+    "MalletPlaneVector",
     "Reward",
     "State",
     "Transition",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name in ("MalletPlane", "MalletPlaneVector"):
+        from faceoff.gym import mallet
+
+        return getattr(mallet, name)
+    raise AttributeError(f"module 'faceoff.gym' has no attribute {name!r}")
 
 
 def _register() -> None:

@@ -23,7 +23,7 @@ Observation = npt.NDArray[np.float32]
 OPTIONS = ("episode", "puck")
 
 
-class AirHockeyEnv(gymnasium.Env[Observation, npt.NDArray[np.floating[Any]]]):
+class AirHockeyEnv(gymnasium.Env[Any, Any]):
     """A task of the qualifying stage.
 
     Args:
@@ -79,6 +79,7 @@ class AirHockeyEnv(gymnasium.Env[Observation, npt.NDArray[np.floating[Any]]]):
         if reward is not None and not callable(reward):
             raise ArgumentTypeError(f"reward: expected a function of a Transition, got {reward!r}")
         self.task = task
+        self.action_mode = action_mode
         self.render_mode = render_mode
         self.observation_space = observation_space(task)
         self.action_space = action_space(interpolation, action_mode)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -31,7 +32,7 @@ Picture = npt.NDArray[np.uint8]
 
 
 @lru_cache(maxsize=1)
-def _grid() -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def _grid() -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     """x of each column and y of each row, m."""
     x = (np.arange(WIDTH) + 0.5 - WIDTH / 2) * SCALE
     y = (HEIGHT / 2 - np.arange(HEIGHT) - 0.5) * SCALE

@@ -98,6 +98,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
             threads = min(available_cpus(), useful)
         self._threads = integer("threads", threads, 1, 1024)
         self.task = task
+        self.action_mode = action_mode
         self.copy = bool(copy)
         self.render_mode = render_mode
         self.metadata = {**AirHockeyEnv.metadata, "render_modes": ["rgb_array"]}
@@ -121,7 +122,7 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
     def _new_rows(self) -> Rows:
         return Rows.make(
             self.num_envs,
-            self.single_observation_space.shape[0],
+            self.single_observation_space.shape[0],  # type: ignore[index]
             finals=self.autoreset_mode.name == "SAME_STEP",
             states=self._reward is not None,
         )
@@ -225,9 +226,9 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         if self._sent is None:
             raise OrderError("recv: expected a step that was sent, got none: call send() first")
         worlds.recv(self._rows_to_write(keep=False).arrays())
-        given, *before = self._sent
+        given, observations, states = self._sent
         self._sent = None
-        return self._result(given, (before[0], before[1]))
+        return self._result(given, (observations, states))
 
     def _before(self) -> tuple[npt.NDArray[np.float32], Floats]:
         if self._reward is None:

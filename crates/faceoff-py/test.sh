@@ -1,0 +1,70 @@
+#!/bin/sh
+# Makes the wheel of the Python package, and tests it where nothing but that wheel is installed.
+#   test.sh wheel       one wheel in TARGET/wheels
+#   test.sh test [...]  pytest, in an environment that is made anew; the rest goes to pytest
+#   test.sh versions    the wheel imported, reset and stepped by each interpreter of PYTHONS
+# TARGET_DIR (default: target), PYTHON (default: python3) and PYTHONS (default: PYTHON) may be set.
+set -eu
+
+here=$(cd "$(dirname "$0")" && pwd)
+root=$(cd "$here/../.." && pwd)
+target=${TARGET_DIR:-$root/target}
+mkdir -p "$target"
+target=$(cd "$target" && pwd)
+python=${PYTHON:-python3}
+
+# An environment with what a file requires, made again only when the file has changed.
+environment() {
+    wanted=$(cksum < "$2")
+    if [ "$(cat "$1/made-of" 2>/dev/null)" != "$wanted" ]; then
+        rm -rf "$1"
+        "$python" -m venv "$1"
+        "$1/bin/pip" install --quiet --disable-pip-version-check -r "$2"
+        echo "$wanted" > "$1/made-of"
+    fi
+}
+
+wheel() {
+    environment "$target/python-build" "$here/requirements-build.txt"
+    rm -rf "$target/wheels"
+    # The interpreter is named so that one of an active environment is not taken; abi3 makes it one for all.
+    (cd "$here" && CARGO_TARGET_DIR=$target "$target/python-build/bin/maturin" build --quiet --release --locked \
+        --interpreter "$python" --out "$target/wheels")
+    ls "$target"/wheels/*.whl
+}
+
+case ${1:-} in
+    wheel)
+        wheel
+        ;;
+    test)
+        shift
+        wheel
+        environment "$target/python-test" "$here/requirements-test.txt"
+        "$target/python-test/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps \
+            "$target"/wheels/*.whl
+        # Elsewhere than beside the sources, which would be imported in place of what is installed.
+        cd "$target"
+        "$target/python-test/bin/mypy" --config-file "$here/pyproject.toml" "$here/python/faceoff"
+        FACEOFF_BINARY=${FACEOFF_BINARY:-$target/debug/faceoff} \
+            "$target/python-test/bin/python" -m pytest -p no:cacheprovider --rootdir "$here" "$here/tests" "$@"
+        ;;
+    versions)
+        wheel
+        for one in ${PYTHONS:-$python}; do
+            rm -rf "$target/python-version"
+            "$one" -m venv "$target/python-version"
+            "$target/python-version/bin/pip" install --quiet --disable-pip-version-check \
+                "$target"/wheels/*.whl "gymnasium${GYMNASIUM:-}" pettingzoo pytest
+            cd "$target"
+            "$target/python-version/bin/python" -VV
+            "$target/python-version/bin/python" -m pytest --quiet -p no:cacheprovider --rootdir "$here" \
+                "$here/tests/test_gym_env.py" "$here/tests/test_gym_vector.py" "$here/tests/test_game.py" \
+                "$here/tests/test_bad_input.py" "$here/tests/test_processes.py"
+        done
+        ;;
+    *)
+        echo "usage: $0 wheel | test [PYTEST ARGUMENTS] | versions" >&2
+        exit 2
+        ;;
+esac
