@@ -22,10 +22,6 @@ pub struct EpisodeRecord {
     pub interpolation: Option<String>,
     /// Computation time included.
     pub penalty_points: f64,
-    /// The observation after the last answered step: 23 numbers for `hit`, 20 otherwise, none if no
-    /// step was answered.
-    #[serde(skip)]
-    pub last_observation: Vec<f64>,
 }
 
 /// The table as it is, in batches, its columns checked.
@@ -91,15 +87,6 @@ impl<'a> Columns<'a> {
         column.is_valid(row) && column.value(row)
     }
 
-    fn last_observation(&self, row: usize) -> Vec<f64> {
-        let schema = self.0.schema();
-        let columns = schema.fields().iter().map(|field| field.name());
-        columns
-            .filter(|name| name.starts_with("last_obs_") && self.column(name).is_valid(row))
-            .map(|name| self.float(name, row))
-            .collect()
-    }
-
     fn record(&self, row: usize) -> Result<EpisodeRecord, String> {
         let absent = |name: &str| format!("{name} is absent");
         let text = |name| self.text(name, row).ok_or_else(|| absent(name));
@@ -134,7 +121,6 @@ impl<'a> Columns<'a> {
             seed: text("seed")?.to_owned(),
             interpolation: self.text("interpolation", row).map(str::to_owned),
             penalty_points: self.float("penalty_points", row),
-            last_observation: self.last_observation(row),
         })
     }
 }

@@ -1,14 +1,12 @@
-//! `faceoff dataset`: looks into a dataset, cuts pieces out of it, and writes the 2023 layout.
+//! `faceoff dataset`: looks into a dataset and cuts pieces out of it.
 
-mod export;
 mod list;
-mod npy;
-mod pickle;
+mod moved;
 mod slice;
 
 use clap::{Args, Subcommand};
 
-/// Looks into a dataset and converts it.
+/// Looks into a dataset.
 #[derive(Debug, Args)]
 pub struct DatasetCommand {
     #[command(subcommand)]
@@ -21,8 +19,9 @@ enum Action {
     List(list::ListArgs),
     /// One episode's control steps as CSV or JSON lines
     Slice(slice::SliceArgs),
-    /// The layout of the 2023 challenge: NumPy arrays and pickled transitions
-    Export(export::ExportArgs),
+    /// Moved to the Python package: python -m faceoff.dataset export
+    #[command(hide = true)]
+    Export(moved::MovedArgs),
 }
 
 impl DatasetCommand {

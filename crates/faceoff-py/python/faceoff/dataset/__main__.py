@@ -1,0 +1,133 @@
+"""``python -m faceoff.dataset``: what is in a recording, and other layouts of it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections import Counter
+from typing import Any, Sequence
+
+from . import Dataset, DatasetError, Game, open, open_dataset, to_2023, to_lerobot, to_minari
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs a command.
+
+    Returns:
+        The exit code: 0, or 1 with a line on standard error if it could not be done.
+    """
+    options = _parser().parse_args(arguments)
+    try:
+        options.run(options)
+    except (DatasetError, ValueError, ImportError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m faceoff.dataset",
+        description="Looks into recordings of evaluations and games, and writes them in other layouts.",
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    recording = "dataset.zip or game.zip, the folder it was unpacked to, or the one it was written to"
+
+    info = commands.add_parser("info", help="what is in a recording")
+    info.add_argument("recording", help=recording)
+    info.add_argument("--json", action="store_true", help="print it as a JSON object")
+    info.set_defaults(run=_info)
+
+    export = commands.add_parser("export", help="write a dataset in another layout")
+    export.add_argument("recording", help=recording)
+    export.add_argument(
+        "--layout",
+        required=True,
+        choices=("2023", "minari", "lerobot"),
+        help="of the 2023 challenge (a folder per task), a Minari dataset, or LeRobot v3.0 (a folder per task)",
+    )
+    export.add_argument(
+        "--out",
+        metavar="DIR",
+        help="where it is written; for minari the folder of datasets [default: Minari's own]",
+    )
+    export.add_argument("--id", metavar="ID", help="of a Minari dataset, e.g. faceoff/hit/striker-v0")
+    export.add_argument("--task", help="one task only [default: all; for minari the one that the id names]")
+    export.set_defaults(run=_export)
+    return parser
+
+
+def _info(options: argparse.Namespace) -> None:
+    found = open(options.recording)
+    told = _of_game(found) if isinstance(found, Game) else _of_dataset(found)
+    if options.json:
+        print(json.dumps(told))
+        return
+    for key, value in told.items():
+        if isinstance(value, dict):
+            print(f"{key}:")
+            for name, inner in value.items():
+                print(f"  {name}: {json.dumps(inner)}")
+        else:
+            print(f"{key}: {value}")
+
+
+def _of_dataset(dataset: Dataset) -> dict[str, Any]:
+    tasks = {}
+    for task in dataset.tasks:
+        episodes = dataset.episodes(task)
+        tasks[task] = {
+            "episodes": len(episodes),
+            "successes": sum(episode.success for episode in episodes),
+            "steps": sum(episode.steps for episode in episodes),
+            "ends": dict(Counter(episode.end for episode in episodes)),
+            "violated": dict(Counter(group for e in episodes for group in sorted(e.violated))),
+        }
+    return {
+        "layout": dataset.layout,
+        "agent": dataset.agent,
+        "profile": dataset.profile,
+        "ruleset": dataset.ruleset,
+        "seed": dataset.seed,
+        "tasks": tasks,
+    }
+
+
+def _of_game(game: Game) -> dict[str, Any]:
+    return {
+        "layout": game.layout,
+        "agents": list(game.agents),
+        "profile": game.manifest.get("profile"),
+        "ruleset": game.manifest.get("ruleset"),
+        "sides": list(game.sides),
+        "steps": sum(rally.steps for rally in game),
+        "rallies": len(game),
+        "ends": dict(Counter(rally.end for rally in game)),
+        "score": list(game.rallies[-1].score) if len(game) else [0, 0],
+    }
+
+
+def _export(options: argparse.Namespace) -> None:
+    dataset = open_dataset(options.recording)
+    if options.layout == "minari":
+        if options.id is None:
+            raise ValueError("--id: expected an id such as faceoff/hit/striker-v0, got none")
+        made = to_minari(dataset, options.id, task=options.task, root=options.out)
+        print(f"{options.id}: {made.total_episodes} episodes, {made.total_steps} steps")
+        return
+    if options.out is None:
+        raise ValueError(f"--out: expected a folder for the layout {options.layout}, got none")
+    if options.layout == "2023":
+        if options.task is not None:
+            raise ValueError("--task: the layout 2023 has all tasks, leave it out")
+        for folder in to_2023(dataset, options.out):
+            print(folder)
+        return
+    dataset.check()
+    for task in dataset.tasks if options.task is None else [options.task]:
+        print(to_lerobot(dataset, f"{options.out}/{task}", task))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

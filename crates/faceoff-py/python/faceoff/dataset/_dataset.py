@@ -1,0 +1,297 @@
+"""The dataset of an evaluation."""
+
+from __future__ import annotations
+
+import json
+from functools import cached_property
+from typing import Any, Iterator, Literal, Sequence
+
+import numpy as np
+import pyarrow as pa
+
+from ._container import MANIFEST, Container
+from ._episode import CONSTRAINTS, Episode
+from ._errors import DatasetError
+from ._rows import Rows, to_polars
+
+__all__ = ["LAYOUTS", "Dataset", "Table"]
+
+LAYOUTS = ("faceoff-dataset/4", "faceoff-dataset/3", "faceoff-dataset/2")
+"""The layouts that are read, newest first."""
+
+Table = Literal["steps", "episodes"]
+
+HOST_TIME = "host_time_ns"
+AFTER = "computation_time_ns"
+
+
+class Dataset:
+    """The recording of an evaluation. Iterating gives its episodes in the order of the file.
+
+    Nothing but the manifest is read when it is opened. One object is for one thread at a time.
+    """
+
+    def __init__(self, container: Container, manifest: dict[str, Any]) -> None:
+        """Use `faceoff.dataset.open`.
+
+        Raises:
+            DatasetError: the manifest is not one of a dataset that can be read.
+        """
+        self._container = container
+        self.path = container.path
+        self.manifest = manifest
+        """What the dataset says of itself: `manifest.json`."""
+        if manifest.get("schema") not in LAYOUTS:
+            known = ", ".join(LAYOUTS)
+            raise DatasetError(
+                f"{self.path}: layout: expected one of {known}, got {manifest.get('schema')!r}"
+            )
+        for key, kind in (("agent", str), ("seed", str), ("episodes", dict), ("files", dict)):
+            if not isinstance(manifest.get(key), kind):
+                raise DatasetError(
+                    f"{self.path}: {MANIFEST}: expected {key!r} to be a {kind.__name__}, "
+                    f"got {manifest.get(key)!r}"
+                )
+
+    @property
+    def layout(self) -> str:
+        """One of `LAYOUTS`."""
+        return str(self.manifest["schema"])
+
+    @property
+    def agent(self) -> str:
+        """The agent's name."""
+        return str(self.manifest["agent"])
+
+    @property
+    def seed(self) -> str:
+        """The evaluation's seed, 64 hexadecimal digits."""
+        return str(self.manifest["seed"])
+
+    @property
+    def profile(self) -> str:
+        """The profile of perturbations that was played."""
+        return str(self.manifest["profile"])
+
+    @property
+    def ruleset(self) -> str:
+        """The rules by which it was played."""
+        return str(self.manifest["ruleset"])
+
+    @property
+    def tasks(self) -> tuple[str, ...]:
+        """The tasks that were played, in the order of the file."""
+        return tuple(self.manifest["episodes"])
+
+    @cached_property
+    def results(self) -> dict[str, Any]:
+        """The score: `results.json`."""
+        return self._container.json("results.json")
+
+    @cached_property
+    def violations(self) -> dict[str, Any]:
+        """Where constraints were broken: `violations.json`."""
+        return self._container.json("violations.json")
+
+    @cached_property
+    def calibration(self) -> dict[str, Any]:
+        """How evenly the slots kept time: `calibration.json`."""
+        return self._container.json("calibration.json")
+
+    @cached_property
+    def log(self) -> str:
+        """The end of the agent's standard error, with its faults."""
+        return self._container.bytes("agent.log").decode(errors="replace")
+
+    def check(self) -> None:
+        """Reads every file and compares it with its size and hash.
+
+        The BLAKE3 hashes of the manifest are compared if the package `blake3` is installed; without
+        it an archive's own checksums and all sizes are. `faceoff verify` also simulates it again.
+
+        Raises:
+            DatasetError: a file is missing, damaged or altered.
+        """
+        self._container.check(self.manifest["files"])
+
+    def __len__(self) -> int:
+        return len(self._episodes)
+
+    def __iter__(self) -> Iterator[Episode]:
+        return iter(self._episodes)
+
+    def episodes(self, task: str | None = None) -> list[Episode]:
+        """The episodes, of one task or of all.
+
+        Raises:
+            ValueError: the task was not played.
+            DatasetError: the table is damaged.
+        """
+        if task is None:
+            return list(self._episodes)
+        self._known(task)
+        return [episode for episode in self._episodes if episode.task == task]
+
+    def episode(self, task: str, index: int) -> Episode:
+        """One episode.
+
+        Raises:
+            ValueError: there is none of this task and number.
+            DatasetError: the table is damaged.
+        """
+        mine = self.episodes(task)
+        if not 0 <= index < len(mine):
+            raise ValueError(
+                f"index: expected an episode of {task} from 0 to {len(mine) - 1}, got {index}"
+            )
+        return mine[index]
+
+    def table(
+        self,
+        table: Table = "steps",
+        *,
+        task: str | None = None,
+        columns: Sequence[str] | None = None,
+    ) -> pa.Table:
+        """A whole table as pyarrow has it. Of `steps` it takes about 550 bytes per control step.
+
+        Args:
+            table: `steps`, a row per answered control step, or `episodes`, a row per episode.
+            task: only the rows of this task.
+            columns: those wanted, in this order; None for all.
+
+        Raises:
+            ValueError: there is no such table or task.
+            DatasetError: there is no such column, or the file is damaged.
+        """
+        if table not in ("steps", "episodes"):
+            raise ValueError(f"table: expected 'steps' or 'episodes', got {table!r}")
+        if task is not None:
+            self._known(task)
+        if table == "steps":
+            first, last = self._span(task)
+            return self._cut(first, last - first, columns)
+        places = [i for i, e in enumerate(self._episodes) if task in (None, e.task)]
+        start = places[0] if places else 0
+        return self._episode_rows.read(start, len(places), columns)
+
+    def to_pandas(
+        self,
+        table: Table = "steps",
+        *,
+        task: str | None = None,
+        columns: Sequence[str] | None = None,
+    ) -> Any:
+        """As `table`, as a pandas data frame."""
+        return self.table(table, task=task, columns=columns).to_pandas()
+
+    def to_polars(
+        self,
+        table: Table = "steps",
+        *,
+        task: str | None = None,
+        columns: Sequence[str] | None = None,
+    ) -> Any:
+        """As `table`, as a polars data frame."""
+        return to_polars(self.table(table, task=task, columns=columns))
+
+    def rows(self, episode: Episode, columns: Sequence[str] | None) -> pa.Table:
+        """The control steps of an episode of this dataset: `Episode.table`."""
+        place = self._places[episode.task, episode.index]
+        return self._cut(int(self._offsets[place]), episode.steps, columns)
+
+    def episode_row(self, episode: Episode) -> dict[str, Any]:
+        """The row of `episodes.parquet` of an episode of this dataset."""
+        place = self._places[episode.task, episode.index]
+        row: dict[str, Any] = self._episode_table.slice(place, 1).to_pylist()[0]
+        return row
+
+    def __repr__(self) -> str:
+        return f"<Dataset of {self.agent}: {self.manifest['episodes']}, {self.path}>"
+
+    def _known(self, task: str) -> None:
+        if task not in self.tasks:
+            raise ValueError(f"task: expected one of {', '.join(self.tasks)}, got {task!r}")
+
+    def _cut(self, start: int, count: int, columns: Sequence[str] | None) -> pa.Table:
+        rows = self._step_rows
+        if HOST_TIME in rows.columns:
+            return rows.read(start, count, columns)
+        # Before layout 4 nothing was told apart: the host took nothing.
+        stored = None if columns is None else [name for name in columns if name != HOST_TIME]
+        if columns is not None and len(stored or []) == len(columns):
+            return rows.read(start, count, columns)
+        table = rows.read(start, count, stored)
+        names = table.column_names
+        place = names.index(AFTER) + 1 if columns is None else list(columns).index(HOST_TIME)
+        return table.add_column(place, HOST_TIME, pa.array(np.zeros(count, dtype=np.int64)))
+
+    def _span(self, task: str | None) -> tuple[int, int]:
+        if task is None:
+            return 0, int(self._offsets[-1])
+        places = [i for i, episode in enumerate(self._episodes) if episode.task == task]
+        if not places:
+            return 0, 0
+        return int(self._offsets[places[0]]), int(self._offsets[places[-1] + 1])
+
+    @cached_property
+    def _step_rows(self) -> Rows:
+        name = "steps.parquet"
+        rows = Rows(self._container.table(name), f"{self.path}: {name}")
+        if len(rows) != int(self._offsets[-1]):
+            raise DatasetError(
+                f"{self.path}: {name}: expected {int(self._offsets[-1])} rows as episodes.parquet "
+                f"has it, got {len(rows)}"
+            )
+        return rows
+
+    @cached_property
+    def _episode_rows(self) -> Rows:
+        name = "episodes.parquet"
+        return Rows(self._container.table(name), f"{self.path}: {name}")
+
+    @cached_property
+    def _episode_table(self) -> pa.Table:
+        return self._episode_rows.read()
+
+    @cached_property
+    def _episodes(self) -> list[Episode]:
+        wanted = (
+            *("task", "episode", "seed", "interpolation", "steps", "end", "success", "fault"),
+            *("penalty_points", "computation_time_mean_s", "computation_time_max_s"),
+            *(f"violated_{group}" for group in CONSTRAINTS),
+        )
+        for name in wanted:
+            if name not in self._episode_table.column_names:
+                raise DatasetError(f"{self.path}: episodes.parquet has no column {name!r}")
+        return [self._episode(row) for row in self._episode_table.select(wanted).to_pylist()]
+
+    def _episode(self, row: dict[str, Any]) -> Episode:
+        try:
+            fault = None if row["fault"] is None else json.loads(row["fault"])
+        except ValueError as error:
+            raise DatasetError(f"{self.path}: episodes.parquet: fault: {error}") from error
+        return Episode(
+            task=row["task"],
+            index=row["episode"],
+            seed=row["seed"],
+            interpolation=row["interpolation"],
+            steps=row["steps"],
+            end=row["end"],
+            success=row["success"],
+            violated=frozenset(group for group in CONSTRAINTS if row[f"violated_{group}"]),
+            penalty_points=row["penalty_points"],
+            computation_time_mean_s=row["computation_time_mean_s"],
+            computation_time_max_s=row["computation_time_max_s"],
+            fault=fault,
+            _source=self,
+        )
+
+    @cached_property
+    def _places(self) -> dict[tuple[str, int], int]:
+        return {(e.task, e.index): place for place, e in enumerate(self._episodes)}
+
+    @cached_property
+    def _offsets(self) -> Any:
+        """Row of `steps.parquet` at which each episode begins, and where the last one ends."""
+        return np.concatenate([[0], np.cumsum([e.steps for e in self._episodes], dtype=np.int64)])

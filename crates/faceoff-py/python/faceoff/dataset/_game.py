@@ -1,0 +1,260 @@
+"""The recording of a game, or of one side of it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Iterator, Sequence
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from ._container import MANIFEST, Container
+from ._episode import CONSTRAINTS, EE, JOINT_POS, JOINT_VEL, OBSERVATION, PUCK, action_shape
+from ._errors import DatasetError
+from ._rows import Floats, Rows, floats, lists, seconds, to_polars
+
+__all__ = ["GAME_LAYOUTS", "Game", "Rally", "SideArrays"]
+
+GAME_LAYOUTS = ("faceoff-game/1", "faceoff-game-side/1")
+"""The layouts that are read: a whole game's, and that of one side's own file."""
+
+
+@dataclass(frozen=True)
+class SideArrays:
+    """A rally of N control steps as one side played it, in NumPy arrays of doubles.
+
+    Lengths in m, angles in rad, times in s. Observations and the end effector are in the base frame of
+    the side's own robot, the puck's true state in the table's frame.
+    """
+
+    observations: Floats
+    """What the agent was told, shape (N, 23)."""
+    actions: Floats
+    """What it answered, shape (N, *action_shape); NaN where it did not."""
+    effects: npt.NDArray[np.str_]
+    """`in_time`, `late`, `fault` or `held` per step, shape (N,)."""
+    puck: Floats
+    """x, y, yaw and their rates after the step, true, shape (N, 6)."""
+    joint_pos: Floats
+    """Joint positions after the step, true, shape (N, 7)."""
+    joint_vel: Floats
+    """Joint velocities after the step, true, shape (N, 7)."""
+    ee: Floats
+    """End effector after the step, shape (N, 3)."""
+    constraints: Floats
+    """Largest value of each constraint group (`CONSTRAINTS`), violated above 0, shape (N, 4)."""
+    computation_time_s: Floats
+    """What counts of the time until the answer, shape (N,); NaN where nothing was asked."""
+
+
+@dataclass(frozen=True)
+class Rally:
+    """A rally of a game: how it ended, and where its control steps are."""
+
+    index: int
+    """Its number, from 0."""
+    game_step: int
+    """Control step of the game at which it began."""
+    serves: int
+    """On whose side the puck lay, 1 or 2."""
+    steps: int
+    """Control steps, N."""
+    end: str
+    """`goal`, `foul`, `stuck`, `left_table`, `diverged` or `game_over`."""
+    by: int | None
+    """Who scored or fouled, 1 or 2."""
+    score: tuple[int, int]
+    """Of both sides after it."""
+    _game: Game = field(repr=False, compare=False, hash=False)
+
+    def table(self, name: str = "motion", columns: Sequence[str] | None = None) -> pa.Table:
+        """The control steps with the columns of `motion`, `side-1` or `side-2`.
+
+        Raises:
+            ValueError: there is no such table of control steps.
+            DatasetError: there is no such column, or the file is damaged.
+        """
+        return self._game.rally_rows(self, name, columns)
+
+    def to_pandas(self, name: str = "motion", columns: Sequence[str] | None = None) -> Any:
+        """As `table`, as a pandas data frame."""
+        return self.table(name, columns).to_pandas()
+
+    def to_polars(self, name: str = "motion", columns: Sequence[str] | None = None) -> Any:
+        """As `table`, as a polars data frame."""
+        return to_polars(self.table(name, columns))
+
+    def to_numpy(self, side: int) -> SideArrays:
+        """The control steps of one side as arrays.
+
+        Args:
+            side: 1 or 2.
+
+        Raises:
+            ValueError: the recording does not hold this side.
+            DatasetError: a file is damaged.
+        """
+        self._game.expect_side(side)
+        steps, motion = self.table(f"side-{side}"), self.table("motion")
+        entry = self._game.table(f"entries-{side}").slice(self.index, 1).to_pylist()[0]
+        what = f"side {side}, rally {self.index}"
+
+        def robot(names: Sequence[str]) -> Floats:
+            return floats(motion, [f"robot_{side}_{name}" for name in names])
+
+        return SideArrays(
+            observations=floats(steps, OBSERVATION),
+            actions=lists(steps, "action", action_shape(entry["interpolation"], what), what),
+            effects=np.asarray(steps.column("effect").to_pylist(), dtype=np.str_),
+            puck=floats(motion, PUCK),
+            joint_pos=robot(JOINT_POS),
+            joint_vel=robot(JOINT_VEL),
+            ee=robot(EE),
+            constraints=floats(steps, [f"constraint_{name}" for name in CONSTRAINTS]),
+            computation_time_s=seconds(steps, "computation_time_ns"),
+        )
+
+
+class Game:
+    """The recording of a game. Iterating gives its rallies.
+
+    A side's own file has the motion, the rallies and that side's tables. One object is for one thread
+    at a time.
+    """
+
+    def __init__(self, container: Container, manifest: dict[str, Any]) -> None:
+        """Use `faceoff.dataset.open`.
+
+        Raises:
+            DatasetError: the manifest is not one of a game that can be read.
+        """
+        self._container = container
+        self.path = container.path
+        self.manifest = manifest
+        """What the recording says of itself: `manifest.json`."""
+        if manifest.get("schema") not in GAME_LAYOUTS:
+            known = ", ".join(GAME_LAYOUTS)
+            raise DatasetError(
+                f"{self.path}: layout: expected one of {known}, got {manifest.get('schema')!r}"
+            )
+        for key, kind in (("agents", list), ("files", dict)):
+            if not isinstance(manifest.get(key), kind):
+                raise DatasetError(
+                    f"{self.path}: {MANIFEST}: expected {key!r} to be a {kind.__name__}, "
+                    f"got {manifest.get(key)!r}"
+                )
+
+    @property
+    def layout(self) -> str:
+        """One of `GAME_LAYOUTS`."""
+        return str(self.manifest["schema"])
+
+    @property
+    def agents(self) -> tuple[str, ...]:
+        """The names of both sides' agents."""
+        return tuple(str(agent) for agent in self.manifest["agents"])
+
+    @property
+    def sides(self) -> tuple[int, ...]:
+        """The sides whose observations and actions are in it: 1, 2 or both."""
+        return tuple(side for side in (1, 2) if f"side-{side}.parquet" in self.manifest["files"])
+
+    @property
+    def tables(self) -> tuple[str, ...]:
+        """The names of its tables: `motion`, `rallies`, `side-1`, `entries-1`, …"""
+        names = self.manifest["files"]
+        return tuple(n.removesuffix(".parquet") for n in names if n.endswith(".parquet"))
+
+    @cached_property
+    def results(self) -> dict[str, Any]:
+        """The score: `results.json`."""
+        return self._container.json("results.json")
+
+    @cached_property
+    def rallies(self) -> list[Rally]:
+        """The rallies, in the order of play.
+
+        Raises:
+            DatasetError: the table is damaged.
+        """
+        return [
+            Rally(
+                index=row["rally"],
+                game_step=row["game_step"],
+                serves=row["serves"],
+                steps=row["steps"],
+                end=row["end"],
+                by=row["by"],
+                score=(row["score_1"], row["score_2"]),
+                _game=self,
+            )
+            for row in self.table("rallies").to_pylist()
+        ]
+
+    def check(self) -> None:
+        """Reads every file and compares it with its size and hash, as `Dataset.check` does.
+
+        Raises:
+            DatasetError: a file is missing, damaged or altered.
+        """
+        self._container.check(self.manifest["files"])
+
+    def __len__(self) -> int:
+        return len(self.rallies)
+
+    def __iter__(self) -> Iterator[Rally]:
+        return iter(self.rallies)
+
+    def table(self, name: str, columns: Sequence[str] | None = None) -> pa.Table:
+        """A whole table as pyarrow has it.
+
+        Args:
+            name: one of `tables`.
+            columns: those wanted, in this order; None for all.
+
+        Raises:
+            ValueError: there is no such table.
+            DatasetError: there is no such column, or the file is damaged.
+        """
+        return self._rows(name).read(columns=columns)
+
+    def to_pandas(self, name: str, columns: Sequence[str] | None = None) -> Any:
+        """As `table`, as a pandas data frame."""
+        return self.table(name, columns).to_pandas()
+
+    def to_polars(self, name: str, columns: Sequence[str] | None = None) -> Any:
+        """As `table`, as a polars data frame."""
+        return to_polars(self.table(name, columns))
+
+    def rally_rows(self, rally: Rally, name: str, columns: Sequence[str] | None) -> pa.Table:
+        """The control steps of a rally of this game: `Rally.table`."""
+        known = ["motion", *(f"side-{side}" for side in self.sides)]
+        if name not in known:
+            raise ValueError(f"name: expected one of {', '.join(known)}, got {name!r}")
+        return self._rows(name).read(rally.game_step, rally.steps, columns)
+
+    def expect_side(self, side: int) -> None:
+        """Raises:
+        ValueError: the recording does not hold this side's tables.
+        """
+        if side not in self.sides:
+            known = " or ".join(map(str, self.sides))
+            raise ValueError(f"side: expected {known}, got {side!r}")
+
+    def __repr__(self) -> str:
+        return f"<Game of {json.dumps(self.agents)}: {self.path}>"
+
+    def _rows(self, name: str) -> Rows:
+        if name not in self.tables:
+            raise ValueError(f"name: expected one of {', '.join(self.tables)}, got {name!r}")
+        if name not in self._opened:
+            file = f"{name}.parquet"
+            self._opened[name] = Rows(self._container.table(file), f"{self.path}: {file}")
+        return self._opened[name]
+
+    @cached_property
+    def _opened(self) -> dict[str, Rows]:
+        return {}

@@ -1,0 +1,44 @@
+"""Which episodes of a dataset are converted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Iterable
+
+from ._dataset import Dataset
+from ._episode import Episode
+from ._errors import DatasetError
+
+__all__ = ["Selection", "select"]
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Episodes of one task whose actions have one shape, each with at least one control step."""
+
+    task: str
+    action_shape: tuple[int, ...]
+    episodes: list[Episode]
+
+
+def select(dataset: Dataset, task: str, episodes: Iterable[Episode] | None) -> Selection:
+    """The episodes that a learner can use: those without an answered step are left out.
+
+    Raises:
+        ValueError: an episode is of another task.
+        DatasetError: none is left, or their actions have different shapes.
+    """
+    chosen = dataset.episodes(task) if episodes is None else list(episodes)
+    for episode in chosen:
+        if episode.task != task:
+            raise ValueError(f"episodes: expected episodes of {task}, got one of {episode.task}")
+    chosen = [episode for episode in chosen if episode.steps]
+    if not chosen:
+        raise DatasetError(f"{dataset.path}: expected an answered control step of {task}, found none")
+    shapes = sorted({episode.action_shape for episode in chosen})
+    if len(shapes) > 1:
+        raise DatasetError(
+            f"{dataset.path}: expected actions of {task} of one shape, got {shapes}; "
+            "choose episodes of one interpolation with the argument `episodes`"
+        )
+    return Selection(task, shapes[0], chosen)
