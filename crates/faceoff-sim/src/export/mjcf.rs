@@ -41,15 +41,12 @@ fn write(model: Model, out: &mut String) -> std::fmt::Result {
     writeln!(
         out,
         "  <default>\n    <geom contype=\"0\" conaffinity=\"0\" rgba=\"0.6 0.6 0.65 1\"/>\n    \
-         <default class=\"driven\"><joint type=\"hinge\" axis=\"0 0 1\" limited=\"true\" {0}=\"{1}\" {2}=\"{3}\" \
-         {4}=\"{1}\" {5}=\"{3}\"/></default>\n    \
+         <default class=\"driven\"><joint type=\"hinge\" axis=\"0 0 1\" limited=\"true\" \
+         solreffriction=\"{soft}\" solimpfriction=\"{impedance}\" solreflimit=\"{soft}\" \
+         solimplimit=\"{impedance}\"/></default>\n    \
          <default class=\"rim\"><geom rgba=\"0.35 0.25 0.2 1\"/></default>\n  </default>",
-        "solreffriction",
-        solref(&JOINT),
-        "solimpfriction",
-        solimp(&JOINT),
-        "solreflimit",
-        "solimplimit",
+        soft = solref(&JOINT),
+        impedance = solimp(&JOINT),
     )?;
     writeln!(out, "  <worldbody>")?;
     writeln!(
