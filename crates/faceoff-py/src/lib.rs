@@ -4,6 +4,7 @@
 //! decides nothing about the simulation, and no panic of the other crates leaves it as one.
 
 mod actions;
+mod batch;
 mod errors;
 mod evaluate;
 mod game;
@@ -34,6 +35,7 @@ mod _native {
 
     #[pymodule_export]
     use crate::{
+        batch::Batch,
         evaluate::{Evaluation, PolicyCourse},
         game::Game,
         snapshot::{Snapshot, load_snapshot},

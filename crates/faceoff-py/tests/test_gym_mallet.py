@@ -12,20 +12,19 @@ import faceoff
 from faceoff.gym import AirHockeyEnv, AirHockeyVectorEnv, MalletPlane, MalletPlaneVector
 
 
-@pytest.mark.parametrize("interpolation", [1, 3])
-def test_the_mallet_goes_where_it_is_sent_and_breaks_nothing(interpolation: int) -> None:
-    base = AirHockeyEnv("prepare", action_mode="raw", interpolation=interpolation)
+@pytest.mark.parametrize("direction", [(1.0, 0.0), (0.0, 1.0), (0.5, -1.0)])
+def test_the_mallet_goes_where_it_is_sent_and_breaks_nothing(direction: tuple[float, float]) -> None:
+    base = AirHockeyEnv("prepare", action_mode="raw", interpolation=3)
     env = MalletPlane(base, max_speed_m_s=0.5)
     assert env.action_space.shape == (2,)
     env.reset(seed=0)
-    for action in ([1.0, 0.0], [0.0, 1.0], [-0.5, -1.0]):
-        start = base.state.mallet
-        for _ in range(20):
-            *_, info = env.step(np.array(action))
-        moved = base.state.mallet - start
-        # A commanded motion lags a little behind.
-        np.testing.assert_allclose(moved[:2], 0.2 * np.array(action), atol=0.04)
+    start = base.state.mallet
+    for _ in range(30):
+        *_, info = env.step(np.array(direction))
         assert (info["constraints"] < 0).all()
+    moved = base.state.mallet - start
+    # It gains speed first, and the arm lags a little behind.
+    np.testing.assert_allclose(moved[:2], 0.3 * np.array(direction), atol=0.03)
 
 
 def test_one_that_is_sent_everywhere_stays_in_its_region() -> None:
@@ -37,8 +36,7 @@ def test_one_that_is_sent_everywhere_stays_in_its_region() -> None:
         action = draws.choice([-1.0, 1.0], 2)
         for _ in range(40):
             *_, terminated, truncated, info = env.step(action)
-            assert info["constraints"][2] < 0, "joint positions"
-            assert info["constraints"][0] < 0, "end effector"
+            assert (info["constraints"] < 0).all()
             if terminated or truncated:
                 env.reset()
 
@@ -79,8 +77,8 @@ def test_what_cannot_be_is_refused() -> None:
     with pytest.raises(faceoff.ArgumentError, match="action_mode='raw'"):
         MalletPlane(AirHockeyEnv("hit"))
     with pytest.raises(faceoff.ArgumentError, match="max_speed_m_s"):
-        MalletPlane(AirHockeyEnv("hit", action_mode="raw"), max_speed_m_s=0.0)
-    env = MalletPlane(AirHockeyEnv("hit", action_mode="raw"))
+        MalletPlane(AirHockeyEnv("hit", action_mode="raw", interpolation=3), max_speed_m_s=0.0)
+    env = MalletPlane(AirHockeyEnv("hit", action_mode="raw", interpolation=3))
     env.reset(seed=0)
     with pytest.raises(faceoff.ArgumentError, match="finite"):
         env.step(np.array([np.nan, 0.0]))

@@ -16,11 +16,13 @@ from faceoff._arguments import numbers
 from faceoff.errors import ArgumentError
 
 #: Where the mallet may go, m in the robot's base frame: [x, y] least and greatest. The constraint on the end effector
-#: begins 1.5 cm beyond it, but towards the middle of the table, where the arm's reach ends.
-REGION = ((0.60, -0.455), (1.30, 0.455))
+#: begins 2 cm beyond it, but towards the middle of the table, where the arm's reach ends.
+REGION = ((0.605, -0.45), (1.30, 0.45))
 CONTROL_STEP_S = 0.02
-#: Of a joint's velocity limit; the constraint is 0.95.
-SPEED_SHARE = 0.9
+#: Of a joint's velocity limit; the constraint is 0.95, and an arm that is pushed on overshoots.
+SPEED_SHARE = 0.8
+#: Along each axis. An arm that is asked for more sags out of its height.
+MAX_ACCELERATION_M_S2 = 8.0
 
 Floats = npt.NDArray[np.float64]
 
@@ -28,45 +30,55 @@ Floats = npt.NDArray[np.float64]
 class MalletMotion:
     """Where the mallets of some worlds are commanded to be, and the joints that bring them there."""
 
-    def __init__(self, worlds: int, rows: int, max_speed_m_s: float) -> None:
-        self._rows = rows
-        self._reach_m = max_speed_m_s * CONTROL_STEP_S
+    def __init__(self, worlds: int, max_speed_m_s: float) -> None:
+        self._max_speed_m_s = max_speed_m_s
         self._start = np.array(_native.start_pose())
         self._step_limits = SPEED_SHARE * np.array(_native.joint_limits()[1]) * CONTROL_STEP_S
         self._q = np.tile(self._start, (worlds, 1))
         self._xy = kinematics.forward(self._q)[:, :2]
+        self._speed = np.zeros((worlds, 2))
 
     def restart(self, which: npt.NDArray[np.bool_]) -> None:
         """These worlds begin an episode: their mallets are where they start."""
         self._q[which] = self._start
         self._xy[which] = kinematics.forward(self._start)[:2]
+        self._speed[which] = 0.0
 
     def command(self, actions: Floats) -> Floats:
-        """From (worlds, 2) fractions of the greatest speed along x and y to (worlds, 7 or 14) raw actions.
+        """From (worlds, 2) fractions of the greatest speed along x and y to (worlds, 14) raw actions.
 
-        A mallet that cannot get there, and one whose joints would be too fast, gets as far as it can.
+        A mallet that would be too fast for its joints, would gain speed too fast or would leave its region gets as far as
+        it can.
         """
         least, greatest = np.array(REGION)
-        target = np.clip(self._xy + np.clip(actions, -1.0, 1.0) * self._reach_m, least, greatest)
-        wanted, is_good = kinematics.inverse(target, self._q)
-        change = np.where(is_good[:, None], wanted - self._q, 0.0)
-        excess = np.max(np.abs(change) / self._step_limits, axis=1, keepdims=True)
-        change /= np.maximum(excess, 1.0)
+        wanted = np.clip(actions, -1.0, 1.0) * self._max_speed_m_s
+        change_m_s = MAX_ACCELERATION_M_S2 * CONTROL_STEP_S
+        speed = self._speed + np.clip(wanted - self._speed, -change_m_s, change_m_s)
+        # So slow towards the region's edge that it can stop there.
+        slow = np.sqrt(2.0 * MAX_ACCELERATION_M_S2 * np.maximum(self._xy - least, 0.0))
+        fast = np.sqrt(2.0 * MAX_ACCELERATION_M_S2 * np.maximum(greatest - self._xy, 0.0))
+        step = np.clip(speed, -slow, fast) * CONTROL_STEP_S
+        step = np.clip(self._xy + step, least, greatest) - self._xy
+        q, _ = kinematics.inverse(self._xy + step)
+        excess = np.max(np.abs(q - self._q) / self._step_limits, axis=1, keepdims=True)
+        # Shortened along the table, not in the joints, so that the mallet keeps its height.
+        step /= np.maximum(excess, 1.0)
+        q, is_good = kinematics.inverse(self._xy + step)
+        step = np.where(is_good[:, None], step, 0.0)
+        change = np.where(is_good[:, None], q - self._q, 0.0)
+        self._xy = self._xy + step
+        self._speed = step / CONTROL_STEP_S
         self._q = self._q + change
-        self._xy = kinematics.forward(self._q)[:, :2]
-        if self._rows == 1:
-            return self._q.copy()
         return np.concatenate([self._q, change / CONTROL_STEP_S], axis=1)
 
 
-def _rows(space: gymnasium.Space[Any], action_mode: str) -> int:
+def _check(space: gymnasium.Space[Any], action_mode: str) -> None:
     length = space.shape[-1]  # type: ignore[index]
-    if action_mode != "raw" or length not in (7, 14):
+    if action_mode != "raw" or length != 14:
         raise ArgumentError(
-            "env: expected one made with action_mode='raw' and interpolation=1, 2, 3, 4 or -1, got one with "
-            f"{action_mode!r} and actions of {length} numbers"
+            "env: expected one made with action_mode='raw' and interpolation=3, whose actions are positions and "
+            f"velocities, got one with {action_mode!r} and actions of {length} numbers"
         )
-    return int(length) // 7
 
 
 def _speed(value: float) -> float:
@@ -79,14 +91,15 @@ class MalletPlane(gymnasium.ActionWrapper[Any, Any, Any]):
     """Actions (2,) in [-1, 1]: how fast the mallet moves along x and y, at its height over the table.
 
     Args:
-        env: an :class:`AirHockeyEnv` with ``action_mode="raw"``.
+        env: an :class:`AirHockeyEnv` with ``action_mode="raw"`` and ``interpolation=3``: without commanded velocities
+            the arm lags and sags by centimetres.
         max_speed_m_s: what 1 stands for; joints that would be too fast for it slow the mallet down.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], max_speed_m_s: float = 1.0) -> None:
         super().__init__(env)
-        rows = _rows(env.action_space, getattr(env.unwrapped, "action_mode", "none"))
-        self._motion = MalletMotion(1, rows, _speed(max_speed_m_s))
+        _check(env.action_space, getattr(env.unwrapped, "action_mode", "none"))
+        self._motion = MalletMotion(1, _speed(max_speed_m_s))
         self.action_space = Box(-1.0, 1.0, (2,), np.float32)
 
     def reset(
@@ -111,8 +124,8 @@ class MalletPlaneVector(VectorWrapper[Any, Any, Any, Any, Any]):
 
     def __init__(self, env: VectorEnv[Any, Any, Any], max_speed_m_s: float = 1.0) -> None:
         super().__init__(env)
-        rows = _rows(env.action_space, getattr(env.unwrapped, "action_mode", "none"))
-        self._motion = MalletMotion(env.num_envs, rows, _speed(max_speed_m_s))
+        _check(env.action_space, getattr(env.unwrapped, "action_mode", "none"))
+        self._motion = MalletMotion(env.num_envs, _speed(max_speed_m_s))
         self.single_action_space = Box(-1.0, 1.0, (2,), np.float32)
         self.action_space = batch_space(self.single_action_space, env.num_envs)
         self._ended = np.zeros(env.num_envs, np.bool_)

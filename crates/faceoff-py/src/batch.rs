@@ -1,0 +1,63 @@
+//! The simulator's own batch, so that the environments can be timed beside it.
+
+use crate::errors::{argument, broken, fenced};
+use faceoff_sim::{
+    Batch as SimBatch, BatchSetup, Interpolation, JOINTS, PerturbationSettings, Plant,
+    model::INITIAL_Q,
+};
+use faceoff_types::{Factors, Seed};
+use pyo3::prelude::*;
+use rayon::ThreadPool;
+
+/// Worlds whose arms are held.
+#[pyclass(module = "faceoff._native")]
+pub struct Batch {
+    batch: SimBatch,
+    actions: Vec<f64>,
+    pool: ThreadPool,
+}
+
+#[pymethods]
+impl Batch {
+    /// In the ideal simulator, with cubic interpolation.
+    #[new]
+    fn new(task: &str, worlds: u32, threads: usize) -> PyResult<Self> {
+        let task = task
+            .parse()
+            .map_err(|_| argument("task", "hit, defend or prepare", task))?;
+        let hold = Interpolation::Cubic.held(&INITIAL_Q);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        fenced(|| {
+            Ok(Self {
+                batch: SimBatch::new(BatchSetup {
+                    task,
+                    interpolation: Interpolation::Cubic,
+                    factors: Factors::NONE,
+                    settings: PerturbationSettings::default(),
+                    plant: Plant::nominal(),
+                    seed: Seed::from_number(0),
+                    worlds,
+                }),
+                actions: hold[..2 * JOINTS].repeat(worlds as usize),
+                pool: pool.map_err(|error| broken(&error.to_string()))?,
+            })
+        })
+    }
+
+    /// A control step of all worlds.
+    fn step(&mut self, py: Python<'_>) -> PyResult<()> {
+        let Self {
+            batch,
+            actions,
+            pool,
+        } = self;
+        py.detach(|| {
+            fenced(|| {
+                pool.install(|| {
+                    batch.step(actions);
+                });
+                Ok(())
+            })
+        })
+    }
+}
