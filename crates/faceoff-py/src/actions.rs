@@ -74,7 +74,7 @@ impl Actions {
         let (at, number) = actions
             .iter()
             .enumerate()
-            .find(|(_, x)| !(x.abs() <= limit))
+            .find(|(_, x)| x.is_nan() || x.abs() > limit)
             .unwrap_or((0, &f64::NAN));
         let (of, index) = (place(at / self.len()), at % self.len());
         Err(if number.is_finite() {

@@ -157,14 +157,6 @@ impl Game {
         Ok(flat(&self.state.playing()?.state()))
     }
 
-    /// Control steps played, the rally's number from 0, goals, fouls and the score.
-    fn count(&mut self) -> PyResult<(u32, u32, [u32; 2], [u32; 2], [u32; 2])> {
-        let game = self.state.playing()?;
-        let referee = game.referee();
-        let (goals, fouls, score) = (referee.goals, referee.fouls, referee.score());
-        Ok((game.steps(), game.rally(), goals, fouls, score))
-    }
-
     /// Gives the game up.
     fn close(&mut self) {
         self.state = State::Closed;

@@ -49,8 +49,11 @@ enum State {
 
 struct Sent {
     by_process: u32,
-    result: Mutex<Receiver<Result<(Vec<World>, OwnRows), String>>>,
+    result: Mutex<Receiver<Result<Stepped, String>>>,
 }
+
+/// Worlds after a step, and what it led to.
+type Stepped = (Vec<World>, OwnRows);
 
 #[pymethods]
 impl Worlds {
@@ -77,7 +80,6 @@ impl Worlds {
 
     /// Resets the worlds of the mask: to the given episode of the given seed, or without a seed to the episode after
     /// the last one. Rows of others are not written.
-    #[expect(clippy::too_many_arguments, reason = "Python's half names them")]
     fn reset(
         slf: &Bound<'_, Self>,
         py: Python<'_>,
@@ -350,7 +352,7 @@ impl State {
         }
     }
 
-    fn received(&mut self, py: Python<'_>) -> PyResult<(Vec<World>, OwnRows)> {
+    fn received(&mut self, py: Python<'_>) -> PyResult<Stepped> {
         let Self::Sent(sent) = self else {
             self.idle()?;
             return Err(OrderError::new_err(

@@ -2,7 +2,9 @@
 
 import multiprocessing
 import os
+import sys
 import threading
+import time
 from typing import Any
 
 import gymnasium
@@ -99,25 +101,31 @@ def test_gymnasiums_own_processes_take_the_environment() -> None:
 
 
 def test_other_threads_of_python_run_while_a_step_does() -> None:
-    envs = AirHockeyVectorEnv(2_000, "hit", threads=1)
+    envs = AirHockeyVectorEnv(64, "hit", threads=1)
     envs.reset(seed=0)
-    done, counted = threading.Event(), []
+    done, counted = threading.Event(), [0]
 
     def count() -> None:
         while not done.is_set():
-            counted.append(1)
+            counted[0] += 1
+            time.sleep(0)
 
+    before = sys.getswitchinterval()
+    # From now on nobody gets the interpreter who is not given it.
+    sys.setswitchinterval(1e3)
     counter = threading.Thread(target=count)
-    counter.start()
-    before = len(counted)
-    # A lock that is held through it lets the other thread run at its end only, for a switch interval.
-    told = []
-    for _ in range(3):
-        envs.step(np.zeros((2_000, 7)))
-        told.append(len(counted))
-    done.set()
-    counter.join()
-    assert told[-1] - before > 1_000
+    try:
+        counter.start()
+        start = counted[0]
+        for _ in range(1_000):
+            envs.step(np.zeros((64, 7)))
+            if counted[0] > start:
+                break
+        assert counted[0] > start
+    finally:
+        sys.setswitchinterval(before)
+        done.set()
+        counter.join()
 
 
 def test_two_calls_at_once_are_refused_or_follow_each_other() -> None:
