@@ -16,6 +16,7 @@ pytest.importorskip("pyarrow")
 import faceoff.dataset as fd  # noqa: E402
 from dataset_recordings import FIXTURES, game  # noqa: E402
 from faceoff.dataset.__main__ import main  # noqa: E402
+from faceoff.errors import Error  # noqa: E402
 
 HOLD = FIXTURES / "dataset-layout-3.zip"
 
@@ -125,6 +126,21 @@ def test_arguments_that_are_wrong() -> None:
         dataset.table("step")  # type: ignore[arg-type]
     with pytest.raises(fd.DatasetError, match="steps.parquet has no column 'speed'; it has task, "):
         dataset.episode("hit", 0).table(["speed"])
+    with pytest.raises(TypeError, match="columns: expected a list of names, got the text 'puck_x'"):
+        dataset.episode("hit", 0).table("puck_x")
+    with pytest.raises(TypeError, match="index: expected a whole number, got '0'"):
+        dataset.episode("hit", "0")  # type: ignore[arg-type]
+
+
+def test_all_of_them_are_errors_of_faceoff(tmp_path: Path) -> None:
+    for wrong in (
+        lambda: fd.open(tmp_path),
+        lambda: fd.open_dataset(HOLD).episodes("prepare"),
+        lambda: fd.open_dataset(HOLD).table("step"),  # type: ignore[arg-type]
+        lambda: fd.to_lerobot(fd.open_dataset(HOLD), tmp_path, "hit"),
+    ):
+        with pytest.raises(Error):
+            wrong()
 
 
 def command(*arguments: object) -> tuple[int, str, str]:

@@ -17,16 +17,18 @@ from __future__ import annotations
 
 import os
 
+from faceoff.errors import MissingError
+
 try:
     import pyarrow as _pyarrow
 except ImportError as error:
-    raise ImportError("faceoff.dataset needs pyarrow: pip install 'faceoff[dataset]'") from error
+    raise MissingError("faceoff.dataset needs pyarrow: pip install 'faceoff[dataset]'") from error
 
 from ._container import MANIFEST as _MANIFEST
 from ._container import find as _find
 from ._dataset import LAYOUTS, Dataset
 from ._episode import ACTION_SHAPES, CONSTRAINTS, Episode, EpisodeArrays
-from ._errors import DatasetError
+from ._errors import DatasetError, ExistsError
 from ._game import GAME_LAYOUTS, Game, Rally, SideArrays
 from ._layout_2023 import to_2023
 from ._lerobot import to_lerobot
@@ -42,6 +44,7 @@ __all__ = [
     "DatasetError",
     "Episode",
     "EpisodeArrays",
+    "ExistsError",
     "Game",
     "Rally",
     "Reward",

@@ -8,7 +8,9 @@ import sys
 from collections import Counter
 from typing import Any, Sequence
 
-from . import Dataset, DatasetError, Game, open, open_dataset, to_2023, to_lerobot, to_minari
+from faceoff.errors import ArgumentError, Error
+
+from . import Dataset, Game, open, open_dataset, to_2023, to_lerobot, to_minari
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -20,7 +22,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         options.run(options)
-    except (DatasetError, ValueError, ImportError, OSError) as error:
+    except (Error, ValueError, ImportError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
     return 0
@@ -112,15 +114,15 @@ def _export(options: argparse.Namespace) -> None:
     dataset = open_dataset(options.recording)
     if options.layout == "minari":
         if options.id is None:
-            raise ValueError("--id: expected an id such as faceoff/hit/striker-v0, got none")
+            raise ArgumentError("--id: expected an id such as faceoff/hit/striker-v0, got none")
         made = to_minari(dataset, options.id, task=options.task, root=options.out)
         print(f"{options.id}: {made.total_episodes} episodes, {made.total_steps} steps")
         return
     if options.out is None:
-        raise ValueError(f"--out: expected a folder for the layout {options.layout}, got none")
+        raise ArgumentError(f"--out: expected a folder for the layout {options.layout}, got none")
     if options.layout == "2023":
         if options.task is not None:
-            raise ValueError("--task: the layout 2023 has all tasks, leave it out")
+            raise ArgumentError("--task: the layout 2023 has all tasks, leave it out")
         for folder in to_2023(dataset, options.out):
             print(folder)
         return

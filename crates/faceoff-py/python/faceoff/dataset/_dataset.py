@@ -9,6 +9,8 @@ from typing import Any, Iterator, Literal, Sequence
 import numpy as np
 import pyarrow as pa
 
+from faceoff.errors import ArgumentError, ArgumentTypeError
+
 from ._container import MANIFEST, Container
 from ._episode import CONSTRAINTS, Episode
 from ._errors import DatasetError
@@ -124,7 +126,7 @@ class Dataset:
         """The episodes, of one task or of all.
 
         Raises:
-            ValueError: the task was not played.
+            ArgumentError: the task was not played.
             DatasetError: the table is damaged.
         """
         if task is None:
@@ -136,12 +138,15 @@ class Dataset:
         """One episode.
 
         Raises:
-            ValueError: there is none of this task and number.
+            ArgumentError: there is none of this task and number.
+            ArgumentTypeError: the number is none.
             DatasetError: the table is damaged.
         """
         mine = self.episodes(task)
+        if not isinstance(index, (int, np.integer)):
+            raise ArgumentTypeError(f"index: expected a whole number, got {index!r}")
         if not 0 <= index < len(mine):
-            raise ValueError(
+            raise ArgumentError(
                 f"index: expected an episode of {task} from 0 to {len(mine) - 1}, got {index}"
             )
         return mine[index]
@@ -161,11 +166,11 @@ class Dataset:
             columns: those wanted, in this order; None for all.
 
         Raises:
-            ValueError: there is no such table or task.
+            ArgumentError: there is no such table or task.
             DatasetError: there is no such column, or the file is damaged.
         """
         if table not in ("steps", "episodes"):
-            raise ValueError(f"table: expected 'steps' or 'episodes', got {table!r}")
+            raise ArgumentError(f"table: expected 'steps' or 'episodes', got {table!r}")
         if task is not None:
             self._known(task)
         if table == "steps":
@@ -211,11 +216,11 @@ class Dataset:
 
     def _known(self, task: str) -> None:
         if task not in self.tasks:
-            raise ValueError(f"task: expected one of {', '.join(self.tasks)}, got {task!r}")
+            raise ArgumentError(f"task: expected one of {', '.join(self.tasks)}, got {task!r}")
 
     def _cut(self, start: int, count: int, columns: Sequence[str] | None) -> pa.Table:
         rows = self._step_rows
-        if HOST_TIME in rows.columns:
+        if HOST_TIME in rows.columns or isinstance(columns, str):
             return rows.read(start, count, columns)
         # Before layout 4 nothing was told apart: the host took nothing.
         stored = None if columns is None else [name for name in columns if name != HOST_TIME]

@@ -1,9 +1,15 @@
-"""The error of this package."""
+"""The errors that this package adds to :mod:`faceoff.errors`."""
 
 from __future__ import annotations
 
-__all__ = ["DatasetError"]
+from faceoff.errors import Error
+
+__all__ = ["DatasetError", "ExistsError"]
 
 
-class DatasetError(Exception):
+class DatasetError(Error):
     """A recording cannot be read or converted; the message names the file and the cause."""
+
+
+class ExistsError(Error, FileExistsError):
+    """What is to be written is there already."""

@@ -11,6 +11,8 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
+from faceoff.errors import ArgumentError
+
 from ._container import MANIFEST, Container
 from ._episode import CONSTRAINTS, EE, JOINT_POS, JOINT_VEL, OBSERVATION, PUCK, action_shape
 from ._errors import DatasetError
@@ -74,7 +76,7 @@ class Rally:
         """The control steps with the columns of `motion`, `side-1` or `side-2`.
 
         Raises:
-            ValueError: there is no such table of control steps.
+            ArgumentError: there is no such table of control steps.
             DatasetError: there is no such column, or the file is damaged.
         """
         return self._game.rally_rows(self, name, columns)
@@ -94,7 +96,7 @@ class Rally:
             side: 1 or 2.
 
         Raises:
-            ValueError: the recording does not hold this side.
+            ArgumentError: the recording does not hold this side.
             DatasetError: a file is damaged.
         """
         self._game.expect_side(side)
@@ -216,7 +218,7 @@ class Game:
             columns: those wanted, in this order; None for all.
 
         Raises:
-            ValueError: there is no such table.
+            ArgumentError: there is no such table.
             DatasetError: there is no such column, or the file is damaged.
         """
         return self._rows(name).read(columns=columns)
@@ -233,23 +235,23 @@ class Game:
         """The control steps of a rally of this game: `Rally.table`."""
         known = ["motion", *(f"side-{side}" for side in self.sides)]
         if name not in known:
-            raise ValueError(f"name: expected one of {', '.join(known)}, got {name!r}")
+            raise ArgumentError(f"name: expected one of {', '.join(known)}, got {name!r}")
         return self._rows(name).read(rally.game_step, rally.steps, columns)
 
     def expect_side(self, side: int) -> None:
         """Raises:
-        ValueError: the recording does not hold this side's tables.
+        ArgumentError: the recording does not hold this side's tables.
         """
         if side not in self.sides:
             known = " or ".join(map(str, self.sides))
-            raise ValueError(f"side: expected {known}, got {side!r}")
+            raise ArgumentError(f"side: expected {known}, got {side!r}")
 
     def __repr__(self) -> str:
         return f"<Game of {json.dumps(self.agents)}: {self.path}>"
 
     def _rows(self, name: str) -> Rows:
         if name not in self.tables:
-            raise ValueError(f"name: expected one of {', '.join(self.tables)}, got {name!r}")
+            raise ArgumentError(f"name: expected one of {', '.join(self.tables)}, got {name!r}")
         if name not in self._opened:
             file = f"{name}.parquet"
             self._opened[name] = Rows(self._container.table(file), f"{self.path}: {file}")

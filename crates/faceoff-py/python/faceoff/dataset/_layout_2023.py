@@ -12,6 +12,7 @@ import numpy as np
 
 from ._dataset import Dataset
 from ._episode import CONSTRAINTS, Episode
+from ._errors import ExistsError
 
 __all__ = ["ENVIRONMENTS", "to_2023"]
 
@@ -43,14 +44,14 @@ def to_2023(dataset: Dataset, out: str | os.PathLike[str]) -> list[Path]:
 
     Raises:
         DatasetError: the dataset is damaged.
-        FileExistsError: a folder of the export is there already.
+        ExistsError: a folder of the export is there already.
     """
     dataset.check()
     root = Path(out)
     folders = [root / ENVIRONMENTS[task] for task in dataset.tasks]
     for folder in folders:
         if folder.exists():
-            raise FileExistsError(f"out: {folder} is there already; name another folder")
+            raise ExistsError(f"out: {folder} is there already; name another folder")
     for task, folder in zip(dataset.tasks, folders):
         folder.mkdir(parents=True)
         _write_task(folder, dataset.episodes(task))

@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 
 from ._dataset import Dataset
 from ._episode import JOINT_POS, JOINT_VEL, OPPONENT_EE, PUCK, Episode
+from ._errors import ExistsError
 from ._rewards import Reward, rewards_of, success_at_end
 from ._select import Selection, select
 
@@ -68,13 +69,13 @@ def to_lerobot(
         The folder.
 
     Raises:
-        ValueError: the task was not played.
-        FileExistsError: the folder is there already.
+        ArgumentError: the task was not played.
+        ExistsError: the folder is there already.
         DatasetError: the dataset is damaged, or actions have different shapes.
     """
     folder = Path(root)
     if folder.exists():
-        raise FileExistsError(f"root: {folder} is there already; name another folder")
+        raise ExistsError(f"root: {folder} is there already; name another folder")
     chosen = select(dataset, task, episodes)
     features = _features(chosen)
     rows: list[dict[str, Any]] = []

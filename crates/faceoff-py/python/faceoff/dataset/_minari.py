@@ -10,6 +10,8 @@ from typing import Any, Iterable, Iterator
 
 import numpy as np
 
+from faceoff.errors import ArgumentError, MissingError
+
 from ._dataset import Dataset
 from ._episode import Episode
 from ._rewards import Reward, rewards_of, success_at_end
@@ -60,20 +62,21 @@ def to_minari(
         The `minari.MinariDataset`.
 
     Raises:
-        ValueError: the task is not said or not known, or Minari refuses an argument or an id that exists.
+        ArgumentError: the task is not said or not known.
+        ValueError: Minari refuses an argument, or an id that exists.
         DatasetError: the dataset is damaged, or actions have different shapes.
-        ImportError: Minari is not installed.
+        MissingError: Minari is not installed.
     """
     try:
         import minari
         from gymnasium.spaces import Box
         from minari.data_collector import EpisodeBuffer
     except ImportError as error:
-        raise ImportError(
+        raise MissingError(
             "to_minari needs Minari and Gymnasium: pip install 'minari>=0.5.3' gymnasium"
         ) from error
     if dtype not in ("float32", "float64"):
-        raise ValueError(f"dtype: expected 'float32' or 'float64', got {dtype!r}")
+        raise ArgumentError(f"dtype: expected 'float32' or 'float64', got {dtype!r}")
     chosen = select(dataset, _task(dataset, dataset_id, task), episodes)
     number = np.dtype(dtype).type
     width = int(np.prod(chosen.action_shape))
@@ -119,7 +122,7 @@ def _task(dataset: Dataset, dataset_id: str, task: str | None) -> str:
     named = [part for part in dataset_id.split("/") if part in dataset.tasks]
     if len(named) == 1:
         return named[0]
-    raise ValueError(f"task: expected one of {', '.join(dataset.tasks)}, got none")
+    raise ArgumentError(f"task: expected one of {', '.join(dataset.tasks)}, got none")
 
 
 def _buffer(kind: Any, episode: Episode, reward: Reward, number: type[Any]) -> Any:

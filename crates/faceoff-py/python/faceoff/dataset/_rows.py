@@ -11,6 +11,8 @@ import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from faceoff.errors import ArgumentTypeError, MissingError
+
 from ._errors import DatasetError
 
 __all__ = ["Rows", "floats", "lists", "seconds", "to_polars"]
@@ -42,8 +44,11 @@ class Rows:
         """Rows ``start`` to ``start + count``, to the end without a count.
 
         Raises:
+            ArgumentTypeError: the columns are a text.
             DatasetError: a column or rows do not exist, or cannot be read.
         """
+        if isinstance(columns, str):
+            raise ArgumentTypeError(f"columns: expected a list of names, got the text {columns!r}")
         wanted = tuple(self.columns if columns is None else columns)
         for name in wanted:
             if name not in self.columns:
@@ -114,10 +119,10 @@ def to_polars(table: pa.Table) -> Any:
     """The table as a polars data frame.
 
     Raises:
-        ImportError: polars is not installed.
+        MissingError: polars is not installed.
     """
     try:
         import polars
     except ImportError as error:
-        raise ImportError("polars is needed for this: pip install polars") from error
+        raise MissingError("polars is needed for this: pip install polars") from error
     return polars.from_arrow(table)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Iterable
 
+from faceoff.errors import ArgumentError
+
 from ._dataset import Dataset
 from ._episode import Episode
 from ._errors import DatasetError
@@ -25,13 +27,13 @@ def select(dataset: Dataset, task: str, episodes: Iterable[Episode] | None) -> S
     """The episodes that a learner can use: those without an answered step are left out.
 
     Raises:
-        ValueError: an episode is of another task.
+        ArgumentError: an episode is of another task.
         DatasetError: none is left, or their actions have different shapes.
     """
     chosen = dataset.episodes(task) if episodes is None else list(episodes)
     for episode in chosen:
         if episode.task != task:
-            raise ValueError(f"episodes: expected episodes of {task}, got one of {episode.task}")
+            raise ArgumentError(f"episodes: expected episodes of {task}, got one of {episode.task}")
     chosen = [episode for episode in chosen if episode.steps]
     if not chosen:
         raise DatasetError(f"{dataset.path}: expected an answered control step of {task}, found none")
