@@ -2,6 +2,7 @@
 
 use crate::{
     Layer, SandboxError, SpawnSpec,
+    cpu_view::CpuView,
     error::IoContext,
     private_mounts::PrivateMounts,
     seccomp::{self, Filters},
@@ -50,9 +51,11 @@ const HIDDEN_FILES: [&str; 17] = [
 ];
 
 /// What ordinary libraries read of the host's counters: agents see them as they were before the first agent,
-/// for they also count what agents do (the processes that were ever started, say).
-const FROZEN_FILES: [&str; 4] = [
+/// for they also count what agents do (the processes that were ever started, say). Of CPUs they tell those that
+/// are the agent's.
+const FROZEN_FILES: [&str; 5] = [
     "/proc/stat",
+    "/proc/cpuinfo",
     "/proc/meminfo",
     "/proc/loadavg",
     "/proc/uptime",
@@ -171,7 +174,11 @@ impl Bubblewrap {
         }
         line.args(["--proc", "/proc", "--dev", "/dev"]);
         line.hide_counters();
-        line.freeze_counters()?;
+        let cpus = CpuView::of(&spec.cpus, &spec.limits);
+        line.freeze_counters(&cpus)?;
+        for (path, list) in cpus.lists() {
+            line.file(path, &list)?;
+        }
         let scratch = spec.limits.scratch_bytes.max(4096).to_string();
         for folder in ["/dev/shm", "/tmp"] {
             line.args(["--perms", "0700", "--size", &scratch, "--tmpfs", folder]);
@@ -217,7 +224,7 @@ pub(crate) struct Invocation {
     pub mounts: Option<PrivateMounts>,
 }
 
-/// The agent's variables; the bundle's own come last.
+/// The agent's variables; the bundle's own come last, and may replace all others.
 pub(crate) fn environment(spec: &SpawnSpec, home: &str) -> Vec<(String, String)> {
     let mut variables = std::collections::BTreeMap::from([
         ("PATH".to_owned(), spec.runtime.path.clone()),
@@ -226,7 +233,10 @@ pub(crate) fn environment(spec: &SpawnSpec, home: &str) -> Vec<(String, String)>
         ("USER".to_owned(), "agent".to_owned()),
         ("LOGNAME".to_owned(), "agent".to_owned()),
         ("LANG".to_owned(), "C.UTF-8".to_owned()),
+        // A thread of ONNX Runtime's would report to its makers, try again and again, and take the agent's time.
+        ("ORT_DISABLE_TELEMETRY".to_owned(), "1".to_owned()),
     ]);
+    variables.extend(CpuView::of(&spec.cpus, &spec.limits).variables());
     variables.extend(spec.env.clone());
     variables.into_iter().collect()
 }
@@ -259,14 +269,14 @@ impl CommandLine {
         }
     }
 
-    fn freeze_counters(&mut self) -> Result<(), SandboxError> {
+    fn freeze_counters(&mut self, cpus: &CpuView) -> Result<(), SandboxError> {
         static FROZEN: OnceLock<Vec<(&str, Vec<u8>)>> = OnceLock::new();
         let frozen = FROZEN.get_or_init(|| {
             let read = |path| Some((path, fs::read(path).ok()?));
             FROZEN_FILES.into_iter().filter_map(read).collect()
         });
         for (path, content) in frozen {
-            let fd = memory_file(content)?;
+            let fd = memory_file(&cpus.of_file(path, content))?;
             self.args(["--perms", "0444"]);
             self.fd("--ro-bind-data", fd);
             self.args([*path]);

@@ -19,6 +19,7 @@ mod command_check;
 mod cpu_clock;
 mod cpu_counters;
 mod cpu_evidence;
+mod cpu_view;
 mod cpu_waits;
 mod end;
 mod error;

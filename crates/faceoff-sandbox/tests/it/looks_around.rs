@@ -36,7 +36,21 @@ fn an_agent_sees_its_bundle_its_runtime_and_nothing_else() {
             .collect()
     };
     let ours = [
-        "HOME", "LANG", "LOGNAME", "PATH", "PWD", "TEAM", "TMPDIR", "USER",
+        "BLIS_NUM_THREADS",
+        "HOME",
+        "LANG",
+        "LOGNAME",
+        "MKL_NUM_THREADS",
+        "NUMEXPR_NUM_THREADS",
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "ORT_DISABLE_TELEMETRY",
+        "PATH",
+        "PWD",
+        "RAYON_NUM_THREADS",
+        "TEAM",
+        "TMPDIR",
+        "USER",
     ];
     assert_eq!(names("environment"), ours);
     assert_eq!(names("environs"), ours);
@@ -53,7 +67,8 @@ fn an_agent_sees_its_bundle_its_runtime_and_nothing_else() {
     }
     for entry in report["root"].as_array().unwrap() {
         let known = [
-            "agent", "bin", "dev", "etc", "lib", "lib32", "lib64", "libx32", "proc", "tmp", "usr",
+            "agent", "bin", "dev", "etc", "lib", "lib32", "lib64", "libx32", "proc", "sys", "tmp",
+            "usr",
         ];
         assert!(known.contains(&entry.as_str().unwrap()), "{entry}");
     }

@@ -11,6 +11,7 @@
 
 mod calls_out;
 mod clings;
+mod counts_cpus;
 mod developer;
 mod ends;
 mod floods;

@@ -1,0 +1,147 @@
+//! The CPUs as an agent sees them: those that it may run on, and no others, wherever it looks.
+//!
+//! Libraries count CPUs in `/sys`, in `/proc`, by affinity or by a variable, and start a thread for each; where
+//! these disagree, threads wait for each other on one CPU, or bind themselves to CPUs that are not theirs and fail.
+
+use crate::{
+    Limits,
+    affinity::{self, cpu_list},
+};
+
+/// Where libraries read which CPUs there are.
+const CPU_LISTS: [&str; 3] = [
+    "/sys/devices/system/cpu/online",
+    "/sys/devices/system/cpu/possible",
+    "/sys/devices/system/cpu/present",
+];
+
+/// What numerical libraries read for their number of threads.
+pub(crate) const THREAD_VARIABLES: [&str; 6] = [
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "BLIS_NUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+    "RAYON_NUM_THREADS",
+];
+
+/// The CPUs of one agent.
+#[derive(Debug)]
+pub(crate) struct CpuView {
+    cpus: Vec<usize>,
+    threads: usize,
+}
+
+impl CpuView {
+    /// Of an agent that is bound to `cpus`; to none: it runs where this process may.
+    pub(crate) fn of(cpus: &[usize], limits: &Limits) -> Self {
+        let cpus = match cpus {
+            // A host that does not even tell this has one CPU at least.
+            [] => affinity::of_process().unwrap_or_else(|_| vec![0]),
+            own => own.to_vec(),
+        };
+        let quota = limits.cpus.ceil().max(1.0) as usize;
+        Self {
+            threads: cpus.len().clamp(1, quota),
+            cpus,
+        }
+    }
+
+    /// The lists of CPUs, each with its path.
+    pub(crate) fn lists(&self) -> impl Iterator<Item = (&'static str, Vec<u8>)> {
+        let list = format!("{}\n", cpu_list(&self.cpus));
+        CPU_LISTS
+            .map(|path| (path, list.clone().into_bytes()))
+            .into_iter()
+    }
+
+    /// As many threads as there are CPUs, or as the CPU time allows if that is less.
+    pub(crate) fn variables(&self) -> impl Iterator<Item = (String, String)> {
+        let threads = self.threads.to_string();
+        THREAD_VARIABLES
+            .map(|name| (name.to_owned(), threads.clone()))
+            .into_iter()
+    }
+
+    /// What the host's file `path` says, without the CPUs that are not the agent's.
+    pub(crate) fn of_file(&self, path: &str, content: &[u8]) -> Vec<u8> {
+        let text = || String::from_utf8_lossy(content);
+        match path {
+            "/proc/stat" => self.of_stat(&text()).into_bytes(),
+            "/proc/cpuinfo" => self.of_cpuinfo(&text()).into_bytes(),
+            _ => content.to_vec(),
+        }
+    }
+
+    fn of_stat(&self, text: &str) -> String {
+        let is_shown = |line: &&str| {
+            let name = line.split(' ').next().unwrap_or_default();
+            match name.strip_prefix("cpu").map(str::parse) {
+                Some(Ok(cpu)) => self.cpus.contains(&cpu),
+                _ => true,
+            }
+        };
+        text.split_inclusive('\n').filter(is_shown).collect()
+    }
+
+    fn of_cpuinfo(&self, text: &str) -> String {
+        let is_shown = |block: &&str| {
+            let number = block.lines().find_map(|line| {
+                let (name, value) = line.split_once(':')?;
+                (name.trim() == "processor").then(|| value.trim().parse().ok())?
+            });
+            number.is_none_or(|cpu| self.cpus.contains(&cpu))
+        };
+        text.split_inclusive("\n\n").filter(is_shown).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn view(cpus: &[usize], quota: f64) -> CpuView {
+        let limits = Limits {
+            cpus: quota,
+            ..Limits::default()
+        };
+        CpuView::of(cpus, &limits)
+    }
+
+    #[test]
+    fn there_are_as_many_threads_as_cpus_unless_the_time_is_less() {
+        for (cpus, quota, threads) in [
+            (&[3][..], 1.0, "1"),
+            (&[3], 4.0, "1"),
+            (&[2, 3], 1.0, "1"),
+            (&[2, 3], 1.5, "2"),
+            (&[2, 3, 5], 8.0, "3"),
+            (&[2], 0.01, "1"),
+        ] {
+            let variables: Vec<_> = view(cpus, quota).variables().collect();
+            assert!(
+                variables.iter().all(|(_, value)| value == threads),
+                "{cpus:?} {quota} {variables:?}"
+            );
+        }
+        assert!(view(&[], 1.0).lists().all(|(_, list)| list.len() > 1));
+    }
+
+    #[test]
+    fn other_cpus_are_in_no_file() {
+        let view = view(&[1, 10], 2.0);
+        let stat = "cpu  9 9\ncpu0 1 1\ncpu1 2 2\ncpu10 3 3\ncpu11 4 4\nintr 5\nctxt 6\n";
+        let shown = String::from_utf8(view.of_file("/proc/stat", stat.as_bytes())).unwrap();
+        assert_eq!(shown, "cpu  9 9\ncpu1 2 2\ncpu10 3 3\nintr 5\nctxt 6\n");
+        let info = "processor\t: 0\nmodel name\t: x\n\nprocessor\t: 1\nmodel name\t: x\n\n\
+                    processor\t: 10\nflags\t\t: fpu\n\nHardware\t: board\n";
+        let shown = String::from_utf8(view.of_file("/proc/cpuinfo", info.as_bytes())).unwrap();
+        assert_eq!(
+            shown,
+            "processor\t: 1\nmodel name\t: x\n\nprocessor\t: 10\nflags\t\t: fpu\n\nHardware\t: board\n"
+        );
+        assert_eq!(view.of_file("/proc/uptime", b"1 2\n"), b"1 2\n");
+        let lists: Vec<_> = view.lists().map(|(_, list)| list).collect();
+        assert_eq!(lists, [b"1,10\n", b"1,10\n", b"1,10\n"]);
+    }
+}
