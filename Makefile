@@ -56,6 +56,7 @@ demo: setup
 # dependencies get the same features as in the run below, and are not built twice.
 test: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
+	docker/runtime.sh $(TARGET_DIR)/runtimes/python3-ml
 	python3 agents/test_agents.py
 	TARGET_DIR=$(TARGET_DIR) crates/faceoff-py/test.sh test
 	if $(CARGO) nextest --version >/dev/null 2>&1; \

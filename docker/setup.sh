@@ -21,6 +21,9 @@ need bwrap bubblewrap
 need python3 python3
 if [ "$purpose" = test ] || [ "$purpose" = steady ]; then
     need chromium chromium
+    # Of the Python that agents get, to make the runtime python3-ml (docker/runtime.sh).
+    /usr/bin/python3 -m pip --version >/dev/null 2>&1 || missing="$missing python3-pip"
+    /usr/bin/python3 -m venv --help >/dev/null 2>&1 || missing="$missing python3-venv"
 fi
 if [ "$purpose" = steady ]; then
     need stress-ng stress-ng

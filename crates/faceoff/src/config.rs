@@ -53,7 +53,7 @@ pub struct Config {
     pub sandbox: SandboxConfig,
     /// Runtimes by the name that `agent.toml` gives; added to `python3` and `native`, or in their
     /// place.
-    pub runtimes: BTreeMap<String, Runtime>,
+    pub runtimes: BTreeMap<String, RuntimeConfig>,
 }
 
 /// `[server]`
@@ -400,7 +400,8 @@ impl Config {
     pub fn agent_environment(&self) -> AgentEnvironment {
         let mut runtimes = BTreeMap::from([("native".to_owned(), Runtime::native())]);
         runtimes.extend(Runtime::python3().map(|python| ("python3".to_owned(), python)));
-        runtimes.extend(self.runtimes.clone());
+        let own = self.runtimes.iter();
+        runtimes.extend(own.map(|(name, own)| (name.clone(), own.runtime())));
         AgentEnvironment {
             limits: self.limits.clone(),
             time: self.time.clone(),
@@ -439,5 +440,8 @@ impl Config {
 
 mod check;
 mod nearest;
+mod runtime;
 #[cfg(test)]
 mod tests;
+
+pub use runtime::RuntimeConfig;

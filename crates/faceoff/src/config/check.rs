@@ -33,6 +33,28 @@ impl Config {
         Ok(())
     }
 
+    /// Folders of runtimes that hold none.
+    ///
+    /// # Errors
+    /// The first, and how to make it.
+    pub fn check_runtimes(&self) -> anyhow::Result<()> {
+        let mut names = self.runtimes.keys();
+        names.try_for_each(|name| self.check_runtime(name))
+    }
+
+    /// [`Self::check_runtimes`], of one.
+    ///
+    /// # Errors
+    /// If its folder holds none.
+    pub fn check_runtime(&self, name: &str) -> anyhow::Result<()> {
+        match self.runtimes.get(name) {
+            Some(runtime) => runtime
+                .check()
+                .with_context(|| format!("the configuration: runtimes.{name}")),
+            None => Ok(()),
+        }
+    }
+
     /// Magnitudes that no robot with this seed of its mismatch meets.
     pub fn check_robot(&self, mismatch_seed: Seed) -> anyhow::Result<()> {
         let settings = self.rules().variation.perturbations;

@@ -283,3 +283,82 @@ fn a_named_file_must_exist() {
     let error = Config::load(Some(missing)).unwrap_err();
     assert!(format!("{error:#}").contains("/nonexistent/faceoff.toml"));
 }
+
+#[test]
+fn the_page_on_the_sandbox_tells_the_default_limits() {
+    let page = include_str!("../../../../docs/sandbox.md");
+    let Config {
+        limits,
+        time,
+        bundle,
+        ..
+    } = Config::default();
+    let mebibytes = |bytes: u64| format!("{} MiB", bytes >> 20);
+    let files = format!("{},{:03}", bundle.files / 1000, bundle.files % 1000);
+    for line in [
+        format!(
+            "| memory, with page cache, `/tmp` and `/dev/shm` | {} |",
+            mebibytes(limits.memory_bytes)
+        ),
+        format!("| CPU time | {} CPU, enforced every 10 ms |", limits.cpus),
+        format!("| processes and threads | {} |", limits.pids),
+        format!("| open files of a process | {} |", limits.open_files),
+        format!("| bundle, packed | {} |", mebibytes(bundle.packed_bytes)),
+        format!(
+            "| bundle, unpacked | {}, {files} files |",
+            mebibytes(bundle.unpacked_bytes)
+        ),
+        format!(
+            "| log that is kept (standard error) | the last {} KiB |",
+            limits.stderr_tail_bytes >> 10
+        ),
+        format!("| to start, until `ready` | {} s |", time.startup_s),
+        format!("| to answer `reset` | {} s |", time.reset_s),
+        format!("| to answer `step`, at most | {} s |", time.step_s),
+        format!(
+            "| to answer `step`, mean of an upload's check | {} s |",
+            time.mean_s
+        ),
+        format!(
+            "`$HOME` and `$TMPDIR` | {} |",
+            mebibytes(limits.scratch_bytes)
+        ),
+        format!("| shared memory | {} |", mebibytes(limits.scratch_bytes)),
+        format!(
+            "largest file that may be written has {}",
+            mebibytes(limits.file_size_bytes)
+        ),
+    ] {
+        assert!(page.contains(&line), "docs/sandbox.md lacks {line:?}");
+    }
+}
+
+#[test]
+fn a_runtime_is_a_folder_or_paths_and_a_folder_must_hold_a_python() {
+    let config = Config::parse("[runtimes.python3-ml]\nfolder = \"/nowhere\"").unwrap();
+    let refused = format!("{:#}", config.check_runtimes().unwrap_err());
+    for words in [
+        "runtimes.python3-ml",
+        "virtual environment in /nowhere",
+        "docker/runtime.sh /nowhere",
+    ] {
+        assert!(refused.contains(words), "{refused}");
+    }
+    // What is not there is not hidden behind what is.
+    let runtime = &config.agent_environment().runtimes["python3-ml"];
+    assert_eq!(
+        runtime.read_only_paths,
+        [std::path::PathBuf::from("/nowhere/bin/python3")]
+    );
+    let written = toml::to_string(&config).unwrap();
+    assert_eq!(Config::parse(&written).unwrap(), config);
+    for (text, words) in [
+        ("folder = \"here\"", "absolute path"),
+        ("folder = \"/a\"\npath = \"/b\"", "either `folder`"),
+        ("path = \"/b\"", "either `folder`"),
+        ("folders = \"/a\"", "did you mean `folder`?"),
+    ] {
+        let refused = error(&format!("[runtimes.x]\n{text}"));
+        assert!(refused.contains(words), "{refused}");
+    }
+}

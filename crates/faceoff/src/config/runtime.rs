@@ -1,0 +1,130 @@
+//! `[runtimes.NAME]`: a folder that holds a Python, or paths of the host.
+
+use anyhow::Context as _;
+use faceoff_sandbox::Runtime;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// A runtime that the organiser offers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Fields", into = "Fields")]
+pub enum RuntimeConfig {
+    /// A virtual environment, as `docker/runtime.sh` makes it: its packages, and the Python behind it.
+    Folder(PathBuf),
+    /// What agents see of the host, path by path.
+    Paths {
+        /// Absolute; see [`Runtime`].
+        read_only_paths: Vec<PathBuf>,
+        /// The agent's `PATH`.
+        path: String,
+    },
+}
+
+/// As the file has it.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Fields {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    folder: Option<PathBuf>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    read_only_paths: Option<Vec<PathBuf>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    path: Option<String>,
+}
+
+impl TryFrom<Fields> for RuntimeConfig {
+    type Error = String;
+
+    fn try_from(fields: Fields) -> Result<Self, String> {
+        match fields {
+            Fields {
+                folder: Some(folder),
+                read_only_paths: None,
+                path: None,
+            } if folder.is_absolute() => Ok(Self::Folder(folder)),
+            Fields {
+                folder: Some(folder),
+                read_only_paths: None,
+                path: None,
+            } => Err(format!("folder: expected an absolute path, got {folder:?}")),
+            Fields {
+                folder: None,
+                read_only_paths: Some(read_only_paths),
+                path: Some(path),
+            } => Ok(Self::Paths {
+                read_only_paths,
+                path,
+            }),
+            _ => Err(
+                "expected a runtime of either `folder`, or `read_only_paths` and `path`".to_owned(),
+            ),
+        }
+    }
+}
+
+impl From<RuntimeConfig> for Fields {
+    fn from(config: RuntimeConfig) -> Self {
+        match config {
+            RuntimeConfig::Folder(folder) => Self {
+                folder: Some(folder),
+                read_only_paths: None,
+                path: None,
+            },
+            RuntimeConfig::Paths {
+                read_only_paths,
+                path,
+            } => Self {
+                folder: None,
+                read_only_paths: Some(read_only_paths),
+                path: Some(path),
+            },
+        }
+    }
+}
+
+impl RuntimeConfig {
+    /// Is there a Python in the folder? Paths are not looked at: `faceoff doctor` does.
+    ///
+    /// # Errors
+    /// If there is none, or it does not start.
+    pub fn check(&self) -> anyhow::Result<()> {
+        match self {
+            Self::Paths { .. } => Ok(()),
+            Self::Folder(folder) => Runtime::python3_at(&interpreter(folder))
+                .map(drop)
+                .with_context(|| {
+                    format!(
+                        "expected a virtual environment in {0}; make it: docker/runtime.sh {0}",
+                        folder.display()
+                    )
+                }),
+        }
+    }
+
+    /// What agents see. Of a folder that holds no Python that is a path that does not exist.
+    #[must_use]
+    pub fn runtime(&self) -> Runtime {
+        match self {
+            Self::Folder(folder) => {
+                let python = interpreter(folder);
+                Runtime::python3_at(&python).unwrap_or_else(|_| Runtime {
+                    read_only_paths: vec![python],
+                    path: folder.join("bin").display().to_string(),
+                    image: None,
+                })
+            }
+            Self::Paths {
+                read_only_paths,
+                path,
+            } => Runtime {
+                read_only_paths: read_only_paths.clone(),
+                path: path.clone(),
+                image: None,
+            },
+        }
+    }
+}
+
+fn interpreter(folder: &Path) -> PathBuf {
+    folder.join("bin/python3")
+}
