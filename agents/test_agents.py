@@ -101,10 +101,10 @@ class EveryAgent(unittest.TestCase):
                 agent.process.stdin = None
 
     def test_manifest_and_protocol_are_those_of_the_folder(self):
-        shell = (AGENTS / "hold" / "protocol.py").read_text()
+        shell = (AGENTS.parent / "crates/faceoff-py/python/faceoff/agent.py").read_bytes()
         for name in self.names:
             self.assertEqual(tomllib.loads((AGENTS / name / "agent.toml").read_text())["name"], name)
-            self.assertEqual((AGENTS / name / "protocol.py").read_text(), shell)
+            self.assertEqual((AGENTS / name / "protocol.py").read_bytes(), shell)
 
 
 class Hold(unittest.TestCase):

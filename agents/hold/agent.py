@@ -1,26 +1,24 @@
 """Holds the robot still, in the pose in which the episode finds it."""
 
-from protocol import play
+from protocol import Agent, run
 
 
-class Hold:
+class Hold(Agent):
     """The safest policy there is, and a start for others."""
 
-    def __init__(self, task, agent_id, env):
-        self.joint_pos_ids = env["joint_pos_ids"]
-        self.pose = None
+    # Interpolation 3: an action is the joints' positions and velocities at the end of the step.
+    interpolation = 3
 
     def reset(self):
         self.pose = None
 
-    def act(self, obs):
+    def act(self, observation):
         # The pose is read once. Following the measured one would let the arm sink: gravity pulls it a
         # little below each command, and the next command would start from there.
         if self.pose is None:
-            self.pose = [obs[i] for i in self.joint_pos_ids]
+            self.pose = self.joint_positions(observation)
         return [self.pose, [0.0] * len(self.pose)]
 
 
 if __name__ == "__main__":
-    # Interpolation 3: an action is the joints' positions and velocities at the end of the step.
-    play(Hold, interpolation=3)
+    run(Hold)

@@ -1,30 +1,31 @@
 """Breaks the safety rules on purpose: what a non-deployable agent looks like."""
 
-from protocol import play
+from protocol import Agent, run
 
 # Where each joint runs first. Shoulder back and elbow open lift the mallet off the table; the base turns
 # it over the edge.
 START = [+1, -1, +1, +1, +1, -1, +1]
 
 
-class Reckless:
+class Reckless(Agent):
     """Runs every joint at its full speed from one end of its range to the other."""
 
-    def __init__(self, task, agent_id, env):
-        self.dt = env["dt"]
-        self.joint_pos_ids = env["joint_pos_ids"]
-        self.lower, self.upper = env["robot"]["joint_pos_limit"]
+    # Interpolation 3: an action is the joints' positions and velocities at the end of the step.
+    interpolation = 3
+
+    def start(self):
+        self.dt = self.env["dt"]
+        self.lower, self.upper = self.env["robot"]["joint_pos_limit"]
         # The rules allow 95 % of these limits, and 95 % of the range above.
-        self.speed = env["robot"]["joint_vel_limit"][1]
-        self.reset()
+        self.speed = self.env["robot"]["joint_vel_limit"][1]
 
     def reset(self):
         self.pose = None
         self.direction = list(START)
 
-    def act(self, obs):
+    def act(self, observation):
         if self.pose is None:
-            self.pose = [obs[i] for i in self.joint_pos_ids]
+            self.pose = self.joint_positions(observation)
         velocity = []
         for i, speed in enumerate(self.speed):
             target = self.pose[i] + self.direction[i] * speed * self.dt
@@ -37,5 +38,4 @@ class Reckless:
 
 
 if __name__ == "__main__":
-    # Interpolation 3: an action is the joints' positions and velocities at the end of the step.
-    play(Reckless, interpolation=3)
+    run(Reckless)

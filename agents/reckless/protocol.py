@@ -1,46 +1,227 @@
 """The evaluator's side of an agent: one JSON object per line, in and out.
 
-Copy this file into your own bundle; only the standard library is needed. A policy is any class with
+Needs the standard library only, and no other file: `faceoff new` copies it into a bundle as `protocol.py`. An
+agent is a class derived from `Agent`, and a call of `run`:
 
-    __init__(self, task, agent_id, env)   once; task is "hit", "defend", "prepare" or "tournament"
-    reset(self)                           before each episode, and before each rally of a game
-    act(self, obs)                        each control step: the list of numbers seen -> the action
+    from protocol import Agent, run
 
-`env` describes table, robot, limits and where to find what in `obs`; its keys are in the protocol's
-documentation. Start-up and reset are not timed; an answer of `act` counts as late after 20 ms.
+    class Hold(Agent):
+        def reset(self):
+            self.pose = None
+
+        def act(self, observation):
+            if self.pose is None:
+                self.pose = self.joint_positions(observation)
+            return [self.pose, [0.0] * 7]
+
+    if __name__ == "__main__":
+        run(Hold)
+
+Lengths in m, angles in rad, times in s; positions in the frame of the agent's own robot base, so that both sides
+of a game see the same picture. Start-up and `reset` are not timed; an answer of `act` costs points from 20 ms on.
 """
 
+from __future__ import annotations
+
 import json
+import math
+import os
 import sys
+import traceback
+from collections.abc import Iterable, Sequence
+from typing import Any, BinaryIO
+
+__all__ = ["Agent", "AgentError", "PROTOCOL", "SHAPES", "run"]
 
 PROTOCOL = 1
+"""The version of the protocol that this file speaks."""
+
+SHAPES: dict[int | None, tuple[int, ...]] = {
+    1: (7,),
+    2: (7,),
+    3: (2, 7),
+    4: (2, 7),
+    5: (3, 7),
+    -1: (2, 7),
+    None: (20, 3, 7),
+}
+"""The shape of an action for each interpolation: positions (rad); then velocities (rad/s), accelerations (rad/s²)."""
+
+LARGEST_NUMBER = 1e4
+"""The evaluator refuses actions with a number of a larger magnitude."""
 
 
-def play(policy_class, interpolation):
-    """Speaks with the evaluator until it says goodbye or goes away."""
-    requests, answers = sys.stdin.buffer, sys.stdout.buffer
-    # Standard output belongs to the protocol: a stray print() goes to the log instead.
+class AgentError(Exception):
+    """What an agent does that the evaluator would refuse; the message says what was expected and what came."""
+
+
+class Agent:
+    """A policy: everything between an observation and an action. Derive from it and write `act`.
+
+    It is made once per process, after `hello`. What it learns in one episode it may use in the next.
+    """
+
+    interpolation: int | None = 3
+    """What an action means, a key of `SHAPES`; 3 is positions and velocities at the end of the step, cubic."""
+
+    task: str
+    """`hit`, `defend`, `prepare`, or `tournament` for a whole game."""
+    agent_id: int
+    """1 or 2: which robot of the table is the agent's own."""
+    env: dict[str, Any]
+    """Table, robot, limits, and where to find what in an observation, as the protocol's documentation lists them."""
+
+    def __init__(self, task: str, agent_id: int, env: dict[str, Any]) -> None:
+        self.task, self.agent_id, self.env = task, agent_id, env
+        self.start()
+
+    def start(self) -> None:
+        """Called once, when task and env are known: the place to load networks and to prepare tables.
+
+        Start-up may take 120 s and is not timed.
+        """
+
+    def reset(self) -> None:
+        """Called before each episode, and before each rally of a game. At most 10 s."""
+
+    def act(self, observation: list[float]) -> Any:
+        """Called at each control step, 50 times per simulated second.
+
+        `observation` has 20 numbers, 23 with an opponent on the table (`hit`, `tournament`). The answer is an
+        action of the shape of `interpolation` (`SHAPES`): lists, tuples or a NumPy array.
+        """
+        raise NotImplementedError(f"{type(self).__name__} has no act(self, observation)")
+
+    @staticmethod
+    def puck_state(observation: Sequence[float]) -> list[float]:
+        """x, y (m), yaw (rad), and their rates (m/s, rad/s): 6 numbers."""
+        return list(observation[0:6])
+
+    @staticmethod
+    def joint_positions(observation: Sequence[float]) -> list[float]:
+        """The 7 joint angles, rad."""
+        return list(observation[6:13])
+
+    @staticmethod
+    def joint_velocities(observation: Sequence[float]) -> list[float]:
+        """The 7 joint velocities, rad/s, low-pass filtered."""
+        return list(observation[13:20])
+
+    @staticmethod
+    def opponent_position(observation: Sequence[float]) -> list[float] | None:
+        """x, y, z (m) of the other mallet, or None if there is no opponent on the table."""
+        return list(observation[20:23]) or None
+
+
+def run(
+    agent_class: type[Agent], requests: Iterable[bytes] | None = None, answers: BinaryIO | None = None
+) -> None:
+    """Lets an agent answer the evaluator until it says goodbye or goes away.
+
+    `requests` and `answers` are standard input and output unless given. What the agent prints goes to standard
+    error, which is its log. An exception goes there with its traceback, and in short to the evaluator, whose
+    fault then quotes it; the program ends with status 1.
+    """
+    if requests is None:
+        requests = sys.stdin.buffer
+    if answers is None:
+        answers = _private_output()
+    try:
+        _converse(agent_class, requests, answers)
+    except BrokenPipeError:
+        return  # the evaluator has gone away
+    except Exception as error:
+        traceback.print_exc()
+        sys.stderr.flush()
+        # No answer to any question: the evaluator takes it as a fault and shows the line to the team.
+        _say(answers, {"type": "error", "error": _in_short(error)})
+        sys.exit(1)
+
+
+def _private_output() -> BinaryIO:
+    """Standard output for the protocol alone: a stray print(), of a library in C too, goes to the log."""
+    sys.stdout.flush()
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
     sys.stdout = sys.stderr
-    policy = None
+    return answers
+
+
+def _converse(agent_class: type[Agent], requests: Iterable[bytes], answers: BinaryIO) -> None:
+    agent: Agent | None = None
     for line in requests:
         message = json.loads(line)
         kind = message["type"]
-        if kind == "step":
-            answer = {"type": "act", "step": message["step"], "action": policy.act(message["obs"])}
-        elif kind == "reset":
-            policy.reset()
-            answer = {"type": "ready", "episode": message["episode"]}
-        elif kind == "hello":
+        if kind == "hello":
             if message["protocol"] != PROTOCOL:
-                sys.exit(f"this agent speaks protocol {PROTOCOL}, not {message['protocol']}")
-            policy = policy_class(message["task"], message["agent_id"], message["env"])
-            answer = {"type": "ready", "protocol": PROTOCOL, "interpolation": interpolation}
+                raise AgentError(f"this agent speaks protocol {PROTOCOL}, the evaluator {message['protocol']}")
+            agent = agent_class(message["task"], message["agent_id"], message["env"])
+            if agent.interpolation not in SHAPES:
+                raise AgentError(f"interpolation: expected one of {list(SHAPES)}, got {agent.interpolation!r}")
+            answer = {"type": "ready", "protocol": PROTOCOL, "interpolation": agent.interpolation}
         elif kind == "end":
             continue  # the episode is over; no answer is expected
         elif kind == "bye":
             return
+        elif agent is None:
+            raise AgentError(f"expected hello first, got {kind!r}")
+        elif kind == "step":
+            action = _action(agent.act(message["obs"]), agent.interpolation)
+            answer = {"type": "act", "step": message["step"], "action": action}
+        elif kind == "reset":
+            agent.reset()
+            answer = {"type": "ready", "episode": message["episode"]}
         else:
-            sys.exit(f"unknown message {kind!r}")
-        # NaN and infinity would be refused; here the log shows where they came from.
-        answers.write(json.dumps(answer, allow_nan=False).encode() + b"\n")
-        answers.flush()
+            raise AgentError(f"expected hello, reset, step, end or bye, got {kind!r}")
+        _say(answers, answer)
+
+
+def _action(action: Any, interpolation: int | None) -> Any:
+    """The action as lists of numbers, of the shape that was agreed."""
+    if hasattr(action, "tolist"):
+        action = action.tolist()  # NumPy, torch
+    expected, got = SHAPES[interpolation], _shape(action)
+    if got != expected:
+        raise AgentError(
+            f"act: expected an action of shape {list(expected)} for interpolation {interpolation}, "
+            f"got {list(got) if got else type(action).__name__}"
+        )
+    return _numbers(action, "action")
+
+
+def _shape(value: Any) -> tuple[int, ...]:
+    """Lengths of nested lists, outermost first; of lists of unequal shapes none fits."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if not isinstance(value, (list, tuple)):
+        return ()
+    inner = {_shape(element) for element in value}
+    return (len(value), *(inner.pop() if len(inner) == 1 else ()))
+
+
+def _numbers(value: Any, place: str) -> Any:
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, (list, tuple)):
+        return [_numbers(element, f"{place}[{i}]") for i, element in enumerate(value)]
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise AgentError(f"act: {place}: expected a number, got {value!r}") from None
+    if not math.isfinite(number) or abs(number) > LARGEST_NUMBER:
+        raise AgentError(f"act: {place}: expected a number within ±{LARGEST_NUMBER:g}, got {number}")
+    return number
+
+
+def _in_short(error: Exception) -> str:
+    """What happened and where, in a line that the evaluator quotes whole."""
+    where = ""
+    for frame in traceback.extract_tb(error.__traceback__):
+        if frame.filename != __file__:
+            where = f" ({os.path.basename(frame.filename)}, line {frame.lineno}, in {frame.name})"
+    return f"{type(error).__name__}: {error}"[:200] + where
+
+
+def _say(answers: BinaryIO, answer: dict[str, Any]) -> None:
+    answers.write(json.dumps(answer, allow_nan=False).encode() + b"\n")
+    answers.flush()

@@ -7,7 +7,7 @@ at x = `self.middle`, so that both sides of a game see the same picture.
 import math
 
 from arm import Arm
-from protocol import play
+from protocol import Agent, run
 from puck import Puck
 
 INCOMING = -0.3  # a puck with less vx comes at us, m/s
@@ -20,28 +20,29 @@ SHARE_TO_STOP = 0.31  # a mallet that retreats at this share of the puck's speed
 NEAR_RIM = 0.39  # beyond this |y| there is no room for the mallet beside the puck, metres
 
 
-class Starter:
-    def __init__(self, task, agent_id, env):
-        self.task = task
-        self.joints = env["joint_pos_ids"]
+class Starter(Agent):
+    # Interpolation 3: an action is the joints' positions and velocities at the end of the step.
+    interpolation = 3
+
+    def start(self):
+        env = self.env
         self.arm = Arm(env)
         self.puck = Puck(env)
         self.middle = self.arm.base
         self.goal = self.middle - env["table"]["length"] / 2
         self.other_goal = self.middle + env["table"]["length"] / 2
         self.contact = env["puck"]["radius"] + env["mallet"]["radius"]
-        self.reset()
 
     def reset(self):
         self.puck.reset()
         self.started = False
         self.strike = None  # while striking: direction, speed and steps left
 
-    def act(self, obs):
+    def act(self, observation):
         if not self.started:
-            self.arm.reset([obs[i] for i in self.joints])
+            self.arm.reset(self.joint_positions(observation))
             self.started = True
-        self.puck.observe(obs)
+        self.puck.observe(observation)
         puck = self.puck
         if self.strike:
             return self.go_through()
@@ -157,5 +158,4 @@ class Starter:
 
 
 if __name__ == "__main__":
-    # Interpolation 3: an action is the joints' positions and velocities at the end of the step.
-    play(Starter, interpolation=3)
+    run(Starter)

@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 
-use crate::env::{Env, JOINTS, Joints};
+use crate::env::{Env, JOINTS, Joints, joint_angle_max, joint_speed_max};
 use crate::field::Vec2;
 use crate::kinematics::{FOREARM_M, HAND_M, Jacobian, SHOULDER_M, UPPER_ARM_M, forward};
 use crate::redundancy::{even_speeds, least_change, least_peak};
@@ -85,8 +85,8 @@ impl Arm {
     pub fn new(env: &Env) -> Self {
         Self {
             height: env.robot.ee_desired_height,
-            speed_max: CRUISE_SHARE * env.robot.joint_speed_max(),
-            angle_max: env.robot.joint_angle_max(),
+            speed_max: CRUISE_SHARE * joint_speed_max(&env.robot),
+            angle_max: joint_angle_max(&env.robot),
             dt: env.dt,
             q: Joints::zeros(),
             dq: Joints::zeros(),

@@ -36,7 +36,7 @@ impl Field {
             half_goal: env.table.goal_width / 2.0,
             puck: env.puck.radius,
             mallet: env.mallet.radius,
-            base: env.robot.base_distance_m(),
+            base: env.robot.base_distance_m().unwrap_or(1.51),
         }
     }
 

@@ -1,0 +1,59 @@
+use crate::env::JOINTS;
+use serde::Deserialize;
+
+/// What the robot perceives at a control step, in its own base frame: 20 numbers, 23 with an opponent on the table.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(try_from = "Vec<f64>")]
+pub struct Observation(Vec<f64>);
+
+impl Observation {
+    /// x, y (m), yaw (rad), and their rates (m/s, rad/s).
+    #[must_use]
+    pub fn puck(&self) -> [f64; 6] {
+        self.numbers(0)
+    }
+
+    /// Joint angles, rad.
+    #[must_use]
+    pub fn joint_positions(&self) -> [f64; JOINTS] {
+        self.numbers(6)
+    }
+
+    /// Joint velocities, rad/s, low-pass filtered.
+    #[must_use]
+    pub fn joint_velocities(&self) -> [f64; JOINTS] {
+        self.numbers(6 + JOINTS)
+    }
+
+    /// x, y, z of the other mallet, m, if there is an opponent on the table.
+    #[must_use]
+    pub fn opponent(&self) -> Option<[f64; 3]> {
+        (self.0.len() == 23).then(|| self.numbers(20))
+    }
+
+    /// All numbers, in the protocol's order.
+    #[must_use]
+    pub fn as_slice(&self) -> &[f64] {
+        &self.0
+    }
+
+    fn numbers<const N: usize>(&self, from: usize) -> [f64; N] {
+        std::array::from_fn(|i| self.0[from + i])
+    }
+}
+
+impl TryFrom<Vec<f64>> for Observation {
+    type Error = WrongLength;
+
+    fn try_from(numbers: Vec<f64>) -> Result<Self, WrongLength> {
+        match numbers.len() {
+            20 | 23 => Ok(Self(numbers)),
+            length => Err(WrongLength(length)),
+        }
+    }
+}
+
+/// An observation of a length that the protocol does not know.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("expected an observation of 20 or 23 numbers, got {0}")]
+pub struct WrongLength(pub usize);

@@ -1,0 +1,165 @@
+"""The protocol's loop, as a library in this process and as a program over pipes."""
+
+from __future__ import annotations
+
+import io
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+AGENT_FILE = Path(__file__).parents[1] / "python" / "faceoff" / "agent.py"
+sys.path.insert(0, str(AGENT_FILE.parents[1]))
+
+from faceoff.agent import SHAPES, Agent, run  # noqa: E402
+
+POSE = [0.0, -0.1961, 0.0, -1.8436, 0.0, 0.9704, 0.0]
+OBSERVATION = [1.0, 0.1, 0.2, -1.0, -0.1, -0.2, *POSE, *[0.5] * 7]
+HELLO = {"type": "hello", "protocol": 1, "task": "defend", "agent_id": 2, "env": {"dt": 0.02}}
+RESET = {"type": "reset", "episode": 17}
+STEP = {"type": "step", "step": 0, "obs": OBSERVATION}
+
+
+class Hold(Agent):
+    def act(self, observation: list[float]) -> Any:
+        return [self.joint_positions(observation), [0.0] * 7]
+
+
+def lines(*messages: dict[str, Any]) -> list[bytes]:
+    return [json.dumps(message).encode() + b"\n" for message in messages]
+
+
+def answers(agent: type[Agent], *messages: dict[str, Any]) -> list[dict[str, Any]]:
+    output = io.BytesIO()
+    run(agent, lines(*messages), output)
+    return [json.loads(line) for line in output.getvalue().splitlines()]
+
+
+def error(agent: type[Agent], *messages: dict[str, Any]) -> str:
+    """What the evaluator is told by an agent that fails; the program ends with status 1."""
+    output = io.BytesIO()
+    with pytest.raises(SystemExit) as ended:
+        run(agent, lines(*messages), output)
+    assert ended.value.code == 1
+    last = json.loads(output.getvalue().splitlines()[-1])
+    assert last["type"] == "error"
+    text = last["error"]
+    assert isinstance(text, str)
+    return text
+
+
+def acting(action: Any, order: int | None = 3) -> type[Agent]:
+    class Acting(Agent):
+        interpolation = order
+
+        def act(self, observation: list[float]) -> Any:
+            return action
+
+    return Acting
+
+
+def test_a_conversation_from_hello_to_bye() -> None:
+    end = {"type": "end", "episode": 17, "steps": 1}
+    said = answers(Hold, HELLO, RESET, STEP, end, RESET, STEP, {"type": "bye"}, STEP)
+    ready = {"type": "ready", "episode": 17}
+    act = {"type": "act", "step": 0, "action": [POSE, [0.0] * 7]}
+    assert said == [{"type": "ready", "protocol": 1, "interpolation": 3}, ready, act, ready, act]
+
+
+def test_an_agent_knows_what_it_plays_before_it_starts() -> None:
+    class Knowing(Hold):
+        def start(self) -> None:
+            assert (self.task, self.agent_id, self.env) == ("defend", 2, {"dt": 0.02})
+
+    assert len(answers(Knowing, HELLO, RESET)) == 2
+
+
+def test_observations_are_told_apart() -> None:
+    agent = Hold("hit", 1, {})
+    assert agent.puck_state(OBSERVATION) == [1.0, 0.1, 0.2, -1.0, -0.1, -0.2]
+    assert agent.joint_positions(OBSERVATION) == POSE
+    assert agent.joint_velocities(OBSERVATION) == [0.5] * 7
+    assert agent.opponent_position(OBSERVATION) is None
+    assert agent.opponent_position([*OBSERVATION, 2.4, 0.1, 0.16]) == [2.4, 0.1, 0.16]
+
+
+@pytest.mark.parametrize("order", SHAPES)
+def test_every_interpolation_has_its_shape(order: int | None) -> None:
+    action: Any = 0.5
+    for length in reversed(SHAPES[order]):
+        action = [action] * length
+    said = answers(acting(action, order), HELLO, RESET, STEP)
+    assert said[0]["interpolation"] == order
+    assert said[2]["action"] == action
+
+
+def test_arrays_are_actions_too() -> None:
+    numpy = pytest.importorskip("numpy")
+    whole = numpy.arange(14, dtype=numpy.float32).reshape(2, 7)
+    in_pieces = [numpy.arange(7), [numpy.float64(7 + i) for i in range(7)]]
+    for action in (whole, in_pieces, tuple(whole)):
+        said = answers(acting(action), HELLO, RESET, STEP)
+        assert said[2]["action"] == whole.tolist()
+
+
+@pytest.mark.parametrize(
+    ("action", "words"),
+    [
+        ([0.0] * 14, "expected an action of shape [2, 7] for interpolation 3, got [14]"),
+        ([[0.0] * 7, [0.0] * 6], "got [2]"),
+        (None, "got NoneType"),
+        ([[0.0] * 7, [0.0] * 6 + [float("nan")]], "action[1][6]: expected a number within ±10000, got nan"),
+        ([[0.0] * 7, [1e5] + [0.0] * 6], "action[1][0]: expected a number within ±10000, got 100000.0"),
+        ([[0.0] * 7, [0.0] * 6 + ["x"]], "action[1][6]: expected a number, got 'x'"),
+    ],
+)
+def test_an_action_that_would_be_refused_is_named(action: Any, words: str) -> None:
+    assert words in error(acting(action), HELLO, RESET, STEP)
+
+
+def test_what_goes_wrong_inside_reaches_log_and_evaluator(capfd: pytest.CaptureFixture[str]) -> None:
+    class Broken(Hold):
+        def act(self, observation: list[float]) -> Any:
+            return 1 / 0
+
+    told = error(Broken, HELLO, RESET, STEP)
+    assert told.startswith("ZeroDivisionError: division by zero (test_agent.py, line ")
+    assert told.endswith(", in act)")
+    log = capfd.readouterr().err
+    assert "Traceback" in log and "return 1 / 0" in log
+
+
+def test_what_an_agent_cannot_answer_is_said() -> None:
+    assert "no act(self, observation)" in error(Agent, HELLO, RESET, STEP)
+    assert "expected hello first, got 'reset'" in error(Hold, RESET)
+    assert "expected hello, reset, step, end or bye, got 'dance'" in error(Hold, HELLO, {"type": "dance"})
+    assert "speaks protocol 1, the evaluator 2" in error(Hold, {**HELLO, "protocol": 2})
+    assert "interpolation: expected one of" in error(acting([], 7), HELLO)
+
+
+def test_a_stray_print_does_not_reach_the_evaluator(tmp_path: Path) -> None:
+    """Not even one of a library in C, which knows nothing of sys.stdout."""
+    (tmp_path / "protocol.py").write_bytes(AGENT_FILE.read_bytes())
+    (tmp_path / "agent.py").write_text(
+        "import os\n"
+        "from protocol import Agent, run\n"
+        "class Chatty(Agent):\n"
+        "    def act(self, observation):\n"
+        "        print('thinking')\n"
+        "        os.write(1, b'deep thought\\n')\n"
+        "        return [[0.0] * 7] * 2\n"
+        "run(Chatty)\n"
+    )
+    # Without site packages: the file stands alone.
+    command = [sys.executable, "-I", "-S", "-c", "import sys; sys.path[0:0] = ['.']; import agent"]
+    ended = subprocess.run(
+        command, cwd=tmp_path, input=b"".join(lines(HELLO, RESET, STEP)), capture_output=True, check=True
+    )
+    kinds = [json.loads(line)["type"] for line in ended.stdout.splitlines()]
+    assert kinds == ["ready", "ready", "act"]
+    assert b"thinking" in ended.stderr and b"deep thought" in ended.stderr
+
+
