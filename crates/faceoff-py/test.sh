@@ -46,7 +46,7 @@ case ${1:-} in
         # Elsewhere than beside the sources, which would be imported in place of what is installed.
         cd "$target"
         "$target/python-test/bin/mypy" --config-file "$here/pyproject.toml" "$here/python/faceoff"
-        FACEOFF_BINARY=${FACEOFF_BINARY:-$target/debug/faceoff} \
+        FACEOFF_BIN=${FACEOFF_BIN:-$target/debug/faceoff} FACEOFF_OLD_READERS=$target/python-old-readers \
             "$target/python-test/bin/python" -m pytest -p no:cacheprovider --rootdir "$here" "$here/tests" "$@"
         ;;
     versions)

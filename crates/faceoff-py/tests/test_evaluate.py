@@ -15,7 +15,7 @@ from faceoff import _native
 from faceoff.gym import AirHockeyEnv
 
 ROOT = Path(__file__).parents[3]
-BINARY = Path(os.environ.get("FACEOFF_BINARY", ROOT / "target" / "debug" / "faceoff"))
+BINARY = Path(os.environ.get("FACEOFF_BIN", ROOT / "target" / "debug" / "faceoff"))
 
 
 def hold(observation: np.ndarray) -> np.ndarray:
