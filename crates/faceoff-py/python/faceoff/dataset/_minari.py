@@ -73,7 +73,7 @@ def to_minari(
         from minari.data_collector import EpisodeBuffer
     except ImportError as error:
         raise MissingError(
-            "to_minari needs Minari and Gymnasium: pip install 'minari>=0.5.3' gymnasium"
+            "to_minari needs Minari and Gymnasium: pip install minari"
         ) from error
     if dtype not in ("float32", "float64"):
         raise ArgumentError(f"dtype: expected 'float32' or 'float64', got {dtype!r}")
