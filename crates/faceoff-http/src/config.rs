@@ -1,4 +1,4 @@
-use crate::pace::LeastRate;
+use crate::{offer::Offer, pace::LeastRate};
 use faceoff_store::UploadQuota;
 use faceoff_types::{Clock, TimeLimits};
 use std::{path::PathBuf, time::Duration};
@@ -66,4 +66,6 @@ pub struct HttpConfig {
     pub limits: HttpLimits,
     /// Tells how long what waits will take.
     pub capacity: Capacity,
+    /// What agents find here.
+    pub offer: Offer,
 }

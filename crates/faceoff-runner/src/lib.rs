@@ -17,6 +17,7 @@ mod exchange;
 mod fault;
 mod game;
 mod host_watch;
+mod inventory;
 mod log;
 mod player;
 mod session;
@@ -36,6 +37,7 @@ pub use game::{
     run_game_watched,
 };
 pub use host_watch::{Counters, HostWatch};
+pub use inventory::inventory;
 pub use session::Session;
 pub use shard::{Observer, play_shard, run_shard, run_shard_watched};
 pub use smoke::{SMOKE_STEPS, SmokeDefect, SmokeReport, smoke, smoke_watched};

@@ -31,6 +31,7 @@ mod result;
 mod retention;
 mod round_number;
 mod ruleset;
+mod runtime_inventory;
 mod runtimes;
 mod schedule;
 mod seed;
@@ -84,6 +85,7 @@ pub use round_number::{InvalidRoundNumber, RoundNumber};
 pub use ruleset::{
     ACTION_LIMIT, FOULS_PER_POINT, GAME_WINDOWS, RULESET, Ruleset, UnknownRuleset, WINDOW_STEPS,
 };
+pub use runtime_inventory::{AgentMachine, PythonInventory, RuntimeContent, RuntimeInventory};
 pub use runtimes::{InvalidRuntimes, RuntimeNotTaken, Runtimes, StageRuntimes};
 pub use schedule::{InvalidSchedule, Schedule};
 pub use seed::{ParseSeedError, Seed};

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 /// Everything that an agent is held to.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct AgentLimits {
     /// Of its archive.
     pub bundle: BundleLimits,
@@ -18,6 +19,7 @@ pub struct AgentLimits {
 
 /// What a bundle may hold (PROTOCOL, "Bundle").
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct BundleLimits {
     /// Largest archive, in bytes.
@@ -44,6 +46,7 @@ impl Default for BundleLimits {
 
 /// What an agent's process tree may use.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct ResourceLimits {
     /// Memory of the tree in bytes: anonymous, page cache, scratch files and swap together.
@@ -80,6 +83,7 @@ impl Default for ResourceLimits {
 
 /// How long an agent may take (PROTOCOL, "Time"), in seconds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct TimeLimits {
     /// From the start of the process, once its sandbox stands, to its answer to `hello`.

@@ -8,6 +8,7 @@ mod commands;
 mod config;
 mod descriptors;
 mod log;
+mod machine;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;

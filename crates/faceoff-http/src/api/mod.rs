@@ -30,6 +30,7 @@ mod registrations;
 mod replays;
 mod rounds;
 mod rulings;
+mod runtimes;
 mod season;
 mod season_archive;
 mod sessions;
@@ -59,6 +60,7 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(health::live))
         .routes(routes!(season::season, season::change_season))
         .routes(routes!(season::close_season))
+        .routes(routes!(runtimes::runtimes))
         .routes(routes!(board::board))
         .routes(routes!(board::task_board))
         .routes(routes!(me::me))

@@ -11,6 +11,7 @@ mod comparison;
 mod evaluation;
 mod figures;
 mod frame;
+mod help;
 mod join;
 mod log;
 mod problems;
@@ -40,6 +41,7 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .route("/evaluations/{id}/compare/{other}", get(comparison::page))
         .route("/season", get(season::page))
         .route("/submissions/{id}/ablation", get(ablation::page))
+        .route("/help", get(help::page))
         .route("/problems", get(problems::page))
         .route("/announcements", get(announcements::page))
         .route("/sign-in", get(sign_in::page).post(sign_in::submit))

@@ -29,6 +29,7 @@ pub mod queue;
 pub(crate) mod ratings;
 pub(crate) mod replays;
 pub mod ruling;
+pub mod runtimes;
 pub mod season;
 pub(crate) mod sight;
 pub mod stage;

@@ -49,6 +49,7 @@ async fn the_document_lists_what_is_there_and_nothing_else() {
         "GET /api/v1/proposals/{id}",
         "GET /api/v1/questions",
         "GET /api/v1/registrations",
+        "GET /api/v1/runtimes",
         "GET /api/v1/season",
         "GET /api/v1/season/archive",
         "GET /api/v1/stages",

@@ -57,6 +57,7 @@ const TABLE: &[(&str, &str)] = &[
     ("POST /registrations", "+++++++"),
     ("POST /registrations/{id}/approve", "?----++"),
     ("POST /registrations/{id}/refuse", "?----++"),
+    ("GET /runtimes", "+++++++"),
     ("GET /season", "+++++++"),
     ("PATCH /season", "?----++"),
     ("GET /season/archive", "?----++"),

@@ -1,4 +1,4 @@
-//! Stages that take agents of some runtimes only.
+//! What agents find on a server, and stages that take agents of some runtimes only.
 
 use crate::site::{ADMIN, Answer, GZIP, Site, TestTeam, result, text};
 use faceoff_store::Work;
@@ -235,4 +235,89 @@ async fn wrong_runtimes_are_refused_by_name() {
             .problem(422, "invalid-content", words);
     }
     assert_eq!(site.get("/api/v1/stages", None).await.json(200), before);
+}
+
+#[tokio::test]
+async fn everybody_may_know_what_agents_find_here() {
+    let site = Site::start().await;
+    let told = site.get("/api/v1/runtimes", None).await.json(200);
+    assert_eq!(told["gpu"], "none");
+    assert_eq!(told["network"], "none");
+    assert_eq!(
+        told["machine"],
+        json!({ "architecture": "x86_64", "cpu_model": "A CPU", "cpus_per_agent": 1 })
+    );
+    assert_eq!(
+        told["runtimes"][0],
+        json!({ "name": "native", "kind": "native", "libc": null })
+    );
+    assert_eq!(told["runtimes"][1]["version"], "3.11.2");
+    assert_eq!(told["runtimes"][1]["packages"]["numpy"], "2.4.6");
+    assert_eq!(told["runtimes"][2]["kind"], "broken");
+    assert!(!told.to_string().contains("secret"), "{told}");
+    assert_eq!(told["limits"]["resources"]["memory_bytes"], 2_u64 << 30);
+    assert_eq!(told["stages"][0]["limits"], told["limits"]);
+    assert_eq!(
+        told["stages"][0]["runtimes"],
+        json!(["native", "python3", "wrong"])
+    );
+
+    // A stage has limits and runtimes of its own, and so has a tournament.
+    let own = json!({
+        "runtimes": ["python3"], "limits": { "memory_bytes": 536_870_912, "step_s": 0.25 },
+        "confirm": "Qualifying",
+    });
+    change(&site, own).await.json(200);
+    site.team("Alpha").await;
+    let rules = json!({ "runtimes": ["native"], "limits": { "pids": 16 } });
+    let cup = json!({ "name": "Cup", "teams": ["Alpha"], "rules": rules });
+    site.post("/api/v1/tournaments", Some(ADMIN), &cup)
+        .await
+        .json(201);
+    let told = site.get("/api/v1/runtimes", None).await.json(200);
+    let (stage, cup) = (&told["stages"][0], &told["tournaments"][0]);
+    assert_eq!(stage["runtimes"], json!(["python3"]));
+    assert_eq!(stage["limits"]["resources"]["memory_bytes"], 536_870_912);
+    assert_eq!(stage["limits"]["time"]["step_s"], 0.25);
+    assert_eq!(stage["limits"]["time"]["reset_s"], 10.0);
+    assert_eq!(told["limits"]["time"]["step_s"], 1.0);
+    assert_eq!(cup["runtimes"], json!(["native"]));
+    assert_eq!(cup["limits"]["resources"]["pids"], 16);
+    assert_eq!(cup["game_limits"]["in_time_s"], 0.02);
+
+    let page = site.get("/help", None).await;
+    assert_eq!(page.status, 200);
+    for words in [
+        "CPython 3.11.2",
+        "numpy&nbsp;2.4.6",
+        "512 MiB",
+        "0.25 s",
+        "A CPU",
+        "Qualifying",
+        "Cup",
+        "does not work",
+        "--like-server",
+        "/api/v1/runtimes",
+    ] {
+        assert!(page.body.contains(words), "{words}: {}", page.body);
+    }
+    assert!(!page.body.contains("<b>odd") && !page.body.contains("secret"));
+    let board = site.get("/", None).await.body;
+    assert!(board.contains("href=\"/help\""));
+}
+
+#[tokio::test]
+async fn a_stage_that_is_over_offers_nothing() {
+    let site = Site::start().await;
+    let stages = async || {
+        let told = site.get("/api/v1/runtimes", None).await.json(200);
+        told["stages"].as_array().unwrap().len()
+    };
+    assert_eq!(stages().await, 1);
+    let over = json!({ "closes_at": "2026-03-01T23:00:00Z" });
+    change(&site, over).await.json(200);
+    site.next_day();
+    assert_eq!(stages().await, 0);
+    let page = site.get("/help", None).await.body;
+    assert!(page.contains("No stage"), "{page}");
 }

@@ -2,7 +2,7 @@
 //! and the steps that a worker would take.
 
 use faceoff_http::{
-    Capacity, CapacityWatch, ConnectionLimits, HttpConfig, HttpLimits, LeastRate, router,
+    Capacity, CapacityWatch, ConnectionLimits, HttpConfig, HttpLimits, LeastRate, Offer, router,
     token::hash_token,
 };
 use faceoff_store::*;
@@ -113,6 +113,41 @@ pub fn patient() -> HttpLimits {
     }
 }
 
+/// Two runtimes, as they might have been found.
+fn offer() -> Offer {
+    let python = PythonInventory {
+        implementation: "CPython".into(),
+        version: "3.11.2".into(),
+        libc: Some("2.36".into()),
+        packages: [("numpy", "2.4.6"), ("<b>odd</b>", "1")]
+            .map(|(name, version)| (name.into(), version.into()))
+            .into(),
+    };
+    let inventory = |name: &str, content| RuntimeInventory {
+        name: name.into(),
+        content,
+    };
+    let machine = AgentMachine {
+        architecture: "x86_64".into(),
+        cpu_model: Some("A CPU".into()),
+        cpus_per_agent: 1,
+    };
+    Offer::of(
+        AgentLimits::default(),
+        machine,
+        vec![
+            inventory("native", RuntimeContent::Native { libc: None }),
+            inventory("python3", RuntimeContent::Python(python)),
+            inventory(
+                "wrong",
+                RuntimeContent::Broken {
+                    why: "/secret/folder does not exist".into(),
+                },
+            ),
+        ],
+    )
+}
+
 impl Site {
     pub async fn start() -> Self {
         Self::start_with(patient()).await
@@ -158,6 +193,7 @@ impl Site {
                 time: TimeLimits::default(),
                 runtimes: ["native", "python3"].map(str::to_owned).to_vec(),
             },
+            offer: offer(),
         };
         let (url, server, ends) = serve(&store, &config).await;
         let http = reqwest::Client::builder().no_proxy().build().unwrap();
@@ -196,6 +232,7 @@ impl Site {
                 runtimes: Vec::new(),
                 time: TimeLimits::default(),
             },
+            offer: Offer::nothing(),
         };
         let (url, server, ends) = serve(&store, &config).await;
         Self {

@@ -2,7 +2,7 @@
 
 use super::*;
 use faceoff_http::{
-    Capacity, ConnectionLimits, HttpConfig, HttpLimits,
+    Capacity, ConnectionLimits, HttpConfig, HttpLimits, Offer,
     requests::DeleteSubmission,
     token::hash_token,
     views::{evaluation::EvaluationStatus, submission::SubmissionStatus},
@@ -62,6 +62,7 @@ async fn site(max_bundle_bytes: u64) -> Site {
             time: TimeLimits::default(),
             runtimes: ["native", "python3"].map(str::to_owned).to_vec(),
         },
+        offer: Offer::nothing(),
     };
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let url = format!("http://{}/", listener.local_addr().unwrap());

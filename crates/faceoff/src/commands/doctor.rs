@@ -1,10 +1,15 @@
 //! `faceoff doctor`: what this host offers to agents and their sandbox, what is missing, and the cure.
 
-use crate::{config::Config, descriptors::Descriptors};
+use crate::{
+    config::{Config, RuntimeConfig},
+    descriptors::Descriptors,
+};
 use anyhow::{Context as _, bail};
 use clap::Args;
-use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime, probe_host};
+use faceoff_runner::inventory;
+use faceoff_sandbox::{HostFeature, Isolation, Layer, MemoryImage, Runtime, probe_host};
 use faceoff_store::Room;
+use faceoff_types::{RuntimeContent, RuntimeInventory};
 use serde::Serialize;
 use std::{io::Write, path::PathBuf};
 
@@ -18,6 +23,9 @@ pub struct DoctorCommand {
     #[arg(long)]
     json: bool,
 }
+
+/// Packages that are worth a word.
+const KNOWN_PACKAGES: [&str; 4] = ["numpy", "scipy", "onnxruntime", "torch"];
 
 /// Everything that was found.
 #[derive(Debug, Serialize)]
@@ -139,8 +147,8 @@ impl Findings {
         let ok = missing(&features).next().is_none();
         Self {
             ok,
+            runtimes: runtimes(config, &features),
             features,
-            runtimes: runtimes(config),
             in_memory: in_memory(config),
             cpus: cpus(config),
             descriptors: descriptors(config),
@@ -212,26 +220,23 @@ fn print_cure(out: &mut impl Write, cure: Option<&str>) -> std::io::Result<()> {
     }
 }
 
-fn runtimes(config: &Config) -> Vec<RuntimeFound> {
-    let offered = config.agent_environment().runtimes;
-    let mut found: Vec<_> = offered
-        .iter()
-        .map(|(name, runtime)| {
-            let missing = runtime.read_only_paths.iter().find(|path| !path.exists());
-            RuntimeFound {
-                name: name.clone(),
-                available: missing.is_none(),
-                found: match missing {
-                    Some(path) => format!("{} does not exist", path.display()),
-                    None => describe(name, runtime),
-                },
-                cure: missing.map(|_| {
-                    format!("correct read_only_paths of [runtimes.{name}] in the configuration")
-                }),
-            }
+/// Each is asked inside the sandbox, as far as this host has one.
+fn runtimes(config: &Config, features: &[Feature]) -> Vec<RuntimeFound> {
+    let mut env = config.agent_environment();
+    let lacking = features.iter().filter(|feature| !feature.host.available);
+    env.isolation = Isolation::Sandboxed {
+        given_up: lacking.map(|feature| feature.host.layer).collect(),
+    };
+    let mut found: Vec<_> = inventory(&env)
+        .into_iter()
+        .map(|RuntimeInventory { name, content }| RuntimeFound {
+            available: !matches!(content, RuntimeContent::Broken { .. }),
+            found: describe(&content, env.runtimes.get(&name)),
+            cure: cure(config, &name, &content),
+            name,
         })
         .collect();
-    if !offered.contains_key("python3") {
+    if !env.runtimes.contains_key("python3") {
         found.push(RuntimeFound {
             name: "python3".into(),
             available: false,
@@ -261,11 +266,51 @@ fn in_memory(config: &Config) -> InMemory {
     }
 }
 
-fn describe(name: &str, runtime: &Runtime) -> String {
-    match runtime.interpreter() {
-        Some(interpreter) if name == "python3" => interpreter.display().to_string(),
-        _ => format!("{} host paths, read-only", runtime.read_only_paths.len()),
+fn describe(content: &RuntimeContent, runtime: Option<&Runtime>) -> String {
+    match content {
+        RuntimeContent::Python(python) => {
+            let interpreter = runtime.and_then(Runtime::interpreter);
+            let place = interpreter.map(|path| format!(" at {}", path.display()));
+            let named = |name: &&str| python.packages.contains_key(*name);
+            let known: Vec<_> = KNOWN_PACKAGES
+                .iter()
+                .filter(|name| named(name))
+                .map(|name| format!("{name} {}", python.packages[*name]))
+                .collect();
+            let more = python.packages.len() - known.len();
+            format!(
+                "{} {}{}; {}{more} other packages",
+                python.implementation,
+                python.version,
+                place.unwrap_or_default(),
+                known
+                    .iter()
+                    .map(|one| format!("{one}, "))
+                    .collect::<String>(),
+            )
+        }
+        RuntimeContent::Native { libc } => format!(
+            "{} host paths, read-only; C library {}",
+            runtime.map_or(0, |runtime| runtime.read_only_paths.len()),
+            libc.as_deref().unwrap_or("of no known version")
+        ),
+        RuntimeContent::Broken { why } => why.clone(),
     }
+}
+
+fn cure(config: &Config, name: &str, content: &RuntimeContent) -> Option<String> {
+    let RuntimeContent::Broken { .. } = content else {
+        return None;
+    };
+    Some(match config.runtimes.get(name) {
+        Some(RuntimeConfig::Folder(folder)) => {
+            format!("make it again: docker/runtime.sh {}", folder.display())
+        }
+        Some(RuntimeConfig::Paths { .. }) => {
+            format!("correct read_only_paths of [runtimes.{name}] in the configuration")
+        }
+        None => "see what is missing of the sandbox above".to_owned(),
+    })
 }
 
 fn cpus(config: &Config) -> Cpus {

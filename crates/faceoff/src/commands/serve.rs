@@ -3,6 +3,7 @@
 mod answering;
 mod archived;
 mod folder;
+mod looking_in;
 
 pub use folder::ADMIN_TOKEN_FILE;
 
@@ -10,7 +11,7 @@ use crate::{config::Config, descriptors::Descriptors, log::LogFormat};
 use answering::{answer, signalled};
 use anyhow::{Context, bail};
 use clap::Args;
-use faceoff_http::{Capacity, CapacityWatch, ConnectionLimits, HttpConfig};
+use faceoff_http::{Capacity, CapacityWatch, ConnectionLimits, HttpConfig, Offer};
 use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime, affinity, probe_host};
 use faceoff_store::{Actor, Room, Store};
 use faceoff_types::Clock;
@@ -60,6 +61,7 @@ impl ServeCommand {
         if archived.is_none() {
             // Before anything is opened: a host that cannot hold agents must not look as if it could.
             check_sandbox(&probe_host(), &config.sandbox.given_up)?;
+            config.check_runtimes()?;
         }
         let connections = config.connections.limits();
         let descriptors = Descriptors::divide(Descriptors::raise(), config.slots(), &connections)?;
@@ -86,10 +88,11 @@ impl ServeCommand {
                 .block_on(archived::serve(config, connections, archived));
         }
         let cpus = CpuLayout::of_a_server(config.slots(), &config.workers.agent_cpus);
+        let offer = looking_in::offer(&config, &cpus)?;
         let (threads, starter) = SlotThreads::of_another();
         let service = thread::Builder::new()
             .name("service".to_owned())
-            .spawn(move || serve_giving_way(config, connections, cpus, threads))
+            .spawn(move || serve_giving_way(config, connections, cpus, threads, offer))
             .context("starting the service's thread")?;
         // This thread keeps its CPUs and its priority, for the slots' threads to inherit.
         starter.tend();
@@ -107,6 +110,7 @@ fn serve_giving_way(
     connections: ConnectionLimits,
     cpus: CpuLayout,
     threads: SlotThreads,
+    offer: Offer,
 ) -> anyhow::Result<()> {
     if let Err(error) = affinity::give_way(&cpus.service) {
         tracing::warn!(%error, cpus = ?cpus.service, "requests cannot be kept from disturbing slots");
@@ -123,7 +127,7 @@ fn serve_giving_way(
         })
         .build()
         .context("starting the async runtime")?
-        .block_on(serve(config, connections, cpus, threads))
+        .block_on(serve(config, connections, cpus, threads, offer))
 }
 
 /// A thread of the runtime that was started for what a slot asked has the slot's priority until here, where
@@ -141,6 +145,7 @@ async fn serve(
     connections: ConnectionLimits,
     cpus: CpuLayout,
     threads: SlotThreads,
+    offer: Offer,
 ) -> anyhow::Result<()> {
     let data_dir = config.server.data_dir.clone();
     private_folder(&data_dir)?;
@@ -203,6 +208,7 @@ async fn serve(
             clock: clock.clone(),
             limits: config.uploads.limits(),
             capacity,
+            offer,
         },
     );
     // For as long as agents run.

@@ -1,7 +1,7 @@
 //! The season's archive as an organiser takes it along: exported from a site, imported, and served by the program.
 
 use faceoff_archive::{Edition, Entry, FORMAT, Manifest, Writer};
-use faceoff_http::{Capacity, ConnectionLimits, HttpConfig, HttpLimits, token::hash_token};
+use faceoff_http::{Capacity, ConnectionLimits, HttpConfig, HttpLimits, Offer, token::hash_token};
 use faceoff_store::{Actor, Claimed, Store, UploadQuota, Work};
 use faceoff_types::{
     BundleRef, Clock, EvaluationId, EvaluationResult, Profile, Ruleset, SmokeOutcome, StageRules,
@@ -98,6 +98,7 @@ async fn site() -> Site {
             slots: 1,
             time: TimeLimits::default(),
         },
+        offer: Offer::nothing(),
     };
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let url = format!("http://{}", listener.local_addr().unwrap());

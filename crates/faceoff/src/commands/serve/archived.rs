@@ -6,7 +6,7 @@ use super::{
 };
 use crate::config::Config;
 use anyhow::Context;
-use faceoff_http::{Capacity, ConnectionLimits, HttpConfig};
+use faceoff_http::{Capacity, ConnectionLimits, HttpConfig, Offer};
 use faceoff_store::{Archived, Room, Store};
 use faceoff_types::Clock;
 use jiff::Timestamp;
@@ -60,6 +60,7 @@ pub async fn serve(
                 runtimes: Vec::new(),
                 time: config.time.clone(),
             },
+            offer: Offer::nothing(),
         },
     );
     let season = store.season().await.context("reading the season")?.name;

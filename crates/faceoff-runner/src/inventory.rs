@@ -1,0 +1,136 @@
+//! What each runtime holds, told by itself, inside the sandbox in which agents find it.
+
+use crate::config::AgentEnvironment;
+use faceoff_sandbox::{AgentProcess, Isolation, ReadLine, Runtime, SpawnSpec};
+use faceoff_types::{PythonInventory, RuntimeContent, RuntimeInventory};
+use serde::Deserialize;
+use std::{
+    collections::BTreeMap,
+    fs,
+    os::unix::fs::PermissionsExt as _,
+    path::Path,
+    time::{Duration, Instant},
+};
+use tempfile::TempDir;
+
+/// Far more than an interpreter takes to start and to list some hundred packages.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// Room for some ten thousand packages.
+const MAX_LINE_BYTES: usize = 1 << 20;
+/// The program that is asked for the C library where there is no interpreter.
+const LOADERS: [&str; 2] = ["/lib64/ld-linux-x86-64.so.2", "/lib/ld-linux-aarch64.so.1"];
+/// Prints one line of JSON.
+const QUESTION: &str = include_str!("inventory.py");
+
+/// Asks each runtime of `env`, one after another, on the CPUs and within the limits of an agent. One that does not
+/// answer is [`RuntimeContent::Broken`] and says why.
+#[must_use]
+pub fn inventory(env: &AgentEnvironment) -> Vec<RuntimeInventory> {
+    let ask = |(name, runtime): (&String, &Runtime)| RuntimeInventory {
+        name: name.clone(),
+        content: look_into(env, runtime).unwrap_or_else(|why| RuntimeContent::Broken { why }),
+    };
+    env.runtimes.iter().map(ask).collect()
+}
+
+/// What one runtime holds, or why that cannot be told.
+fn look_into(env: &AgentEnvironment, runtime: &Runtime) -> Result<RuntimeContent, String> {
+    if let Some(path) = runtime.read_only_paths.iter().find(|path| !path.exists()) {
+        return Err(format!("{} does not exist", path.display()));
+    }
+    let is_open = env.isolation == Isolation::None;
+    let shown = |path: &Path| {
+        is_open
+            || runtime
+                .read_only_paths
+                .iter()
+                .any(|root| path.starts_with(root))
+    };
+    if runtime.interpreter().is_some_and(|python| shown(&python)) {
+        let line = answer(env, runtime, &["python3", "-c", QUESTION])?;
+        return serde_json::from_str::<Answer>(&line)
+            .map(|answer| RuntimeContent::Python(answer.into()))
+            .map_err(|error| {
+                format!("expected one line of JSON from its python3, got {line:?}: {error}")
+            });
+    }
+    let loader = LOADERS.iter().find(|loader| Path::new(loader).exists());
+    let libc = loader.and_then(|loader| answer(env, runtime, &[loader, "--version"]).ok());
+    Ok(RuntimeContent::Native {
+        libc: libc.as_deref().and_then(libc_version),
+    })
+}
+
+/// As `inventory.py` prints it.
+#[derive(Deserialize)]
+struct Answer {
+    implementation: String,
+    version: String,
+    libc: Option<String>,
+    packages: BTreeMap<String, String>,
+}
+
+impl From<Answer> for PythonInventory {
+    fn from(answer: Answer) -> Self {
+        Self {
+            implementation: answer.implementation,
+            version: answer.version,
+            libc: answer.libc,
+            packages: answer.packages,
+        }
+    }
+}
+
+/// The first line that `command` prints in an empty bundle.
+fn answer(env: &AgentEnvironment, runtime: &Runtime, command: &[&str]) -> Result<String, String> {
+    let bundle = empty_bundle().map_err(|error| format!("cannot make a folder: {error}"))?;
+    let spec = SpawnSpec {
+        bundle_dir: bundle.path().to_owned(),
+        command: command.iter().map(|&word| word.to_owned()).collect(),
+        env: BTreeMap::new(),
+        runtime: runtime.clone(),
+        limits: env.limits.clone(),
+        isolation: env.isolation.clone(),
+        cpus: env.agent_cpus.clone(),
+    };
+    let mut process = AgentProcess::spawn(&spec).map_err(|error| error.to_string())?;
+    let line = process
+        .read_line(MAX_LINE_BYTES, Instant::now() + PATIENCE)
+        .map_err(|error| error.to_string())?;
+    if let ReadLine::Line { bytes, .. } = line {
+        return Ok(String::from_utf8_lossy(&bytes).into_owned());
+    }
+    let log = process.stderr_tail();
+    let last = log.lines().last().unwrap_or("it printed nothing");
+    Err(format!("{} gave no answer: {last}", command[0]))
+}
+
+/// A folder that an agent of another user can pass through.
+fn empty_bundle() -> std::io::Result<TempDir> {
+    let folder = tempfile::tempdir()?;
+    fs::set_permissions(folder.path(), fs::Permissions::from_mode(0o755))?;
+    Ok(folder)
+}
+
+/// Of `ld.so (…) stable release version 2.36.`
+fn libc_version(line: &str) -> Option<String> {
+    let (_, version) = line.rsplit_once("version ")?;
+    let version = version.trim().trim_end_matches('.');
+    let is_version =
+        !version.is_empty() && version.bytes().all(|b| b.is_ascii_digit() || b == b'.');
+    is_version.then(|| version.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_loaders_answer_is_understood_or_left() {
+        let debian = "ld.so (Debian GLIBC 2.36-9+deb12u10) stable release version 2.36.";
+        assert_eq!(libc_version(debian).as_deref(), Some("2.36"));
+        for other in ["", "version", "musl libc (x86_64)", "version x.y."] {
+            assert_eq!(libc_version(other), None, "{other}");
+        }
+    }
+}

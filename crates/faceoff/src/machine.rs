@@ -1,0 +1,41 @@
+//! This machine, as far as agents notice.
+
+use faceoff_sandbox::affinity;
+use faceoff_types::AgentMachine;
+use std::fs;
+
+/// What agents that are bound to `cpus` run on; to none: anywhere that this process may.
+#[must_use]
+pub fn of_agents(cpus: &[usize]) -> AgentMachine {
+    let count = match cpus {
+        [] => affinity::allowed().map_or(1, |cpus| cpus.len()),
+        own => own.len(),
+    };
+    AgentMachine {
+        architecture: std::env::consts::ARCH.to_owned(),
+        cpu_model: cpu_model(&fs::read_to_string("/proc/cpuinfo").unwrap_or_default()),
+        cpus_per_agent: u32::try_from(count).unwrap_or(u32::MAX),
+    }
+}
+
+/// The first that the kernel names.
+fn cpu_model(cpuinfo: &str) -> Option<String> {
+    cpuinfo.lines().find_map(|line| {
+        let (name, value) = line.split_once(':')?;
+        (name.trim() == "model name").then(|| value.trim().to_owned())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_model_is_read_where_the_kernel_tells_it() {
+        let x86 = "processor\t: 0\nmodel\t\t: 85\nmodel name\t: A CPU @ 2 GHz\n\nprocessor\t: 1\n";
+        assert_eq!(cpu_model(x86).as_deref(), Some("A CPU @ 2 GHz"));
+        assert_eq!(cpu_model("processor\t: 0\nFeatures\t: fp\n"), None);
+        assert_eq!(of_agents(&[4, 5]).cpus_per_agent, 2);
+        assert!(of_agents(&[]).cpus_per_agent >= 1);
+    }
+}
