@@ -26,6 +26,7 @@ use faceoff_http::{
         evaluation::EvaluationView,
         event::EventsView,
         me::MeView,
+        runtimes::RuntimesView,
         season::SeasonView,
         stage::StageView,
         submission::SubmissionView,
@@ -169,6 +170,25 @@ impl Client {
     /// All stages, the first to open first.
     pub async fn stages(&self) -> anyhow::Result<Vec<StageView>> {
         self.get("/stages").await
+    }
+
+    /// What agents find on the server.
+    ///
+    /// # Errors
+    /// If it does not answer, or not as one of this version would.
+    pub async fn runtimes(&self) -> anyhow::Result<RuntimesView> {
+        self.get("/runtimes").await.map_err(|error| {
+            let unknown = error
+                .downcast_ref::<ApiError>()
+                .is_some_and(|error| error.status == StatusCode::NOT_FOUND);
+            if unknown {
+                error.context(
+                    "it does not tell what agents find there; is it an older version of Faceoff?",
+                )
+            } else {
+                error
+            }
+        })
     }
 
     /// Organiser: how the days of a stage fit into their time.

@@ -1,21 +1,24 @@
 //! `faceoff eval`: the server's evaluator, run locally.
 
 mod ablation;
+mod differences;
 mod files;
+mod like_server;
 mod pool;
 mod profile_run;
 mod table;
 
 use super::local_bundle;
 use crate::config::Config;
-use anyhow::{Context, ensure};
+use anyhow::Context;
 use clap::Args;
 use faceoff_dataset::ARCHIVE_FILE;
 use faceoff_runner::AgentEnvironment;
 use faceoff_sandbox::affinity;
-use faceoff_types::{MAX_EPISODES_PER_TASK, Profile, Seed, Task};
+use faceoff_types::{MAX_EPISODES_PER_TASK, Profile, Seed, StageRules, Task};
 use faceoff_worker::CpuLayout;
 use files::RESULTS;
+use like_server::LikeServer;
 use profile_run::EvalSetup;
 use std::{fs, path::PathBuf};
 
@@ -25,20 +28,15 @@ use std::{fs, path::PathBuf};
 pub struct EvalCommand {
     /// The agent: a folder with agent.toml, or a .tar.gz, .tar.zst or .zip
     bundle: PathBuf,
-    /// Tasks to play
-    #[arg(
-        long = "task",
-        value_name = "TASKS",
-        value_delimiter = ',',
-        default_value = "hit,defend,prepare"
-    )]
+    /// Tasks to play [default: hit,defend,prepare, or the stage's with --like-server]
+    #[arg(long = "task", value_name = "TASKS", value_delimiter = ',')]
     tasks: Vec<Task>,
     /// Episodes of each task
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_EPISODES_PER_TASK)))]
     episodes: u32,
-    /// Perturbations: ideal, one factor's name, or evaluation
-    #[arg(long, default_value = "evaluation")]
-    profile: Profile,
+    /// Perturbations: ideal, one factor's name, or evaluation [default: evaluation, or the stage's with --like-server]
+    #[arg(long)]
+    profile: Option<Profile>,
     /// Play the same episodes in every profile (ideal, each factor alone, all together) and compare
     /// them: ablation.json, and a folder for each profile
     #[arg(long, conflicts_with = "profile")]
@@ -62,6 +60,12 @@ pub struct EvalCommand {
     /// faults, as a server's configuration states them
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    /// Play by the rules and limits of this server's stage, and say what this machine has otherwise
+    #[arg(long, value_name = "URL")]
+    like_server: Option<String>,
+    /// The stage of that server, by its name or id; may be left out where one is open
+    #[arg(long, value_name = "STAGE", requires = "like_server")]
+    stage: Option<String>,
 }
 
 impl EvalCommand {
@@ -71,13 +75,27 @@ impl EvalCommand {
     /// If the bundle is refused, the agent fails too often, or the platform fails; the error says
     /// which.
     pub fn run(mut self) -> anyhow::Result<()> {
+        let mut config = Config::load(self.config.as_deref())?;
+        let like = self.like_server.as_deref();
+        let like = like
+            .map(|url| LikeServer::ask(url, self.stage.as_deref()))
+            .transpose()?;
+        let rules = match &like {
+            Some(like) => {
+                like.apply(&mut config);
+                like.stage().rules.rules.clone()
+            }
+            None => StageRules {
+                profile: Profile::Evaluation,
+                tasks: Task::ALL.to_vec(),
+                ..config.rules()
+            },
+        };
+        if self.tasks.is_empty() {
+            self.tasks = rules.tasks;
+        }
         self.tasks.sort_unstable();
         self.tasks.dedup();
-        ensure!(
-            !self.tasks.is_empty(),
-            "--task: expected hit, defend or prepare"
-        );
-        let config = Config::load(self.config.as_deref())?;
         fs::create_dir_all(&self.out)
             .with_context(|| format!("creating {}", self.out.display()))?;
         files::remove_earlier(&self.out)?;
@@ -88,7 +106,18 @@ impl EvalCommand {
             self.no_sandbox,
             &config.bundle,
         )?;
-        let envs = self.environments(&config, &bundle.manifest.runtime)?;
+        let runtime = &bundle.manifest.runtime;
+        if !self.no_sandbox {
+            config.check_runtime(runtime)?;
+        }
+        let envs = self.environments(&config, runtime)?;
+        if let Some(like) = &like {
+            like.check_runtime(runtime, &envs[0])?;
+            for line in like.told(runtime, &envs[0], &self.given_up(&config)) {
+                println!("{line}");
+            }
+            println!("");
+        }
 
         let mismatch_seed = self
             .mismatch_seed
@@ -110,7 +139,7 @@ impl EvalCommand {
         if self.ablation {
             return ablation::run(&setup, &self.out);
         }
-        let played = profile_run::play(&setup, self.profile, &self.out)?;
+        let played = profile_run::play(&setup, self.profile.unwrap_or(rules.profile), &self.out)?;
         let agent = &setup.bundle.manifest.name;
         print!("{}", table::of(agent, &played.result));
         println!(
@@ -120,6 +149,15 @@ impl EvalCommand {
             played.archive_blake3
         );
         Ok(())
+    }
+
+    /// Layers of the sandbox that this machine does without.
+    fn given_up(&self, config: &Config) -> Vec<String> {
+        if self.no_sandbox {
+            return vec!["the sandbox (--no-sandbox)".to_owned()];
+        }
+        let layers = config.sandbox.given_up.iter();
+        layers.map(|layer| layer.as_str().to_owned()).collect()
     }
 
     /// One environment per worker: the server's limits, on CPUs of its own where there are enough.
