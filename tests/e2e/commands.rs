@@ -27,6 +27,13 @@ impl Told {
         self.out
     }
 
+    /// Of one that failed with this status, and may have printed before: standard error.
+    #[track_caller]
+    pub fn failed(self, code: i32) -> String {
+        assert_eq!(self.code, Some(code), "{}{}", self.out, self.err);
+        self.err
+    }
+
     /// Of one that did, asked for JSON.
     #[track_caller]
     pub fn json(self) -> Value {

@@ -75,6 +75,20 @@ pub fn python_bundle(folder: &Path, name: &str, source: &str) -> PathBuf {
     bundle
 }
 
+/// A copy of a folder of files.
+///
+/// # Panics
+/// If it cannot be made.
+#[must_use]
+pub(crate) fn copied(folder: &Path, to: &Path) -> PathBuf {
+    fs::create_dir_all(to).expect("a scratch folder can be made");
+    for entry in fs::read_dir(folder).expect("the folder is there") {
+        let entry = entry.expect("a folder can be read");
+        fs::copy(entry.path(), to.join(entry.file_name())).expect("it holds files only");
+    }
+    to.to_path_buf()
+}
+
 /// The folder as a `.tar.gz`.
 ///
 /// # Panics

@@ -2,6 +2,7 @@
 //! and an HTTP client that knows nothing of the server's types.
 
 pub mod bundle;
+pub mod packages;
 pub mod server;
 pub mod small_disk;
 

@@ -1,0 +1,53 @@
+"""Plays with a network that ONNX Runtime runs, once it has found that the sandbox keeps its promises."""
+
+import importlib.metadata
+import os
+import sys
+
+import numpy as np
+import onnxruntime
+
+from protocol import play
+
+
+def check_promises(session):
+    """Ends the agent, with the reason in its log, where the runtime is not as docs/sandbox.md tells."""
+    options = session.get_session_options()
+    counted = {
+        "os.cpu_count": os.cpu_count(),
+        "affinity": len(os.sched_getaffinity(0)),
+        "OMP_NUM_THREADS": int(os.environ["OMP_NUM_THREADS"]),
+        "OPENBLAS_NUM_THREADS": int(os.environ["OPENBLAS_NUM_THREADS"]),
+        "ONNX Runtime, intra": options.intra_op_num_threads,
+        "ONNX Runtime, inter": options.inter_op_num_threads,
+    }
+    if len(set(counted.values())) != 1:
+        sys.exit(f"expected as many threads as CPUs everywhere, got {counted}")
+    packages = {found.name.lower() for found in importlib.metadata.distributions()}
+    expected = {"flatbuffers", "numpy", "onnxruntime", "packaging", "protobuf", "scipy"}
+    if packages != expected:
+        sys.exit(f"expected the packages {sorted(expected)} and no others, got {sorted(packages)}")
+
+
+class Network:
+    """The pose that the episode began with, moved a little by what the network says of the puck."""
+
+    def __init__(self, task, agent_id, env):
+        self.joint_pos_ids = env["joint_pos_ids"]
+        self.session = onnxruntime.InferenceSession("policy.onnx", providers=["CPUExecutionProvider"])
+        check_promises(self.session)
+        self.pose = None
+
+    def reset(self):
+        self.pose = None
+
+    def act(self, obs):
+        if self.pose is None:
+            self.pose = [obs[i] for i in self.joint_pos_ids]
+        state = np.array([[*obs[:6], *self.pose]], dtype=np.float32)
+        (joint_pos,) = self.session.run(["joint_pos"], {"state": state})
+        return [joint_pos[0].tolist(), [0.0] * len(self.pose)]
+
+
+if __name__ == "__main__":
+    play(Network, interpolation=3)

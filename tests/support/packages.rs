@@ -1,0 +1,94 @@
+//! Python packages for agents of tests, from the package index, kept below the target folder.
+
+use crate::{bundle::copied, program, repository};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+/// Where what was downloaded stays.
+fn kept() -> PathBuf {
+    let programs = program("faceoff");
+    let target = programs.ancestors().nth(2);
+    target
+        .expect("programs lie two folders below the target folder's")
+        .join("runtimes")
+}
+
+/// The runtime `python3-ml`, made by `docker/runtime.sh` the first time.
+///
+/// # Panics
+/// If it cannot be made, as without a package index.
+#[must_use]
+pub fn python3_ml() -> PathBuf {
+    let folder = kept().join("python3-ml");
+    let script = repository().join("docker/runtime.sh");
+    run(Command::new(script).arg(&folder));
+    folder
+}
+
+/// The bundle `tests/bundles/NAME`, complete.
+///
+/// # Panics
+/// If it cannot be copied.
+#[must_use]
+pub fn test_bundle(name: &str, into: &Path) -> PathBuf {
+    let folder = copied(
+        &repository().join("tests/bundles").join(name),
+        &into.join(name),
+    );
+    let protocol = repository().join("agents/hold/protocol.py");
+    fs::copy(protocol, folder.join("protocol.py")).expect("a scratch file can be written");
+    folder
+}
+
+/// Brings what `requirements.txt` of a bundle names into its folder `vendor`, as docs/sandbox.md tells teams to, for a
+/// server whose Python is `version` (`3.11`).
+///
+/// # Panics
+/// If that cannot be done, as without a package index.
+pub fn vendor(bundle: &Path, version: &str) {
+    // What pip fetched for an earlier test is there without the index.
+    let wheels = kept().join(format!("wheels-{version}"));
+    let requirements = bundle.join("requirements.txt");
+    let pip = |verb: &str, place: &Path| {
+        let mut pip = Command::new("/usr/bin/python3");
+        pip.args(["-m", "pip", "--disable-pip-version-check", verb])
+            .args([
+                "--quiet",
+                "--only-binary",
+                ":all:",
+                "--python-version",
+                version,
+            ])
+            .args(["--platform", "manylinux2014_x86_64", "--requirement"])
+            .arg(&requirements)
+            .arg(if verb == "download" {
+                "--dest"
+            } else {
+                "--target"
+            })
+            .arg(place);
+        pip
+    };
+    if !wheels.exists() {
+        fs::create_dir_all(kept()).expect("the target folder can be written");
+        let fetched = tempfile::tempdir_in(kept()).expect("the target folder can be written");
+        run(&mut pip("download", fetched.path()));
+        // Another test may have been faster.
+        let _ = fs::rename(fetched.path(), &wheels);
+    }
+    let mut install = pip("install", &bundle.join("vendor"));
+    run(install.args(["--no-index", "--find-links"]).arg(&wheels));
+}
+
+fn run(command: &mut Command) {
+    let output = command.output().expect("the program can be started");
+    assert!(
+        output.status.success(),
+        "{command:?}: {}{}",
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    );
+}
