@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -25,6 +25,12 @@ SPEED_SHARE = 0.8
 MAX_ACCELERATION_M_S2 = 8.0
 
 Floats = npt.NDArray[np.float64]
+
+if TYPE_CHECKING:
+    ManyWorlds = VectorWrapper[Any, Any, Any, Any, Any]
+else:
+    # Not generic in Gymnasium 1.1.
+    ManyWorlds = VectorWrapper
 
 
 class MalletMotion:
@@ -119,7 +125,7 @@ class MalletPlane(gymnasium.ActionWrapper[Any, Any, Any]):
         return result
 
 
-class MalletPlaneVector(VectorWrapper[Any, Any, Any, Any, Any]):
+class MalletPlaneVector(ManyWorlds):
     """:class:`MalletPlane` for an :class:`AirHockeyVectorEnv`; actions are (num_envs, 2)."""
 
     def __init__(self, env: VectorEnv[Any, Any, Any], max_speed_m_s: float = 1.0) -> None:
