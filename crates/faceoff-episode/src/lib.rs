@@ -10,6 +10,7 @@ mod game_record;
 mod game_side;
 mod record;
 mod time_sum;
+mod why;
 
 pub use arena::Arena;
 pub use course::{Course, NotFinite, Question};
@@ -20,3 +21,4 @@ pub use game_record::{
 };
 pub use record::{Answered, EpisodeStart, Nowhere, RecordError, StepRow, StepSink};
 pub use time_sum::TimeSum;
+pub use why::why_it_ended;
