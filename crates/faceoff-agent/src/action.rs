@@ -76,7 +76,11 @@ impl Action {
             ));
         }
         let refused = |number: &f64| !number.is_finite() || number.abs() > LARGEST_NUMBER;
-        let (index, number) = self.numbers().iter().enumerate().find(|(_, n)| refused(n))?;
+        let (index, number) = self
+            .numbers()
+            .iter()
+            .enumerate()
+            .find(|(_, n)| refused(n))?;
         Some(format!(
             "expected numbers within ±{LARGEST_NUMBER} in an action, got {number} for joint {} in row {}",
             index % JOINTS + 1,

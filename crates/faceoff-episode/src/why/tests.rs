@@ -27,7 +27,7 @@ fn every_end_of_hit() {
         (
             [0.98, 0.126, 1.2, 0.0],
             false,
-            "puck left the table beside the goal: x = 0.98 m, y = 0.126 m, outside ±0.125 m",
+            "puck left the table beside the goal: x = 0.98 m, y = 0.13 m, outside ±0.125 m",
         ),
         (
             [-0.98, -0.1, -1.2, 0.0],
