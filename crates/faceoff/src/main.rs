@@ -29,12 +29,16 @@ enum Command {
     Init(commands::init::InitCommand),
     /// Play a whole competition day with the reference agents.
     Demo(commands::demo::DemoCommand),
+    /// Start an agent of your own: a folder that runs as it is.
+    New(commands::new::NewCommand),
     /// Evaluate a bundle locally with the server's evaluator.
     Eval(commands::eval::EvalCommand),
     /// Play one game between two bundles.
     Play(commands::play::PlayCommand),
     /// Compare two evaluations that played the same episodes.
     Compare(commands::compare::CompareCommand),
+    /// Draw an episode of a dataset, and say why it ended as it did.
+    Replay(commands::replay::ReplayCommand),
     /// Simulate a dataset or a game again and compare every state and score.
     Verify(commands::verify::VerifyCommand),
     /// Look into a dataset, cut pieces out of it, or convert it.
@@ -68,9 +72,11 @@ fn main() -> ExitCode {
         Command::Serve(command) => command.run(),
         Command::Init(command) => command.run(),
         Command::Demo(command) => command.run(),
+        Command::New(command) => command.run(),
         Command::Eval(command) => command.run(),
         Command::Play(command) => command.run(),
         Command::Compare(command) => command.run(),
+        Command::Replay(command) => command.run(),
         Command::Verify(command) => return command.run(),
         Command::Dataset(command) => command.run(),
         Command::Score(command) => command.run(),

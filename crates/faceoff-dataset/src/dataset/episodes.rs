@@ -22,6 +22,12 @@ pub struct EpisodeRecord {
     pub interpolation: Option<String>,
     /// Computation time included.
     pub penalty_points: f64,
+    /// The puck's true state before the first step, table frame: x, y, yaw, vx, vy, yaw rate.
+    #[serde(skip)]
+    pub initial_puck: [f64; 6],
+    /// The end effector before the first step, in the robot's own base frame: x, y, z.
+    #[serde(skip)]
+    pub initial_ee: [f64; 3],
 }
 
 /// The table as it is, in batches, its columns checked.
@@ -121,6 +127,9 @@ impl<'a> Columns<'a> {
             seed: text("seed")?.to_owned(),
             interpolation: self.text("interpolation", row).map(str::to_owned),
             penalty_points: self.float("penalty_points", row),
+            initial_puck: ["x", "y", "yaw", "vx", "vy", "yaw_rate"]
+                .map(|name| self.float(&format!("initial_puck_{name}"), row)),
+            initial_ee: ["x", "y", "z"].map(|name| self.float(&format!("initial_ee_{name}"), row)),
         })
     }
 }

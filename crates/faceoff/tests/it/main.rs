@@ -6,7 +6,9 @@ mod compare;
 mod dataset;
 mod eval;
 mod init;
+mod new;
 mod play;
+mod replay;
 
 /// A configuration that gives agents time: what is played again must not differ by a busy machine's faults.
 const PATIENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/patient.toml");

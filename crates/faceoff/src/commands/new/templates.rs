@@ -1,0 +1,90 @@
+//! What `faceoff new` writes: paths in the new folder, and texts with `{{name}}`, `{{task}}` and `{{version}}`.
+
+use super::example::Example;
+
+type Files = Vec<(&'static str, &'static str)>;
+
+macro_rules! template {
+    ($path:literal) => {
+        include_str!(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/templates/new/",
+            $path
+        ))
+    };
+}
+
+/// Of another crate: the very file that it is built from.
+macro_rules! of_crate {
+    ($path:literal) => {
+        include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../", $path))
+    };
+}
+
+/// A bundle.
+pub fn python(example: Example) -> Files {
+    let agent = match example {
+        Example::Defender => template!("python/defender.py"),
+        Example::Hitter => template!("python/hitter.py"),
+    };
+    vec![
+        ("README.md", template!("python/README.md")),
+        ("agent.toml", template!("python/agent.toml")),
+        ("agent.py", agent),
+        ("mallet.py", template!("python/mallet.py")),
+        ("puck.py", template!("python/puck.py")),
+        ("test_agent.py", template!("python/test_agent.py")),
+        (
+            "protocol.py",
+            of_crate!("faceoff-py/python/faceoff/agent.py"),
+        ),
+        (
+            "kinematics.py",
+            of_crate!("faceoff-py/python/faceoff/kinematics/plain.py"),
+        ),
+    ]
+}
+
+/// A crate with a bundle in it.
+pub fn rust(example: Example) -> Files {
+    let policy = match example {
+        Example::Defender => template!("rust/src/defender.rs"),
+        Example::Hitter => template!("rust/src/hitter.rs"),
+    };
+    vec![
+        ("README.md", template!("rust/README.md")),
+        ("Cargo.toml", template!("rust/Cargo.toml.txt")),
+        (".gitignore", template!("rust/gitignore.txt")),
+        ("pack.sh", template!("rust/pack.sh")),
+        ("bundle/agent.toml", template!("rust/agent.toml")),
+        ("src/main.rs", template!("rust/src/main.rs")),
+        ("src/policy.rs", policy),
+        ("src/mallet.rs", template!("rust/src/mallet.rs")),
+        ("src/puck.rs", template!("rust/src/puck.rs")),
+        ("src/tests.rs", template!("rust/src/tests.rs")),
+        (
+            "faceoff-agent/Cargo.toml",
+            template!("rust/faceoff-agent.toml.txt"),
+        ),
+        (
+            "faceoff-agent/src/lib.rs",
+            of_crate!("faceoff-agent/src/lib.rs"),
+        ),
+        (
+            "faceoff-agent/src/action.rs",
+            of_crate!("faceoff-agent/src/action.rs"),
+        ),
+        (
+            "faceoff-agent/src/conversation.rs",
+            of_crate!("faceoff-agent/src/conversation.rs"),
+        ),
+        (
+            "faceoff-agent/src/env.rs",
+            of_crate!("faceoff-agent/src/env.rs"),
+        ),
+        (
+            "faceoff-agent/src/observation.rs",
+            of_crate!("faceoff-agent/src/observation.rs"),
+        ),
+    ]
+}

@@ -1,0 +1,241 @@
+use super::recorded::{CONSTRAINTS, Recorded, time_s};
+use faceoff_scoring::COMPUTATION_TIME_LIMITS_S;
+use faceoff_sim::model::LIMIT_FRACTION;
+use plotters::prelude::*;
+use std::ops::Range;
+
+/// Left and right of the time axis, px.
+const LABELS_PX: u32 = 56;
+const MARGIN_PX: u32 = 8;
+/// Beside the plots: what the lines are.
+const LEGEND_PX: u32 = 150;
+const CHART_PX: u32 = 150;
+
+/// One colour per line, told apart by colour-blind readers too (Okabe and Ito's).
+const COLOURS: [RGBColor; 7] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(80, 80, 80),
+];
+
+struct Chart {
+    caption: String,
+    lines: Vec<Line>,
+    /// Values that must not be passed.
+    bounds: Vec<f64>,
+    /// The values that are shown, unless they are all within.
+    window: Range<f64>,
+}
+
+struct Line {
+    name: String,
+    points: Vec<(f64, f64)>,
+    dots: bool,
+}
+
+/// All plots of an episode below each other.
+pub struct Plots {
+    pub svg: String,
+    pub height_px: u32,
+    /// Where the time axis begins and ends, px from the left.
+    pub axis_px: [i32; 2],
+}
+
+/// Draws them as wide as asked for.
+pub fn draw(recorded: &Recorded, width_px: u32) -> anyhow::Result<Plots> {
+    let charts = charts(recorded);
+    let end_s = time_s(recorded.puck.len().max(2) - 1);
+    let height_px = CHART_PX * u32::try_from(charts.len())?;
+    let mut svg = String::new();
+    let mut axis_px = [0, 0];
+    {
+        let root = SVGBackend::with_string(&mut svg, (width_px, height_px)).into_drawing_area();
+        for (area, chart) in root.split_evenly((charts.len(), 1)).iter().zip(&charts) {
+            axis_px = chart.draw(area, end_s)?;
+        }
+        root.present()?;
+    }
+    Ok(Plots {
+        svg,
+        height_px,
+        axis_px,
+    })
+}
+
+fn charts(recorded: &Recorded) -> Vec<Chart> {
+    let puck = |axis: usize, name: &str| Chart {
+        caption: format!("puck {name} (m), table frame: true and observed"),
+        lines: vec![
+            Line::from_start("observed", recorded.seen.iter().map(|at| at[axis])).dotted(),
+            Line::from_start("true", recorded.puck.iter().map(|at| at[axis])),
+        ],
+        bounds: Vec::new(),
+        window: f64::MIN..f64::MAX,
+    };
+    let constraint = |group: usize, scale: f64| {
+        let values = recorded
+            .constraints
+            .iter()
+            .map(move |values| scale * values[group]);
+        Line::after_steps(CONSTRAINTS[group].0, values)
+    };
+    vec![
+        puck(0, "x"),
+        puck(1, "y"),
+        Chart {
+            caption: "mallet (m), table frame".to_owned(),
+            lines: vec![
+                Line::from_start("x", recorded.mallet.iter().map(|at| at[0])),
+                Line::from_start("y", recorded.mallet.iter().map(|at| at[1])),
+            ],
+            bounds: Vec::new(),
+            window: f64::MIN..f64::MAX,
+        },
+        Chart {
+            caption: "joint speeds, % of their limits (95 % may not be passed, filtered)"
+                .to_owned(),
+            lines: (0..7)
+                .map(|joint| {
+                    let shares = recorded
+                        .speed_share
+                        .iter()
+                        .map(|share| 100.0 * share[joint]);
+                    Line::after_steps(&format!("{}", joint + 1), shares)
+                })
+                .collect(),
+            bounds: vec![-100.0 * LIMIT_FRACTION, 100.0 * LIMIT_FRACTION],
+            window: -120.0..120.0,
+        },
+        Chart {
+            caption: "constraints (mm): broken above 0".to_owned(),
+            lines: vec![constraint(2, 1e3), constraint(3, 1e3)],
+            bounds: vec![0.0],
+            window: -60.0..40.0,
+        },
+        Chart {
+            caption: "constraints (rad, rad/s): broken above 0".to_owned(),
+            lines: vec![constraint(0, 1.0), constraint(1, 1.0)],
+            bounds: vec![0.0],
+            window: -1.5..0.5,
+        },
+        Chart {
+            caption: "computation time (ms): points from 20 ms on".to_owned(),
+            lines: vec![Line::after_steps(
+                "of a step",
+                recorded.computation_time_s.iter().map(|s| 1e3 * s),
+            )],
+            bounds: vec![1e3 * COMPUTATION_TIME_LIMITS_S[0]],
+            window: 0.0..f64::MAX,
+        },
+    ]
+}
+
+impl Line {
+    /// Values after 0, 1, 2 … steps.
+    fn from_start(name: &str, values: impl Iterator<Item = f64>) -> Self {
+        Self {
+            name: name.to_owned(),
+            points: values
+                .enumerate()
+                .map(|(k, value)| (time_s(k), value))
+                .collect(),
+            dots: false,
+        }
+    }
+
+    /// Values after 1, 2, 3 … steps.
+    fn after_steps(name: &str, values: impl Iterator<Item = f64>) -> Self {
+        let mut line = Self::from_start(name, values);
+        for (time, _) in &mut line.points {
+            *time += time_s(1);
+        }
+        line
+    }
+
+    fn dotted(mut self) -> Self {
+        self.dots = true;
+        self
+    }
+}
+
+impl Chart {
+    /// The values that are shown.
+    fn range(&self) -> Range<f64> {
+        let values = self
+            .lines
+            .iter()
+            .flat_map(|line| &line.points)
+            .map(|(_, value)| *value);
+        let values = values.map(|value| value.clamp(self.window.start, self.window.end));
+        let (low, high) = values
+            .chain(self.bounds.iter().copied())
+            .fold((f64::MAX, f64::MIN), |(low, high), value| {
+                (low.min(value), high.max(value))
+            });
+        let margin = 0.06 * (high - low).max(0.02);
+        if low > high {
+            -1.0..1.0
+        } else {
+            low - margin..high + margin
+        }
+    }
+
+    fn draw<DB: DrawingBackend>(
+        &self,
+        area: &DrawingArea<DB, plotters::coord::Shift>,
+        end_s: f64,
+    ) -> anyhow::Result<[i32; 2]>
+    where
+        DB::ErrorType: 'static,
+    {
+        let range = self.range();
+        let (low, high) = (range.start, range.end);
+        let mut chart = ChartBuilder::on(area)
+            .caption(&self.caption, ("sans-serif", 13))
+            .margin(MARGIN_PX)
+            .margin_right(LEGEND_PX)
+            .x_label_area_size(20)
+            .y_label_area_size(LABELS_PX)
+            .build_cartesian_2d(0.0..end_s, range)?;
+        chart
+            .configure_mesh()
+            .light_line_style(TRANSPARENT)
+            .x_labels(11)
+            .y_labels(5)
+            .x_label_formatter(&|time| format!("{time:.1} s"))
+            .y_label_formatter(&|value| format!("{}", (value * 1e3).round() / 1e3 + 0.0))
+            .label_style(("sans-serif", 11))
+            .draw()?;
+        for bound in &self.bounds {
+            chart.draw_series(LineSeries::new([(0.0, *bound), (end_s, *bound)], RED))?;
+        }
+        for (line, colour) in self.lines.iter().zip(COLOURS) {
+            let shown = line
+                .points
+                .iter()
+                .map(|(time, value)| (*time, value.clamp(low, high)));
+            let drawn = if line.dots {
+                chart.draw_series(shown.map(|at| Circle::new(at, 1, BLACK.mix(0.6).filled())))?
+            } else {
+                chart.draw_series(LineSeries::new(shown, colour.stroke_width(1)))?
+            };
+            let colour = if line.dots { BLACK } else { colour };
+            drawn
+                .label(&line.name)
+                .legend(move |(x, y)| PathElement::new([(x, y), (x + 12, y)], colour));
+        }
+        let (axis, _) = chart.plotting_area().get_pixel_range();
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::Coordinate(axis.end - axis.start, -8))
+            .legend_area_size(14)
+            .margin(4)
+            .label_font(("sans-serif", 10))
+            .draw()?;
+        Ok([axis.start, axis.end])
+    }
+}

@@ -1,0 +1,221 @@
+use anyhow::Context;
+use arrow_array::{
+    Array, RecordBatch,
+    cast::AsArray,
+    types::{Float64Type, Int64Type},
+};
+use faceoff_dataset::{Dataset, DatasetError};
+use faceoff_episode::why_it_ended;
+use faceoff_scoring::{
+    COMPUTATION_TIME_LIMITS_S, COMPUTATION_TIME_MAX_POINTS, EE_POINTS, JOINT_POS_POINTS,
+    JOINT_VEL_POINTS, LINK_POINTS, computation_time_penalty,
+};
+use faceoff_sim::{
+    JOINTS,
+    model::{CONTROL_STEP_S, LINKS},
+    table::geometry::TABLE,
+};
+use faceoff_types::{EpisodeOutcome, Task, harmless};
+use std::path::Path;
+
+/// What the drawings need of an episode. Places are in the table's frame, in m; "after k steps" is index k, so that
+/// index 0 is the start.
+#[derive(Debug)]
+pub struct Recorded {
+    pub agent: String,
+    pub profile: String,
+    pub outcome: EpisodeOutcome,
+    pub points: f64,
+    pub seed: String,
+    /// Why it ended, in words.
+    pub why: String,
+    /// x, y, yaw after k steps.
+    pub puck: Vec<[f64; 3]>,
+    /// x, y of the puck as the agent was told after k steps.
+    pub seen: Vec<[f64; 2]>,
+    /// x, y of the mallet after k steps.
+    pub mallet: Vec<[f64; 2]>,
+    /// x, y of the opponent's mallet, from the first step on; empty without an opponent.
+    pub opponent: Vec<[f64; 2]>,
+    /// Joint speeds as a share of their limits, after each step.
+    pub speed_share: Vec<[f64; JOINTS]>,
+    /// Joint position (rad), joint velocity (rad/s), end effector (m), elbow and wrist (m): above 0 if broken, after
+    /// each step.
+    pub constraints: Vec<[f64; 4]>,
+    /// What counts, s, per step.
+    pub computation_time_s: Vec<f64>,
+}
+
+/// The groups of [`Recorded::constraints`]: name, points, unit.
+pub const CONSTRAINTS: [(&str, f64, &str); 4] = [
+    ("joint position", JOINT_POS_POINTS, "rad"),
+    ("joint velocity", JOINT_VEL_POINTS, "rad/s"),
+    ("end effector", EE_POINTS, "m"),
+    ("elbow and wrist height", LINK_POINTS, "m"),
+];
+
+impl Recorded {
+    /// Reads little more than the one episode.
+    pub fn read(path: &Path, task: Task, episode: u32) -> anyhow::Result<Self> {
+        let dataset = Dataset::open_unread(path).with_context(|| {
+            format!(
+                "opening {} as the dataset of an evaluation (games are shown on their page of the server)",
+                path.display()
+            )
+        })?;
+        let steps = dataset.episode(task, episode, None)?;
+        let record = dataset
+            .episodes()?
+            .into_iter()
+            .find(|record| record.outcome.task == task && record.outcome.episode == episode)
+            .ok_or_else(|| {
+                DatasetError::Absent(format!("there is no episode {episode} of {task}"))
+            })?;
+        let columns = Columns(&steps);
+
+        let puck: Vec<[f64; 6]> = columns
+            .rows(["x", "y", "yaw", "vx", "vy", "yaw_rate"].map(|name| format!("puck_{name}")))?;
+        let last = puck.last().unwrap_or(&record.initial_puck);
+        let fault = record.outcome.fault.as_ref().map(|fault| &fault.fault);
+        let why = why_it_ended(task, record.outcome.end, last, record.outcome.steps, fault);
+
+        let in_table = |[x, y]: [f64; 2]| [x - TABLE.base_x_m, y];
+        let seen = columns.rows(["obs_puck_x", "obs_puck_y"])?.into_iter();
+        let last_seen = match record.last_observation[..] {
+            [x, y, ..] => Some([x, y]),
+            _ => None,
+        };
+        let [start_x, start_y, _] = record.initial_ee;
+        let mallet = columns.rows(["ee_x", "ee_y"])?.into_iter();
+        // The other robot stands opposite, turned by half a turn.
+        let opposite = |[x, y]: [f64; 2]| [TABLE.base_x_m - x, -y];
+        let opponent = match columns.is_absent("opponent_ee_x")? {
+            true => Vec::new(),
+            false => columns.rows(["opponent_ee_x", "opponent_ee_y"])?,
+        };
+        let speeds: Vec<[f64; JOINTS]> =
+            columns.rows(std::array::from_fn(|i| format!("dq_{}", i + 1)))?;
+        let share =
+            |dq: [f64; JOINTS]| std::array::from_fn(|i| dq[i] / LINKS[i].velocity_limit_rad_s);
+        let manifest = dataset.manifest();
+        Ok(Self {
+            agent: harmless(&manifest.agent).into_owned(),
+            profile: manifest.profile.to_string(),
+            points: record.penalty_points,
+            seed: record.seed,
+            why: harmless(&why).into_owned(),
+            puck: std::iter::once(record.initial_puck)
+                .chain(puck)
+                .map(|[x, y, yaw, ..]| [x, y, yaw])
+                .collect(),
+            seen: seen.chain(last_seen).map(in_table).collect(),
+            mallet: std::iter::once([start_x, start_y])
+                .chain(mallet)
+                .map(in_table)
+                .collect(),
+            opponent: opponent.into_iter().map(opposite).collect(),
+            speed_share: speeds.into_iter().map(share).collect(),
+            constraints: columns.rows(
+                ["joint_pos", "joint_vel", "ee", "link"].map(|name| format!("constraint_{name}")),
+            )?,
+            computation_time_s: columns.seconds("computation_time_ns")?,
+            outcome: record.outcome,
+        })
+    }
+
+    /// Which episode, and whether it was a success.
+    pub fn headline(&self) -> String {
+        let EpisodeOutcome {
+            task,
+            episode,
+            success,
+            ..
+        } = &self.outcome;
+        let verdict = if *success { "success" } else { "no success" };
+        format!("{task}, episode {episode} of {}: {verdict}", self.agent)
+    }
+
+    /// What cost penalty points, a line each.
+    pub fn losses(&self) -> Vec<String> {
+        let mut losses = Vec::new();
+        for (group, (name, points, unit)) in CONSTRAINTS.iter().enumerate() {
+            let values = || self.constraints.iter().map(|values| values[group]);
+            if let Some(first) = self.first_broken(group) {
+                let steps = values().filter(|value| *value > 0.0).count();
+                let worst = values().fold(f64::MIN, f64::max);
+                losses.push(format!(
+                    "{points} points: {name} limit broken from step {first} ({:.2} s) on, in {steps} steps, by up to \
+                     {worst:.4} {unit}",
+                    time_s(first)
+                ));
+            }
+        }
+        let time = &self.outcome.computation_time;
+        if self.outcome.fault.is_some() {
+            losses.push(format!(
+                "{COMPUTATION_TIME_MAX_POINTS} points: the agent's fault"
+            ));
+        } else if computation_time_penalty(time) > 0.0 {
+            losses.push(format!(
+                "{} points: computation time up to {:.1} ms and {:.1} ms on average, where {:.0} ms are free",
+                computation_time_penalty(time),
+                1e3 * time.max_s,
+                1e3 * time.mean_s,
+                1e3 * COMPUTATION_TIME_LIMITS_S[0]
+            ));
+        }
+        losses
+    }
+
+    /// After how many steps a constraint was broken first.
+    pub fn first_broken(&self, group: usize) -> Option<usize> {
+        let broken = self
+            .constraints
+            .iter()
+            .position(|values| values[group] > 0.0);
+        broken.map(|step| step + 1)
+    }
+}
+
+/// The time after so many control steps, s.
+#[expect(
+    clippy::cast_precision_loss,
+    reason = "an episode has some hundred steps"
+)]
+pub fn time_s(steps: usize) -> f64 {
+    steps as f64 * CONTROL_STEP_S
+}
+
+struct Columns<'a>(&'a RecordBatch);
+
+impl Columns<'_> {
+    fn column(&self, name: &str) -> anyhow::Result<&dyn Array> {
+        let column = self.0.column_by_name(name);
+        Ok(column
+            .with_context(|| format!("the table of steps has no column {name}"))?
+            .as_ref())
+    }
+
+    fn is_absent(&self, name: &str) -> anyhow::Result<bool> {
+        let column = self.column(name)?;
+        Ok(column.null_count() == column.len())
+    }
+
+    fn rows<const N: usize>(&self, names: [impl AsRef<str>; N]) -> anyhow::Result<Vec<[f64; N]>> {
+        let mut rows = vec![[0.0; N]; self.0.num_rows()];
+        for (i, name) in names.iter().enumerate() {
+            let column = self.column(name.as_ref())?.as_primitive::<Float64Type>();
+            for (row, value) in rows.iter_mut().zip(column.values()) {
+                row[i] = *value;
+            }
+        }
+        Ok(rows)
+    }
+
+    fn seconds(&self, name: &str) -> anyhow::Result<Vec<f64>> {
+        let column = self.column(name)?.as_primitive::<Int64Type>();
+        #[expect(clippy::cast_precision_loss, reason = "for a picture")]
+        let seconds = column.values().iter().map(|ns| *ns as f64 * 1e-9);
+        Ok(seconds.collect())
+    }
+}

@@ -1,0 +1,6 @@
+#!/bin/sh
+# Builds the agent and puts it into the bundle.
+set -eu
+cd "$(dirname "$0")"
+cargo build --release
+cp target/release/{{name}} bundle/agent

@@ -1,0 +1,50 @@
+const motion = JSON.parse(document.getElementById("motion").textContent);
+const element = (id) => document.getElementById(id);
+const last = motion.puck.length - 1;
+let startedAt = null;
+let startedFrom = 0;
+
+function show(step) {
+  const whole = Math.min(last, Math.floor(step));
+  for (const name of ["puck", "seen", "mallet", "opponent"]) {
+    const places = motion[name];
+    const disc = element(name);
+    if (!disc || places.length === 0) continue;
+    const [x, y] = places[Math.min(whole, places.length - 1)];
+    disc.setAttribute("cx", x);
+    disc.setAttribute("cy", y);
+  }
+  element("at").value = whole;
+  element("told").textContent = `step ${whole}, ${(whole * motion.step_s).toFixed(2)} s`;
+  const plots = element("plots");
+  const scale = plots.firstElementChild.getBoundingClientRect().width / plots.firstElementChild.viewBox.baseVal.width;
+  const share = last === 0 ? 0 : whole / last;
+  element("now").style.left = `${scale * (axis[0] + share * (axis[1] - axis[0]))}px`;
+}
+
+function frame(now) {
+  if (startedAt === null) return;
+  const step = startedFrom + ((now - startedAt) / 1000) * Number(element("speed").value) / motion.step_s;
+  show(step);
+  if (step < last) requestAnimationFrame(frame);
+  else stop();
+}
+
+function stop() {
+  startedAt = null;
+  element("play").textContent = "play";
+}
+
+function go() {
+  startedFrom = Number(element("at").value) >= last ? 0 : Number(element("at").value);
+  startedAt = performance.now();
+  element("play").textContent = "pause";
+  requestAnimationFrame(frame);
+}
+
+element("play").addEventListener("click", () => (startedAt === null ? go() : stop()));
+element("at").addEventListener("input", () => { stop(); show(Number(element("at").value)); });
+element("speed").addEventListener("change", () => { if (startedAt !== null) go(); });
+element("controls").hidden = false;
+element("now").hidden = false;
+show(last);
