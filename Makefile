@@ -11,11 +11,12 @@ CARGO      ?= cargo
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
 
-.PHONY: demo test wheel test-python fuzz busy soak steady lint format fidelity setup setup-test agents clean-demo help
+.PHONY: demo test wheel test-python fuzz busy soak steady lint format fidelity setup setup-test agents dist clean-demo help
 
 help:
 	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
 	@echo "make agents   bundle striker and baseline: $(TARGET_DIR)/bundles"
+	@echo "make dist   pack the program for other Linux machines: $(TARGET_DIR)/dist"
 	@echo "make test   run everything that proves that it works"
 	@echo "make wheel  the Python package: $(TARGET_DIR)/wheels"
 	@echo "make test-python   make it, install it where nothing else is, test it"
@@ -37,6 +38,11 @@ setup-test:
 agents: setup
 	$(CARGO) build --release --locked --package striker --package baseline
 	$(PACK_AGENTS)
+
+# The program in an archive; it refuses what only a newer system than the participants' could start.
+dist: setup
+	$(CARGO) build --release --locked --package faceoff
+	docker/dist.sh $(RELEASE)/faceoff $(TARGET_DIR)/dist
 
 define PACK_AGENTS
 for agent in striker baseline; do \

@@ -22,6 +22,10 @@ pub struct EpisodeRecord {
     pub interpolation: Option<String>,
     /// Computation time included.
     pub penalty_points: f64,
+    /// The observation after the last answered step: 23 numbers for `hit`, 20 otherwise, none if no
+    /// step was answered.
+    #[serde(skip)]
+    pub last_observation: Vec<f64>,
     /// The puck's true state before the first step, table frame: x, y, yaw, vx, vy, yaw rate.
     #[serde(skip)]
     pub initial_puck: [f64; 6],
@@ -93,6 +97,15 @@ impl<'a> Columns<'a> {
         column.is_valid(row) && column.value(row)
     }
 
+    fn last_observation(&self, row: usize) -> Vec<f64> {
+        let schema = self.0.schema();
+        let columns = schema.fields().iter().map(|field| field.name());
+        columns
+            .filter(|name| name.starts_with("last_obs_") && self.column(name).is_valid(row))
+            .map(|name| self.float(name, row))
+            .collect()
+    }
+
     fn record(&self, row: usize) -> Result<EpisodeRecord, String> {
         let absent = |name: &str| format!("{name} is absent");
         let text = |name| self.text(name, row).ok_or_else(|| absent(name));
@@ -127,6 +140,7 @@ impl<'a> Columns<'a> {
             seed: text("seed")?.to_owned(),
             interpolation: self.text("interpolation", row).map(str::to_owned),
             penalty_points: self.float("penalty_points", row),
+            last_observation: self.last_observation(row),
             initial_puck: ["x", "y", "yaw", "vx", "vy", "yaw_rate"]
                 .map(|name| self.float(&format!("initial_puck_{name}"), row)),
             initial_ee: ["x", "y", "z"].map(|name| self.float(&format!("initial_ee_{name}"), row)),

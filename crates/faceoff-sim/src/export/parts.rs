@@ -72,7 +72,7 @@ pub(super) fn shown_radius_m(i: usize) -> f64 {
 /// Angles of the universal joint, rad, with which the mallet is vertical at a pose.
 pub(super) fn level(q: &[f64; JOINTS]) -> [f64; 2] {
     let ee = Kinematics::new(&full(q)).end_effector;
-    vertical(ee.x.lane(0), ee.y.lane(0), [0.0; 2]).map(tidy)
+    vertical(ee.x, ee.y, [0.0; 2]).map(tidy)
 }
 
 #[cfg(test)]
