@@ -2,8 +2,8 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use faceoff_sim::{
-    Batch, BatchSetup, Command, Episode, Game, GameSetup, Interpolation, JOINTS,
-    LanePath, PerturbationSettings, Plant, model::INITIAL_Q, step_together_by,
+    Batch, BatchSetup, Command, Episode, Game, GameSetup, Interpolation, JOINTS, LanePath,
+    PerturbationSettings, Plant, model::INITIAL_Q, step_together_by,
 };
 use faceoff_types::{Factors, Seed, Task};
 use std::hint::black_box;
@@ -129,12 +129,22 @@ fn together(c: &mut Criterion) {
                 let Some(path) = path else { continue };
                 group.bench_function(format!("together/{name}"), |b| {
                     b.iter_batched_ref(
-                        || (episodes.clone(), vec![episodes[0].clone().step(action); WORLDS]),
+                        || {
+                            (
+                                episodes.clone(),
+                                vec![episodes[0].clone().step(action); WORLDS],
+                            )
+                        },
                         |(episodes, outcomes)| {
                             let mut episodes: Vec<&mut Episode> = episodes.iter_mut().collect();
                             let actions = [action; WORLDS];
                             for _ in 0..STEPS {
-                                step_together_by(path, &mut episodes, black_box(&actions), outcomes);
+                                step_together_by(
+                                    path,
+                                    &mut episodes,
+                                    black_box(&actions),
+                                    outcomes,
+                                );
                             }
                         },
                         criterion::BatchSize::SmallInput,

@@ -26,5 +26,5 @@ mod policy;
 mod puck;
 mod reference;
 mod replay;
-mod together;
 mod robot_document;
+mod together;

@@ -93,7 +93,7 @@ fn read(line: &str) -> Result<Answer> {
     let q = match joints("q", &pose.q)? {
         Joints::Driven(driven) => {
             let ee = Kinematics::new(&full(&driven)).end_effector;
-            let universal = vertical(ee.x.lane(0), ee.y.lane(0), [0.0; 2]);
+            let universal = vertical(ee.x, ee.y, [0.0; 2]);
             let mut q = full(&driven);
             q[JOINTS..].copy_from_slice(&universal);
             q
