@@ -41,7 +41,7 @@ enum Command {
     Replay(commands::replay::ReplayCommand),
     /// Simulate a dataset or a game again and compare every state and score.
     Verify(commands::verify::VerifyCommand),
-    /// Look into a dataset, cut pieces out of it, or convert it.
+    /// Look into a dataset, or cut pieces out of it.
     Dataset(commands::dataset::DatasetCommand),
     /// Score results by hand: a qualifying board or a tournament.
     Score(commands::score::ScoreCommand),
