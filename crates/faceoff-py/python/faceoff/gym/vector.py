@@ -251,8 +251,8 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         self, given: Floats, before: tuple[npt.NDArray[np.float32], Floats]
     ) -> Step:
         rows = self._rows
-        ended = rows.ends >= 0
-        was_reset = rows.steps == 0
+        ended = rows.facts[:, 0] >= 0.0
+        was_reset = rows.facts[:, 3] == 0.0
         if self._reward is not None:
             rows.rewards[:] = self._custom_rewards(given, before, ended)
             rows.rewards[was_reset] = 0.0
@@ -278,19 +278,24 @@ class AirHockeyVectorEnv(VectorEnv[Any, Any, Any]):
         rows = self._rows
         infos: dict[str, Any] = {}
         if told.any():
-            infos["constraints"] = np.where(told[:, None], rows.constraints, 0.0)
-            infos["_constraints"] = told.copy()
+            constraints = rows.constraints
+            constraints[~told] = 0.0
+            infos["constraints"], infos["_constraints"] = constraints, told.copy()
         if ended.any():
+            success = np.zeros(self.num_envs, np.bool_)
             ends = np.full(self.num_envs, None, object)
-            for world in np.flatnonzero(ended):
-                ends[world] = _native.ENDS[rows.ends[world]]
-            for name, values in {
-                "success": rows.success & ended,
-                "end": ends,
-                "violations": rows.violations & ended[:, None],
-                "steps": np.where(ended, rows.steps, 0),
-            }.items():
-                infos[name], infos[f"_{name}"] = values, ended.copy()
+            violations = np.zeros((self.num_envs, 4), np.bool_)
+            steps = np.zeros(self.num_envs, np.int64)
+            # Few worlds end in a step: only their rows are read.
+            for world in np.flatnonzero(ended).tolist():
+                code, is_success, _, count = rows.facts[world, :4].tolist()
+                success[world] = is_success > 0.0
+                ends[world] = _native.ENDS[int(code)]
+                violations[world] = rows.facts[world, 8:12] > 0.0
+                steps[world] = int(count)
+            infos |= {"success": success, "end": ends, "violations": violations, "steps": steps}
+            for name in ("success", "end", "violations", "steps"):
+                infos[f"_{name}"] = ended.copy()
         return infos
 
     def _custom_rewards(
