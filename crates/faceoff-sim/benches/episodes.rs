@@ -2,8 +2,8 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use faceoff_sim::{
-    Batch, BatchSetup, Command, Episode, Game, GameSetup, Interpolation, JOINTS, LanePath,
-    PerturbationSettings, Plant, model::INITIAL_Q, step_together_by,
+    Batch, BatchSetup, Command, Episode, Game, GameSetup, Interpolation, JOINTS,
+    PerturbationSettings, Plant, model::INITIAL_Q,
 };
 use faceoff_types::{Factors, Seed, Task};
 use std::hint::black_box;
@@ -93,68 +93,5 @@ fn batch(c: &mut Criterion) {
     group.finish();
 }
 
-/// Held arms: worlds one by one, and the same together by each path.
-fn together(c: &mut Criterion) {
-    const WORLDS: usize = 16;
-    let hold = Interpolation::Cubic.held(&INITIAL_Q);
-    let action = &hold[..2 * JOINTS];
-    let paths = [("plain", Some(LanePath::PLAIN)), ("avx", LanePath::avx())];
-    for (profile, factors) in [("ideal", Factors::NONE), ("evaluation", Factors::ALL)] {
-        for task in Task::ALL {
-            let settings = PerturbationSettings::default();
-            let plant = Plant::under(factors, &settings, Seed::from_number(0));
-            let episodes: Vec<Episode> = (0..WORLDS as u32)
-                .map(|number| {
-                    let seed = Seed::from_number(0).episode(task, number);
-                    Episode::new(task, Interpolation::Cubic, factors, &settings, &plant, seed)
-                })
-                .collect();
-            let mut group = c.benchmark_group(format!("held/{task}/{profile}"));
-            group.throughput(Throughput::Elements(STEPS * WORLDS as u64));
-            group.sample_size(20);
-            group.bench_function("one by one", |b| {
-                b.iter_batched_ref(
-                    || episodes.clone(),
-                    |episodes| {
-                        for _ in 0..STEPS {
-                            for episode in episodes.iter_mut() {
-                                black_box(episode.step(black_box(action)));
-                            }
-                        }
-                    },
-                    criterion::BatchSize::SmallInput,
-                );
-            });
-            for (name, path) in paths {
-                let Some(path) = path else { continue };
-                group.bench_function(format!("together/{name}"), |b| {
-                    b.iter_batched_ref(
-                        || {
-                            (
-                                episodes.clone(),
-                                vec![episodes[0].clone().step(action); WORLDS],
-                            )
-                        },
-                        |(episodes, outcomes)| {
-                            let mut episodes: Vec<&mut Episode> = episodes.iter_mut().collect();
-                            let actions = [action; WORLDS];
-                            for _ in 0..STEPS {
-                                step_together_by(
-                                    path,
-                                    &mut episodes,
-                                    black_box(&actions),
-                                    outcomes,
-                                );
-                            }
-                        },
-                        criterion::BatchSize::SmallInput,
-                    );
-                });
-            }
-            group.finish();
-        }
-    }
-}
-
-criterion_group!(benches, held_arm, game, batch, together);
+criterion_group!(benches, held_arm, game, batch);
 criterion_main!(benches);

@@ -5,7 +5,7 @@
 //! sit in the lanes of a register and are moved at once, whatever their tasks, plants and steps played.
 
 use crate::{
-    dynamics::{lanes::MAX_LANES, path::LanePath},
+    dynamics::path::LanePath,
     episode::{Episode, StepOutcome},
     world::World,
 };
@@ -53,7 +53,7 @@ pub fn step_together_by(
             .filter(|episode| episode.world().robots() == robots)
             .peekable();
         while alike.peek().is_some() {
-            let worlds = alike.by_ref().take(MAX_LANES / robots);
+            let worlds = alike.by_ref().take(path.worlds_at_once(robots));
             World::control_step_together(path, worlds.map(|episode| episode.moving()));
         }
     }

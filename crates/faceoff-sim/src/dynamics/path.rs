@@ -2,8 +2,8 @@
 
 #[cfg(target_arch = "x86_64")]
 use super::avx::Avx;
-use super::lanes::Lanes;
-use wide::f64x4;
+use super::lanes::{Lanes, MAX_LANES};
+use wide::{f64x2, f64x4};
 
 /// How four arms are computed at once. All ways give the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,9 +35,19 @@ impl LanePath {
         Self::avx().unwrap_or(Self::PLAIN)
     }
 
-    /// Does something in four lanes.
-    pub(crate) fn run<I: InLanes>(self, work: I) -> I::Output {
+    /// How many worlds of so many robots are moved at once. Registers of two numbers are full with the two
+    /// arms of a table.
+    pub(crate) fn worlds_at_once(self, robots: usize) -> usize {
         match self.0 {
+            Registers::Plain if robots == 2 => 1,
+            _ => MAX_LANES / robots,
+        }
+    }
+
+    /// Does something with so many arms in lanes, at most [`MAX_LANES`].
+    pub(crate) fn run<I: InLanes>(self, arms: usize, work: I) -> I::Output {
+        match self.0 {
+            Registers::Plain if arms <= 2 => work.run::<f64x2>(),
             Registers::Plain => work.run::<f64x4>(),
             #[cfg(target_arch = "x86_64")]
             Registers::Avx(avx) => avx.run(work),

@@ -52,7 +52,7 @@ impl World {
         match seats.as_mut_slice() {
             [] => {}
             [seat] => seat.world.control_step(&mut seat.air),
-            seats => path.run(ControlStep { seats }),
+            seats => path.run(first, ControlStep { seats }),
         }
     }
 
