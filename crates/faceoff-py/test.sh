@@ -47,7 +47,8 @@ case ${1:-} in
         cd "$target"
         "$target/python-test/bin/mypy" --config-file "$here/pyproject.toml" "$here/python/faceoff"
         FACEOFF_BIN=${FACEOFF_BIN:-$target/debug/faceoff} FACEOFF_OLD_READERS=$target/python-old-readers \
-            "$target/python-test/bin/python" -m pytest -p no:cacheprovider --rootdir "$here" "$here/tests" "$@"
+            FACEOFF_SKIP_NOTHING=1 \
+            "$target/python-test/bin/python" -m pytest -p no:cacheprovider -rs --durations 12 --rootdir "$here" "$here/tests" "$@"
         ;;
     versions)
         wheel
