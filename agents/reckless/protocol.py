@@ -122,19 +122,17 @@ def run(
     error, which is its log. An exception goes there with its traceback, and in short to the evaluator, whose
     fault then quotes it; the program ends with status 1.
     """
-    if requests is None:
-        requests = sys.stdin.buffer
-    if answers is None:
-        answers = _private_output()
+    questions: Iterable[bytes] = sys.stdin.buffer if requests is None else requests
+    output: BinaryIO = _private_output() if answers is None else answers
     try:
-        _converse(agent_class, requests, answers)
+        _converse(agent_class, questions, output)
     except BrokenPipeError:
         return  # the evaluator has gone away
     except Exception as error:
         traceback.print_exc()
         sys.stderr.flush()
         # No answer to any question: the evaluator takes it as a fault and shows the line to the team.
-        _say(answers, {"type": "error", "error": _in_short(error)})
+        _say(output, {"type": "error", "error": _in_short(error)})
         sys.exit(1)
 
 
