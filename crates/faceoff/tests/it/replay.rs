@@ -100,6 +100,54 @@ fn a_page_is_complete_by_itself_and_says_why() {
     }
 }
 
+/// An agent that fails at its first step leaves an episode of one state.
+#[test]
+fn a_fault_is_told_with_the_line_that_the_agent_left() {
+    let dir = tempfile::tempdir().unwrap();
+    let bundle = dir.path().join("bundle");
+    let made = faceoff(&["new", bundle.to_str().unwrap()]);
+    assert!(made.status.success(), "{}", text(&made.stderr));
+    let source = fs::read_to_string(bundle.join("agent.py")).unwrap();
+    let broken = source.replace(
+        "        mallet, puck =",
+        "        raise ValueError(7)\n        mallet, puck =",
+    );
+    fs::write(bundle.join("agent.py"), broken).unwrap();
+    let out = dir.path().join("out");
+    let page = dir.path().join("look.html");
+    let (bundle, out) = (bundle.to_str().unwrap(), out.to_str().unwrap());
+    faceoff(&[
+        "eval",
+        bundle,
+        "--out",
+        out,
+        "--config",
+        PATIENT,
+        "--task",
+        "defend",
+        "--episodes",
+        "1",
+    ]);
+    let drawn = faceoff(&[
+        "replay",
+        out,
+        "--task",
+        "defend",
+        "--episode",
+        "0",
+        "--out",
+        page.to_str().unwrap(),
+    ]);
+    assert!(drawn.status.success(), "{}", text(&drawn.stderr));
+    let told = text(&drawn.stdout);
+    assert!(
+        told.contains("the agent's fault ended the episode"),
+        "{told}"
+    );
+    assert!(told.contains("ValueError: 7 (agent.py, line "), "{told}");
+    assert!(fs::read_to_string(page).unwrap().contains("ValueError: 7"));
+}
+
 #[test]
 fn a_picture_is_well_formed() {
     let (_, file) = replayed("hit", "0", "hit.svg");

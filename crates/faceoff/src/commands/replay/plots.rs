@@ -218,24 +218,29 @@ impl Chart {
                 .points
                 .iter()
                 .map(|(time, value)| (*time, value.clamp(low, high)));
-            let drawn = if line.dots {
-                chart.draw_series(shown.map(|at| Circle::new(at, 1, BLACK.mix(0.6).filled())))?
+            if line.dots {
+                chart.draw_series(shown.map(|at| Circle::new(at, 1, BLACK.mix(0.6).filled())))?;
             } else {
-                chart.draw_series(LineSeries::new(shown, colour.stroke_width(1)))?
-            };
-            let colour = if line.dots { BLACK } else { colour };
-            drawn
-                .label(&line.name)
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 12, y)], colour));
+                chart.draw_series(LineSeries::new(shown, colour.stroke_width(1)))?;
+            }
         }
         let (axis, _) = chart.plotting_area().get_pixel_range();
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::Coordinate(axis.end - axis.start, -8))
-            .legend_area_size(14)
-            .margin(4)
-            .label_font(("sans-serif", 10))
-            .draw()?;
+        // Beside the plot, where the library's own legend does not go: it would hide the episode's end.
+        let mut y = 14;
+        for (line, colour) in self.lines.iter().zip(COLOURS) {
+            let colour = if line.dots { BLACK } else { colour };
+            let x = axis.end + 10;
+            area.draw(&PathElement::new(
+                [(x, y), (x + 14, y)],
+                colour.stroke_width(2),
+            ))?;
+            area.draw(&Text::new(
+                line.name.clone(),
+                (x + 19, y - 5),
+                ("sans-serif", 11),
+            ))?;
+            y += 14;
+        }
         Ok([axis.start, axis.end])
     }
 }

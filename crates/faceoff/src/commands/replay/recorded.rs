@@ -151,9 +151,11 @@ impl Recorded {
             }
         }
         let time = &self.outcome.computation_time;
-        if self.outcome.fault.is_some() {
+        if let Some(fault) = &self.outcome.fault {
+            let fault = fault.to_string();
             losses.push(format!(
-                "{COMPUTATION_TIME_MAX_POINTS} points: the agent's fault"
+                "{COMPUTATION_TIME_MAX_POINTS} points: the agent's fault: {}",
+                harmless(&fault)
             ));
         } else if computation_time_penalty(time) > 0.0 {
             losses.push(format!(
