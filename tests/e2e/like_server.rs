@@ -82,8 +82,9 @@ fn a_bundle_is_played_by_the_rules_and_limits_of_a_servers_stage() {
         "hungry",
         &python_agent("kept = b\"x\" * (128 << 20)\nsay(hold)"),
     );
-    let refused = run(&eval(&bundle, &server.url, &out, &[])).failed(REFUSED);
-    assert!(refused.contains("the agent failed"), "{refused}");
+    let told = run(&eval(&bundle, &server.url, &out, &[])).done();
+    let fault = "exceeded its memory limit: 67108864 bytes used";
+    assert!(told.contains(fault), "{told}");
     let log = run(&eval(&hold, &server.url, &out, &[])).done();
     assert!(
         log.contains("revision 2") && log.contains("64 MiB"),

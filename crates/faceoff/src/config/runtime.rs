@@ -1,9 +1,12 @@
 //! `[runtimes.NAME]`: a folder that holds a Python, or paths of the host.
 
-use anyhow::Context as _;
+use anyhow::{Context as _, bail};
 use faceoff_sandbox::Runtime;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+
+/// What is below these folders of the host no agent sees.
+const COVERED: [&str; 4] = ["/tmp", "/dev", "/proc", "/agent"];
 
 /// A runtime that the organiser offers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -90,6 +93,13 @@ impl RuntimeConfig {
     pub fn check(&self) -> anyhow::Result<()> {
         match self {
             Self::Paths { .. } => Ok(()),
+            Self::Folder(folder) if COVERED.iter().any(|covered| folder.starts_with(covered)) => {
+                bail!(
+                    "expected a folder outside of {}, in place of which agents see their own, got {}",
+                    COVERED.join(", "),
+                    folder.display()
+                )
+            }
             Self::Folder(folder) => Runtime::python3_at(&interpreter(folder))
                 .map(drop)
                 .with_context(|| {

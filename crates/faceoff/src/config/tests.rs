@@ -344,6 +344,9 @@ fn a_runtime_is_a_folder_or_paths_and_a_folder_must_hold_a_python() {
     ] {
         assert!(refused.contains(words), "{refused}");
     }
+    let covered = Config::parse("[runtimes.python3-ml]\nfolder = \"/tmp/ml\"").unwrap();
+    let refused = format!("{:#}", covered.check_runtimes().unwrap_err());
+    assert!(refused.contains("outside of /tmp"), "{refused}");
     // What is not there is not hidden behind what is.
     let runtime = &config.agent_environment().runtimes["python3-ml"];
     assert_eq!(
