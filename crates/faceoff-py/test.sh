@@ -1,8 +1,9 @@
 #!/bin/sh
 # Makes the wheel of the Python package, and tests it where nothing but that wheel is installed.
-#   test.sh wheel       one wheel in TARGET/wheels
-#   test.sh test [...]  pytest, in an environment that is made anew; the rest goes to pytest
-#   test.sh versions    the wheel imported, reset and stepped by each interpreter of PYTHONS
+#   test.sh wheel       one wheel in TARGET/wheels, for glibc 2.17 and later: zig links it
+#   test.sh test [...]  a wheel for this host's glibc, which shares what was built before; pytest where it alone is
+#                       installed. The rest of the arguments goes to pytest
+#   test.sh versions    the environments' tests, of the wheel in TARGET/wheels, by each interpreter of PYTHONS
 # TARGET_DIR (default: target), PYTHON (default: python3) and PYTHONS (default: PYTHON) may be set.
 set -eu
 
@@ -24,25 +25,28 @@ environment() {
     fi
 }
 
+# Makes a wheel in a folder; the rest are arguments of maturin.
 wheel() {
     environment "$target/python-build" "$here/requirements-build.txt"
-    rm -rf "$target/wheels"
+    out=$1
+    shift
+    rm -rf "$out"
     # The interpreter is named so that one of an active environment is not taken; abi3 makes it one for all.
-    (cd "$here" && CARGO_TARGET_DIR=$target "$target/python-build/bin/maturin" build --quiet --release --locked \
-        --interpreter "$python" --out "$target/wheels")
-    ls "$target"/wheels/*.whl
+    (cd "$here" && PATH=$target/python-build/bin:$PATH CARGO_TARGET_DIR=$target \
+        maturin build --quiet --release --locked --interpreter "$python" --out "$out" "$@")
+    ls "$out"/*.whl
 }
 
 case ${1:-} in
     wheel)
-        wheel
+        wheel "$target/wheels" --zig --target x86_64-unknown-linux-gnu --compatibility manylinux2014
         ;;
     test)
         shift
-        wheel
+        wheel "$target/wheels-of-this-host"
         environment "$target/python-test" "$here/requirements-test.txt"
         "$target/python-test/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps \
-            "$target"/wheels/*.whl
+            "$target"/wheels-of-this-host/*.whl
         # Elsewhere than beside the sources, which would be imported in place of what is installed.
         cd "$target"
         "$target/python-test/bin/mypy" --config-file "$here/pyproject.toml" "$here/python/faceoff"
@@ -51,7 +55,6 @@ case ${1:-} in
             "$target/python-test/bin/python" -m pytest -p no:cacheprovider -rs --durations 12 --rootdir "$here" "$here/tests" "$@"
         ;;
     versions)
-        wheel
         for one in ${PYTHONS:-$python}; do
             rm -rf "$target/python-version"
             "$one" -m venv "$target/python-version"
