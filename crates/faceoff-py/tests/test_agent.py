@@ -11,10 +11,9 @@ from typing import Any
 
 import pytest
 
-AGENT_FILE = Path(__file__).parents[1] / "python" / "faceoff" / "agent.py"
-sys.path.insert(0, str(AGENT_FILE.parents[1]))
+from faceoff.agent import SHAPES, Agent, run
 
-from faceoff.agent import SHAPES, Agent, run  # noqa: E402
+AGENT_FILE = Path(__file__).parents[1] / "python" / "faceoff" / "agent.py"
 
 POSE = [0.0, -0.1961, 0.0, -1.8436, 0.0, 0.9704, 0.0]
 OBSERVATION = [1.0, 0.1, 0.2, -1.0, -0.1, -0.2, *POSE, *[0.5] * 7]

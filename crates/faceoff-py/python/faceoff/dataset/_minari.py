@@ -65,15 +65,16 @@ def to_minari(
         ArgumentError: the task is not said or not known.
         ValueError: Minari refuses an argument, or an id that exists.
         DatasetError: the dataset is damaged, or actions have different shapes.
-        MissingError: Minari is not installed.
+        MissingError: Minari or Pillow is not installed.
     """
     try:
         import minari
+        import PIL  # noqa: F401 - Minari's Arrow storage needs it and does not say so
         from gymnasium.spaces import Box
         from minari.data_collector import EpisodeBuffer
     except ImportError as error:
         raise MissingError(
-            "to_minari needs Minari and Gymnasium: pip install minari"
+            "to_minari needs Minari, Gymnasium and Pillow: pip install minari pillow"
         ) from error
     if dtype not in ("float32", "float64"):
         raise ArgumentError(f"dtype: expected 'float32' or 'float64', got {dtype!r}")
