@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import onnxruntime
 
-from protocol import play
+from protocol import Agent, run
 
 
 def check_promises(session):
@@ -29,25 +29,25 @@ def check_promises(session):
         sys.exit(f"expected the packages {sorted(expected)} and no others, got {sorted(packages)}")
 
 
-class Network:
+class Network(Agent):
     """The pose that the episode began with, moved a little by what the network says of the puck."""
 
-    def __init__(self, task, agent_id, env):
-        self.joint_pos_ids = env["joint_pos_ids"]
+    interpolation = 3
+
+    def start(self):
         self.session = onnxruntime.InferenceSession("policy.onnx", providers=["CPUExecutionProvider"])
         check_promises(self.session)
-        self.pose = None
 
     def reset(self):
         self.pose = None
 
     def act(self, obs):
         if self.pose is None:
-            self.pose = [obs[i] for i in self.joint_pos_ids]
+            self.pose = self.joint_positions(obs)
         state = np.array([[*obs[:6], *self.pose]], dtype=np.float32)
         (joint_pos,) = self.session.run(["joint_pos"], {"state": state})
         return [joint_pos[0].tolist(), [0.0] * len(self.pose)]
 
 
 if __name__ == "__main__":
-    play(Network, interpolation=3)
+    run(Network)

@@ -4,7 +4,7 @@
 //! fdlibm, which `libm` follows; elsewhere, and for fewer lanes, each is `libm`'s own.
 
 use super::lanes::{Lanes, MAX_LANES, PIO2_HEAD, PIO2_TAIL, turned};
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 /// Angle of the point (x, y), rad, as `libm::atan2`.
 #[inline(always)]
@@ -175,9 +175,9 @@ const ARC_TANGENT: [f64; 11] = [
 const ARC_HEAD: [f64; 5] = [
     0.0,
     0.463_647_609_000_806_1,
-    0.785_398_163_397_448_3,
+    FRAC_PI_4,
     0.982_793_723_247_329,
-    1.570_796_326_794_896_6,
+    FRAC_PI_2,
 ];
 const ARC_TAIL: [f64; 5] = [
     0.0,

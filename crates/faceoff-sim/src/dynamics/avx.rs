@@ -11,8 +11,8 @@
 )]
 
 use super::{
+    in_lanes::InLanes,
     lanes::{Lanes, ROUNDING, SIZE},
-    path::InLanes,
 };
 use std::{
     arch::x86_64::{

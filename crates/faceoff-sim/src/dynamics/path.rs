@@ -2,7 +2,7 @@
 
 #[cfg(target_arch = "x86_64")]
 use super::avx::Avx;
-use super::lanes::{Lanes, MAX_LANES};
+use super::{in_lanes::InLanes, lanes::MAX_LANES};
 use wide::{f64x2, f64x4};
 
 /// How four arms are computed at once. All ways give the same bits.
@@ -53,14 +53,4 @@ impl LanePath {
             Registers::Avx(avx) => avx.run(work),
         }
     }
-}
-
-/// Something to be done in lanes. What it calls has to be inlined wherever it computes with lanes, since
-/// functions are compiled for the registers that every machine has.
-pub(crate) trait InLanes {
-    /// What comes of it.
-    type Output;
-
-    /// Does it. To be marked `#[inline(always)]`.
-    fn run<T: Lanes>(self) -> Self::Output;
 }

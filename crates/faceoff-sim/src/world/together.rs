@@ -9,8 +9,9 @@ use super::{
 };
 use crate::{
     dynamics::{
+        in_lanes::InLanes,
         lanes::{Lanes, MAX_LANES},
-        path::{InLanes, LanePath},
+        path::LanePath,
     },
     model::SUBSTEPS,
     table::puck::Puck,
