@@ -198,6 +198,8 @@ fn limit_descriptors(server: &Server, limits: Rlimit) -> Rlimit {
 fn without_a_free_descriptor_who_comes_waits_at_the_door() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
+    // The answer comes when the runtimes have been asked what they hold, which takes and gives back descriptors.
+    assert_eq!(server.get("/api/v1/runtimes", None).status(), 200);
     let open = fs::read_dir(format!("/proc/{}/fd", server.process_id())).expect("it runs");
     let open: Vec<u64> = open
         .flatten()
