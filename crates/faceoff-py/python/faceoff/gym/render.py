@@ -9,16 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from faceoff.gym.reward import State
+from faceoff.kinematics import model
 
 #: Pixels.
 HEIGHT, WIDTH = 360, 640
 #: Metres of a pixel: the table with a margin.
 SCALE = 2.16 / WIDTH
 
-HALF_LENGTH, HALF_WIDTH, HALF_GOAL = 0.974, 0.519, 0.125
-PUCK_RADIUS, MALLET_RADIUS = 0.03165, 0.04815
-#: The robots' bases, along x.
-BASE_X = 1.51
+HALF_LENGTH, HALF_WIDTH, HALF_GOAL = model.TABLE_LENGTH_M / 2, model.TABLE_WIDTH_M / 2, model.GOAL_WIDTH_M / 2
 
 FLOOR = (58, 64, 72)
 TABLE = (238, 241, 244)
@@ -61,12 +59,12 @@ def draw(state: State, *, has_opponent: bool) -> Picture:
     """(360, 640, 3) uint8: the table, the puck with a mark that shows its yaw, and the mallets."""
     picture = _table().copy()
     own_x, own_y, _ = state.mallet
-    _disc(picture, own_x - BASE_X, own_y, MALLET_RADIUS, OWN)
+    _disc(picture, own_x - model.BASE_X_M, own_y, model.MALLET_RADIUS_M, OWN)
     if has_opponent:
         x, y, _ = state.opponent
-        _disc(picture, BASE_X - x, -y, MALLET_RADIUS, OTHER)
+        _disc(picture, model.BASE_X_M - x, -y, model.MALLET_RADIUS_M, OTHER)
     x, y, yaw = state.puck[:3]
-    _disc(picture, x, y, PUCK_RADIUS, PUCK)
-    mark = 0.6 * PUCK_RADIUS
-    _disc(picture, x + mark * np.cos(yaw), y + mark * np.sin(yaw), 0.25 * PUCK_RADIUS, TABLE)
+    _disc(picture, x, y, model.PUCK_RADIUS_M, PUCK)
+    mark = 0.6 * model.PUCK_RADIUS_M
+    _disc(picture, x + mark * np.cos(yaw), y + mark * np.sin(yaw), 0.25 * model.PUCK_RADIUS_M, TABLE)
     return picture
