@@ -3,6 +3,7 @@
 #   test.sh wheel       one wheel in TARGET/wheels, for glibc 2.17 and later: zig links it
 #   test.sh test [...]  a wheel for this host's glibc, which shares what was built before; pytest where it alone is
 #                       installed. The rest of the arguments goes to pytest
+#   test.sh learning    that wheel beside the libraries that need torch; the examples learn anew
 #   test.sh versions    the environments' tests, of the wheel in TARGET/wheels, by each interpreter of PYTHONS
 # TARGET_DIR (default: target), PYTHON (default: python3) and PYTHONS (default: PYTHON) may be set.
 set -eu
@@ -50,9 +51,21 @@ case ${1:-} in
         # Elsewhere than beside the sources, which would be imported in place of what is installed.
         cd "$target"
         "$target/python-test/bin/mypy" --config-file "$here/pyproject.toml" "$here/python/faceoff"
-        FACEOFF_BIN=${FACEOFF_BIN:-$target/debug/faceoff} FACEOFF_OLD_READERS=$target/python-old-readers \
-            FACEOFF_SKIP_NOTHING=1 \
-            "$target/python-test/bin/python" -m pytest -p no:cacheprovider -rs --durations 12 --rootdir "$here" "$here/tests" "$@"
+        "$target/python-test/bin/mypy" --config-file "$here/pyproject.toml" "$root"/agents/examples/*.py
+        export TARGET_DIR="$target" FACEOFF_BIN="${FACEOFF_BIN:-$target/debug/faceoff}"
+        FACEOFF_OLD_READERS=$target/python-old-readers FACEOFF_SKIP_NOTHING=1 \
+            "$target/python-test/bin/python" -m pytest -p no:cacheprovider -rs --durations 12 --rootdir "$here" \
+            "$here/tests" "$root/agents/examples" "$@"
+        ;;
+    learning)
+        shift
+        wheel "$target/wheels-of-this-host"
+        environment "$target/python-learning" "$here/tests_learning/requirements.txt"
+        "$target/python-learning/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps \
+            "$target"/wheels-of-this-host/*.whl
+        cd "$target"
+        TARGET_DIR=$target "$target/python-learning/bin/python" -m pytest -p no:cacheprovider -rs --durations 12 \
+            --rootdir "$here" "$here/tests_learning" "$@"
         ;;
     versions)
         for one in ${PYTHONS:-$python}; do
@@ -68,7 +81,7 @@ case ${1:-} in
         done
         ;;
     *)
-        echo "usage: $0 wheel | test [PYTEST ARGUMENTS] | versions" >&2
+        echo "usage: $0 wheel | test [PYTEST ARGUMENTS] | learning [PYTEST ARGUMENTS] | versions" >&2
         exit 2
         ;;
 esac

@@ -1,4 +1,5 @@
-//! The native half of the Python package `faceoff`: the simulator and the evaluator, for programs in Python.
+//! The native half of the Python package `faceoff`: the simulator, the evaluator and the arm's kinematics, for programs
+//! in Python.
 //!
 //! This crate turns arguments into the types of the other crates, and their results into arrays. It
 //! decides nothing about the simulation, and no panic of the other crates leaves it as one.
@@ -8,6 +9,7 @@ mod batch;
 mod errors;
 mod evaluate;
 mod game;
+mod kinematics;
 mod observation;
 mod outputs;
 mod pool;
@@ -38,6 +40,10 @@ mod _native {
         batch::Batch,
         evaluate::{Evaluation, PolicyCourse},
         game::Game,
+        kinematics::{
+            arm_constraints, arm_forward, arm_frames, arm_heights, arm_inverse, arm_jacobian,
+            arm_numbers, arm_posture_velocities, arm_velocities,
+        },
         snapshot::{Snapshot, load_snapshot},
         worlds::Worlds,
     };

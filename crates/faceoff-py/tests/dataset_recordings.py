@@ -84,7 +84,7 @@ def odd() -> Path:
     (bundle / "agent.toml").write_text(ODD_MANIFEST)
     faceoff(
         *("eval", bundle, "--no-sandbox", "--episodes", "3", "--seed", "5"),
-        *("--task", "hit,defend", "--out", out),
+        *("--task", "hit,defend", "--allow-faults", "--out", out),
     )
     return out
 

@@ -10,6 +10,7 @@ from gymnasium.vector import AutoresetMode
 
 import faceoff
 from faceoff.gym import AirHockeyEnv, AirHockeyVectorEnv, MalletPlane, MalletPlaneVector
+from faceoff.kinematics import MalletMotion, native
 
 
 @pytest.mark.parametrize("direction", [(1.0, 0.0), (0.0, 1.0), (0.5, -1.0)])
@@ -71,6 +72,15 @@ def test_many_mallets_move_as_each_alone(mode: AutoresetMode) -> None:
             if restart and mode is AutoresetMode.SAME_STEP:
                 observation, _ = one.reset()
         np.testing.assert_allclose(observations[1], observation, atol=1e-5)
+
+
+def test_mallets_are_commanded_by_the_compiled_inverse() -> None:
+    """To the last bit, which NumPy's would not give on another machine."""
+    env = MalletPlane(AirHockeyEnv("hit", action_mode="raw", interpolation=3))
+    env.reset(seed=0)
+    motion = MalletMotion(1, 1.0, native.inverse)
+    for action in np.random.default_rng(0).uniform(-1, 1, (50, 2)):
+        np.testing.assert_array_equal(env.action(action), motion.command(action[None])[0])
 
 
 def test_what_cannot_be_is_refused() -> None:

@@ -1,6 +1,6 @@
 """The real LeRobot opens what `faceoff.dataset.to_lerobot` writes.
 
-Runs in an environment of its own (`requirements-lerobot.txt`), without network.
+Runs in an environment of its own (`requirements.txt`), without network.
 """
 
 from __future__ import annotations

@@ -2,13 +2,15 @@
 
 All functions take and return NumPy arrays with any leading dimensions, in the robot's own base frame, in SI units and
 radians. `faceoff.kinematics.plain` does the same for one pose with the standard library alone, in one file to be
-copied into a bundle. `faceoff.kinematics.model` has the numbers.
+copied into a bundle; `faceoff.kinematics.native` computes most of it by the compiled half of the package, for training.
+`faceoff.kinematics.model` has the numbers.
 
 The agent's model has seven joints. The mallet hangs on a universal joint that keeps it upright by itself, so that
 "where the mallet is" means the end effector, the rod's tip.
 """
 
 from faceoff.kinematics.limits import Constraints, constraints, speed_share
+from faceoff.kinematics.mallet import MalletMotion
 from faceoff.kinematics.poses import (
     forward,
     frames,
@@ -22,6 +24,7 @@ from faceoff.kinematics.trajectory import Trajectory, minimum_jerk, setpoints
 
 __all__ = [
     "Constraints",
+    "MalletMotion",
     "Trajectory",
     "constraints",
     "forward",

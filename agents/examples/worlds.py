@@ -1,0 +1,79 @@
+"""Worlds in which a policy learns to defend."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from faceoff.gym import AirHockeyVectorEnv, MalletPlaneVector, Transition
+
+from player import MAX_SPEED_M_S
+from view import LENGTH, View
+
+#: The table's centre in the robot's base frame, m.
+MIDDLE = (1.51, 0.0)
+
+
+def reward(step: Transition) -> npt.NDArray[np.float64]:
+    """1 for a puck that is held; a tenth of the speed (m/s) that it lost; less for a mallet that is not in its way.
+
+    Without the last part a policy first learns to keep away: a mallet that moves at random costs a puck that would have
+    stopped by itself, and few that it meets stop.
+    """
+    before, after = step.state.puck, step.next_state.puck
+    lost_m_s = np.linalg.norm(before[:, 3:5], axis=1) - np.linalg.norm(after[:, 3:5], axis=1)
+    mallet = step.next_state.mallet[:, :2] - MIDDLE
+    is_coming = (after[:, 3] < 0.0) & (after[:, 0] > mallet[:, 0])
+    off_m = np.where(is_coming, np.abs(after[:, 1] - mallet[:, 1]), 0.0)
+    rewards: npt.NDArray[np.float64] = 1.0 * step.success + 0.1 * lost_m_s - 0.05 * off_m
+    return rewards
+
+
+class Defending:
+    """Episodes of `defend`, perturbed as they count, each world with another robot; actions are the mallet's velocity."""
+
+    view_length = LENGTH
+    actions = 2
+
+    def __init__(self, worlds: int) -> None:
+        self.worlds = worlds
+        self._env = AirHockeyVectorEnv(
+            worlds,
+            "defend",
+            action_mode="raw",
+            interpolation=3,
+            profile="evaluation",
+            autoreset_mode="SameStep",
+            reward=reward,
+        )
+        self._plane = MalletPlaneVector(self._env, MAX_SPEED_M_S)
+        self._view = View(worlds)
+        self._ended: list[tuple[bool, bool]] = []
+
+    def reset(self, seed: int) -> npt.NDArray[np.float64]:
+        """Begins; world i plays the episodes of seed + i."""
+        observations, _ = self._plane.reset(seed=seed)
+        self._view.restart(np.ones(self.worlds, np.bool_))
+        return self._look(observations)
+
+    def _look(self, observations: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
+        motion = self._plane.motion
+        return self._view.look(observations, motion.xy, motion.speed)
+
+    def shares(self) -> tuple[float, float]:
+        """Of the episodes that ended since the last call: that were held, and that broke a constraint."""
+        held, violated = np.mean(self._ended, axis=0) if self._ended else (np.nan, np.nan)
+        self._ended.clear()
+        return float(held), float(violated)
+
+    def step(
+        self, actions: npt.NDArray[np.float32]
+    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.bool_]]:
+        """What is seen, rewards, whose episode ended."""
+        observations, rewards, terminated, truncated, infos = self._plane.step(actions)
+        ended = terminated | truncated
+        self._view.restart(ended)
+        if ended.any():
+            final = infos["final_info"]
+            for world in np.flatnonzero(ended):
+                self._ended.append((final["success"][world], final["violations"][world].any()))
+        return self._look(observations), rewards, ended

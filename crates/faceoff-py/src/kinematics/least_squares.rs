@@ -1,0 +1,107 @@
+//! The inverse from a start: damped least squares, each joint weighted by its velocity limit.
+
+use super::{
+    numbers::{Arm, DAMPING, GOAL_M, ITERATIONS, LOWEST_M, STEP_LIMIT_RAD},
+    pose::{at, jacobian},
+};
+use faceoff_sim::{JOINTS, dynamics::spatial::Vec3};
+use std::array::from_fn;
+
+/// Joint positions, rad, near `start` that put the end effector at a point, m; the last iterate where none are found.
+pub fn near(arm: &Arm, point: Vec3<f64>, start: &[f64; JOINTS]) -> [f64; JOINTS] {
+    let within = |joint: usize, angle: f64| {
+        let bound = arm.bound_rad[joint];
+        angle.clamp(-bound, bound)
+    };
+    let mut q = from_fn(|joint| within(joint, start[joint]));
+    for _ in 0..ITERATIONS {
+        let kinematics = at(&q);
+        let wrist = kinematics.links[JOINTS - 1].origin;
+        let error = point - kinematics.end_effector.origin;
+        let deficit = LOWEST_M - wrist.z;
+        if error.dot(error).sqrt() < GOAL_M && deficit <= 0.0 {
+            break;
+        }
+        let task = Task {
+            columns: jacobian(&kinematics),
+            rise: from_fn(|joint| kinematics.axes[joint].at(wrist).z),
+            error,
+            deficit,
+        };
+        let mut step = task.step(&arm.weight);
+        let is_stuck: [bool; JOINTS] = from_fn(|joint| {
+            let (angle, bound) = (q[joint], arm.bound_rad[joint]);
+            (angle + step[joint]).abs() > bound && angle.abs() >= bound && angle * step[joint] > 0.0
+        });
+        if is_stuck.contains(&true) {
+            let left = from_fn(|joint| {
+                if is_stuck[joint] {
+                    0.0
+                } else {
+                    arm.weight[joint]
+                }
+            });
+            step = task.step(&left);
+        }
+        let length = inner(&step, &step).sqrt();
+        let share = (STEP_LIMIT_RAD / length.max(1e-300)).min(1.0);
+        q = from_fn(|joint| within(joint, q[joint] + share * step[joint]));
+    }
+    q
+}
+
+/// What a step is to do, at one pose.
+struct Task {
+    /// How the end effector moves with each joint, m/rad.
+    columns: [Vec3<f64>; JOINTS],
+    /// How the wrist's height changes with each joint, m/rad.
+    rise: [f64; JOINTS],
+    /// From the end effector to where it shall be, m.
+    error: Vec3<f64>,
+    /// How much too low the wrist is, m.
+    deficit: f64,
+}
+
+impl Task {
+    /// Towards the target, rad; where the wrist is too low, it also rises, the end effector staying.
+    fn step(&self, weight: &[f64; JOINTS]) -> [f64; JOINTS] {
+        let step = weighted(&self.columns, self.error, weight);
+        if self.deficit <= 0.0 {
+            return step;
+        }
+        let wish: [f64; JOINTS] = from_fn(|joint| weight[joint] * self.rise[joint]);
+        let moved = self
+            .columns
+            .iter()
+            .zip(wish)
+            .fold(Vec3::zero(), |sum, (column, wish)| sum + column.scale(wish));
+        let held = weighted(&self.columns, moved, weight);
+        let free: [f64; JOINTS] = from_fn(|joint| wish[joint] - held[joint]);
+        let share = self.deficit / inner(&self.rise, &free).max(1e-3);
+        from_fn(|joint| step[joint] + share * free[joint])
+    }
+}
+
+/// The least joint changes that move the end effector by a wish: W Jᵀ (J W Jᵀ + λ I)⁻¹ wish, where the columns are J's.
+pub fn weighted(
+    columns: &[Vec3<f64>; JOINTS],
+    wish: Vec3<f64>,
+    weight: &[f64; JOINTS],
+) -> [f64; JOINTS] {
+    let mut a = Vec3::new(DAMPING, 0.0, 0.0);
+    let mut b = Vec3::new(0.0, DAMPING, 0.0);
+    let mut c = Vec3::new(0.0, 0.0, DAMPING);
+    for (column, &weight) in columns.iter().zip(weight) {
+        a = a + column.scale(weight * column.x);
+        b = b + column.scale(weight * column.y);
+        c = c + column.scale(weight * column.z);
+    }
+    // The inverse of a symmetric matrix by its rows' vector products.
+    let (bc, ca, ab) = (b.cross(c), c.cross(a), a.cross(b));
+    let force = (bc.scale(wish.x) + ca.scale(wish.y) + ab.scale(wish.z)).scale(1.0 / a.dot(bc));
+    from_fn(|joint| weight[joint] * columns[joint].dot(force))
+}
+
+fn inner(a: &[f64; JOINTS], b: &[f64; JOINTS]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
