@@ -11,7 +11,7 @@ CARGO      ?= cargo
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
 
-.PHONY: demo test wheel test-python fuzz busy soak steady lint format fidelity setup setup-test agents dist clean-demo help
+.PHONY: demo test wheel test-api test-python test-learning fuzz busy load soak steady lint format fidelity setup setup-test agents dist clean-demo help
 
 help:
 	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
@@ -19,9 +19,12 @@ help:
 	@echo "make dist   pack the program for other Linux machines: $(TARGET_DIR)/dist"
 	@echo "make test   run everything that proves that it works"
 	@echo "make wheel  the Python package: $(TARGET_DIR)/wheels"
+	@echo "make test-api   validate the API's document, try every operation, make two clients of it"
 	@echo "make test-python   make it, install it where nothing else is, test it"
+	@echo "make test-learning   learn from nothing, and try the libraries that need torch (8 GB)"
 	@echo "make fuzz   feed the readers what is nearly valid: MINUTES=$(MINUTES)"
 	@echo "make busy   play beside hogs, floods and bursts of processes"
+	@echo "make load   how much looking on a server bears, and that agents notice nothing of it"
 	@echo "make soak   upload, play, read, fill the disk and kill the server, all at once: MINUTES=$(MINUTES)"
 	@echo "make steady run the tests ten times, and three times on a busy machine"
 	@echo "make lint   format check and lints"
@@ -64,6 +67,7 @@ test: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
 	docker/runtime.sh $(TARGET_DIR)/runtimes/python3-ml
 	python3 agents/test_agents.py
+	TARGET_DIR=$(TARGET_DIR) tests/api/test.sh
 	TARGET_DIR=$(TARGET_DIR) crates/faceoff-py/test.sh test
 	if $(CARGO) nextest --version >/dev/null 2>&1; \
 	    then $(CARGO) nextest run --locked --workspace --no-fail-fast; \
@@ -75,10 +79,21 @@ test: setup-test
 wheel: setup
 	TARGET_DIR=$(TARGET_DIR) crates/faceoff-py/test.sh wheel
 
-# The evaluator in Python is compared with the binary's.
+# The API as strangers' tools see it: a validator, a fuzzer and two generators of clients, against the debug server.
+test-api: setup-test
+	$(CARGO) build --locked --workspace --bins --tests
+	TARGET_DIR=$(TARGET_DIR) tests/api/test.sh
+
+# The evaluator in Python is compared with the binary's, and the examples play in the sandbox.
 test-python: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
+	docker/runtime.sh $(TARGET_DIR)/runtimes/python3-ml
 	TARGET_DIR=$(TARGET_DIR) crates/faceoff-py/test.sh test
+
+# What takes long and gigabytes: the examples learned anew, Stable-Baselines3 and LeRobot themselves.
+test-learning: agents
+	$(CARGO) build --release --locked --package faceoff
+	TARGET_DIR=$(TARGET_DIR) crates/faceoff-py/test.sh learning
 
 # The fuzz targets, all at once for so many minutes; FUZZ_SEED=N for other inputs than last time.
 fuzz: setup-test
@@ -89,6 +104,12 @@ fuzz: setup-test
 busy: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
 	$(CARGO) test --locked --workspace --test e2e busy_host -- --include-ignored --test-threads 1
+
+# Visitors by the hundred, beside evaluations, on the machine's own CPUs; nothing else should run.
+load:
+	@docker/setup.sh load
+	$(CARGO) build --release --locked --package faceoff --package striker --package baseline
+	python3 tests/load/load.py $(RELEASE)/faceoff $(RELEASE)/striker
 
 # All disturbances at once; SOAK_SEED=N for other moments than last time.
 soak: setup-test

@@ -4,10 +4,13 @@
 #   docker/setup.sh build    to compile and run the service (cc for the C parts of SQLite and zstd,
 #                            bubblewrap for the sandbox)
 #   docker/setup.sh test     also what the tests drive (a browser, so that pages are really opened)
+#   docker/setup.sh load     also what asks a server for pages, as often as it can
 #   docker/setup.sh steady   also what keeps the machine busy while the tests run again and again
 #
 # As root it installs them with apt-get; otherwise it prints the command and fails.
 set -eu
+# Where ordinary users do not look, and servers are.
+PATH=$PATH:/usr/sbin
 
 purpose=${1:-build}
 missing=''
@@ -19,12 +22,27 @@ need cc build-essential
 need bwrap bubblewrap
 # Reference agents are interpreted by it.
 need python3 python3
+# Whom to trust, when webhooks are told by TLS.
+[ -e /etc/ssl/certs/ca-certificates.crt ] || missing="$missing ca-certificates"
 if [ "$purpose" = test ] || [ "$purpose" = steady ]; then
     need chromium chromium
     # Of the Python that agents get, to make the runtime python3-ml (docker/runtime.sh).
     /usr/bin/python3 -m pip --version >/dev/null 2>&1 || missing="$missing python3-pip"
     # The Python package is tested in an environment of its own.
     python3 -c 'import ensurepip' 2>/dev/null || missing="$missing python3-venv"
+    # A client of the API in TypeScript is made and run.
+    need node nodejs
+    need npm npm
+    # Databases are given what no version of ours writes.
+    need sqlite3 sqlite3
+    # The examples for organisers are tried: systemd's own judgement of the unit, and the proxies.
+    need systemd-analyze systemd
+    need nginx nginx-light
+    need caddy caddy
+fi
+if [ "$purpose" = load ]; then
+    need wrk wrk
+    need hey hey
 fi
 if [ "$purpose" = steady ]; then
     need stress-ng stress-ng
@@ -45,6 +63,8 @@ if [ "$(id -u)" -ne 0 ]; then
 fi
 echo "installing:$missing"
 export DEBIAN_FRONTEND=noninteractive
+# Servers are installed to be started by tests, not by themselves.
+export RUNLEVEL=1
 apt-get update -qq
 # shellcheck disable=SC2086 # a list of words on purpose
 apt-get install -y -qq --no-install-recommends $missing >/dev/null

@@ -4,13 +4,23 @@ use faceoff_tests::{program, server::Server};
 use serde_json::Value;
 use std::{
     io::Write,
+    path::Path,
     process::{Command, Stdio},
 };
 
-/// A refusal by the server, or by what a command finds.
-pub const REFUSED: i32 = 1;
+/// A refusal by what a command finds.
+pub const FAILED: i32 = 1;
 /// What the command line itself does not understand.
 pub const MISUSED: i32 = 2;
+/// A refusal by the server.
+pub const REFUSED: i32 = 3;
+/// The server does not answer.
+pub const UNREACHABLE: i32 = 4;
+/// The server knows no such token, or it is not enough.
+pub const NOT_ALLOWED: i32 = 5;
+
+/// A folder that there is not: nobody's logins, and not those of whoever runs the tests.
+const NOWHERE: &str = "/nonexistent";
 
 /// What a command has left.
 pub struct Told {
@@ -53,11 +63,18 @@ impl Told {
 
 /// The program with these arguments, which reads `input`.
 pub fn faceoff(args: &[&str], input: &str) -> Told {
+    faceoff_of(Path::new(NOWHERE), args, input)
+}
+
+/// The same, of somebody whose logins are kept in this folder.
+pub fn faceoff_of(config_home: &Path, args: &[&str], input: &str) -> Told {
     let mut child = Command::new(program("faceoff"))
         .args(args)
         .env_remove("FACEOFF_TOKEN")
         .env_remove("FACEOFF_ADMIN_TOKEN")
         .env_remove("FACEOFF_SERVER")
+        .env_remove("FACEOFF_CA_FILE")
+        .env("XDG_CONFIG_HOME", config_home)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())

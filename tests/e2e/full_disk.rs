@@ -7,7 +7,7 @@
 use crate::{Team, dataset, entry, scored_locally, upgrade, without_times};
 use faceoff_tests::{
     bundle::{packed, python_bundle},
-    server::{PATIENCE, Server},
+    server::{PATIENCE, Server, http},
     small_disk::{Full, LogTo, SmallDisk},
 };
 use reqwest::blocking::Body;
@@ -304,7 +304,7 @@ fn a_disk_that_fills_up_under_an_upload_leaves_nothing_of_it() {
             sender.send(Full::of(&root)).expect("the test waits");
         }),
     };
-    let refused = reqwest::blocking::Client::builder()
+    let refused = http()
         .timeout(PATIENCE)
         .build()
         .expect("a client needs nothing")

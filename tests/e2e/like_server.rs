@@ -2,7 +2,7 @@
 
 use crate::{
     CONFIG,
-    commands::{MISUSED, REFUSED, admin, faceoff},
+    commands::{FAILED, MISUSED, UNREACHABLE, admin, faceoff},
     packages::offering_python3_ml,
 };
 use faceoff_tests::{
@@ -82,7 +82,7 @@ fn a_bundle_is_played_by_the_rules_and_limits_of_a_servers_stage() {
         "hungry",
         &python_agent("kept = b\"x\" * (128 << 20)\nsay(hold)"),
     );
-    let told = run(&eval(&bundle, &server.url, &out, &[])).done();
+    let told = run(&eval(&bundle, &server.url, &out, &["--allow-faults"])).done();
     let fault = "exceeded its memory limit: 67108864 bytes used";
     assert!(told.contains(fault), "{told}");
     let log = run(&eval(&hold, &server.url, &out, &[])).done();
@@ -107,11 +107,14 @@ fn what_the_server_does_not_take_or_cannot_tell_is_refused_in_words() {
     let server = Server::start(&scratch.path().join("data"), &offering_python3_ml());
     let out = scratch.path().join("out");
     let hold = reference("hold", scratch.path());
-    let refused = |bundle: &Path, url: &str, more: &[&str], words: &[&str]| {
-        let told = run(&eval(bundle, url, &out, more)).failed(REFUSED);
+    let ended = |code, bundle: &Path, url: &str, more: &[&str], words: &[&str]| {
+        let told = run(&eval(bundle, url, &out, more)).failed(code);
         for word in words {
             assert!(told.contains(word), "{word:?} is not in {told:?}");
         }
+    };
+    let refused = |bundle: &Path, url: &str, more: &[&str], words: &[&str]| {
+        ended(FAILED, bundle, url, more, words);
     };
     let onnx = test_bundle("onnx", scratch.path());
     refused(
@@ -137,7 +140,8 @@ fn what_the_server_does_not_take_or_cannot_tell_is_refused_in_words() {
     let free = TcpListener::bind("127.0.0.1:0").expect("there is a free port");
     let nobody = format!("http://{}", free.local_addr().expect("it has an address"));
     drop(free);
-    refused(
+    ended(
+        UNREACHABLE,
         &hold,
         &nobody,
         &[],

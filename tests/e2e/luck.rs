@@ -119,7 +119,14 @@ fn evaluated(scratch: &Path, name: &str, source: &str, config: &str) -> Value {
     let played = Command::new(program("faceoff"))
         .arg("eval")
         .arg(&folder)
-        .args(["--task", "hit", "--episodes", "1", "--config"])
+        .args([
+            "--task",
+            "hit",
+            "--episodes",
+            "1",
+            "--allow-faults",
+            "--config",
+        ])
         .arg(&file)
         .arg("--out")
         .arg(&out)

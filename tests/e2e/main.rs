@@ -1,8 +1,10 @@
 //! End to end: what an organiser, a team and a visitor get from the real program.
 
+mod backup;
 mod bad_agents;
 mod browser;
 mod busy_host;
+mod command_line;
 mod commands;
 mod crash;
 mod cut;
@@ -11,7 +13,9 @@ mod fair_shares;
 mod full_disk;
 mod growth;
 mod house;
+mod installed;
 mod kills;
+mod large_uploads;
 mod like_server;
 mod luck;
 mod packages;

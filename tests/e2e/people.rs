@@ -3,9 +3,9 @@
 
 use crate::{
     CONFIG,
-    commands::{MISUSED, REFUSED, Told, admin, admin_as, faceoff, member},
+    commands::{FAILED, MISUSED, NOT_ALLOWED, REFUSED, Told, admin, admin_as, faceoff, member},
 };
-use faceoff_tests::server::Server;
+use faceoff_tests::server::{Server, http};
 use serde_json::{Value, json};
 use std::{fs, os::unix::fs::PermissionsExt, path::Path};
 
@@ -57,7 +57,7 @@ fn people_are_invited_join_and_leave_by_the_commands() {
     // An organiser, by a link that is good for one person, once.
     let invited = people(&["invite-organiser", "Grace"]).done();
     let link = word(&invited, "/join/fo_invite_");
-    join(&server, "nonsense", &["--name", "Grace"]).not_done(REFUSED, &["expected a link like"]);
+    join(&server, "nonsense", &["--name", "Grace"]).not_done(FAILED, &["expected a link like"]);
     join(&server, &format!("{link}x"), &["--name", "Grace"])
         .not_done(REFUSED, &["the server refused"]);
     join(&server, &link, &["--name", "<b>"]).not_done(MISUSED, &["--name", "letters, digits"]);
@@ -79,7 +79,7 @@ fn people_are_invited_join_and_leave_by_the_commands() {
     let team = admin_as(&server, &grace, &["create-team", "Alpha"]).done();
     word(&team, "fo_team_");
     people(&["invite-member", "Nobodies", "Ada"]).not_done(
-        REFUSED,
+        FAILED,
         &["no team is named \"Nobodies\"", "faceoff admin teams"],
     );
     let invited = people(&["invite-member", "Alpha", "Ada"]).done();
@@ -112,9 +112,9 @@ fn people_are_invited_join_and_leave_by_the_commands() {
         &["announce", "a", "b"],
         &["create-team", "Eve"],
     ] {
-        admin_as(&server, &ada, args).not_done(REFUSED, &["403"]);
+        admin_as(&server, &ada, args).not_done(NOT_ALLOWED, &["403"]);
     }
-    admin_as(&server, "fo_person_nobody", &["people", "list"]).not_done(REFUSED, &["401"]);
+    admin_as(&server, "fo_person_nobody", &["people", "list"]).not_done(NOT_ALLOWED, &["401"]);
 
     // The founder of a team.
     let invited = people(&["invite-team", "a founder"]).done();
@@ -142,7 +142,7 @@ fn people_are_invited_join_and_leave_by_the_commands() {
     }
 
     // Who has lost everything comes back as who they were.
-    people(&["invite-back", "Nobody"]).not_done(REFUSED, &["nobody is named \"Nobody\""]);
+    people(&["invite-back", "Nobody"]).not_done(FAILED, &["nobody is named \"Nobody\""]);
     let invited = people(&["invite-back", "Ada"]).done();
     let link = word(&invited, "/join/fo_invite_");
     join(&server, &link, &["--name", "Eve"]).not_done(REFUSED, &["leave the name out"]);
@@ -154,7 +154,7 @@ fn people_are_invited_join_and_leave_by_the_commands() {
     );
 
     // Somebody is removed only when that is meant.
-    people(&["remove", "Nobody"]).not_done(REFUSED, &["nobody is named"]);
+    people(&["remove", "Nobody"]).not_done(FAILED, &["nobody is named"]);
     for args in [
         &["remove", "Ada"][..],
         &["remove", "Ada", "--confirm", "ada"],
@@ -164,7 +164,7 @@ fn people_are_invited_join_and_leave_by_the_commands() {
     member(&server, &ada, "whoami", &[]).done();
     let removed = people(&["remove", "Ada", "--confirm", "Ada"]).done();
     assert!(removed.contains("left"), "{removed}");
-    member(&server, &ada, "whoami", &[]).not_done(REFUSED, &["401"]);
+    member(&server, &ada, "whoami", &[]).not_done(NOT_ALLOWED, &["401"]);
     people(&["invite-back", "Ada"]).not_done(REFUSED, &["has left"]);
     let list = admin(&server, &["people", "list", "--json"]).json();
     let names: Vec<_> = list.as_array().expect("a list").iter().collect();
@@ -217,9 +217,9 @@ fn tokens_are_made_listed_rotated_and_revoked_by_the_commands() {
     let rotated = tokens(&["rotate", id_of_laptop]).done();
     let fresh = word(&rotated, "fo_person_");
     assert!(!is_good(&laptop) && is_good(&fresh));
-    member(&server, &laptop, "whoami", &[]).not_done(REFUSED, &["401"]);
+    member(&server, &laptop, "whoami", &[]).not_done(NOT_ALLOWED, &["401"]);
     let by_host = admin(&server, &["token", "rotate", id_of_laptop]);
-    by_host.not_done(REFUSED, &["403", "that person alone"]);
+    by_host.not_done(NOT_ALLOWED, &["403", "that person alone"]);
     for verb in ["rotate", "revoke"] {
         tokens(&[verb, NOBODY]).not_done(REFUSED, &["404"]);
         tokens(&[verb, "laptop"]).not_done(MISUSED, &["laptop"]);
@@ -227,7 +227,7 @@ fn tokens_are_made_listed_rotated_and_revoked_by_the_commands() {
     let revoked = admin(&server, &["token", "revoke", id_of_laptop]).done();
     assert!(revoked.contains("revoked 2"), "{revoked}");
     assert!(!is_good(&fresh) && is_good(&grace));
-    member(&server, &fresh, "whoami", &[]).not_done(REFUSED, &["401", "revoked"]);
+    member(&server, &fresh, "whoami", &[]).not_done(NOT_ALLOWED, &["401", "revoked"]);
     tokens(&["rotate", id_of_laptop]).not_done(REFUSED, &["make another one"]);
     // Again it is no change.
     tokens(&["revoke", id_of_laptop]).done();
@@ -251,7 +251,7 @@ fn teams_register_and_everybody_is_told_by_the_commands() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let server = Server::start(&scratch.path().join("data"), CONFIG);
     let registration = |args: &[&str]| admin(&server, &[&["registration"], args].concat());
-    let http = reqwest::blocking::Client::new();
+    let http = http().build().expect("a client needs nothing");
     let register = |body: &Value| {
         let url = format!("{}/api/v1/registrations", server.url);
         let answer = http
@@ -267,11 +267,11 @@ fn teams_register_and_everybody_is_told_by_the_commands() {
     // Terms first: what taking part needs.
     let terms = scratch.path().join("terms.txt");
     let publish = |file: &Path| admin(&server, &["publish-terms", &file.to_string_lossy()]);
-    publish(&terms).not_done(REFUSED, &["reading the terms from", "terms.txt"]);
+    publish(&terms).not_done(FAILED, &["reading the terms from", "terms.txt"]);
     fs::write(&terms, " \n").expect("a scratch file can be written");
     publish(&terms).not_done(REFUSED, &["text", "1 to"]);
     fs::write(&terms, b"\xff\xfe").expect("a scratch file can be written");
-    publish(&terms).not_done(REFUSED, &["reading the terms from"]);
+    publish(&terms).not_done(FAILED, &["reading the terms from"]);
     fs::write(&terms, "Be fair.").expect("a scratch file can be written");
     assert!(publish(&terms).done().contains("published as version 1"));
     publish(&terms).not_done(REFUSED, &["these are the terms"]);
@@ -405,7 +405,7 @@ fn a_start_makes_another_host_token_when_the_one_in_the_file_was_revoked() {
     admin_as(&server, &grace, &["token", "rotate", &of_host])
         .not_done(REFUSED, &["data folder", "revoke it"]);
     admin_as(&server, &grace, &["token", "revoke", &of_host]).done();
-    by_file(&server, &["people", "list"]).not_done(REFUSED, &["401", "revoked"]);
+    by_file(&server, &["people", "list"]).not_done(NOT_ALLOWED, &["401", "revoked"]);
     server.kill();
 
     let server = Server::start(&data, CONFIG);
@@ -417,18 +417,18 @@ fn a_start_makes_another_host_token_when_the_one_in_the_file_was_revoked() {
         .mode();
     assert_eq!(mode & 0o777, 0o600);
     by_file(&server, &["people", "list"]).done();
-    admin_as(&server, &first, &["people", "list"]).not_done(REFUSED, &["401", "revoked"]);
+    admin_as(&server, &first, &["people", "list"]).not_done(NOT_ALLOWED, &["401", "revoked"]);
     admin_as(&server, &grace, &["people", "list"]).done();
     // The revoked one stays worth nothing, even if somebody puts it back.
     server.kill();
     fs::write(&file, format!("{first}\n")).expect("the file can be written");
     let server = Server::start(&data, CONFIG);
     assert_ne!(server.admin_token, first);
-    admin_as(&server, &first, &["people", "list"]).not_done(REFUSED, &["401", "revoked"]);
+    admin_as(&server, &first, &["people", "list"]).not_done(NOT_ALLOWED, &["401", "revoked"]);
     // No token at all is a sentence, too.
     fs::remove_file(&file).expect("the file can be removed");
     by_file(&server, &["people", "list"]).not_done(
-        REFUSED,
+        NOT_ALLOWED,
         &["reading the organiser's token from", "--data-dir"],
     );
 }

@@ -9,7 +9,7 @@ use crate::{
 };
 use faceoff_tests::{
     bundle::{packed, python_agent, python_bundle, reference},
-    server::Server,
+    server::{Server, http},
     small_disk::{Full, LogTo, SmallDisk},
 };
 use reqwest::blocking::{Client, RequestBuilder};
@@ -266,7 +266,7 @@ fn everything_at_once_ends_as_if_nothing_had_been() {
         url: Mutex::new(server.url.clone()),
         ends: Instant::now() + Duration::from_secs(60 * minutes),
         tally: Tally::default(),
-        client: Client::builder()
+        client: http()
             .timeout(Duration::from_secs(60))
             .build()
             .expect("a client needs nothing"),

@@ -6,7 +6,7 @@ use crate::{
 };
 use faceoff_tests::{
     repository,
-    server::{PATIENCE, Server},
+    server::{PATIENCE, Server, http},
 };
 use rustix::{
     net::{AddressFamily, SocketType, bind, connect, socket, sockopt::set_socket_recv_buffer_size},
@@ -136,7 +136,8 @@ fn disturbed_by(manner: Manner) {
         thread::sleep(Duration::from_millis(200));
     }
     // Whoever comes now is answered.
-    let health = reqwest::blocking::get(format!("{}/api/v1/health", server.url));
+    let client = http().build().expect("a client needs nothing");
+    let health = client.get(format!("{}/api/v1/health", server.url)).send();
     assert_eq!(health.expect("the server answers").status(), 200);
     assert_undisturbed(&server, &team, &evaluation, &hold, scratch.path());
 }

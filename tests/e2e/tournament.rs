@@ -4,7 +4,7 @@
 
 use crate::{
     CONFIG, Team,
-    commands::{MISUSED, REFUSED, Told, admin, faceoff, member},
+    commands::{FAILED, MISUSED, NOT_ALLOWED, REFUSED, Told, admin, faceoff, member},
     people::joined,
 };
 use faceoff_tests::{bundle, server::Server};
@@ -59,7 +59,7 @@ fn a_tournament_from_its_opening_to_its_close_by_the_command_line() {
     let as_ada = |command: &str, args: &[&str]| member(&server, &teams[0].token, command, args);
 
     // Open: rules, teams, and games that do not count.
-    visitor(&server, &["show"]).not_done(REFUSED, &["there is no tournament yet"]);
+    visitor(&server, &["show"]).not_done(FAILED, &["there is no tournament yet"]);
     let rules = [
         "--format",
         "round-robin",
@@ -170,7 +170,8 @@ fn a_tournament_from_its_opening_to_its_close_by_the_command_line() {
             .is_err()
     );
     let both = scratch.path().join("both.zip");
-    as_ada("game", &["download", id(of_ada), path(&both), "--both"]).not_done(REFUSED, &["403"]);
+    as_ada("game", &["download", id(of_ada), path(&both), "--both"])
+        .not_done(NOT_ALLOWED, &["403"]);
     let log = as_ada("game", &["log", id(of_ada)]);
     assert_eq!(log.code, Some(0));
     let as_organiser = |args: &[&str]| member(&server, &server.admin_token, "game", args);

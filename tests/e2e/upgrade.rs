@@ -46,7 +46,7 @@ impl Told {
     }
 }
 
-fn unpack(archive: &str, into: &Path) {
+pub(crate) fn unpack(archive: &str, into: &Path) {
     let file = File::open(repository().join("tests/fixtures").join(archive)).expect("a fixture");
     tar::Archive::new(GzDecoder::new(file))
         .unpack(into)

@@ -3,7 +3,7 @@
 use crate::program;
 use reqwest::{
     Method,
-    blocking::{Client, RequestBuilder, Response},
+    blocking::{Client, ClientBuilder, RequestBuilder, Response},
 };
 use serde_json::Value;
 use std::{
@@ -22,6 +22,14 @@ use std::{
 pub const PATIENCE: Duration = Duration::from_secs(1800);
 /// The smallest pipe that Linux offers: a page.
 const PAGE_BYTES: usize = 4096;
+
+/// Of whatever makes clients. None speaks TLS, so none asks for the machine's certificate authorities.
+pub fn http() -> ClientBuilder {
+    let nobody = rustls::ClientConfig::builder()
+        .with_root_certificates(rustls::RootCertStore::empty())
+        .with_no_client_auth();
+    Client::builder().tls_backend_preconfigured(nobody)
+}
 
 /// A process that does not outlive the test, however that ends.
 #[derive(Debug)]
@@ -91,7 +99,7 @@ impl Server {
         let mut process = Process(child.expect("the program can be started"));
         let child = &mut process.0;
         let log = Log::collect(child.stderr.take().expect("standard error is piped"));
-        let client = Client::builder()
+        let client = http()
             .timeout(PATIENCE)
             .build()
             .expect("a client needs nothing");

@@ -19,7 +19,8 @@ pub fn why_it_ended(
     fault: Option<&AgentFaultKind>,
 ) -> String {
     let [x, y, _, vx, vy, _] = *puck;
-    let speed = vx.hypot(vy);
+    // Not `hypot`: the C library of newer systems only has it, and the program would need that one.
+    let speed = (vx * vx + vy * vy).sqrt();
     match end {
         EpisodeEnd::AgentFault => match fault {
             Some(fault) => format!("the agent's fault ended the episode: {fault}"),

@@ -1,11 +1,15 @@
 use crate::{
-    config::HttpConfig, kept::Kept, passwords::Passwords, standing::KeptRows, summaries::Summaries,
-    uploads::Uploads, views::certainty::CertaintyView,
+    config::HttpConfig, kept::Kept, kept_answers::KeptAnswers, passwords::Passwords,
+    problem::Problem, rates::Rates, standing::KeptRows, summaries::Summaries, uploads::Uploads,
+    views::certainty::CertaintyView,
 };
+use faceoff_notify::Feed;
 use faceoff_scoring::tournament::rating::Ratings;
 use faceoff_store::Store;
+use faceoff_types::TokenId;
 use std::sync::Arc;
 use tokio::sync::Semaphore;
+use uuid::Uuid;
 
 /// State of the handlers.
 #[derive(Debug)]
@@ -20,11 +24,19 @@ pub(crate) struct AppState {
     pub(crate) archiving: Arc<Semaphore>,
     pub(crate) summaries: Summaries,
     pub(crate) rows: KeptRows,
+    pub(crate) kept_answers: KeptAnswers,
     pub(crate) ratings: Kept<Ratings>,
     pub(crate) certainties: Kept<CertaintyView>,
     /// One permit per reader of a game under way.
     pub(crate) watching: Arc<Semaphore>,
+    /// One permit per reader of the stream of events.
+    pub(crate) following: Arc<Semaphore>,
+    /// What all of them read.
+    pub(crate) feed: Feed,
     pub(crate) passwords: Passwords,
+    pub(crate) rates: Rates,
+    /// Of this process alone: what was tagged before a restart may have been of another database.
+    pub(crate) run: Uuid,
 }
 
 /// The disk is no faster for more of them, and each holds files open.
@@ -40,12 +52,29 @@ impl AppState {
             archiving: Arc::new(Semaphore::new(1)),
             summaries: Summaries::new(store.clone(), config.clock.clone()),
             rows: KeptRows::new(store.clone()),
+            kept_answers: KeptAnswers::default(),
             ratings: Kept::default(),
             certainties: Kept::default(),
             watching: Arc::new(Semaphore::new(config.limits.live_readers)),
+            following: Arc::new(Semaphore::new(config.limits.event_readers)),
+            feed: Feed::new(store.clone()),
             passwords: Passwords::default(),
+            rates: Rates::new(config.rates),
+            run: Uuid::now_v7(),
             store,
             config,
         }
+    }
+
+    /// Counts a request with a token.
+    ///
+    /// # Errors
+    /// [`ProblemKind::TooManyRequests`](crate::problem::ProblemKind::TooManyRequests).
+    pub(crate) fn check_rate(&self, token: TokenId) -> Result<(), Problem> {
+        let checked = self.rates.check_token(token);
+        if checked.is_err() {
+            self.config.metrics.web().refused("rate");
+        }
+        checked
     }
 }

@@ -6,6 +6,7 @@ use crate::{
     problem::{Problem, ProblemKind},
     session,
     token::hash_token,
+    watched,
 };
 use axum::{
     extract::FromRequestParts,
@@ -166,8 +167,11 @@ async fn caller(parts: &Parts, app: &App) -> Result<Option<Caller>, Problem> {
         Err(_) if kind == TokenKind::Session => return Ok(None),
         Err(refusal) => return Err(refused(refusal)),
     };
+    app.check_rate(token.id)?;
     note_use(app, &token, now);
-    Ok(Some(Caller { token, who }))
+    let caller = Caller { token, who };
+    watched::asked_by(&caller.actor());
+    Ok(Some(caller))
 }
 
 /// Beside the request, which does not wait for it and does not fail with it.

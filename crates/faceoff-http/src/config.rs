@@ -1,4 +1,6 @@
-use crate::{offer::Offer, pace::LeastRate};
+use crate::{link_key::LinkKey, offer::Offer, pace::LeastRate, rates::RateLimits};
+use faceoff_metrics::{Metrics, Process};
+use faceoff_notify::WebhookRules;
 use faceoff_store::UploadQuota;
 use faceoff_types::{Clock, TimeLimits};
 use std::{path::PathBuf, time::Duration};
@@ -12,6 +14,8 @@ pub struct HttpLimits {
     pub team_uploads: usize,
     /// Readers of games under way at the same time, each of whom holds a connection.
     pub live_readers: usize,
+    /// Readers of the stream of events at the same time, each of whom holds a connection.
+    pub event_readers: usize,
     /// Longest time to answer a request that is no upload.
     pub answer: Duration,
     /// How fast the body of an upload must come.
@@ -28,6 +32,7 @@ impl Default for HttpLimits {
             requests: 512,
             team_uploads: 2,
             live_readers: 256,
+            event_readers: 512,
             answer: Duration::from_secs(30),
             upload_rate: LeastRate {
                 bytes_per_s: 16 << 10,
@@ -64,8 +69,18 @@ pub struct HttpConfig {
     pub clock: Clock,
     /// Concurrency and patience.
     pub limits: HttpLimits,
+    /// Where webhooks may be.
+    pub webhooks: WebhookRules,
     /// Tells how long what waits will take.
     pub capacity: Capacity,
     /// What agents find here.
     pub offer: Offer,
+    /// How often somebody may ask.
+    pub rates: RateLimits,
+    /// What links are signed with.
+    pub link_key: LinkKey,
+    /// The server's numbers.
+    pub metrics: Metrics,
+    /// What the operating system counts of this process.
+    pub process: fn() -> Process,
 }

@@ -1,5 +1,7 @@
 //! Extractors whose rejections are problems that name the place.
 
+pub(crate) mod objects_only;
+
 use crate::{
     problem::{Problem, ProblemKind},
     session,
@@ -13,6 +15,7 @@ use axum::{
     http::{StatusCode, header, request::Parts},
 };
 use serde::de::DeserializeOwned;
+use serde_json::Value;
 use std::{fmt::Display, str::FromStr};
 
 /// Largest JSON body; the largest legitimate one has some hundred bytes.
@@ -92,14 +95,17 @@ fn parse<T: DeserializeOwned>((is_json, bytes): (bool, Bytes)) -> Result<T, Prob
             "expected a JSON body; send it with the header “Content-Type: application/json”",
         ));
     }
+    let does_not_fit = |error| {
+        Problem::new(
+            ProblemKind::InvalidContent,
+            format!("the JSON does not fit: {error}"),
+        )
+    };
     let mut deserializer = serde_json::Deserializer::from_slice(&bytes);
     // Many a type's own message does not say which field it is about.
     let parsed = serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
         if error.inner().is_data() {
-            Problem::new(
-                ProblemKind::InvalidContent,
-                format!("the JSON does not fit: {error}"),
-            )
+            does_not_fit(error)
         } else {
             Problem::new(
                 ProblemKind::InvalidRequest,
@@ -108,12 +114,14 @@ fn parse<T: DeserializeOwned>((is_json, bytes): (bool, Bytes)) -> Result<T, Prob
         }
     })?;
     let rest = deserializer.end();
-    rest.map_err(|error| {
+    let value = rest.and_then(|()| serde_json::from_slice::<Value>(&bytes));
+    let value = value.map_err(|error| {
         Problem::new(
             ProblemKind::InvalidRequest,
             format!("the body is not valid JSON: {error}"),
         )
     })?;
+    objects_only::check::<T>(&value).map_err(does_not_fit)?;
     Ok(parsed)
 }
 

@@ -1,44 +1,68 @@
 //! What surrounds every request: id, log line, security headers, patience, and a net for panics.
 
-use crate::problem::{Problem, ProblemKind};
+use crate::{
+    app::AppState,
+    in_flight::{self, InFlight},
+    kept_answers, pages,
+    peer::Peer,
+    problem::{Problem, ProblemKind},
+    watched::{REQUEST_ID, watch},
+};
 use axum::{
     Router,
     extract::{Request, State},
-    http::{HeaderName, HeaderValue, header},
+    http::{Extensions, HeaderMap, HeaderName, HeaderValue, StatusCode, Version, header},
     middleware::{self, Next},
     response::{IntoResponse, Response},
 };
 use std::{any::Any, sync::Arc, time::Duration};
-use tokio::sync::Semaphore;
 use tower_http::{
     catch_panic::CatchPanicLayer,
+    compression::{
+        CompressionLayer,
+        predicate::{Predicate, SizeAbove},
+    },
     request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer},
-    trace::{DefaultOnResponse, TraceLayer},
 };
-use tracing::{Level, Span};
 
-const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
-
-/// Wraps the site. `in_flight` bounds the requests being answered at the same time.
-pub(crate) fn around(site: Router, in_flight: usize) -> Router {
+/// Wraps the site.
+pub(crate) fn around(site: Router, app: &Arc<AppState>) -> Router {
     // The last layer is the outermost: the id exists before the log line, and a panic or a refusal
     // carries the security headers as well.
+    let texts = SizeAbove::new(WORTH_COMPRESSING).and(is_text);
     site.layer(CatchPanicLayer::custom(panicked))
+        .layer(CompressionLayer::new().compress_when(texts))
+        .layer(middleware::from_fn_with_state(Arc::clone(app), keep))
         .layer(middleware::from_fn_with_state(
-            Arc::new(Semaphore::new(in_flight)),
-            limit_in_flight,
+            InFlight::new(app),
+            in_flight::limit,
         ))
+        .layer(middleware::from_fn_with_state(Arc::clone(app), limit_rate))
         .layer(middleware::map_response(security_headers))
         .layer(PropagateRequestIdLayer::new(REQUEST_ID))
-        .layer(
-            TraceLayer::new_for_http()
-                .make_span_with(span)
-                .on_response(DefaultOnResponse::new().level(Level::INFO))
-                // A 5xx answer was logged with its cause where it arose.
-                .on_failure(()),
-        )
+        .layer(middleware::from_fn_with_state(Arc::clone(app), watch))
         .layer(SetRequestIdLayer::new(REQUEST_ID, MakeRequestUuid))
         .layer(middleware::map_request(drop_foreign_request_id))
+}
+
+/// Smaller answers gain nothing. (And what holds a secret is smaller: how far that is compressed could tell of it.)
+const WORTH_COMPRESSING: u64 = 2048;
+
+/// Archives are compressed already, streams of events are to come at once, and parts of files are parts of their bytes.
+fn is_text(_: StatusCode, _: Version, headers: &HeaderMap, _: &Extensions) -> bool {
+    let media_type = headers.get(header::CONTENT_TYPE);
+    let media_type = media_type.and_then(|value| value.to_str().ok());
+    let essence = media_type.and_then(|value| value.split(';').next());
+    let texts = [
+        "application/json",
+        "application/problem+json",
+        "image/svg+xml",
+        "text/css",
+        "text/csv",
+        "text/html",
+        "text/plain",
+    ];
+    essence.is_some_and(|essence| texts.contains(&essence.trim()))
 }
 
 /// Answers `Busy` when a handler takes longer than `patience`.
@@ -60,18 +84,28 @@ pub(crate) async fn time_out(
     }
 }
 
-async fn limit_in_flight(
-    State(slots): State<Arc<Semaphore>>,
-    request: Request,
-    next: Next,
-) -> Response {
-    match slots.try_acquire() {
-        Ok(_slot) => next.run(request).await,
-        Err(_) => Problem::new(
-            ProblemKind::Busy,
-            "the server answers as many requests as it may at once; try again in 2 s",
-        )
-        .into_response(),
+/// Answers visitors from what is kept.
+async fn keep(State(app): State<Arc<AppState>>, request: Request, next: Next) -> Response {
+    let second = app.config.clock.now().as_second();
+    match kept_answers::asked(&request, &app.store, second) {
+        Some(asked) => app.kept_answers.get(asked, next.run(request)).await,
+        None => next.run(request).await,
+    }
+}
+
+/// Answers `TooManyRequests` to an address that asks too often.
+async fn limit_rate(State(app): State<Arc<AppState>>, request: Request, next: Next) -> Response {
+    let peer = request.extensions().get::<Peer>();
+    let checked = match peer.and_then(|peer| peer.asks(request.headers())) {
+        Some(address) => app.rates.check_address(address),
+        None => Ok(()),
+    };
+    match checked {
+        Ok(()) => next.run(request).await,
+        Err(problem) => {
+            app.config.metrics.web().refused("rate");
+            pages::for_whom(request.uri().path(), request.headers(), problem)
+        }
     }
 }
 
@@ -79,26 +113,6 @@ async fn limit_in_flight(
 async fn drop_foreign_request_id(mut request: Request) -> Request {
     request.headers_mut().remove(REQUEST_ID);
     request
-}
-
-fn span(request: &Request) -> Span {
-    let id = request
-        .headers()
-        .get(REQUEST_ID)
-        .and_then(|id| id.to_str().ok())
-        .unwrap_or_default();
-    // The query and the headers stay out of the log: they may hold names and tokens.
-    let path = without_code(request.uri().path());
-    tracing::info_span!("http", method = %request.method(), path, id)
-}
-
-/// Who reads the log must not be able to follow an invitation.
-fn without_code(path: &str) -> &str {
-    const JOIN: &str = "/join/";
-    match path.strip_prefix(JOIN) {
-        Some(_) => JOIN,
-        None => path,
-    }
 }
 
 async fn security_headers(mut response: Response) -> Response {
@@ -137,15 +151,4 @@ fn panicked(panic: Box<dyn Any + Send + 'static>) -> Response {
         .or_else(|| panic.downcast_ref::<&str>().copied())
         .unwrap_or("no message");
     Problem::internal(format_args!("a handler panicked: {message}")).into_response()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_code_of_an_invitation_stays_out_of_the_log() {
-        assert_eq!(without_code("/join/fo_invite_abc"), "/join/");
-        assert_eq!(without_code("/api/v1/board"), "/api/v1/board");
-    }
 }

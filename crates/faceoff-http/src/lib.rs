@@ -14,18 +14,30 @@ mod archive;
 mod archived;
 mod auth;
 mod capacity_watch;
+mod conditions;
 mod config;
+mod csv;
 mod ending;
+mod event_reader;
 mod extract;
+mod in_flight;
 mod kept;
+mod kept_answers;
 mod layers;
+mod link_key;
+mod links;
 mod live_reader;
+mod network;
 mod offer;
 mod pace;
 mod pages;
+mod paging;
 mod passwords;
 mod paths;
+mod peer;
+mod probes;
 pub mod problem;
+mod rates;
 mod release;
 pub mod requests;
 mod room;
@@ -38,13 +50,16 @@ pub mod token;
 mod uploads;
 mod viewer;
 pub mod views;
+mod watched;
 
 pub use axum::Router;
 pub use capacity_watch::{CapacityWatch, Overflow};
 pub use config::{Capacity, HttpConfig, HttpLimits};
+pub use link_key::LinkKey;
 pub use offer::{InventoryTeller, Offer};
 pub use pace::LeastRate;
 pub use paths::API_BASE;
+pub use rates::{Rate, RateLimits};
 pub use serve::{ConnectionLimits, serve};
 
 use app::AppState;
@@ -57,17 +72,27 @@ use std::sync::Arc;
 /// Every error is a problem (RFC 9457), unknown paths, wrong methods and panics included; browsers
 /// get the same as a page.
 pub fn router(store: Store, config: HttpConfig) -> Router {
-    let limits = config.limits;
+    let patience = config.limits.answer;
     let app = Arc::new(AppState::new(store, config));
     let site = Router::new()
-        .merge(api::router(limits.answer))
-        .merge(pages::router(limits.answer))
+        .merge(api::router(patience))
+        .merge(pages::router(patience))
+        .merge(probes::router(patience))
         .fallback(pages::unknown_path)
         .method_not_allowed_fallback(pages::unknown_method)
         .layer(middleware::from_fn_with_state(
             Arc::clone(&app),
             archived::refuse_changes,
         ))
-        .with_state(app);
-    layers::around(site, limits.requests)
+        .with_state(Arc::clone(&app));
+    layers::around(site, &app)
+}
+
+/// What watches the server finds it here without a token: numbers, and whether it lives and is ready. For an address of its
+/// own that strangers do not reach, beside [`router`] on the same store.
+pub fn watching_router(store: Store, config: HttpConfig) -> Router {
+    let patience = config.limits.answer;
+    let app = Arc::new(AppState::new(store, config));
+    let site = probes::open_router(patience).with_state(Arc::clone(&app));
+    layers::around(site, &app)
 }

@@ -20,3 +20,6 @@ pub(crate) fn tournament(id: TournamentId) -> String {
 pub(crate) fn game(id: GameId) -> String {
     format!("{API_BASE}/games/{id}")
 }
+
+/// Where the process says that it lives.
+pub(crate) const LIVE_PATH: &str = "/livez";

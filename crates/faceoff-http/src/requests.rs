@@ -1,22 +1,33 @@
 //! What clients send to the API.
 
+mod boards;
+mod field_by_field;
 mod left_out;
+mod links;
 mod people;
 mod tournaments;
+mod webhooks;
 
+pub use boards::*;
+pub use links::*;
 pub use people::*;
 pub use tournaments::*;
+pub use webhooks::*;
 
+use crate::extract::objects_only;
 use faceoff_archive::Edition;
 use faceoff_types::{
-    DayDeadline, DivisionName, EvaluationId, PerturbationSettings, Profile, Publishes, Retention,
-    Runtimes, Schedule, StageId, StageLimits, StageUploads, Standings, SubmissionId, Task,
-    TaskWeights, TeamId, TierBounds, Zone,
+    DayDeadline, EvaluationId, PerturbationSettings, Profile, Publishes, Retention, Runtimes,
+    Schedule, StageId, StageLimits, StageUploads, Standings, SubmissionId, Task, TaskWeights,
+    TeamId, TierBounds, Zone,
 };
 use jiff::{Timestamp, civil::Date};
 use left_out::{given, given_or_null};
 use serde::{Deserialize, Deserializer, Serialize};
-use utoipa::{IntoParams, ToSchema};
+use utoipa::{
+    IntoParams, ToSchema,
+    openapi::{Object, ObjectBuilder, Type},
+};
 
 /// A team to create.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
@@ -26,24 +37,15 @@ pub struct NewTeam {
     pub name: String,
 }
 
-/// Which board.
-#[derive(Debug, Clone, Default, Serialize, Deserialize, IntoParams)]
+/// What of a comparison.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
-pub struct BoardQuery {
-    /// Whose; without it that of the stage that is open, or of the nearest.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub stage: Option<StageId>,
-    /// By which of the stage's rules; without it by the newest with results. No board mixes two.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub revision: Option<u32>,
-    /// Of the teams of one of the season's divisions alone, ranked among themselves; without it of all teams.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub division: Option<DivisionName>,
-    /// The organiser: with what was finished since the boards were frozen.
+pub struct ComparisonQuery {
+    /// Also which episodes were solved by both, by one and by neither.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[param(required = false)]
-    pub live: bool,
+    pub episodes: bool,
 }
 
 /// Which archive of the season.
@@ -53,8 +55,16 @@ pub struct BoardQuery {
 pub struct ArchiveQuery {
     /// For whom: `public`, or `organiser` (which it is without this).
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[param(value_type = Option<String>, example = "public")]
+    #[param(schema_with = editions, required = false)]
     pub edition: Option<Edition>,
+}
+
+fn editions() -> Object {
+    let names = [Edition::Public, Edition::Organiser].map(|edition| edition.to_string());
+    ObjectBuilder::new()
+        .schema_type(Type::String)
+        .enum_values(Some(names))
+        .build()
 }
 
 /// A day to be played after all.
@@ -97,6 +107,16 @@ pub struct EventsQuery {
     pub subject: Option<String>,
     /// What happened, e.g. `day_started`.
     pub kind: Option<String>,
+}
+
+/// What of the season is followed.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, IntoParams)]
+#[serde(default, deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct FollowQuery {
+    /// What fits one of these, separated by commas: topics (`board`, `queue`, `season`, …), subjects (`stage:ID`, `team:ID`,
+    /// `tournament:ID`, …) or names of events (`day_released`). Without it everything that the caller may know of.
+    pub about: Option<String>,
 }
 
 /// Which day is to start.
@@ -285,8 +305,10 @@ pub struct StageChange {
 /// By way of a value, so that what is no deadline is told as a wrong value and not as wrong JSON.
 fn deadline<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<DayDeadline>, D::Error> {
     let value = Option::<serde_json::Value>::deserialize(deserializer)?;
-    let parsed = value.map(serde_json::from_value).transpose();
-    parsed.map_err(serde::de::Error::custom)
+    let Some(value) = value else { return Ok(None) };
+    objects_only::check::<DayDeadline>(&value).map_err(serde::de::Error::custom)?;
+    let parsed = serde_json::from_value(value);
+    parsed.map(Some).map_err(serde::de::Error::custom)
 }
 
 /// What is to be tried without counting.

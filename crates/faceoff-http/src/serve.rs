@@ -10,6 +10,7 @@ mod paced_stream;
 use crate::{
     ending::Ending,
     pace::LeastRate,
+    peer::Peer,
     problem::{Problem, ProblemKind},
 };
 use addresses::Addresses;
@@ -34,6 +35,7 @@ use tokio::{
     sync::{OwnedSemaphorePermit, Semaphore},
     time::Instant,
 };
+use tower::Layer as _;
 
 /// After an error of the listener itself, most often for want of a descriptor. Connections wait meanwhile.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(500);
@@ -51,7 +53,8 @@ pub struct ConnectionLimits {
     pub open: usize,
     /// Connections of one address (IPv6: of one /64) at the same time. More are told so and closed.
     pub per_address: usize,
-    /// Addresses without a bound of their own: a proxy's, behind which everybody is.
+    /// Addresses without a bound of their own: a proxy's, behind which everybody is. What it says of whom it asks for is
+    /// believed (`X-Forwarded-For`).
     pub exempt: Vec<IpAddr>,
     /// To send the head of a request, counted from the opening or from the end of the last answer: so also
     /// how long a connection may be idle.
@@ -92,6 +95,7 @@ pub async fn serve(
         told: None,
         told_of_failure: None,
     };
+    let proxies: Arc<[IpAddr]> = limits.exempt.clone().into();
     let addresses = Arc::new(Addresses::new(limits.per_address, limits.exempt));
     let refusal: Arc<[u8]> = refusal(limits.per_address).into();
     let mut http = http1::Builder::new();
@@ -115,7 +119,11 @@ pub async fn serve(
             tracing::debug!(%from, %error, "a slow reader will look slower than it is");
         }
         let stream = PacedStream::new(stream, limits.reading, reset);
-        let service = TowerToHyperService::new(router.clone());
+        let peer = Peer {
+            address: from.ip(),
+            proxies: Arc::clone(&proxies),
+        };
+        let service = TowerToHyperService::new(Extension(peer).layer(router.clone()));
         let answering = ending.watch(http.serve_connection(TokioIo::new(stream), service));
         tokio::spawn(async move {
             if let Err(error) = answering.await {

@@ -5,7 +5,7 @@ use crate::problem::Problem;
 use faceoff_scoring::mean_result;
 use faceoff_store::{BoardRecord, Store};
 use faceoff_types::{EvaluationId, RunId, StageId, Standings, Task};
-use jiff::Timestamp;
+use jiff::{Timestamp, civil::Date};
 use std::{
     collections::HashMap,
     sync::{Arc, Mutex, MutexGuard},
@@ -67,6 +67,8 @@ pub(crate) struct RowsOf {
     pub(crate) task: Option<Task>,
     /// Of results until then.
     pub(crate) until: Option<Timestamp>,
+    /// Of days until then.
+    pub(crate) until_day: Option<Date>,
 }
 
 /// By board the rows, and the id of the newest change that they have.

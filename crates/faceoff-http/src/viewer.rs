@@ -6,6 +6,7 @@ use crate::{
     problem::{Problem, ProblemKind},
 };
 use axum::{extract::FromRequestParts, http::request::Parts};
+use faceoff_notify::Reader;
 use faceoff_types::TeamId;
 
 /// A caller, with or without a token.
@@ -38,6 +39,22 @@ impl Viewer {
             kind,
             format!("{what} is for the organiser: it needs the organiser's token"),
         ))
+    }
+}
+
+impl From<Caller> for Viewer {
+    fn from(caller: Caller) -> Self {
+        Self::of(&caller)
+    }
+}
+
+impl From<Viewer> for Reader {
+    fn from(viewer: Viewer) -> Self {
+        match viewer {
+            Viewer::Organiser => Self::Organiser,
+            Viewer::Team(team) => Self::Team(team),
+            Viewer::Anybody => Self::Anybody,
+        }
     }
 }
 

@@ -3,7 +3,6 @@
 
 mod budget;
 mod error;
-mod folder;
 mod links;
 mod node;
 mod tar_archive;
@@ -130,24 +129,6 @@ pub fn open(path: &Path, scratch: &Path, limits: &BundleLimits) -> Result<Bundle
     } else {
         unpack(path, &scratch.join("bundle"), limits, &|| false)
     }
-}
-
-/// Copies a developer's own folder into the folder `into`, which is created and must be empty, under
-/// the rules and limits of an archive: what is refused here would be refused by the server.
-///
-/// # Errors
-/// As [`unpack`].
-pub fn copy(folder: &Path, into: &Path, limits: &BundleLimits) -> Result<Bundle, BundleError> {
-    let (now, never) = (Instant::now, || false);
-    let budget = Budget::new(limits, &now, &never);
-    let copied = || {
-        let mut tree = Tree::new(into, &budget)?;
-        folder::copy(folder, &mut tree)?;
-        let root = tree.bundle_root(MANIFEST_NAME).ok_or_else(no_manifest)?;
-        tree.finish(&root)?;
-        open_dir(&into.join(root))
-    };
-    budget.verdict(copied())
 }
 
 fn open_dir(path: &Path) -> Result<Bundle, BundleError> {

@@ -28,6 +28,7 @@ mod tier;
 mod tier_change;
 pub mod tournament;
 mod unique_map;
+mod who_solved;
 
 pub use ablation::{ProfileEffect, ablation};
 pub use board::{BoardEntry, RankedEntry, overall_board, task_board};
@@ -52,3 +53,4 @@ pub use tier::{
     DEPLOYABLE_POINTS_PER_EPISODE, IMPROVABLE_POINTS_PER_EPISODE, tier_of, tier_within,
 };
 pub use tier_change::TIER_CHANGE_RESAMPLES;
+pub use who_solved::WhoSolved;

@@ -3,9 +3,11 @@ use bytes::Bytes;
 use futures::{StreamExt, TryStreamExt, stream::BoxStream};
 use jiff::Timestamp;
 use object_store::{
-    ObjectStore, ObjectStoreExt, WriteMultipart, local::LocalFileSystem, path::Path as Key,
+    GetOptions, ObjectStore, ObjectStoreExt, WriteMultipart, local::LocalFileSystem,
+    path::Path as Key,
 };
 use std::{
+    ops::Range,
     path::{Path, PathBuf},
     sync::Arc,
     time::SystemTime,
@@ -118,6 +120,17 @@ impl Artifacts {
             .map_err(artifact_error)?;
         let bytes = found.meta.size;
         Ok((bytes, found.into_stream().map_err(artifact_error).boxed()))
+    }
+
+    /// Some of an artifact's bytes, for a download: the others are not read.
+    pub async fn read_range(&self, key: &str, range: Range<u64>) -> Result<ArtifactStream> {
+        let wanted = GetOptions::new().with_range(Some(range));
+        let found = self
+            .objects
+            .get_opts(&parse(key)?, wanted)
+            .await
+            .map_err(artifact_error)?;
+        Ok(found.into_stream().map_err(artifact_error).boxed())
     }
 
     /// Removes an artifact; one that does not exist is no error, so that a removal can be repeated.

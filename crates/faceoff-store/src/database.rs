@@ -1,17 +1,15 @@
 use crate::{
     error::{Result, StoreError},
     log::{LOG_BOUND_BYTES, Log},
+    schema::{self, MIGRATIONS, Upgrade},
 };
 use futures::future::BoxFuture;
 use sqlx::{
     Connection, Sqlite, SqliteConnection, SqlitePool, Transaction,
-    migrate::Migrator,
     pool::PoolConnectionMetadata,
     sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous},
 };
 use std::{path::Path, sync::Arc, time::Duration};
-
-pub(crate) static MIGRATIONS: Migrator = sqlx::migrate!("../../migrations");
 
 /// How long a writer waits for the writer of another process.
 pub(crate) const BUSY_TIMEOUT: Duration = Duration::from_secs(30);
@@ -40,6 +38,8 @@ pub(crate) struct Database {
     pub(crate) write: SqlitePool,
     pub(crate) file: Arc<Path>,
     pub(crate) log: Arc<Log>,
+    /// What opening it has changed.
+    pub(crate) upgrade: Option<Upgrade>,
 }
 
 impl Database {
@@ -66,10 +66,12 @@ impl Database {
             .after_release(is_sound)
             .connect_with(options.clone())
             .await?;
+        let before = schema::before(&mut *write.acquire().await?).await?;
         MIGRATIONS
             .run(&write)
             .await
             .map_err(|error| StoreError::Database(error.into()))?;
+        let upgrade = schema::after(&mut *write.acquire().await?, before).await?;
         let read = SqlitePoolOptions::new()
             .max_connections(READERS)
             .after_release(is_sound)
@@ -82,6 +84,7 @@ impl Database {
             write,
             file: file.into(),
             log: Arc::new(Log::new(log.into())),
+            upgrade,
         })
     }
 

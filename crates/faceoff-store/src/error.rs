@@ -1,3 +1,4 @@
+use crate::program::Program;
 use faceoff_types::tells_of_full_disk;
 use jiff::{Timestamp, civil::Date};
 use sqlx::error::DatabaseError;
@@ -121,6 +122,20 @@ pub enum StoreError {
     /// A disk is full: what was asked is not done, or may not be, and can be once there is room.
     #[error("the disk is full: {0}")]
     FullDisk(String),
+    /// A later version of the program has migrated the database.
+    #[error(
+        "the database is of a later version of Faceoff: {} has its migration {schema}, this is {} and knows {}; use that \
+         version, or a later one, or restore a backup from before it",
+        program.as_deref().unwrap_or("another"), this.version, this.schema
+    )]
+    NewerDatabase {
+        /// Its newest migration.
+        schema: i64,
+        /// What opened it last.
+        program: Option<String>,
+        /// This one.
+        this: Program,
+    },
     /// SQLite failed.
     #[error("database: {0}")]
     Database(#[source] sqlx::Error),

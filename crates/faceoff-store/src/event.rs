@@ -13,7 +13,7 @@ pub use subject::Subject;
 use faceoff_types::{
     DivisionName, EvaluationId, InvitationId, LeftAs, PersonName, ProposalId, Retention,
     RoundNumber, RunId, ShardId, StageId, StageName, StageRules, StageSettings, SubmissionId, Task,
-    TeamId, TeamName, TokenId, TournamentRules, TournamentSettings, Zone,
+    TeamId, TeamName, TokenId, TournamentRules, TournamentSettings, WebhookId, Zone,
 };
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
@@ -135,6 +135,10 @@ pub enum Event {
         /// The division that it is in.
         division: Option<DivisionName>,
     },
+    /// The team is a reference agent of the organisers from now on, which no board ranks.
+    TeamMadeBaseline,
+    /// The team is ranked as others are, and no baseline any more.
+    TeamMadeRanked,
     /// The team plays no more, by its own wish.
     TeamRetired,
     /// The team plays again.
@@ -529,6 +533,41 @@ pub enum Event {
     FriendlyGamesDeclined {
         /// Or does it again.
         declines: bool,
+    },
+    /// A program is told of what happens.
+    WebhookCreated {
+        /// Which.
+        webhook: WebhookId,
+        /// What its owner calls it.
+        name: String,
+    },
+    /// It is somewhere else, told of something else, called otherwise, or told again.
+    WebhookChanged {
+        /// Which.
+        webhook: WebhookId,
+        /// What its owner calls it.
+        name: String,
+    },
+    /// It has another secret.
+    WebhookRotated {
+        /// Which.
+        webhook: WebhookId,
+        /// What its owner calls it.
+        name: String,
+    },
+    /// It is told nothing any more, by its owner's wish.
+    WebhookRemoved {
+        /// Which.
+        webhook: WebhookId,
+        /// What its owner called it.
+        name: String,
+    },
+    /// It is told nothing any more, since it takes nothing.
+    WebhookDied {
+        /// Which.
+        webhook: WebhookId,
+        /// What was wrong.
+        reason: String,
     },
     /// Nothing of the queue is begun from now on.
     QueuePaused {

@@ -28,10 +28,12 @@ mod health;
 mod live;
 mod log;
 mod operations;
+mod program;
 mod pulse;
 mod queue;
 mod reads;
 mod room;
+mod schema;
 mod signals;
 mod store;
 mod tables;
@@ -45,6 +47,7 @@ pub use live::{LIVE_GAMES_KEPT, LiveGames, LiveMark, LiveNews, LiveWatch};
 pub use log::LOG_BOUND_BYTES;
 pub use operations::{
     announcements::MAX_OPEN_QUESTIONS,
+    backup::CheckedDatabase,
     claim::MAX_LEASES,
     commit::Committed,
     describe_submission::SubmissionWords,
@@ -65,18 +68,27 @@ pub use operations::{
         open::{NewTournament, TournamentChange},
         replays::MAX_REPLAYS,
     },
+    webhooks::{
+        AttemptMeans, DELIVERIES_KEPT, FAILING_FOR, MAX_ORGANISER_WEBHOOKS, MAX_TEAM_WEBHOOKS,
+        MAX_WAITING_DELIVERIES, NewWebhook, OLD_SECRET, PlannedDeliveries, WebhookChange,
+    },
     work::{Claimed, RunSeeds, Work},
 };
+pub use program::Program;
 pub use queue::Claim;
 pub use reads::{
     board::{BoardRecord, BoardScope},
+    concerns::Concern,
+    evaluations::EvaluationsOf,
+    numbers::Numbers,
     outlook::{OpenWork, Outlook, QueuePlace},
     runs::RunFaults,
     standings::BoardDays,
     storage::{Counted, TeamStorage},
     tournaments::{GamesOf, TournamentRecord},
 };
-pub use room::Room;
+pub use room::{DiskSpace, Room};
+pub use schema::Upgrade;
 pub use store::Store;
 pub use tables::{
     ablations::{Ablation, AblationState},
@@ -84,6 +96,7 @@ pub use tables::{
     archived::{Archived, Edition, KeptArtifact, KeptOf, ParseEditionError},
     bundles::{UploadQuota, UploadUsage},
     days::Day,
+    deliveries::{Delivery, DeliveryAttempt, DeliveryState},
     drafts::Draft,
     entrants::{Entrant, Leave},
     evaluations::{Evaluation, EvaluationState},
@@ -93,6 +106,7 @@ pub use tables::{
     games::{Game, GameCommit, GamePurpose, GameRecording, GameResultRow, GameState, Meeting},
     invitations::{Invitation, InvitationState, InvitedAs},
     measured::Measured,
+    needed::Needed,
     people::Person,
     plan::RunPlan,
     proposals::{Proposal, ProposalKind, Settled},
@@ -109,4 +123,5 @@ pub use tables::{
     terms::Terms,
     tokens::{Token, TokenKind, TokenOwner},
     tournaments::Tournament,
+    webhooks::{DeadWebhook, Webhook, WebhookKeys},
 };

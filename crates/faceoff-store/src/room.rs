@@ -36,6 +36,13 @@ impl Room {
         self.min_free_bytes
     }
 
+    /// How much each of the watched folders' file systems has, in their order; `None` of one that cannot be asked.
+    #[must_use]
+    pub fn disks(&self) -> Vec<Option<DiskSpace>> {
+        let folders = self.folders.iter();
+        folders.map(|folder| DiskSpace::of(folder)).collect()
+    }
+
     /// Is there too little room? The disks are looked at now, and whoever finds a change tells the log
     /// of it. What was short is enough again with an eighth more, so that work under way, which comes
     /// and goes with its files, does not switch back and forth.
@@ -67,6 +74,25 @@ impl Room {
         }
         *short = lack.is_some();
         *short
+    }
+}
+
+/// What a file system has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DiskSpace {
+    /// Bytes that this process may still write.
+    pub free_bytes: u64,
+    /// Bytes in all.
+    pub size_bytes: u64,
+}
+
+impl DiskSpace {
+    fn of(folder: &Path) -> Option<Self> {
+        let disk = statvfs(folder).ok()?;
+        Some(Self {
+            free_bytes: disk.f_bavail.saturating_mul(disk.f_frsize),
+            size_bytes: disk.f_blocks.saturating_mul(disk.f_frsize),
+        })
     }
 }
 

@@ -1,4 +1,5 @@
 use crate::event::Change;
+use std::sync::atomic::{AtomicU64, Ordering};
 use tokio::sync::{broadcast, watch};
 
 /// How many changes a receiver may be behind before it misses the oldest.
@@ -9,6 +10,8 @@ const BACKLOG: usize = 256;
 pub(crate) struct Signals {
     changes: broadcast::Sender<Change>,
     work: watch::Sender<u64>,
+    /// How many changes were committed.
+    made: AtomicU64,
 }
 
 impl Signals {
@@ -16,7 +19,17 @@ impl Signals {
         Self {
             changes: broadcast::Sender::new(BACKLOG),
             work: watch::Sender::new(0),
+            made: AtomicU64::new(0),
         }
+    }
+
+    /// Something that is told of was committed, or may have been.
+    pub(crate) fn committed(&self) {
+        self.made.fetch_add(1, Ordering::Release);
+    }
+
+    pub(crate) fn made(&self) -> u64 {
+        self.made.load(Ordering::Acquire)
     }
 
     pub(crate) fn changed(&self, change: Change) {

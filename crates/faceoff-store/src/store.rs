@@ -1,6 +1,6 @@
 use crate::{
     artifacts::Artifacts, database::Database, error::Result, event::Change, live::LiveGames,
-    pulse::Pulse, room::Room, signals::Signals, tables::archived::Archived,
+    pulse::Pulse, room::Room, schema::Upgrade, signals::Signals, tables::archived::Archived,
 };
 use std::sync::Arc;
 use tokio::sync::{broadcast, watch};
@@ -41,6 +41,12 @@ impl Store {
         self.archived.as_deref()
     }
 
+    /// The database was of an earlier version when this handle opened it.
+    #[must_use]
+    pub const fn upgrade(&self) -> Option<&Upgrade> {
+        self.database.upgrade.as_ref()
+    }
+
     /// Copies the database's log into the database, as far as nobody must wait for it. Run it now and
     /// then; a log that grows too long is emptied without it.
     pub async fn checkpoint(&self) -> Result<()> {
@@ -65,6 +71,12 @@ impl Store {
     #[must_use]
     pub fn events(&self) -> broadcast::Receiver<Change> {
         self.signals.changes()
+    }
+
+    /// How often this process has changed the season so far: what was read before is as good as new while that stays.
+    #[must_use]
+    pub fn changes_made(&self) -> u64 {
+        self.signals.made()
     }
 
     /// Changes whenever this process adds work to the queue. Look at the value before claiming and

@@ -136,7 +136,12 @@ impl Store {
         };
         let done = change(&mut tx).await?;
         let told = tx.append_events(&actor).await?;
-        tx.transaction.commit().await?;
+        let committed = tx.transaction.commit().await;
+        // What is not told changes nothing that is shown: deliveries, leases. An error leaves open whether it is stored.
+        if committed.is_err() || !told.is_empty() {
+            self.signals.committed();
+        }
+        committed?;
         if tx.work_added {
             self.signals.work_added();
         }

@@ -141,3 +141,13 @@ id!(
     GameId,
     "game"
 );
+id!(
+    /// An address of somebody's program that is told of what happens.
+    WebhookId,
+    "webhook"
+);
+id!(
+    /// One thing told to one webhook, however often it is sent.
+    DeliveryId,
+    "delivery"
+);

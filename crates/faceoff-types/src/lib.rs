@@ -63,9 +63,9 @@ pub use game_limits::GameLimits;
 pub use game_seed::{GameSeed, ParseGameSeedError};
 pub use harmless::{harmless, is_harmless};
 pub use ids::{
-    AblationId, AnnouncementId, EvaluationId, GameId, InvitationId, ParseIdError, PersonId,
-    ProposalId, QuestionId, RegistrationId, RunId, ShardId, StageId, SubmissionId, TeamId, TokenId,
-    TournamentId,
+    AblationId, AnnouncementId, DeliveryId, EvaluationId, GameId, InvitationId, ParseIdError,
+    PersonId, ProposalId, QuestionId, RegistrationId, RunId, ShardId, StageId, SubmissionId,
+    TeamId, TokenId, TournamentId, WebhookId,
 };
 pub use interpolation::{Interpolation, JOINTS, MAX_ACTION_LEN, SUBSTEPS, UnknownInterpolation};
 pub use left_as::LeftAs;

@@ -11,7 +11,7 @@ use crate::{
 use anyhow::Context as _;
 use faceoff_runner::{AgentEnvironment, GameSpec, bundle::Bundle};
 use faceoff_sandbox::{Isolation, Runtime};
-use faceoff_types::{AgentLimits, GameId, SmokeOutcome, StageRuntimes};
+use faceoff_types::{AgentLimits, GameId, SlotTiming, SmokeOutcome, StageRuntimes};
 use faceoff_wire::work::{
     AgentOrder, Assignment, EvaluationMeta, Lease, ShardSpec, SmokeSpec, StoredGame, WorkOrder,
     WorkReport,
@@ -25,6 +25,8 @@ use std::{
 /// Carries out a slot's orders. All errors are faults of ours; a unit that is no longer the slot's
 /// ends by one, too, soon after [`Progress::stopped`] says so.
 pub(crate) struct Executor {
+    /// How evenly the slot kept time in the last shard that it played.
+    pub(crate) timing: Option<SlotTiming>,
     pub(crate) server: Arc<dyn WorkServer>,
     pub(crate) evaluator: Arc<dyn Evaluator>,
     pub(crate) host: AgentHost,
@@ -200,6 +202,7 @@ impl Executor {
                 .store_recording(key, out.path())
                 .context("storing the recording")?;
         }
+        self.timing = Some(played.timing);
         Ok(WorkReport::Play {
             outcomes: played.outcomes,
             log: played.log,

@@ -12,6 +12,7 @@ use crate::{
     tidying,
 };
 use anyhow::Context as _;
+use faceoff_metrics::Metrics;
 use faceoff_runner::{AgentEnvironment, bundle::BundleLimits};
 use faceoff_store::{Store, StoreError};
 use faceoff_types::{AgentLimits, Clock};
@@ -56,6 +57,8 @@ pub struct WorkerConfig {
     pub agent: AgentEnvironment,
     /// What an archive may hold.
     pub bundle_limits: BundleLimits,
+    /// What slots do is counted here.
+    pub metrics: Metrics,
 }
 
 /// Runs a named thread per slot (`faceoff-slot-0` …) until `shutdown` is cancelled. On a shutdown every
@@ -134,9 +137,12 @@ pub(crate) async fn run_with(
         let folder = scratch.slot(index)?;
         let slot = Slot {
             name: format!("{}/slot-{index}", scratch.worker()),
+            number: index.to_string(),
+            metrics: config.metrics.clone(),
             idle_poll: intervals.idle_poll,
             server: Arc::clone(&slots_server),
             executor: Executor {
+                timing: None,
                 server: Arc::clone(&slots_server),
                 evaluator: Arc::clone(&evaluator),
                 host: AgentHost {

@@ -3,14 +3,22 @@ use crate::{
     lease::{LeaseKeeper, Progress},
     server::{Claimed, GivenBack, Holding, WorkServer},
 };
+use faceoff_metrics::{Metrics, UnitEnd};
 use faceoff_runner::PlatformFault;
-use faceoff_wire::work::{WorkOrder, WorkReport};
-use std::{panic::AssertUnwindSafe, sync::Arc, time::Duration};
+use faceoff_wire::work::{Assignment, WorkOrder, WorkReport};
+use std::{
+    panic::AssertUnwindSafe,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 use tokio_util::sync::CancellationToken;
 
 /// One slot: claims units and works them off, one at a time, on its own thread.
 pub(crate) struct Slot {
     pub(crate) name: String,
+    /// As the server's numbers name it.
+    pub(crate) number: String,
+    pub(crate) metrics: Metrics,
     /// How long to wait, idle, before looking for units that became claimable by the passing of time:
     /// an expired lease, the end of a back-off, work added by another process.
     pub(crate) idle_poll: Duration,
@@ -52,16 +60,33 @@ impl Slot {
 
     fn work_on(&mut self, order: &WorkOrder) {
         let (unit, work) = (order.lease.unit, &order.assignment);
+        // All that is logged meanwhile, by whatever this calls on the slot's thread, says for whom.
+        let _span = span(order).entered();
         tracing::info!(%unit, %work, "begun");
+        let (busy, began) = (self.metrics.slots().begin(kind(work)), Instant::now());
         // A defect of ours in the middle of an episode must not end the slot, nor the evaluation.
         let ended = std::panic::catch_unwind(AssertUnwindSafe(|| self.perform(order)))
             .unwrap_or_else(|panic| {
                 Err(anyhow::anyhow!("the evaluator failed: {}", words(&*panic)))
             });
         match ended {
-            Ok(Holding::Held) => tracing::info!(%unit, %work, "committed"),
-            Ok(Holding::Lost) => tracing::info!(%unit, %work, "no longer this slot's"),
-            Err(error) => self.give_back(order, &error),
+            Ok(Holding::Held) => {
+                tracing::info!(%unit, %work, "committed");
+                busy.end(UnitEnd::Committed, began.elapsed());
+            }
+            Ok(Holding::Lost) => {
+                tracing::info!(%unit, %work, "no longer this slot's");
+                busy.end(UnitEnd::Lost, began.elapsed());
+            }
+            Err(error) => {
+                let end = if self.server.met_full_disk(&error) {
+                    UnitEnd::FullDisk
+                } else {
+                    UnitEnd::PlatformFault
+                };
+                self.give_back(order, &error);
+                busy.end(end, began.elapsed());
+            }
         }
     }
 
@@ -73,10 +98,13 @@ impl Slot {
             &self.shutdown,
         )?;
         let progress = keeper.progress();
-        let committed = self
-            .executor
-            .report(order, &progress)
-            .and_then(|report| self.commit(order, &report, &progress));
+        let committed = self.executor.report(order, &progress).and_then(|report| {
+            let holding = self.commit(order, &report, &progress)?;
+            if holding == Holding::Held {
+                self.count(&report);
+            }
+            Ok(holding)
+        });
         match committed {
             // no fault: the unit was given back, or is another's
             Err(error) if progress.stopped() => {
@@ -84,6 +112,14 @@ impl Slot {
                 Ok(Holding::Lost)
             }
             committed => committed,
+        }
+    }
+
+    /// Counts what came of a unit.
+    fn count(&self, report: &WorkReport) {
+        if let (WorkReport::Play { outcomes, .. }, Some(timing)) = (report, &self.executor.timing) {
+            let slots = self.metrics.slots();
+            slots.played(&self.number, outcomes, timing);
         }
     }
 
@@ -140,6 +176,34 @@ impl Slot {
                 }
             }
         }
+    }
+}
+
+/// Names the unit, and whose work it is.
+fn span(order: &WorkOrder) -> tracing::Span {
+    let (unit, slot) = (order.lease.unit, &order.lease.slot);
+    match &order.assignment {
+        Assignment::Smoke { submission, .. } => {
+            tracing::info_span!("slot", %unit, slot, %submission)
+        }
+        // Of an ablation or a draft it is theirs.
+        Assignment::Play { part_of, .. } => {
+            tracing::info_span!("slot", %unit, slot, evaluation = %part_of)
+        }
+        Assignment::Game { game, .. } => tracing::info_span!("slot", %unit, slot, %game),
+        Assignment::Finalise { evaluation, .. } => {
+            tracing::info_span!("slot", %unit, slot, %evaluation)
+        }
+    }
+}
+
+/// As the server's numbers call it.
+const fn kind(work: &Assignment) -> &'static str {
+    match work {
+        Assignment::Smoke { .. } => "smoke",
+        Assignment::Play { .. } => "play",
+        Assignment::Game { .. } => "game",
+        Assignment::Finalise { .. } => "finalise",
     }
 }
 

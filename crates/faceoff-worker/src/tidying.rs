@@ -22,6 +22,9 @@ pub async fn tidy(store: &Store, now: Timestamp) {
     if let Err(error) = store.remove_dropped_datasets(now).await {
         tracing::warn!(%error, "datasets of dropped proposals could not be removed");
     }
+    if let Err(error) = store.forget_deliveries(now).await {
+        tracing::warn!(%error, "what webhooks were told long ago could not be removed");
+    }
     keep_as_said(store, now).await;
     if let Err(error) = store.checkpoint().await {
         tracing::warn!(%error, "the database's log could not be copied");

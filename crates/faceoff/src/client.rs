@@ -1,22 +1,28 @@
 //! A client of the REST API. It reads the very types that the server writes.
 
 mod archive;
-mod bundle_file;
+mod download;
 mod game;
 mod http;
 mod kept;
+mod links;
+mod pages;
 mod people;
 mod proposals;
+mod sessions;
 mod sse;
+mod tls;
 mod tournament;
+mod uploads;
+mod webhooks;
 
-use anyhow::{Context, bail};
-use bundle_file::BundleFile;
+use anyhow::{Context, anyhow, bail};
+pub use download::Downloaded;
 use faceoff_http::{
     API_BASE,
     requests::{
-        Cancellation, CloseSeason, Confirmation, Decision, ExtraTurn, MissedDay, NewStage, NewTeam,
-        Reason, StageChange, StartDay, SubmissionChange,
+        BoardFormat, BoardQuery, Cancellation, CloseSeason, ComparisonQuery, Confirmation,
+        Decision, ExtraTurn, MissedDay, NewStage, NewTeam, Reason, StageChange, StartDay,
     },
     views::{
         board::BoardView,
@@ -29,20 +35,18 @@ use faceoff_http::{
         runtimes::RuntimesView,
         season::SeasonView,
         stage::StageView,
-        submission::SubmissionView,
         team::{TeamView, TeamWithToken},
     },
 };
-use faceoff_types::{EvaluationId, StageDay, StageId, SubmissionId, TeamId};
-use futures::StreamExt;
-use http::http;
-use indicatif::ProgressBar;
+use faceoff_types::{EvaluationId, StageDay, StageId, Task, TeamId};
+use http::Address;
 use jiff::civil::Date;
+pub use links::Linked;
 use reqwest::{Method, RequestBuilder, Response, StatusCode, header};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 pub use sse::ServerEvent;
 use std::{path::Path, time::Duration};
-use tokio_util::io::ReaderStream;
+pub use tls::{none as no_tls, trusting as trusting_tls};
 
 /// Longest silence of the server.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -59,32 +63,30 @@ pub struct ApiError {
     pub detail: String,
 }
 
+/// No answer, or none that a Faceoff server gives; the cause says more.
+#[derive(Debug, Clone, thiserror::Error)]
+#[error("{0}")]
+pub struct Unreachable(pub String);
+
 /// A server, and who we are to it.
 #[derive(Debug, Clone)]
 pub struct Client {
     http: reqwest::Client,
-    base: String,
+    address: Address,
     token: Option<String>,
 }
 
 impl Client {
-    /// A client of `server` (e.g. `http://127.0.0.1:8080`), with a bearer token or without.
+    /// A client of `server` (e.g. `https://faceoff.example.org`), with a bearer token or without. Behind TLS the authorities
+    /// of `ca_file` are believed, too.
     ///
     /// # Errors
-    /// If `server` is no `http://` address.
-    pub fn new(server: &str, token: Option<&str>) -> anyhow::Result<Self> {
-        let url = reqwest::Url::parse(server).with_context(|| {
-            format!("{server:?} is no address; expected e.g. http://127.0.0.1:8080")
-        })?;
-        if url.scheme() != "http" {
-            bail!(
-                "{server}: this program speaks http only; for a server behind TLS, tunnel to it \
-                 (e.g. ssh -L) or upload with another client, as docs/api.md shows"
-            );
-        }
+    /// If `server` is no `http://` or `https://` address, or there is no authority to believe.
+    pub fn new(server: &str, token: Option<&str>, ca_file: Option<&Path>) -> anyhow::Result<Self> {
+        let address = Address::new(server, ca_file)?;
         Ok(Self {
-            http: http(PATIENCE)?,
-            base: server.trim_end_matches('/').to_owned(),
+            http: address.http(PATIENCE)?,
+            address,
             token: token.map(str::to_owned),
         })
     }
@@ -108,12 +110,32 @@ impl Client {
             .map(drop)
     }
 
-    /// The overall board.
+    /// The board of a task, or the overall one.
     ///
     /// # Errors
     /// As [`ApiError`], or when the server cannot be reached; so for all calls below.
-    pub async fn board(&self) -> anyhow::Result<BoardView> {
-        self.get("/board").await
+    pub async fn board(
+        &self,
+        task: Option<Task>,
+        wanted: &BoardQuery,
+    ) -> anyhow::Result<BoardView> {
+        let request = self.request(Method::GET, &board_path(task)).query(wanted);
+        read(self.send(request).await?).await
+    }
+
+    /// A board as a table for spreadsheets.
+    pub async fn board_csv(
+        &self,
+        task: Option<Task>,
+        wanted: &BoardQuery,
+    ) -> anyhow::Result<String> {
+        let wanted = BoardQuery {
+            format: Some(BoardFormat::Csv),
+            ..wanted.clone()
+        };
+        let request = self.request(Method::GET, &board_path(task)).query(&wanted);
+        let text = self.send(request).await?.text().await;
+        text.context("reading the server's answer")
     }
 
     /// Two finished evaluations on the same episodes.
@@ -121,8 +143,11 @@ impl Client {
         &self,
         a: EvaluationId,
         b: EvaluationId,
+        wanted: ComparisonQuery,
     ) -> anyhow::Result<ComparisonView> {
-        self.get(&format!("/evaluations/{a}/compare/{b}")).await
+        let path = format!("/evaluations/{a}/compare/{b}");
+        let request = self.request(Method::GET, &path).query(&wanted);
+        read(self.send(request).await?).await
     }
 
     /// The season.
@@ -150,7 +175,7 @@ impl Client {
 
     /// Organiser: all teams.
     pub async fn teams(&self) -> anyhow::Result<Vec<TeamView>> {
-        self.get("/teams").await
+        self.list(self.request(Method::GET, "/teams")).await
     }
 
     /// Organiser: a new token for a team; the old one is worth nothing from then on.
@@ -332,78 +357,6 @@ impl Client {
         self.get("/me").await
     }
 
-    /// Team: uploads a bundle, an archive or a folder (packed on the way).
-    pub async fn upload(&self, bundle: &Path) -> anyhow::Result<SubmissionView> {
-        self.upload_with(bundle, &ProgressBar::hidden()).await
-    }
-
-    /// Team: uploads a bundle and shows how far it is.
-    pub async fn upload_with(
-        &self,
-        bundle: &Path,
-        progress: &ProgressBar,
-    ) -> anyhow::Result<SubmissionView> {
-        let path = bundle.to_owned();
-        let bundle = tokio::task::spawn_blocking(move || BundleFile::open(&path))
-            .await
-            .context("packing the bundle")??;
-        let bytes = bundle.bytes();
-        let limit = self.me().await?.max_bundle_bytes;
-        if bytes > limit {
-            bail!(
-                "the bundle has {bytes} bytes, the server takes at most {limit}; leave out what the \
-                 agent does not need to run"
-            );
-        }
-        progress.set_length(bytes);
-        let file = tokio::fs::File::open(bundle.path())
-            .await
-            .with_context(|| format!("opening {}", bundle.path().display()))?;
-        let counted = progress.clone();
-        let stream = ReaderStream::with_capacity(file, 256 * 1024).inspect(move |chunk| {
-            counted.inc(chunk.as_ref().map_or(0, |chunk| chunk.len() as u64));
-        });
-        let request = self
-            .request(Method::POST, "/submissions")
-            .query(&[("file_name", bundle.name())])
-            .header(header::CONTENT_TYPE, "application/octet-stream")
-            .header(header::CONTENT_LENGTH, bytes)
-            .body(reqwest::Body::wrap_stream(stream));
-        read(self.send(request).await?).await
-    }
-
-    /// Team or organiser: one submission.
-    pub async fn submission(&self, id: SubmissionId) -> anyhow::Result<SubmissionView> {
-        self.get(&format!("/submissions/{id}")).await
-    }
-
-    /// Team: chooses the submission that plays at the next cut.
-    pub async fn activate(&self, id: SubmissionId) -> anyhow::Result<SubmissionView> {
-        let request = self.request(Method::POST, &format!("/submissions/{id}/activate"));
-        read(self.send(request).await?).await
-    }
-
-    /// Team: its submissions, newest first.
-    pub async fn submissions(&self) -> anyhow::Result<Vec<SubmissionView>> {
-        self.get("/submissions").await
-    }
-
-    /// Team: takes a submission back.
-    pub async fn withdraw(&self, id: SubmissionId) -> anyhow::Result<SubmissionView> {
-        let request = self.request(Method::POST, &format!("/submissions/{id}/withdraw"));
-        read(self.send(request).await?).await
-    }
-
-    /// Team: changes what it says of a submission.
-    pub async fn describe(
-        &self,
-        id: SubmissionId,
-        change: &SubmissionChange,
-    ) -> anyhow::Result<SubmissionView> {
-        let request = self.request(Method::PATCH, &format!("/submissions/{id}"));
-        read(self.send(request.json(change)).await?).await
-    }
-
     /// Organiser: all evaluations of a day (today). Team: its own (all).
     pub async fn evaluations(&self, day: Option<Date>) -> anyhow::Result<Vec<EvaluationView>> {
         let request = self.request(Method::GET, "/evaluations");
@@ -411,7 +364,16 @@ impl Client {
             Some(day) => request.query(&[("day", day.to_string())]),
             None => request,
         };
-        read(self.send(request).await?).await
+        self.list(request).await
+    }
+
+    /// Team: its newest evaluations, so many at most.
+    pub async fn newest_evaluations(&self, limit: usize) -> anyhow::Result<Vec<EvaluationView>> {
+        let request = self.request(Method::GET, "/evaluations");
+        let request = request.query(&[("limit", limit.clamp(1, 200))]);
+        let mut newest: Vec<EvaluationView> = read(self.send(request).await?).await?;
+        newest.truncate(limit);
+        Ok(newest)
     }
 
     /// Organiser: what was changed last, of what the parameters of `GET /events` let through.
@@ -428,7 +390,7 @@ impl Client {
     fn request(&self, method: Method, path: &str) -> RequestBuilder {
         let request = self
             .http
-            .request(method, format!("{}{API_BASE}{path}", self.base));
+            .request(method, format!("{}{API_BASE}{path}", self.address.base));
         match &self.token {
             Some(token) => request.bearer_auth(token),
             None => request,
@@ -454,14 +416,28 @@ impl Client {
     }
 
     async fn send(&self, request: RequestBuilder) -> anyhow::Result<Response> {
-        let response = request
-            .send()
-            .await
-            .map_err(reqwest::Error::without_url)
-            .with_context(|| format!("talking to {}", self.base))?;
+        let base = &self.address.base;
+        let sent = request.send().await.map_err(reqwest::Error::without_url);
+        let response = sent.map_err(|error| {
+            let error = anyhow::Error::from(error);
+            let error = match tls::advice(&error) {
+                Some(advice) => error.context(advice),
+                None => error,
+            };
+            error.context(Unreachable(format!("talking to {base}")))
+        })?;
         let status = response.status();
         if status.is_success() {
             return Ok(response);
+        }
+        if let (true, Some(elsewhere)) = (
+            status.is_redirection(),
+            response.headers().get(header::LOCATION),
+        ) {
+            bail!(
+                "{base} says that it is elsewhere now ({}); give that server's address",
+                String::from_utf8_lossy(elsewhere.as_bytes())
+            );
         }
         #[derive(Deserialize)]
         struct Problem {
@@ -470,9 +446,9 @@ impl Client {
         }
         let text = response.text().await.unwrap_or_default();
         let Ok(Problem { title, detail }) = serde_json::from_str(&text) else {
-            bail!(
-                "{} answered {status}, and not as a Faceoff server would",
-                self.base
+            return Err(
+                anyhow!("it answered {status}, and not as a Faceoff server would")
+                    .context(Unreachable(format!("talking to {base}"))),
             );
         };
         Err(ApiError {
@@ -489,8 +465,16 @@ async fn read<T: DeserializeOwned>(response: Response) -> anyhow::Result<T> {
         .bytes()
         .await
         .context("reading the server's answer")?;
-    serde_json::from_slice(&bytes)
-        .context("the server's answer is not understood; is it another version of Faceoff?")
+    serde_json::from_slice(&bytes).context(Unreachable(
+        "the server's answer is not understood; is it another version of Faceoff?".to_owned(),
+    ))
+}
+
+fn board_path(task: Option<Task>) -> String {
+    match task {
+        Some(task) => format!("/board/{task}"),
+        None => "/board".to_owned(),
+    }
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 
 use anyhow::{Context, anyhow};
 use faceoff_http::{ConnectionLimits, HttpLimits, LeastRate};
+use faceoff_notify::WebhookRules;
 use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::BundleLimits};
 use faceoff_sandbox::{Isolation, Layer, Limits, Runtime, affinity};
 use faceoff_store::UploadQuota;
@@ -49,6 +50,10 @@ pub struct Config {
     pub uploads: UploadsConfig,
     /// How much of the server a stranger may hold.
     pub connections: ConnectionsConfig,
+    /// How often a stranger may ask.
+    pub rates: RatesConfig,
+    /// Where programs may be told of what happens.
+    pub webhooks: WebhookRules,
     /// What is not enforced.
     pub sandbox: SandboxConfig,
     /// Runtimes by the name that `agent.toml` gives; added to `python3` and `native`, or in their
@@ -65,6 +70,9 @@ pub struct ServerConfig {
     /// The address by which people reach the server, for links: of http or https, without a slash at its end.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub public_url: Option<String>,
+    /// Where numbers and health are there without a token; left out: nowhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub metrics_listen: Option<SocketAddr>,
     /// Folder of the database, the artifacts and the organiser's token.
     pub data_dir: PathBuf,
     /// Bytes that must stay free on the disks of `data_dir` and `workers.scratch_dir`; below, the queue
@@ -77,6 +85,7 @@ impl Default for ServerConfig {
         Self {
             listen: SocketAddr::from(([127, 0, 0, 1], 8080)),
             public_url: None,
+            metrics_listen: None,
             data_dir: PathBuf::from("faceoff-data"),
             min_free_bytes: 1 << 30,
         }
@@ -440,8 +449,10 @@ impl Config {
 
 mod check;
 mod nearest;
+mod rates;
 mod runtime;
 #[cfg(test)]
 mod tests;
 
+pub use rates::RatesConfig;
 pub use runtime::RuntimeConfig;

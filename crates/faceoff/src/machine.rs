@@ -1,5 +1,6 @@
-//! This machine, as far as agents notice.
+//! This machine, as far as agents notice, and what it counts of this process.
 
+use faceoff_metrics::Process;
 use faceoff_sandbox::affinity;
 use faceoff_types::AgentMachine;
 use std::fs;
@@ -16,6 +17,27 @@ pub fn of_agents(cpus: &[usize]) -> AgentMachine {
         cpu_model: cpu_model(&fs::read_to_string("/proc/cpuinfo").unwrap_or_default()),
         cpus_per_agent: u32::try_from(count).unwrap_or(u32::MAX),
     }
+}
+
+/// What the system counts of this process; 0 where it does not tell.
+#[must_use]
+pub fn process() -> Process {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let open = fs::read_dir("/proc/self/fd").map_or(0, Iterator::count);
+    let limit = rustix::process::getrlimit(rustix::process::Resource::Nofile);
+    Process {
+        resident_bytes: resident_bytes(&status).unwrap_or_default(),
+        open_fds: open as u64,
+        max_fds: limit.current.unwrap_or(u64::MAX),
+    }
+}
+
+fn resident_bytes(status: &str) -> Option<u64> {
+    let line = status
+        .lines()
+        .find_map(|line| line.strip_prefix("VmRSS:"))?;
+    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kib * 1024)
 }
 
 /// The first that the kernel names.
@@ -37,5 +59,19 @@ mod tests {
         assert_eq!(cpu_model("processor\t: 0\nFeatures\t: fp\n"), None);
         assert_eq!(of_agents(&[4, 5]).cpus_per_agent, 2);
         assert!(of_agents(&[]).cpus_per_agent >= 1);
+    }
+
+    #[test]
+    fn the_system_counts_this_process() {
+        assert_eq!(
+            resident_bytes("Name:\tx\nVmRSS:\t  12 kB\n"),
+            Some(12 * 1024)
+        );
+        let Process {
+            resident_bytes,
+            open_fds,
+            max_fds,
+        } = process();
+        assert!(resident_bytes > 0 && open_fds > 0 && max_fds >= open_fds);
     }
 }

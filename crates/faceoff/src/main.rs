@@ -6,11 +6,15 @@ mod terminal;
 mod client;
 mod commands;
 mod config;
+mod credentials;
 mod descriptors;
+mod exit;
 mod log;
 mod machine;
+mod packing;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
+use exit::Exit;
 use std::process::ExitCode;
 
 /// Competition server for robot-learning agents.
@@ -53,18 +57,32 @@ enum Command {
     Activate(commands::activate::ActivateCommand),
     /// Make an evaluation of the team's public, with its dataset.
     Publish(commands::publish::PublishCommand),
+    Withdraw(commands::withdraw::WithdrawCommand),
+    Evaluation(commands::evaluation::EvaluationCommand),
+    Status(commands::status::StatusCommand),
+    Board(commands::board::BoardCommand),
+    Log(commands::log::LogCommand),
+    Link(commands::link::LinkCommand),
     Submissions(commands::submissions::SubmissionsCommand),
     Join(commands::join::JoinCommand),
+    Register(commands::register::RegisterCommand),
+    Login(commands::login::LoginCommand),
+    Logout(commands::logout::LogoutCommand),
+    Password(commands::password_change::PasswordCommand),
     Whoami(commands::whoami::WhoamiCommand),
     Team(commands::team::TeamCommand),
     Tournament(commands::tournament::TournamentCommand),
     Game(commands::game::GameCommand),
     Token(commands::token::TokenCommand),
+    Webhook(commands::webhook::WebhookCommand),
     /// Organise a running competition.
     Admin(commands::admin::AdminCommand),
     Import(commands::import::ImportCommand),
+    Backup(commands::backup::BackupCommand),
+    Restore(commands::restore::RestoreCommand),
     /// Check what this host offers and what is missing.
     Doctor(commands::doctor::DoctorCommand),
+    Completions(commands::completions::CompletionsCommand),
 }
 
 fn main() -> ExitCode {
@@ -77,23 +95,37 @@ fn main() -> ExitCode {
         Command::Play(command) => command.run(),
         Command::Compare(command) => command.run(),
         Command::Replay(command) => command.run(),
-        Command::Verify(command) => return command.run(),
+        Command::Verify(command) => return command.run().into(),
         Command::Dataset(command) => command.run(),
         Command::Score(command) => command.run(),
         Command::Sim(command) => command.run(),
         Command::Submit(command) => command.run(),
         Command::Activate(command) => command.run(),
         Command::Publish(command) => command.run(),
+        Command::Withdraw(command) => command.run(),
+        Command::Evaluation(command) => command.run(),
+        Command::Status(command) => command.run(),
+        Command::Board(command) => command.run(),
+        Command::Log(command) => command.run(),
+        Command::Link(command) => command.run(),
         Command::Submissions(command) => command.run(),
         Command::Join(command) => command.run(),
+        Command::Register(command) => command.run(),
+        Command::Login(command) => command.run(),
+        Command::Logout(command) => command.run(),
+        Command::Password(command) => command.run(),
         Command::Whoami(command) => command.run(),
         Command::Team(command) => command.run(),
         Command::Tournament(command) => command.run(),
         Command::Game(command) => command.run(),
         Command::Token(command) => command.run(),
+        Command::Webhook(command) => command.run(),
         Command::Admin(command) => command.run(),
         Command::Import(command) => command.run(),
+        Command::Backup(command) => command.run(),
+        Command::Restore(command) => command.run(),
         Command::Doctor(command) => command.run(),
+        Command::Completions(command) => command.run(Cli::command()),
     };
-    commands::exit_code(outcome)
+    Exit::from_outcome(outcome).into()
 }

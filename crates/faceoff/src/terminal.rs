@@ -7,6 +7,7 @@ use faceoff_types::harmless;
 use std::{
     fmt,
     io::{self, BufWriter, Stderr, StdoutLock, Write},
+    sync::atomic::{AtomicBool, Ordering},
 };
 
 macro_rules! print {
@@ -21,9 +22,29 @@ macro_rules! eprintln {
     ($($text:tt)*) => { $crate::terminal::print_error(::std::format_args!($($text)*)) };
 }
 
-#[expect(clippy::print_stdout, reason = "a command talks to the terminal")]
+static NOBODY_READS: AtomicBool = AtomicBool::new(false);
+
+/// Has whoever read standard output gone away? Then nothing that is told again and again has a reader.
+pub fn nobody_reads() -> bool {
+    NOBODY_READS.load(Ordering::Relaxed)
+}
+
+/// Where nobody reads on, as in `faceoff board | head`, the rest is said to nobody, and the command goes on to its own end.
 pub fn print(text: fmt::Arguments<'_>) {
-    ::std::print!("{}", harmless(&text.to_string()));
+    if nobody_reads() {
+        return;
+    }
+    let text = text.to_string();
+    match write!(io::stdout(), "{}", harmless(&text)) {
+        Ok(()) => {}
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => {
+            NOBODY_READS.store(true, Ordering::Relaxed);
+        }
+        Err(error) => {
+            print_error(format_args!("error: writing to standard output: {error}\n"));
+            std::process::exit(1)
+        }
+    }
 }
 
 #[expect(

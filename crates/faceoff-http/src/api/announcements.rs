@@ -4,34 +4,37 @@ use crate::{
     app::App,
     auth::{Anybody, Organiser, TeamCaller},
     extract::{Json as Body, PathParam},
+    paging::{Page, PageQuery, Paged},
     problem::Problem,
     requests::{NewAnnouncement, NewAnswer, NewQuestion},
     text,
     views::announcement::{AnnouncementView, QuestionView},
 };
 use axum::{Json, extract::State, http::StatusCode};
-use faceoff_types::QuestionId;
+use faceoff_types::{AnnouncementId, QuestionId};
 
-/// Announcements that a list shows.
-const SHOWN: u32 = 500;
 const TITLE_CHARS: usize = 120;
 const TEXT_CHARS: usize = 5000;
 const QUESTION_CHARS: usize = 2000;
 
 /// What the organisers have told everybody, the newest first.
 #[utoipa::path(
-    get, path = "/announcements", tag = "public", responses((status = 200, body = Vec<AnnouncementView>))
+    get, path = "/announcements", tag = "public",
+    params(PageQuery), responses((status = 200, body = Vec<AnnouncementView>))
 )]
 pub(crate) async fn list_announcements(
+    page: Page<AnnouncementId>,
     State(app): State<App>,
-) -> Result<Json<Vec<AnnouncementView>>, Problem> {
-    let announcements = app.store.announcements(SHOWN).await?.into_iter();
-    Ok(Json(announcements.map(AnnouncementView::from).collect()))
+) -> Result<Paged<AnnouncementView>, Problem> {
+    let announcements = app.store.announcements(u32::MAX).await?;
+    let page = page.cut(announcements, |announcement| announcement.id)?;
+    Ok(page.map(AnnouncementView::from))
 }
 
 /// Tells everybody; what was told stays.
 #[utoipa::path(
     post, path = "/announcements", tag = "organiser", security(("organiser" = [])), request_body = NewAnnouncement,
+    params(PageQuery),
     responses((status = 201, body = AnnouncementView), (status = 422))
 )]
 pub(crate) async fn announce(
@@ -52,12 +55,15 @@ pub(crate) async fn announce(
 
 /// Questions, the newest first: for everybody those with a public answer, for a team also its own, for organisers all.
 #[utoipa::path(
-    get, path = "/questions", tag = "public", responses((status = 200, body = Vec<QuestionView>))
+    get, path = "/questions", tag = "public", security((), ("team" = []), ("organiser" = [])),
+    params(PageQuery),
+    responses((status = 200, body = Vec<QuestionView>))
 )]
 pub(crate) async fn list_questions(
     caller: Anybody,
+    page: Page<QuestionId>,
     State(app): State<App>,
-) -> Result<Json<Vec<QuestionView>>, Problem> {
+) -> Result<Paged<QuestionView>, Problem> {
     let questions = app.store.questions().await?.into_iter();
     let shown = questions.filter_map(|question| {
         let is_theirs = caller
@@ -71,7 +77,7 @@ pub(crate) async fn list_questions(
             .is_some_and(|answer| answer.is_public);
         (is_theirs || is_public).then(|| QuestionView::of(question, is_theirs))
     });
-    Ok(Json(shown.collect()))
+    page.cut(shown, |question| question.id)
 }
 
 /// Asks the organisers. Other teams read it only with a public answer, and never who asked.

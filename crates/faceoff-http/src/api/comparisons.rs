@@ -2,8 +2,9 @@
 
 use crate::{
     app::App,
-    extract::PathParams,
+    extract::{PathParams, QueryParams},
     problem::Problem,
+    requests::ComparisonQuery,
     viewer::Viewer,
     views::{comparison::ComparisonView, sight::Sight},
 };
@@ -13,8 +14,8 @@ use faceoff_types::EvaluationId;
 /// Compares two finished evaluations of the same day: counts of paired episodes, McNemar's exact test
 /// and the difference with its interval, by task and overall.
 #[utoipa::path(
-    get, path = "/evaluations/{id}/compare/{other}", tag = "public",
-    params(("id" = EvaluationId, Path), ("other" = EvaluationId, Path)),
+    get, path = "/evaluations/{id}/compare/{other}", tag = "public", security((), ("team" = []), ("organiser" = [])),
+    params(("id" = EvaluationId, Path), ("other" = EvaluationId, Path), ComparisonQuery),
     responses(
         (status = 200, body = ComparisonView),
         (status = 404),
@@ -25,7 +26,8 @@ pub(crate) async fn compare(
     viewer: Viewer,
     State(app): State<App>,
     PathParams(ids): PathParams<EvaluationId, 2>,
+    QueryParams(query): QueryParams<ComparisonQuery>,
 ) -> Result<Json<ComparisonView>, Problem> {
     let sight = Sight::of(&app, viewer).await?;
-    ComparisonView::of(&app, &sight, ids).await.map(Json)
+    ComparisonView::of(&app, &sight, ids, query).await.map(Json)
 }

@@ -1,20 +1,33 @@
 //! Recorded datasets: the archive, and what of it is read without a download.
 
-use super::{downloads::download, proposals};
+use super::{
+    document::{Binary, FileHeaders, TagHeader},
+    downloads::{Download, download, plain, stays_its_callers},
+    proposals,
+    recorded::Recorded,
+};
 use crate::{
     app::App,
     archived,
-    auth::TeamCaller,
-    extract::PathParam,
+    auth::{Caller, TeamCaller},
+    conditions::{Conditions, ETag},
+    extract::{OptionalJson, PathParam},
+    links::{self, LinkOr, LinkQuery},
+    paths,
     problem::{Problem, ProblemKind},
     release::check_released,
+    requests::NewLink,
     viewer::Viewer,
-    views::{evaluation::EvaluationView, sight::Sight, violations::ViolationsView},
+    views::{evaluation::EvaluationView, link::LinkView, sight::Sight, violations::ViolationsView},
 };
-use axum::{Json, extract::State, response::Response};
-use faceoff_store::{Evaluation, EvaluationState, StoreError};
+use axum::{
+    Json,
+    extract::State,
+    http::{StatusCode, header},
+    response::{IntoResponse, Response},
+};
+use faceoff_store::{EvaluationState, StoreError};
 use faceoff_types::EvaluationId;
-use jiff::civil::Date;
 
 /// The recorded dataset, a zip archive; for its team and the organiser, and once it is public for everybody.
 ///
@@ -23,41 +36,66 @@ use jiff::civil::Date;
 #[utoipa::path(
     get, path = "/evaluations/{id}/dataset", tag = "team",
     security((), ("team" = []), ("organiser" = [])),
-    params(("id" = EvaluationId, Path)),
+    params(("id" = EvaluationId, Path), FileHeaders, LinkQuery),
     responses(
-        (status = 200, body = Vec<u8>, content_type = "application/zip"),
+        (status = 200, body = inline(Binary), content_type = "application/zip"),
+        (status = 403, description = "the link is not good"),
         (status = 404),
         (status = 409, description = "not finished yet, or failed, its day is not released, or its stage is blind"),
-        (status = 410, description = "it was removed, by a retention or with its proposal; the detail says when and why"),
+        (status = 410, description = "it was removed, by a retention or with its proposal, and the detail says when and why; or the link has expired"),
     )
 )]
 pub(crate) async fn dataset(
-    viewer: Viewer,
+    LinkOr(viewer): LinkOr<Viewer>,
+    conditions: Conditions,
     State(app): State<App>,
     PathParam(id): PathParam<EvaluationId>,
 ) -> Result<Response, Problem> {
-    let (team, date, dataset) = match proposals::dataset(viewer, &app, id).await? {
-        Some(proposed) => {
-            archived::check_kept(&app, &proposed.2, "dataset").await?;
-            proposed
-        }
-        None => {
-            let (evaluation, dataset) = released(viewer, &app, id).await?;
-            (evaluation.team, evaluation.of.date, dataset)
-        }
+    let recorded = recorded(viewer, &app, id).await?;
+    let team = app.store.team(recorded.team).await?;
+    let file = Download {
+        key: &recorded.dataset,
+        blake3: recorded.blake3.as_deref(),
+        media_type: "application/zip",
+        name: &format!("faceoff-{}-{}.zip", plain(team.name.as_str()), recorded.day),
     };
-    let team = app.store.team(team).await?;
-    let name = download_name(team.name.as_str(), date);
-    match download(&app, &dataset, "application/zip", &name).await {
+    match download(&app, &conditions, file).await {
         Err(StoreError::NotFound(_)) => {
             // It may have gone meanwhile. A dataset that is promised must be there: without it, we lost it.
             if proposals::dataset(viewer, &app, id).await?.is_none() {
                 released(viewer, &app, id).await?;
             }
-            Err(Problem::internal(format_args!("{dataset} is lost")))
+            Err(Problem::internal(format_args!("{} is lost", file.key)))
         }
         answer => Ok(answer?),
     }
+}
+
+/// A link that downloads the dataset without a token, for a time; made by whoever may download it now.
+///
+/// What it opens is decided when it is followed, as if whoever made it asked then: it ends with the token that made it,
+/// and shows nothing that was hidden or removed meanwhile.
+#[utoipa::path(
+    post, path = "/evaluations/{id}/dataset/link", tag = "team", security(("team" = []), ("organiser" = [])),
+    params(("id" = EvaluationId, Path)),
+    request_body(content = Option<NewLink>, content_type = "application/json"),
+    responses(
+        (status = 201, body = LinkView),
+        (status = 404),
+        (status = 409, description = "there is no dataset to download, as for a download"),
+        (status = 410, description = "it was removed"),
+        (status = 422),
+    )
+)]
+pub(crate) async fn link_dataset(
+    caller: Caller,
+    State(app): State<App>,
+    PathParam(id): PathParam<EvaluationId>,
+    OptionalJson(wanted): OptionalJson<NewLink>,
+) -> Result<(StatusCode, Json<LinkView>), Problem> {
+    recorded(Viewer::of(&caller), &app, id).await?;
+    let path = format!("{}/dataset", paths::evaluation(id));
+    links::link(&app, &caller, &path, wanted).await
 }
 
 /// Where each constraint was broken and which answers were slow, by episode: `violations.json` of the dataset,
@@ -66,7 +104,7 @@ pub(crate) async fn dataset(
 #[utoipa::path(
     get, path = "/evaluations/{id}/violations", tag = "team",
     security((), ("team" = []), ("organiser" = [])),
-    params(("id" = EvaluationId, Path)),
+    params(("id" = EvaluationId, Path), TagHeader),
     responses(
         (status = 200, body = ViolationsView),
         (status = 404),
@@ -76,11 +114,23 @@ pub(crate) async fn dataset(
 )]
 pub(crate) async fn violations(
     viewer: Viewer,
+    conditions: Conditions,
     State(app): State<App>,
     PathParam(id): PathParam<EvaluationId>,
-) -> Result<Json<ViolationsView>, Problem> {
-    let (_, dataset) = released(viewer, &app, id).await?;
-    ViolationsView::read(&app, &dataset).await.map(Json)
+) -> Result<Response, Problem> {
+    let recorded = released(viewer, &app, id).await?;
+    // They are read out of the dataset by this program.
+    let made_of = recorded.blake3.as_deref().unwrap_or(&recorded.dataset);
+    let tag = ETag::of("violations", &[made_of, env!("CARGO_PKG_VERSION")]);
+    let mut answer = match conditions.not_modified(&tag) {
+        Some(answer) => answer,
+        None => {
+            let view = ViolationsView::read(&app, &recorded.dataset).await?;
+            ([(header::ETAG, tag.header())], Json(view)).into_response()
+        }
+    };
+    stays_its_callers(answer.headers_mut());
+    Ok(answer)
 }
 
 /// Makes a finished evaluation of the team's public, with its dataset, before its stage does: everybody sees it from
@@ -122,17 +172,28 @@ pub(crate) async fn publish_evaluation(
     EvaluationView::of(&app, &sight, published).await.map(Json)
 }
 
-/// A finished evaluation whose day is released, and its dataset's name among the artifacts.
-async fn released(
-    viewer: Viewer,
-    app: &App,
-    id: EvaluationId,
-) -> Result<(Evaluation, String), Problem> {
+/// The dataset of an evaluation, for whoever may have it now.
+async fn recorded(viewer: Viewer, app: &App, id: EvaluationId) -> Result<Recorded, Problem> {
+    match proposals::dataset(viewer, app, id).await? {
+        Some(proposed) => {
+            archived::check_kept(app, &proposed.dataset, "dataset").await?;
+            Ok(proposed)
+        }
+        None => released(viewer, app, id).await,
+    }
+}
+
+/// The dataset of a finished evaluation whose day is released.
+async fn released(viewer: Viewer, app: &App, id: EvaluationId) -> Result<Recorded, Problem> {
     let sight = Sight::of(app, viewer).await?;
     let evaluation = sight.readable(app.store.evaluation(id).await)?;
     sight.check_shown(evaluation.of.stage)?;
     let why_not = match &evaluation.state {
-        EvaluationState::Finished { dataset, .. } => {
+        EvaluationState::Finished {
+            dataset,
+            dataset_blake3,
+            ..
+        } => {
             check_released(app, &evaluation).await?;
             let is_there = app.store.artifacts().bytes_of(dataset).await?.is_some();
             // An organiser gets at evidence as long as the file is there.
@@ -142,9 +203,13 @@ async fn released(
                 let what = "the dataset, with all that is read out of it,";
                 return Err(Problem::removed(what, removed));
             }
-            let dataset = dataset.clone();
-            archived::check_kept(app, &dataset, "dataset").await?;
-            return Ok((evaluation, dataset));
+            archived::check_kept(app, dataset, "dataset").await?;
+            return Ok(Recorded {
+                team: evaluation.team,
+                day: evaluation.of.date,
+                dataset: dataset.clone(),
+                blake3: dataset_blake3.clone(),
+            });
         }
         EvaluationState::Queued | EvaluationState::Running { .. } | EvaluationState::Finalising => {
             "the evaluation is not finished; follow it until its state is “finished”"
@@ -163,13 +228,4 @@ async fn released(
         EvaluationState::Cancelled { .. } => "the evaluation was cancelled and has no dataset",
     };
     Err(Problem::new(ProblemKind::Conflict, why_not))
-}
-
-/// A file name without anything that a header or a file system could trip over.
-fn download_name(team: &str, day: Date) -> String {
-    let team: String = team
-        .chars()
-        .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
-        .collect();
-    format!("faceoff-{team}-{day}.zip")
 }

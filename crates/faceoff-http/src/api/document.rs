@@ -1,10 +1,19 @@
 //! What the OpenAPI document says besides routes and types.
 
-use crate::problem::{Problem, ProblemBody};
+mod answers;
+mod files;
+mod integers;
+mod lists;
+mod unions;
+
+pub(super) use files::{FileHeaders, TagHeader};
+
+use crate::problem::ProblemBody;
+use serde_json::Value;
 use utoipa::{
-    Modify, OpenApi, ToSchema,
+    Modify, OpenApi, PartialSchema, ToSchema,
     openapi::{
-        self, Content, Ref, RefOr,
+        self, KnownFormat, ObjectBuilder, RefOr, Schema, SchemaFormat, Type,
         security::{HttpAuthScheme, HttpBuilder, SecurityScheme},
     },
 };
@@ -55,28 +64,28 @@ impl Modify for Tokens {
     }
 }
 
-/// Every error is a problem, so no route says so.
-pub(super) fn describe_errors(document: &mut openapi::OpenApi) {
-    let problem = Content::new(Some(Ref::from_schema_name(ProblemBody::name())));
-    for item in document.paths.paths.values_mut() {
-        let operations = [
-            &mut item.get,
-            &mut item.post,
-            &mut item.put,
-            &mut item.patch,
-            &mut item.delete,
-        ];
-        for operation in operations.into_iter().flatten() {
-            for (status, response) in &mut operation.responses.responses {
-                if let RefOr::T(response) = response
-                    && status.starts_with(['4', '5'])
-                {
-                    let media_type = Problem::MEDIA_TYPE.to_owned();
-                    response
-                        .content
-                        .insert(media_type, RefOr::T(problem.clone()));
-                }
-            }
-        }
+/// The document, with what follows from what routes and types say of themselves.
+pub(super) fn told(mut document: openapi::OpenApi) -> Value {
+    answers::complete(&mut document);
+    let components = document.components.get_or_insert_default();
+    unions::multiply_out(&mut components.schemas);
+    let mut told = serde_json::to_value(document).expect("its keys are texts");
+    integers::tell_unsigned(&mut told);
+    told
+}
+
+/// The bytes of an archive, as a body or an answer.
+pub(super) struct Binary;
+
+impl PartialSchema for Binary {
+    /// Some generators know `format` (of OpenAPI 3.0), others `contentMediaType` (of 3.1).
+    fn schema() -> RefOr<Schema> {
+        ObjectBuilder::new()
+            .schema_type(Type::String)
+            .format(Some(SchemaFormat::KnownFormat(KnownFormat::Binary)))
+            .content_media_type("application/octet-stream")
+            .into()
     }
 }
+
+impl ToSchema for Binary {}

@@ -4,7 +4,8 @@ use super::rulings::checked_reason;
 use crate::{
     app::App,
     auth::{Caller, Organiser},
-    extract::{Json as Body, PathParam, QueryParams},
+    extract::{Json as Body, PathParam},
+    paging::{BesidePage, Page, PageQuery, Paged},
     paths,
     problem::Problem,
     requests::Cancellation,
@@ -17,6 +18,7 @@ use axum::{
     http::{StatusCode, header},
     response::{AppendHeaders, IntoResponse},
 };
+use faceoff_store::EvaluationsOf;
 use faceoff_types::EvaluationId;
 use jiff::civil::Date;
 use serde::Deserialize;
@@ -33,30 +35,35 @@ pub(crate) struct DayQuery {
 /// The organiser: all evaluations of a day. A team: its own.
 #[utoipa::path(
     get, path = "/evaluations", tag = "team", security(("team" = []), ("organiser" = [])),
-    params(DayQuery), responses((status = 200, body = Vec<EvaluationView>))
+    params(DayQuery, PageQuery), responses((status = 200, body = Vec<EvaluationView>))
 )]
 pub(crate) async fn list_evaluations(
     caller: Caller,
+    mut page: Page<EvaluationId>,
     State(app): State<App>,
-    QueryParams(query): QueryParams<DayQuery>,
-) -> Result<Json<Vec<EvaluationView>>, Problem> {
+    BesidePage(query): BesidePage<DayQuery>,
+) -> Result<Paged<EvaluationView>, Problem> {
     let sight = Sight::of(&app, Viewer::of(&caller)).await?;
-    let mut evaluations = match caller.team() {
-        None => {
-            let day = match query.day {
-                Some(day) => day,
-                None => stage::current(&app).await?.day(app.config.clock.now()).date,
-            };
-            EvaluationView::all_on(&app, &sight, day).await?
+    let whose = match (caller.team(), query.day) {
+        (None, Some(day)) => EvaluationsOf::Day(day),
+        (None, None) => {
+            let today = stage::current(&app).await?.day(app.config.clock.now());
+            page = page.always_of("day", today.date);
+            EvaluationsOf::Day(today.date)
         }
-        Some(team) => {
-            let mut own = EvaluationView::of_team(&app, &sight, team.id).await?;
-            own.retain(|evaluation| query.day.is_none_or(|day| evaluation.day == day));
-            own
-        }
+        (Some(team), day) => EvaluationsOf::Team(team.id, day),
     };
-    EvaluationView::place(&app, &mut evaluations).await?;
-    Ok(Json(evaluations))
+    let rows = app
+        .store
+        .evaluations_after(whose, page.after, page.limit + 1);
+    let rows = rows.await?.ok_or_else(|| page.unknown())?;
+    let page = page.of_more(rows, |evaluation| evaluation.id);
+    page.seen(async |rows| {
+        let mut views = EvaluationView::all(&app, &sight, rows).await?;
+        EvaluationView::place(&app, &mut views).await?;
+        Ok(views)
+    })
+    .await
 }
 
 /// One evaluation: state, progress, score and points; once its day is released also the whole result, or the
@@ -109,7 +116,7 @@ pub(crate) async fn cancel_evaluation(
     post, path = "/evaluations/{id}/rerun", tag = "organiser", security(("organiser" = [])),
     params(("id" = EvaluationId, Path)),
     responses(
-        (status = 201, body = EvaluationView, description = "the evaluation that plays it again"),
+        (status = 201, body = EvaluationView, headers(("Location" = String, description = "where it is, from the server's root")), description = "the evaluation that plays it again"),
         (status = 404),
         (status = 409, description = "it ended otherwise, the team has another evaluation of the day that counts, the stage is signed off, or the season is closed"),
     )

@@ -5,6 +5,7 @@ use crate::{
     app::App,
     auth::{Caller, TeamCaller},
     extract::{Json as Body, OptionalJson, PathParam},
+    paging::{Page, PageQuery, Paged},
     paths,
     problem::{Problem, ProblemKind},
     requests::{NewFriendlyGame, NewTestGames},
@@ -21,7 +22,7 @@ use axum::{
     response::{AppendHeaders, IntoResponse},
 };
 use faceoff_store::{Game, StoreError};
-use faceoff_types::{TeamId, TournamentId};
+use faceoff_types::{GameId, TeamId, TournamentId};
 
 /// Plays what teams have active against the baseline: a team its own, within its quota of the day; an organiser anybody's
 /// who is in the tournament, without one.
@@ -123,7 +124,7 @@ async fn baselines_team(app: &App, sheet: &TournamentSheet) -> Result<Option<Tea
     post, path = "/tournaments/{id}/friendly-games", tag = "team", security(("team" = [])),
     params(("id" = TournamentId, Path)), request_body = NewFriendlyGame,
     responses(
-        (status = 201, body = GameView),
+        (status = 201, body = GameView, headers(("Location" = String, description = "where it is, from the server's root"))),
         (status = 404),
         (status = 409, description = "a round is under way, the opponent declines such games, one of them has nothing valid active or is not in the tournament, or that is closed"),
         (status = 422),
@@ -160,15 +161,15 @@ pub(crate) async fn order_friendly_game(
 /// The games that do not count: a team's own, an organiser all, the newest first.
 #[utoipa::path(
     get, path = "/tournaments/{id}/free-games", tag = "team", security(("team" = []), ("organiser" = [])),
-    params(("id" = TournamentId, Path)),
+    params(("id" = TournamentId, Path), PageQuery),
     responses((status = 200, body = Vec<GameView>), (status = 404))
 )]
 pub(crate) async fn list_free_games(
     caller: Caller,
+    page: Page<GameId>,
     State(app): State<App>,
     PathParam(id): PathParam<TournamentId>,
-) -> Result<Json<Vec<GameView>>, Problem> {
-    GameView::free(&app, Viewer::of(&caller), id)
-        .await
-        .map(Json)
+) -> Result<Paged<GameView>, Problem> {
+    let games = GameView::free(&app, Viewer::of(&caller), id).await?;
+    page.cut(games, |game| game.id)
 }

@@ -1,18 +1,26 @@
 //! The files of games: each side's own at once, both sides' when they are published, and what agents wrote.
 
-use super::downloads::download;
+use super::{
+    document::{Binary, FileHeaders},
+    downloads::{Download, download, plain},
+};
 use crate::{
     app::App,
     archived,
     auth::Caller,
-    extract::{PathParam, PathParams},
+    conditions::Conditions,
+    extract::{OptionalJson, PathParam, PathParams},
+    links::{self, LinkOr, LinkQuery},
+    paths,
     problem::{Problem, ProblemKind},
+    requests::NewLink,
     viewer::Viewer,
-    views::{game, tournament_sheet::TournamentSheet},
+    views::{game, link::LinkView, tournament_sheet::TournamentSheet},
 };
 use axum::{
+    Json,
     extract::State,
-    http::header,
+    http::{StatusCode, header},
     response::{IntoResponse, Response},
 };
 use faceoff_store::{Game, GameRecording, GameState, StoreError};
@@ -22,59 +30,106 @@ use faceoff_types::{GameId, Side};
 /// motion; for its team at once, for everybody once the recording is published. It names no seed.
 #[utoipa::path(
     get, path = "/games/{id}/sides/{side}", tag = "team", security((), ("team" = []), ("organiser" = [])),
-    params(("id" = GameId, Path), ("side" = u32, Path, description = "1: home, 2: away")),
+    params(
+        ("id" = GameId, Path), ("side" = u32, Path, minimum = 1, maximum = 2, description = "1: home, 2: away"),
+        FileHeaders, LinkQuery,
+    ),
     responses(
-        (status = 200, body = Vec<u8>, content_type = "application/zip"),
+        (status = 200, body = inline(Binary), content_type = "application/zip"),
         (status = 401), (status = 403), (status = 404),
         (status = 409, description = "the game has no result, or no recording: of the schedule played again none is kept"),
+        (status = 410, description = "the link has expired, or the archive that the server shows was made without the file"),
     )
 )]
 pub(crate) async fn side(
-    viewer: Viewer,
+    LinkOr(viewer): LinkOr<Viewer>,
+    conditions: Conditions,
     State(app): State<App>,
     PathParams(path): PathParams<String, 2>,
 ) -> Result<Response, Problem> {
     let (id, side) = side_of(&path)?;
-    let (sheet, game) = game::known(&app, viewer, id).await?;
-    let sight = sheet.sight(viewer);
-    if !sight.is_own(&game, side) && !sight.sees_both_sides(&game) {
-        return Err(sight.refused(&game, &format!("the file of side {}", side.number())));
-    }
-    let files = recording_of(&game)?;
-    let name = format!("side-{}.zip", side.number());
-    send(&app, &sheet, &game, files, &name).await
+    let recorded = Recorded::find(&app, viewer, id, Which::Side(side)).await?;
+    recorded.send(&app, &conditions).await
 }
 
 /// The recording of both sides with the game's seed, a zip archive that `faceoff verify` plays again; for organisers at
 /// once, for everybody once it is published.
 #[utoipa::path(
     get, path = "/games/{id}/recording", tag = "public", security((), ("organiser" = [])),
-    params(("id" = GameId, Path)),
+    params(("id" = GameId, Path), FileHeaders, LinkQuery),
     responses(
-        (status = 200, body = Vec<u8>, content_type = "application/zip"),
+        (status = 200, body = inline(Binary), content_type = "application/zip"),
         (status = 401), (status = 403), (status = 404),
         (status = 409, description = "the game has no result, or no recording: of the schedule played again none is kept"),
+        (status = 410, description = "the link has expired, or the archive that the server shows was made without the file"),
     )
 )]
 pub(crate) async fn recording(
-    viewer: Viewer,
+    LinkOr(viewer): LinkOr<Viewer>,
+    conditions: Conditions,
     State(app): State<App>,
     PathParam(id): PathParam<GameId>,
 ) -> Result<Response, Problem> {
-    let (sheet, game) = game::known(&app, viewer, id).await?;
-    let sight = sheet.sight(viewer);
-    if !sight.sees_both_sides(&game) {
-        return Err(sight.refused(&game, "the recording of both sides"));
-    }
-    let files = recording_of(&game)?;
-    send(&app, &sheet, &game, files, "game.zip").await
+    let recorded = Recorded::find(&app, viewer, id, Which::BothSides).await?;
+    recorded.send(&app, &conditions).await
+}
+
+/// A link that downloads a side's file without a token, for a time; made by whoever may download it now.
+///
+/// What it opens is decided when it is followed, as if whoever made it asked then.
+#[utoipa::path(
+    post, path = "/games/{id}/sides/{side}/link", tag = "team", security(("team" = []), ("organiser" = [])),
+    params(("id" = GameId, Path), ("side" = u32, Path, minimum = 1, maximum = 2, description = "1: home, 2: away")),
+    request_body(content = Option<NewLink>, content_type = "application/json"),
+    responses(
+        (status = 201, body = LinkView),
+        (status = 404),
+        (status = 409, description = "the game has no result, or no recording"),
+        (status = 422),
+    )
+)]
+pub(crate) async fn link_side(
+    caller: Caller,
+    State(app): State<App>,
+    PathParams(path): PathParams<String, 2>,
+    OptionalJson(wanted): OptionalJson<NewLink>,
+) -> Result<(StatusCode, Json<LinkView>), Problem> {
+    let (id, side) = side_of(&path)?;
+    Recorded::find(&app, Viewer::of(&caller), id, Which::Side(side)).await?;
+    let path = format!("{}/sides/{}", paths::game(id), side.number());
+    links::link(&app, &caller, &path, wanted).await
+}
+
+/// A link that downloads the recording of both sides without a token, for a time; made by whoever may download it now.
+///
+/// What it opens is decided when it is followed, as if whoever made it asked then.
+#[utoipa::path(
+    post, path = "/games/{id}/recording/link", tag = "team", security(("team" = []), ("organiser" = [])),
+    params(("id" = GameId, Path)),
+    request_body(content = Option<NewLink>, content_type = "application/json"),
+    responses(
+        (status = 201, body = LinkView),
+        (status = 404),
+        (status = 409, description = "the game has no result, or no recording"),
+        (status = 422),
+    )
+)]
+pub(crate) async fn link_recording(
+    caller: Caller,
+    State(app): State<App>,
+    PathParam(id): PathParam<GameId>,
+    OptionalJson(wanted): OptionalJson<NewLink>,
+) -> Result<(StatusCode, Json<LinkView>), Problem> {
+    Recorded::find(&app, Viewer::of(&caller), id, Which::BothSides).await?;
+    let path = format!("{}/recording", paths::game(id));
+    links::link(&app, &caller, &path, wanted).await
 }
 
 /// The end of what a side's agent wrote to its standard error in the attempt that counts, with its faults; for its team
 /// and organisers alone.
 #[utoipa::path(
     get, path = "/games/{id}/sides/{side}/log", tag = "team", security(("team" = []), ("organiser" = [])),
-    params(("id" = GameId, Path), ("side" = u32, Path, description = "1: home, 2: away")),
+    params(("id" = GameId, Path), ("side" = u32, Path, minimum = 1, maximum = 2, description = "1: home, 2: away")),
     responses(
         (status = 200, body = String, content_type = "text/plain"),
         (status = 403), (status = 404),
@@ -152,34 +207,77 @@ fn no_result(game: &Game) -> Problem {
     )
 }
 
-async fn send(
-    app: &App,
-    sheet: &TournamentSheet,
-    game: &Game,
-    files: &GameRecording,
-    file: &str,
-) -> Result<Response, Problem> {
-    let key = format!("{}/{file}", files.key);
-    archived::check_kept(app, &key, "recording").await?;
-    let [home, away] = game.teams;
-    let name = plain(&format!(
-        "faceoff-{}-{}",
-        sheet.name(home)?,
-        sheet.name(away)?
-    ));
-    match download(app, &key, "application/zip", &format!("{name}-{file}")).await {
-        Err(StoreError::NotFound(_)) => {
-            // It may have been voided meanwhile, and what it had be gone. One that is promised must be there.
-            recording_of(&app.store.game(game.id).await?)?;
-            Err(Problem::internal(format_args!("{key} is lost")))
+/// Which file of a game.
+#[derive(Debug, Clone, Copy)]
+enum Which {
+    BothSides,
+    Side(Side),
+}
+
+/// A file of a game that the viewer may have now.
+#[derive(Debug)]
+struct Recorded {
+    game: GameId,
+    /// Among the artifacts.
+    key: String,
+    blake3: String,
+    /// To be stored as.
+    name: String,
+}
+
+impl Recorded {
+    async fn find(app: &App, viewer: Viewer, id: GameId, which: Which) -> Result<Self, Problem> {
+        let (sheet, game) = game::known(app, viewer, id).await?;
+        let sight = sheet.sight(viewer);
+        let is_theirs = match which {
+            Which::BothSides => false,
+            Which::Side(side) => sight.is_own(&game, side),
+        };
+        if !is_theirs && !sight.sees_both_sides(&game) {
+            let what = match which {
+                Which::BothSides => "the recording of both sides".to_owned(),
+                Which::Side(side) => format!("the file of side {}", side.number()),
+            };
+            return Err(sight.refused(&game, &what));
         }
-        answer => Ok(answer?),
+        let files = recording_of(&game)?;
+        let (file, blake3) = match which {
+            Which::BothSides => ("game.zip".to_owned(), &files.game_blake3),
+            Which::Side(side) => {
+                let file = format!("side-{}.zip", side.number());
+                (file, &files.side_blake3[side.index()])
+            }
+        };
+        let key = format!("{}/{file}", files.key);
+        archived::check_kept(app, &key, "recording").await?;
+        Ok(Self {
+            game: id,
+            name: stored_as(&sheet, &game, &file)?,
+            key,
+            blake3: blake3.clone(),
+        })
+    }
+
+    async fn send(&self, app: &App, conditions: &Conditions) -> Result<Response, Problem> {
+        let file = Download {
+            key: &self.key,
+            blake3: Some(&self.blake3),
+            media_type: "application/zip",
+            name: &self.name,
+        };
+        match download(app, conditions, file).await {
+            Err(StoreError::NotFound(_)) => {
+                // It may have been voided meanwhile, and what it had be gone. One that is promised must be there.
+                recording_of(&app.store.game(self.game).await?)?;
+                Err(Problem::internal(format_args!("{} is lost", self.key)))
+            }
+            answer => Ok(answer?),
+        }
     }
 }
 
-/// Nothing that a header or a file system could trip over.
-fn plain(name: &str) -> String {
-    name.chars()
-        .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
-        .collect()
+fn stored_as(sheet: &TournamentSheet, game: &Game, file: &str) -> Result<String, Problem> {
+    let [home, away] = game.teams;
+    let teams = format!("faceoff-{}-{}", sheet.name(home)?, sheet.name(away)?);
+    Ok(format!("{}-{file}", plain(&teams)))
 }

@@ -4,7 +4,8 @@ use super::rulings::checked_reason;
 use crate::{
     app::App,
     auth::{Caller, Organiser},
-    extract::{Json as Body, PathParam, QueryParams},
+    extract::{Json as Body, PathParam},
+    paging::{BesidePage, Page, PageQuery, Paged},
     problem::{Problem, ProblemKind},
     requests::{Decision, GamesQuery},
     viewer::Viewer,
@@ -20,22 +21,26 @@ use faceoff_types::{GameId, TournamentId};
 
 /// The games of a tournament's rounds, in the order of play, each with what it came to and why.
 #[utoipa::path(
-    get, path = "/tournaments/{id}/games", tag = "public", params(("id" = TournamentId, Path), GamesQuery),
+    get, path = "/tournaments/{id}/games", tag = "public", security((), ("team" = []), ("organiser" = [])),
+    params(("id" = TournamentId, Path), GamesQuery, PageQuery),
     responses((status = 200, body = Vec<GameView>), (status = 404))
 )]
 pub(crate) async fn list_games(
     viewer: Viewer,
+    page: Page<GameId>,
     State(app): State<App>,
     PathParam(id): PathParam<TournamentId>,
-    QueryParams(query): QueryParams<GamesQuery>,
-) -> Result<Json<Vec<GameView>>, Problem> {
+    BesidePage(query): BesidePage<GamesQuery>,
+) -> Result<Paged<GameView>, Problem> {
     let sheet = TournamentSheet::find(&app, id).await?;
-    GameView::of_rounds(&sheet, viewer, query.round).map(Json)
+    let games = GameView::of_rounds(&sheet, viewer, query.round)?;
+    page.cut(games, |game| game.id)
 }
 
 /// One game. What does not count is seen by its two teams and organisers alone.
 #[utoipa::path(
-    get, path = "/games/{id}", tag = "public", params(("id" = GameId, Path)),
+    get, path = "/games/{id}", tag = "public", security((), ("team" = []), ("organiser" = [])),
+    params(("id" = GameId, Path)),
     responses((status = 200, body = GameView), (status = 404))
 )]
 pub(crate) async fn game(

@@ -2,40 +2,10 @@
 
 use crate::{
     app::App,
-    problem::{Problem, ProblemKind},
-    views::ruling::RulingView,
+    problem::Problem,
+    views::health::{HealthView, LiveView},
 };
 use axum::{Json, extract::State};
-use faceoff_store::QueueHealth;
-use serde::Serialize;
-use utoipa::ToSchema;
-
-/// The server does all that it is for.
-#[derive(Debug, Serialize, ToSchema)]
-pub(crate) struct HealthView {
-    /// Always `ok`; anything else is a problem with status 503.
-    #[schema(example = "ok")]
-    status: &'static str,
-    /// Version of the server.
-    version: &'static str,
-    /// Units of work that are being done.
-    running: u32,
-    /// Units of work that could be begun.
-    waiting: u32,
-    /// The organiser holds the queue: since when, and why; absent otherwise.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    paused: Option<RulingView>,
-}
-
-/// The process answers.
-#[derive(Debug, Serialize, ToSchema)]
-pub(crate) struct LiveView {
-    /// Always `alive`.
-    #[schema(example = "alive")]
-    status: &'static str,
-    /// Version of the server.
-    version: &'static str,
-}
 
 /// Readiness: the database can be written (it is tried, once a second at most), the queue moves, and the
 /// disks have room. Otherwise a problem, whose `database`, `queue` and `room` say what is missing.
@@ -47,90 +17,12 @@ pub(crate) struct LiveView {
     )
 )]
 pub(crate) async fn health(State(app): State<App>) -> Result<Json<HealthView>, Problem> {
-    let room = app.store.room();
-    let short = room.is_short();
-    let health = app.store.health(app.config.clock.now()).await;
-    let without_room = match health.queue {
-        QueueHealth::Moving { without_room, .. } => without_room,
-        _ => 0,
-    };
-    let (running, waiting, queue) = match health.queue {
-        QueueHealth::Moving {
-            running, waiting, ..
-        } => (running, waiting, "moving"),
-        QueueHealth::Held {
-            running, waiting, ..
-        } => (running, waiting, "held"),
-        QueueHealth::Paused { waiting } => (0, waiting, "paused"),
-        QueueHealth::Stuck { waiting, .. } => (0, waiting, "stuck"),
-        QueueHealth::Unknown => (0, 0, "unknown"),
-    };
-    let mut missing = Vec::new();
-    if !health.database_writable {
-        missing.push("the database cannot be written".to_owned());
-    }
-    if short {
-        missing.push(format!(
-            "less than {} bytes are free on the disk, so the queue pauses and uploads are refused",
-            room.min_free_bytes()
-        ));
-    }
-    if without_room > 0 {
-        missing.push(format!(
-            "{without_room} units of work found no room again and again although the disk has what is to be kept \
-             free: they need more than that; they are tried on"
-        ));
-    }
-    match &health.queue {
-        QueueHealth::Stuck { waiting, since } => {
-            missing.push(format!(
-                "{waiting} units of work wait, the first since {since}, and nobody works"
-            ));
-        }
-        QueueHealth::Unknown => missing.push("the queue cannot be read".to_owned()),
-        QueueHealth::Moving { .. } | QueueHealth::Held { .. } | QueueHealth::Paused { .. } => {}
-    }
-    if missing.is_empty() {
-        return Ok(Json(HealthView {
-            status: "ok",
-            version: env!("CARGO_PKG_VERSION"),
-            running,
-            waiting,
-            paused: match health.queue {
-                QueueHealth::Held { ruling, .. } => Some(ruling.into()),
-                _ => None,
-            },
-        }));
-    }
-    // How much is free exactly would tell every team how large the others' uploads are.
-    Err(Problem::new(ProblemKind::NotReady, missing.join("; "))
-        .with(
-            "database",
-            if health.database_writable {
-                "writable"
-            } else {
-                "not writable"
-            },
-        )
-        .with("queue", queue)
-        .with(
-            "room",
-            match (short, without_room > 0) {
-                (true, _) => "short",
-                (false, true) => "too little for some work",
-                (false, false) => "enough",
-            },
-        )
-        .with("min_free_bytes", room.min_free_bytes())
-        .with("waiting", waiting))
+    HealthView::now(&app).await.map(Json)
 }
 
 /// Liveness: the process answers, whatever it lacks. A server that is not ready is not to be restarted
 /// for that.
 #[utoipa::path(get, path = "/health/live", tag = "public", responses((status = 200, body = LiveView)))]
 pub(crate) async fn live() -> Json<LiveView> {
-    Json(LiveView {
-        status: "alive",
-        version: env!("CARGO_PKG_VERSION"),
-    })
+    Json(LiveView::ALIVE)
 }

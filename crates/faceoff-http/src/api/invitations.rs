@@ -5,6 +5,7 @@ use crate::{
     app::App,
     auth::Caller,
     extract::{Json as Body, PathParam},
+    paging::{Page, PageQuery, Paged},
     problem::{Problem, ProblemKind},
     requests::{self, InvitedRole, Join},
     text,
@@ -118,21 +119,19 @@ pub(crate) async fn create_invitation(
 /// The invitations that the caller may manage, the newest first: an organiser's are all of them.
 #[utoipa::path(
     get, path = "/invitations", tag = "people", security(("team" = []), ("organiser" = [])),
+    params(PageQuery),
     responses((status = 200, body = Vec<InvitationView>))
 )]
 pub(crate) async fn list_invitations(
     caller: Caller,
+    page: Page<InvitationId>,
     State(app): State<App>,
-) -> Result<Json<Vec<InvitationView>>, Problem> {
+) -> Result<Paged<InvitationView>, Problem> {
     let now = app.config.clock.now();
     let mut invitations = app.store.invitations().await?;
     invitations.retain(|invitation| may_manage(&caller, invitation));
-    let views = invitations.into_iter();
-    Ok(Json(
-        views
-            .map(|invitation| InvitationView::of(invitation, now))
-            .collect(),
-    ))
+    let page = page.cut(invitations, |invitation| invitation.id)?;
+    Ok(page.map(|invitation| InvitationView::of(invitation, now)))
 }
 
 /// Takes an invitation back: its link is worth nothing from then on.

@@ -1,5 +1,6 @@
 //! A game as it is played, by server-sent events.
 
+use super::told::{LAST_EVENT_ID, told};
 use crate::{
     app::App,
     ending::Ending,
@@ -9,22 +10,10 @@ use crate::{
     viewer::Viewer,
     views::game,
 };
-use axum::{
-    Extension,
-    extract::State,
-    http::{HeaderMap, HeaderName},
-    response::{
-        AppendHeaders, IntoResponse,
-        sse::{KeepAlive, Sse},
-    },
-};
+use axum::{Extension, extract::State, http::HeaderMap, response::IntoResponse};
 use faceoff_types::GameId;
-use futures::{StreamExt as _, stream};
-use std::{convert::Infallible, sync::Arc, time::Duration};
-
-const LAST_EVENT_ID: &str = "last-event-id";
-/// Proxies close what says nothing for a minute.
-const KEEP_ALIVE: Duration = Duration::from_secs(15);
+use futures::stream;
+use std::sync::Arc;
 
 /// Follows a game: `snapshot` (how it stands), then every `happening` in order, and `position` ten times a second at
 /// most, of which only the newest is told; `waiting` while no slot plays it; at the end `over`, and the stream ends.
@@ -32,7 +21,7 @@ const KEEP_ALIVE: Duration = Duration::from_secs(15);
 /// The id of a happening is `ATTEMPT.NUMBER`. Who comes again with the header `Last-Event-ID` gets a snapshot and all
 /// that happened since; of another attempt everything. Streams end after an hour at most, and when the server ends.
 #[utoipa::path(
-    get, path = "/games/{id}/live", tag = "public",
+    get, path = "/games/{id}/live", tag = "public", security((), ("team" = []), ("organiser" = [])),
     params(
         ("id" = GameId, Path),
         ("Last-Event-ID" = Option<String>, Header, description = "the id of the last event that came", example = "1.17"),
@@ -71,9 +60,5 @@ pub(crate) async fn watch_game(
         let batch = reader.next().await?;
         Some((batch, reader))
     });
-    let events = batches.flat_map(stream::iter).map(Ok::<_, Infallible>);
-    let events = Sse::new(events).keep_alive(KeepAlive::new().interval(KEEP_ALIVE));
-    // A proxy that collects answers would hold what is told now.
-    let unbuffered = [(HeaderName::from_static("x-accel-buffering"), "no")];
-    Ok((AppendHeaders(unbuffered), events))
+    Ok(told(batches))
 }

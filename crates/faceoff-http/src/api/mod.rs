@@ -14,6 +14,7 @@ mod downloads;
 mod entrants;
 mod episodes;
 mod evaluations;
+mod event_stream;
 mod events;
 mod free_games;
 mod freezes;
@@ -26,6 +27,7 @@ mod me;
 mod people;
 mod proposals;
 mod ratings;
+mod recorded;
 mod registrations;
 mod replays;
 mod rounds;
@@ -42,13 +44,15 @@ mod submissions;
 mod teams;
 mod terms;
 mod tokens;
+mod told;
 mod tournaments;
 mod turns;
 mod upload;
+mod webhooks;
 
 use crate::{app::App, extract::MAX_JSON_BYTES, layers, paths::API_BASE};
 use axum::{Json, Router, extract::DefaultBodyLimit, middleware, routing::get};
-use document::{Document, describe_errors};
+use document::Document;
 use std::{sync::Arc, time::Duration};
 use utoipa::OpenApi;
 use utoipa_axum::{router::OpenApiRouter, routes};
@@ -62,6 +66,7 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(season::close_season))
         .routes(routes!(runtimes::runtimes))
         .routes(routes!(board::board))
+        .routes(routes!(board::board_history))
         .routes(routes!(board::task_board))
         .routes(routes!(me::me))
         .routes(routes!(teams::create_team, teams::list_teams))
@@ -73,6 +78,15 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(tokens::list_tokens, tokens::create_token))
         .routes(routes!(tokens::revoke_token))
         .routes(routes!(tokens::rotate_token))
+        .routes(routes!(webhooks::list_webhooks, webhooks::create_webhook))
+        .routes(routes!(
+            webhooks::webhook,
+            webhooks::change_webhook,
+            webhooks::remove_webhook
+        ))
+        .routes(routes!(webhooks::rotate_webhook))
+        .routes(routes!(webhooks::test_webhook))
+        .routes(routes!(webhooks::list_deliveries))
         .routes(routes!(sessions::create_session))
         .routes(routes!(sessions::end_session))
         .routes(routes!(people::list_people))
@@ -115,6 +129,7 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(proposals::apply_proposal))
         .routes(routes!(proposals::drop_proposal))
         .routes(routes!(events::list_events))
+        .routes(routes!(event_stream::follow_events))
         .routes(routes!(submissions::list_submissions))
         .routes(routes!(
             submissions::submission,
@@ -122,6 +137,7 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
             submission_archives::delete_submission
         ))
         .routes(routes!(submission_archives::submission_archive))
+        .routes(routes!(submission_archives::link_archive))
         .routes(routes!(storage::storage))
         .routes(routes!(storage::team_storage))
         .routes(routes!(submissions::withdraw_submission))
@@ -139,6 +155,7 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(rulings::resume_queue))
         .routes(routes!(rulings::reinstate_team))
         .routes(routes!(datasets::dataset))
+        .routes(routes!(datasets::link_dataset))
         .routes(routes!(datasets::violations))
         .routes(routes!(datasets::publish_evaluation))
         .routes(routes!(comparisons::compare))
@@ -172,6 +189,8 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .routes(routes!(game_files::side))
         .routes(routes!(game_files::side_log))
         .routes(routes!(game_files::recording))
+        .routes(routes!(game_files::link_side))
+        .routes(routes!(game_files::link_recording))
         .routes(routes!(live_game::watch_game))
         .layer(middleware::from_fn_with_state(patience, layers::time_out))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES));
@@ -185,8 +204,7 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .nest(API_BASE, resources.merge(uploads).merge(archives))
         .split_for_parts();
     document.info = Document::openapi().info;
-    describe_errors(&mut document);
-    let document = Arc::new(document);
+    let document = Arc::new(document::told(document));
     router.route(
         &format!("{API_BASE}/openapi.json"),
         get(move || {

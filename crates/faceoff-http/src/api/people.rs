@@ -4,6 +4,7 @@ use crate::{
     app::App,
     auth::Caller,
     extract::{Json as Body, PathParam},
+    paging::{Page, PageQuery, Paged},
     problem::{Problem, ProblemKind},
     requests::{Confirmation, NewPassword},
     views::person::PersonView,
@@ -15,17 +16,20 @@ use faceoff_types::PersonId;
 /// The people whom the caller may see: an organiser everybody, a team its members.
 #[utoipa::path(
     get, path = "/people", tag = "people", security(("team" = []), ("organiser" = [])),
+    params(PageQuery),
     responses((status = 200, body = Vec<PersonView>))
 )]
 pub(crate) async fn list_people(
     caller: Caller,
+    page: Page<PersonId>,
     State(app): State<App>,
-) -> Result<Json<Vec<PersonView>>, Problem> {
+) -> Result<Paged<PersonView>, Problem> {
     let people = match caller.team() {
         Some(team) => app.store.members_of(team.id).await?,
         None => app.store.people().await?,
     };
-    Ok(Json(people.into_iter().map(PersonView::from).collect()))
+    let page = page.cut(people, |person| person.id)?;
+    Ok(page.map(PersonView::from))
 }
 
 /// The person, if the caller is an organiser or that person; a teammate is seen, and not acted for.

@@ -1,10 +1,11 @@
 //! Trials and re-evaluations: made, looked at, applied or dropped by the organiser, and seen by nobody else.
 
-use super::rulings::checked_reason;
+use super::{recorded::Recorded, rulings::checked_reason};
 use crate::{
     app::App,
     auth::Organiser,
     extract::{Json as Body, OptionalJson, PathParam},
+    paging::{Page, PageQuery, Paged},
     problem::{Problem, ProblemKind},
     requests::{Confirmation, NewProposal, Trial},
     viewer::Viewer,
@@ -12,19 +13,22 @@ use crate::{
 };
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_store::{EvaluationState, Reevaluation, Settled, StoreError};
-use faceoff_types::{EvaluationId, ProposalId, StageDay, StageId, TeamId};
-use jiff::civil::Date;
+use faceoff_types::{EvaluationId, ProposalId, StageDay, StageId};
 
 /// All trials and proposals, the newest first, without what they play.
 #[utoipa::path(
     get, path = "/proposals", tag = "organiser", security(("organiser" = [])),
+    params(PageQuery),
     responses((status = 200, body = Vec<ProposalView>))
 )]
 pub(crate) async fn list_proposals(
     _: Organiser,
+    page: Page<ProposalId>,
     State(app): State<App>,
-) -> Result<Json<Vec<ProposalView>>, Problem> {
-    ProposalView::all(&app).await.map(Json)
+) -> Result<Paged<ProposalView>, Problem> {
+    let page = page.cut(app.store.proposals().await?, |proposal| proposal.id)?;
+    page.seen(async |proposals| ProposalView::heads(&app, proposals).await)
+        .await
 }
 
 /// One, with what it plays; once all of it is played, the board as it is and as it would be, and whose rank or score
@@ -191,8 +195,8 @@ pub(crate) async fn drop_proposal(
     ProposalView::find(&app, id).await.map(Json)
 }
 
-/// Of what a trial or a proposal has played, that is not applied: its team, its date, and the name of its dataset among
-/// the artifacts. `None` of what it is not, and for everybody but organisers.
+/// The dataset of what a trial or a proposal has played, that is not applied. `None` of what it is not, and for
+/// everybody but organisers.
 ///
 /// # Errors
 /// `Gone` once it is dropped; `Conflict` if it has no dataset.
@@ -200,7 +204,7 @@ pub(super) async fn dataset(
     viewer: Viewer,
     app: &App,
     id: EvaluationId,
-) -> Result<Option<(TeamId, Date, String)>, Problem> {
+) -> Result<Option<Recorded>, Problem> {
     if viewer != Viewer::Organiser {
         return Ok(None);
     }
@@ -225,15 +229,24 @@ pub(super) async fn dataset(
         None => {}
     }
     let why_not = match draft.state {
-        EvaluationState::Finished { dataset, .. } => {
-            let date = match proposal.kind.day() {
+        EvaluationState::Finished {
+            dataset,
+            dataset_blake3,
+            ..
+        } => {
+            let day = match proposal.kind.day() {
                 Some(day) => day,
                 None => {
                     let stage = app.store.stage(proposal.stage).await?;
                     stage.day(proposal.created_at).date
                 }
             };
-            return Ok(Some((draft.team, date, dataset)));
+            return Ok(Some(Recorded {
+                team: draft.team,
+                day,
+                dataset,
+                blake3: dataset_blake3,
+            }));
         }
         EvaluationState::Queued | EvaluationState::Running { .. } | EvaluationState::Finalising => {
             "is not finished; follow it there until its state is “finished”"

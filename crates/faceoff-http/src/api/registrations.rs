@@ -6,6 +6,7 @@ use crate::{
     app::App,
     auth::Organiser,
     extract::{Json as Body, PathParam},
+    paging::{Page, PageQuery, Paged},
     problem::Problem,
     requests::{Reason, Register},
     views::invitation::{NewRegistrationView, RegistrationView},
@@ -33,14 +34,17 @@ pub(crate) async fn register(
 /// All registrations, the newest first.
 #[utoipa::path(
     get, path = "/registrations", tag = "organiser", security(("organiser" = [])),
+    params(PageQuery),
     responses((status = 200, body = Vec<RegistrationView>))
 )]
 pub(crate) async fn list_registrations(
     _: Organiser,
+    page: Page<RegistrationId>,
     State(app): State<App>,
-) -> Result<Json<Vec<RegistrationView>>, Problem> {
-    let registrations = app.store.registrations().await?.into_iter();
-    Ok(Json(registrations.map(RegistrationView::from).collect()))
+) -> Result<Paged<RegistrationView>, Problem> {
+    let registrations = app.store.registrations().await?;
+    let page = page.cut(registrations, |registration| registration.id)?;
+    Ok(page.map(RegistrationView::from))
 }
 
 /// Lets a registered team take part: the link of its registration is its first member's for seven days from now on.

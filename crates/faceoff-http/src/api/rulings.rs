@@ -67,7 +67,7 @@ pub(crate) async fn void_evaluation(
 /// Voids a whole day: what has ended leaves the boards, what is under way is cancelled, and the day is released.
 #[utoipa::path(
     post, path = "/stages/{id}/days/{day}/void", tag = "organiser", security(("organiser" = [])),
-    params(("id" = StageId, Path), ("day" = String, Path, example = "2026-03-01")), request_body = Decision,
+    params(("id" = StageId, Path), ("day" = Date, Path, example = "2026-03-01")), request_body = Decision,
     responses(
         (status = 200, body = DayView),
         (status = 404),

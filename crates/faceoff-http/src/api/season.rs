@@ -12,7 +12,10 @@ use crate::{
 use axum::{Json, extract::State};
 
 /// The season.
-#[utoipa::path(get, path = "/season", tag = "public", responses((status = 200, body = SeasonView)))]
+#[utoipa::path(
+    get, path = "/season", tag = "public", security((), ("team" = []), ("organiser" = [])),
+    responses((status = 200, body = SeasonView))
+)]
 pub(crate) async fn season(
     viewer: Viewer,
     State(app): State<App>,

@@ -1,5 +1,6 @@
 //! The season as one file, to take along.
 
+use super::document::Binary;
 use crate::{
     app::App,
     archive::{self, one_at_a_time},
@@ -25,7 +26,7 @@ use std::sync::Arc;
 #[utoipa::path(
     get, path = "/season/archive", tag = "organiser", security(("organiser" = [])), params(ArchiveQuery),
     responses(
-        (status = 200, body = Vec<u8>, content_type = "application/zstd"),
+        (status = 200, body = inline(Binary), content_type = "application/zstd"),
         (status = 409, description = "this server shows a public archive, and the organiser's was asked for"),
         (status = 503, description = "another one is being made"),
         (status = 507, description = "the server's disk has too little room"),

@@ -74,7 +74,8 @@ pub(super) async fn check_robot(app: &App, settings: &PerturbationSettings) -> R
 
 /// All stages, the first to open first.
 #[utoipa::path(
-    get, path = "/stages", tag = "public", responses((status = 200, body = Vec<StageView>))
+    get, path = "/stages", tag = "public", security((), ("team" = []), ("organiser" = [])),
+    responses((status = 200, body = Vec<StageView>))
 )]
 pub(crate) async fn list_stages(
     viewer: Viewer,
@@ -85,7 +86,8 @@ pub(crate) async fn list_stages(
 
 /// One stage.
 #[utoipa::path(
-    get, path = "/stages/{id}", tag = "public", params(("id" = StageId, Path)),
+    get, path = "/stages/{id}", tag = "public", security((), ("team" = []), ("organiser" = [])),
+    params(("id" = StageId, Path)),
     responses((status = 200, body = StageView), (status = 404))
 )]
 pub(crate) async fn stage(

@@ -1,53 +1,98 @@
 //! The archives of submissions: downloaded, and deleted.
 
-use super::{downloads::download, rulings::checked_reason};
+use super::{
+    document::{Binary, FileHeaders},
+    downloads::{Download, download},
+    rulings::checked_reason,
+};
 use crate::{
     app::App,
     archived,
     auth::Caller,
+    conditions::Conditions,
     extract::{OptionalJson, PathParam},
+    links::{self, LinkOr, LinkQuery},
+    paths,
     problem::Problem,
-    requests::DeleteSubmission,
-    views::submission::SubmissionView,
+    requests::{DeleteSubmission, NewLink},
+    views::{link::LinkView, submission::SubmissionView},
 };
-use axum::{Json, extract::State, response::Response};
+use axum::{Json, extract::State, http::StatusCode, response::Response};
 use faceoff_store::{StoreError, Submission};
 use faceoff_types::SubmissionId;
 
 /// The archive as it was uploaded; for its team and the organiser.
 #[utoipa::path(
     get, path = "/submissions/{id}/archive", tag = "team", security(("team" = []), ("organiser" = [])),
-    params(("id" = SubmissionId, Path)),
+    params(("id" = SubmissionId, Path), FileHeaders, LinkQuery),
     responses(
-        (status = 200, body = Vec<u8>, content_type = "application/octet-stream"),
+        (status = 200, body = inline(Binary), content_type = "application/octet-stream"),
+        (status = 403, description = "the link is not good"),
         (status = 404),
-        (status = 410, description = "it was removed; the detail says when and why"),
+        (status = 410, description = "it was removed, and the detail says when and why; or the link has expired"),
     )
 )]
 pub(crate) async fn submission_archive(
-    caller: Caller,
+    LinkOr(caller): LinkOr<Caller>,
+    conditions: Conditions,
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,
 ) -> Result<Response, Problem> {
+    let submission = downloadable(&caller, &app, id).await?;
+    let bundle = &submission.bundle;
+    let stored_as = bundle.key.rsplit('/').next().unwrap_or_default();
+    let format = stored_as.split_once('.').map_or("bundle", |(_, end)| end);
+    let file = Download {
+        key: &bundle.key,
+        blake3: Some(&bundle.blake3),
+        media_type: "application/octet-stream",
+        name: &format!("faceoff-submission-{id}.{format}"),
+    };
+    match download(&app, &conditions, file).await {
+        Err(StoreError::NotFound(_)) => {
+            // It may have gone meanwhile.
+            check_kept(&app.store.submission(id).await?)?;
+            Err(Problem::internal(format_args!("{} is lost", file.key)))
+        }
+        answer => Ok(answer?),
+    }
+}
+
+/// A link that downloads the archive without a token, for a time; made by whoever may download it now.
+///
+/// What it opens is decided when it is followed, as if whoever made it asked then.
+#[utoipa::path(
+    post, path = "/submissions/{id}/archive/link", tag = "team", security(("team" = []), ("organiser" = [])),
+    params(("id" = SubmissionId, Path)),
+    request_body(content = Option<NewLink>, content_type = "application/json"),
+    responses(
+        (status = 201, body = LinkView),
+        (status = 404),
+        (status = 410, description = "it was removed"),
+        (status = 422),
+    )
+)]
+pub(crate) async fn link_archive(
+    caller: Caller,
+    State(app): State<App>,
+    PathParam(id): PathParam<SubmissionId>,
+    OptionalJson(wanted): OptionalJson<NewLink>,
+) -> Result<(StatusCode, Json<LinkView>), Problem> {
+    downloadable(&caller, &app, id).await?;
+    let path = format!("{}/archive", paths::submission(id));
+    links::link(&app, &caller, &path, wanted).await
+}
+
+/// A submission whose archive the caller may have now.
+async fn downloadable(caller: &Caller, app: &App, id: SubmissionId) -> Result<Submission, Problem> {
     let found = app.store.submission(id).await;
     let submission = caller.visible("submission", found, |submission| submission.team)?;
     // An organiser gets at evidence as long as the file is there, whoever had it deleted.
     if !caller.is_organiser() {
         check_kept(&submission)?;
     }
-    let key = &submission.bundle.key;
-    archived::check_kept(&app, key, "submission").await?;
-    let stored_as = key.rsplit('/').next().unwrap_or_default();
-    let format = stored_as.split_once('.').map_or("bundle", |(_, end)| end);
-    let name = format!("faceoff-submission-{id}.{format}");
-    match download(&app, key, "application/octet-stream", &name).await {
-        Err(StoreError::NotFound(_)) => {
-            // It may have gone meanwhile.
-            check_kept(&app.store.submission(id).await?)?;
-            Err(Problem::internal(format_args!("{key} is lost")))
-        }
-        answer => Ok(answer?),
-    }
+    archived::check_kept(app, &submission.bundle.key, "submission").await?;
+    Ok(submission)
 }
 
 fn check_kept(submission: &Submission) -> Result<(), Problem> {

@@ -4,6 +4,7 @@ use crate::{
     app::App,
     auth::{Caller, TeamCaller},
     extract::{Json as Body, PathParam},
+    paging::{Page, PageQuery, Paged},
     problem::{Problem, ProblemKind},
     requests::SubmissionChange,
     views::submission::SubmissionView,
@@ -21,15 +22,22 @@ const MAX_NOTE_CHARS: usize = 2000;
 /// The calling team's submissions, newest first.
 #[utoipa::path(
     get, path = "/submissions", tag = "team", security(("team" = [])),
+    params(PageQuery),
     responses((status = 200, body = Vec<SubmissionView>))
 )]
 pub(crate) async fn list_submissions(
     caller: TeamCaller,
+    page: Page<SubmissionId>,
     State(app): State<App>,
-) -> Result<Json<Vec<SubmissionView>>, Problem> {
-    SubmissionView::of_team(&app, caller.team.id)
+) -> Result<Paged<SubmissionView>, Problem> {
+    let team = caller.team.id;
+    let rows = app
+        .store
+        .submissions_after(team, page.after, page.limit + 1);
+    let rows = rows.await?.ok_or_else(|| page.unknown())?;
+    let page = page.of_more(rows, |submission| submission.id);
+    page.seen(async |rows| SubmissionView::all(&app, rows).await)
         .await
-        .map(Json)
 }
 
 /// One submission with its verdict: the reason and the agent's log.

@@ -5,6 +5,7 @@ use crate::{
     app::App,
     auth::{Caller, Organiser},
     extract::{Json as Body, PathParam},
+    paging::{Page, PageQuery, Paged},
     problem::{Problem, ProblemKind},
     requests::{self, Confirmation, NewTeam},
     token::{Secret, SecretKind},
@@ -49,13 +50,15 @@ pub(crate) async fn create_team(
 /// All teams.
 #[utoipa::path(
     get, path = "/teams", tag = "organiser", security(("organiser" = [])),
+    params(PageQuery),
     responses((status = 200, body = Vec<TeamView>))
 )]
 pub(crate) async fn list_teams(
     _: Organiser,
+    page: Page<TeamId>,
     State(app): State<App>,
-) -> Result<Json<Vec<TeamView>>, Problem> {
-    TeamView::all(&app).await.map(Json)
+) -> Result<Paged<TeamView>, Problem> {
+    page.cut(TeamView::all(&app).await?, |team| team.id)
 }
 
 /// Replaces a team's own tokens by a new one; the old ones are worth nothing from now on. Its members' stay.
@@ -96,14 +99,14 @@ async fn own(app: &App, caller: &Caller, id: TeamId) -> Result<Team, Problem> {
     Ok(team)
 }
 
-/// Changes a team's name, or what it tells of itself. By an organiser or a member; the division by an organiser alone.
+/// Changes a team's name, or what it tells of itself. By an organiser or a member; the division, and whether it is a baseline, by an organiser alone.
 #[utoipa::path(
     patch, path = "/teams/{id}", tag = "people", security(("team" = []), ("organiser" = [])),
     params(("id" = TeamId, Path)), request_body = requests::TeamChange,
     responses(
         (status = 200, body = TeamView),
         (status = 403), (status = 404),
-        (status = 409, description = "the name is taken, there is no such division, or the season is closed"),
+        (status = 409, description = "the name is taken, there is no such division, a board that is signed off would have other ranks, or the season is closed"),
         (status = 422),
     )
 )]
@@ -120,6 +123,12 @@ pub(crate) async fn change_team(
             "division: only an organiser puts a team into another division",
         ));
     }
+    if change.baseline.is_some() && !caller.is_organiser() {
+        return Err(Problem::new(
+            ProblemKind::Forbidden,
+            "baseline: only an organiser says which team is a baseline",
+        ));
+    }
     let described = requests::FoundedTeam {
         name: change.name.clone().unwrap_or_else(|| team.name.clone()),
         affiliation: change.affiliation.unwrap_or(team.profile.affiliation),
@@ -131,6 +140,7 @@ pub(crate) async fn change_team(
     let change = TeamChange {
         name: change.name,
         profile: Some(profile),
+        baseline: change.baseline,
     };
     let now = app.config.clock.now();
     let team = app

@@ -4,6 +4,7 @@ use crate::{
     app::App,
     auth::Caller,
     extract::{Json as Body, PathParam},
+    paging::{Page, PageQuery, Paged},
     problem::{Problem, ProblemKind},
     requests, text,
     token::{Secret, SecretKind},
@@ -51,15 +52,18 @@ pub(crate) async fn whoami(caller: Caller) -> Json<WhoView> {
 /// The tokens and sessions that the caller may manage, the newest first: an organiser's are all of them.
 #[utoipa::path(
     get, path = "/tokens", tag = "people", security(("team" = []), ("organiser" = [])),
+    params(PageQuery),
     responses((status = 200, body = Vec<TokenView>))
 )]
 pub(crate) async fn list_tokens(
     caller: Caller,
+    page: Page<TokenId>,
     State(app): State<App>,
-) -> Result<Json<Vec<TokenView>>, Problem> {
+) -> Result<Paged<TokenView>, Problem> {
     let mut tokens = app.store.tokens().await?;
     tokens.retain(|token| may_manage(&caller, token));
-    Ok(Json(tokens.into_iter().map(TokenView::from).collect()))
+    let page = page.cut(tokens, |token| token.id)?;
+    Ok(page.map(TokenView::from))
 }
 
 /// By whom a new token speaks.

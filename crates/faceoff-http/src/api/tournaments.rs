@@ -8,7 +8,7 @@ use crate::{
     acts::entering,
     app::App,
     auth::Organiser,
-    extract::{Json as Body, PathParam},
+    extract::{Json as Body, PathParam, objects_only},
     paths,
     problem::Problem,
     requests::{Confirmation, NewTournament, Reason, TournamentChange},
@@ -55,7 +55,7 @@ pub(crate) async fn tournament(
 #[utoipa::path(
     post, path = "/tournaments", tag = "organiser", security(("organiser" = [])), request_body = NewTournament,
     responses(
-        (status = 201, body = TournamentView),
+        (status = 201, body = TournamentView, headers(("Location" = String, description = "where it is, from the server's root"))),
         (status = 404, description = "no such stage"),
         (status = 409, description = "the name is taken, or the season is closed"),
         (status = 422),
@@ -260,8 +260,9 @@ fn merged<T: Serialize + DeserializeOwned>(
             value => drop(all.insert(field, value)),
         }
     }
-    serde_path_to_error::deserialize(Value::Object(all))
-        .map_err(|error| Problem::invalid(what, error))
+    let value = Value::Object(all);
+    objects_only::check::<T>(&value).map_err(|error| Problem::invalid(what, error))?;
+    serde_path_to_error::deserialize(value).map_err(|error| Problem::invalid(what, error))
 }
 
 async fn changed_rules(

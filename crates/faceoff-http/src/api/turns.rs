@@ -66,9 +66,9 @@ pub(crate) async fn start_missed_day(
 /// the day's are public; its row says so, and is not compared episode by episode.
 #[utoipa::path(
     post, path = "/stages/{id}/days/{day}/extra-turn", tag = "organiser", security(("organiser" = [])),
-    params(("id" = StageId, Path), ("day" = String, Path, example = "2026-03-01")), request_body = ExtraTurn,
+    params(("id" = StageId, Path), ("day" = Date, Path, example = "2026-03-01")), request_body = ExtraTurn,
     responses(
-        (status = 201, body = EvaluationView),
+        (status = 201, body = EvaluationView, headers(("Location" = String, description = "where it is, from the server's root"))),
         (status = 403, description = "the team is disqualified"),
         (status = 404),
         (status = 409, description = "a result that counts would be replaced, and the team's name does not confirm it (nothing is done); one is under way; the team has nothing active; the stage is not open, or the season is closed"),

@@ -1,6 +1,9 @@
 //! Uploading an agent.
 
-use super::bundle_stream::{self, Allowance, Uploaded};
+use super::{
+    bundle_stream::{self, Allowance, Uploaded},
+    document::Binary,
+};
 use crate::{
     app::App,
     auth::TeamCaller,
@@ -52,10 +55,26 @@ const ARCHIVE_TYPES: [&str; 8] = [
 ///
 /// It is unpacked and started in a smoke run; follow the submission until it is `valid` or `invalid`.
 #[utoipa::path(
-    post, path = "/submissions", tag = "team", security(("team" = [])), params(UploadQuery),
-    request_body(content = Vec<u8>, content_type = "application/octet-stream"),
+    post, path = "/submissions", tag = "team", security(("team" = [])),
+    params(
+        UploadQuery,
+        ("X-File-Name" = Option<String>, Header, description = "another place for the archive's name", example = "striker.tar.gz"),
+    ),
+    request_body(
+        description = "the archive itself",
+        content(
+            (inline(Binary) = "application/octet-stream"),
+            (inline(Binary) = "application/gzip"),
+            (inline(Binary) = "application/x-gzip"),
+            (inline(Binary) = "application/x-gtar"),
+            (inline(Binary) = "application/x-tar"),
+            (inline(Binary) = "application/zstd"),
+            (inline(Binary) = "application/zip"),
+            (inline(Binary) = "application/x-zip-compressed"),
+        )
+    ),
     responses(
-        (status = 201, body = SubmissionView),
+        (status = 201, body = SubmissionView, headers(("Location" = String, description = "where it is, from the server's root"))),
         (status = 408, description = "the body stalled, or came too slowly"),
         (status = 409, description = "the season is closed, or the team's storage is full"),
         (status = 413, description = "larger than max_bundle_bytes"),

@@ -1,7 +1,7 @@
 //! The archive of a season, made while the server goes on: a snapshot of the database without what the edition does not
 //! hold, what API and pages show of it as files, and the artifacts, which are read when their turn comes.
 
-mod csv;
+mod day_csv;
 mod events;
 mod files;
 mod results;

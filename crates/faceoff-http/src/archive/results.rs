@@ -1,11 +1,12 @@
 //! What an archive tells in files that need no program: stages, boards, days, tournaments, teams, words to everybody.
 
 use super::{
-    csv,
+    day_csv,
     files::{self, Files},
 };
 use crate::{
     app::{App, AppState},
+    csv,
     problem::Problem,
     requests::BoardQuery,
     viewer::Viewer,
@@ -151,7 +152,7 @@ async fn boards(
         .put_json(&format!("{folder}/board.json"), &newest)
         .await?;
     files
-        .put(&format!("{folder}/board.csv"), csv::board(&newest))
+        .put(&format!("{folder}/board.csv"), newest.csv())
         .await?;
     for task in &stage.rules.rules.tasks {
         let board = BoardView::asked(app, sight, by(None), Some(*task)).await?;
@@ -162,14 +163,13 @@ async fn boards(
     for revision in view.revisions {
         let query = by(Some(revision.revision));
         let board = BoardView::asked(app, sight, query, None).await?;
-        if board.revision == newest.revision || board.rows.is_empty() {
+        if board.revision == newest.revision || board.rows.is_empty() && board.baselines.is_empty()
+        {
             continue;
         }
         let name = format!("{folder}/board-revision-{}", revision.revision);
         files.put_json(&format!("{name}.json"), &board).await?;
-        files
-            .put(&format!("{name}.csv"), csv::board(&board))
-            .await?;
+        files.put(&format!("{name}.csv"), board.csv()).await?;
     }
     Ok(())
 }
@@ -187,7 +187,7 @@ async fn one_day(
         .put_json(&format!("{name}.json"), &evaluations)
         .await?;
     files
-        .put(&format!("{name}.csv"), csv::day(&evaluations))
+        .put(&format!("{name}.csv"), day_csv::day(&evaluations))
         .await
 }
 

@@ -1,6 +1,7 @@
 //! The boards: `/` in tiers as in the paper's qualifying table, `/tasks/{task}` by task.
 
 use super::{
+    baselines::{self, Baseline},
     figures,
     frame::{Frame, PageProblem, render},
     standing,
@@ -292,6 +293,7 @@ struct OverallPage {
     commitment: String,
     setting: Option<String>,
     tiers: Vec<TierRows<OverallRow>>,
+    baselines: Vec<Baseline>,
     under_way: Vec<UnderWay>,
     disqualified: Vec<TeamView>,
 }
@@ -321,6 +323,7 @@ pub(super) async fn overall(
         heading: Heading::of(&app, &board, &sight, season.paused).await?,
         commitment: season.commitment,
         tiers: by_tier(&board, |row| OverallRow::of(row, setting.as_ref())),
+        baselines: baselines::of(&board),
         setting,
         under_way,
         disqualified: board.disqualified,
@@ -413,6 +416,7 @@ struct TaskPage {
     aim: &'static str,
     setting: Option<String>,
     tiers: Vec<TierRows<TaskRow>>,
+    baselines: Vec<Baseline>,
 }
 
 /// The board of one task.
@@ -454,5 +458,6 @@ pub(super) async fn by_task(
         aim,
         setting,
         tiers,
+        baselines: baselines::of(&board),
     })
 }

@@ -8,6 +8,7 @@ use crate::{
     app::App,
     extract::PathParams,
     problem::Problem,
+    requests::ComparisonQuery,
     viewer::Viewer,
     views::{comparison::ComparisonView, season::SeasonHead, sight::Sight},
 };
@@ -72,7 +73,7 @@ pub(super) async fn page(
 ) -> Result<Response, PageProblem> {
     let PathParams(ids) = ids?;
     let sight = Sight::of(&app, viewer?).await?;
-    let view = ComparisonView::of(&app, &sight, ids).await?;
+    let view = ComparisonView::of(&app, &sight, ids, ComparisonQuery::default()).await?;
     let season = SeasonHead::now(&app).await?;
     let names = [view.a.team.as_str(), view.b.team.as_str()];
     let rows = view

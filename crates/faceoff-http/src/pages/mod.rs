@@ -6,9 +6,11 @@ mod ablation;
 mod account;
 mod announcements;
 mod assets;
+mod baselines;
 mod board;
 mod comparison;
 mod evaluation;
+mod feed;
 mod figures;
 mod frame;
 mod help;
@@ -50,6 +52,7 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .route("/join/{code}", get(join::page).post(join::submit))
         .route("/register", get(register::page).post(register::submit))
         .route("/log", get(log::page))
+        .route(feed::FEED_PATH, get(feed::feed))
         .route(assets::STYLE_PATH, get(assets::style))
         .route(assets::ICON_PATH, get(assets::icon))
         .layer(middleware::from_fn_with_state(patience, layers::time_out))

@@ -5,6 +5,14 @@ use faceoff_types::Standings;
 
 /// What a row is, as the table's caption says it.
 pub(super) fn rows(board: &BoardView) -> String {
+    let rows = by(board);
+    match board.day {
+        None => rows,
+        Some(day) => format!("{rows}, of the days up to {day}"),
+    }
+}
+
+fn by(board: &BoardView) -> String {
     match board.rows_by {
         Standings::Latest => "Each team's newest finished evaluation".to_owned(),
         Standings::Best => {

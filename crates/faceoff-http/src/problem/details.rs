@@ -59,6 +59,12 @@ impl Problem {
         self
     }
 
+    /// With a header of the answer.
+    pub(crate) fn with_header(mut self, name: HeaderName, value: HeaderValue) -> Self {
+        self.headers.push((name, value));
+        self
+    }
+
     /// To be tried again after so many seconds.
     pub(crate) fn retry_after(mut self, seconds: u64) -> Self {
         let value = (header::RETRY_AFTER, HeaderValue::from(seconds));

@@ -134,7 +134,8 @@ impl From<StoreError> for Problem {
             StoreError::Conflict(detail) => Self::new(ProblemKind::Conflict, detail),
             error @ (StoreError::Database(_)
             | StoreError::Artifacts(_)
-            | StoreError::Damaged(_)) => Self::internal(error),
+            | StoreError::Damaged(_)
+            | StoreError::NewerDatabase { .. }) => Self::internal(error),
         }
     }
 }

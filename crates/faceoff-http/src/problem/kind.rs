@@ -42,6 +42,9 @@ kinds! {
     TermsOwed "terms-owed" FORBIDDEN
         "The terms are to be accepted"
         "There are other terms than the team's members have accepted. One of them reads GET /api/v1/terms and accepts with POST /api/v1/terms/VERSION/accept."
+    LinkInvalid "link-invalid" FORBIDDEN
+        "The link is not good"
+        "A signed link opens the one file that it was made for, as long as the token that made it is good. Follow it as it was given, or ask for another one."
     NotFound "not-found" NOT_FOUND
         "Not found"
         "There is no such thing, or it belongs to another team. Check the id."
@@ -105,9 +108,15 @@ kinds! {
     Gone "gone" GONE
         "No longer offered"
         "The server no longer does this. The detail says why, and what there is instead."
+    LinkExpired "link-expired" GONE
+        "The link has expired"
+        "A signed link is good for a time; “expired_at” says until when. Ask who gave it to you for another one."
     Removed "removed" GONE
         "It was removed"
         "The file was kept for a time, and is no more: by the retention of its stage, or because its team or an organiser had it deleted. The detail says when and why; results stay."
+    RangeNotSatisfiable "range-not-satisfiable" RANGE_NOT_SATISFIABLE
+        "The range begins behind the end"
+        "The header “Range” asks for bytes that the file does not have; “Content-Range” says how many it has. Who has that many has all of it."
     TooManyPending "too-many-pending" TOO_MANY_REQUESTS
         "Too many uploads are waiting"
         "Several uploads of the team are not validated yet. Wait until one has its verdict."
@@ -126,6 +135,9 @@ kinds! {
     FreeGamesSpent "free-games-spent" TOO_MANY_REQUESTS
         "The day's games are spent"
         "A team asks for so many games that do not count on a UTC day. “limit” and “used” state how many; “Retry-After” is the time to midnight UTC."
+    TooManyRequests "too-many-requests" TOO_MANY_REQUESTS
+        "Too many requests"
+        "An address, and a token, may make so many requests per second in the mean. Wait the seconds stated in the header “Retry-After”, and ask less often."
     TooManyConnections "too-many-connections" TOO_MANY_REQUESTS
         "Too many connections"
         "An address has so many connections at a time. Close some, or send several requests over one."

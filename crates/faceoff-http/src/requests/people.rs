@@ -135,6 +135,9 @@ pub struct TeamChange {
     )]
     #[schema(value_type = Option<String>)]
     pub division: Option<Option<DivisionName>>,
+    /// Is it a reference agent of the organisers, which no board ranks? Only organisers change it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub baseline: Option<bool>,
     /// Does it play no friendly games that other teams ask for?
     #[serde(skip_serializing_if = "Option::is_none")]
     pub declines_friendly_games: Option<bool>,

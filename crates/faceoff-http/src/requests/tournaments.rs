@@ -1,12 +1,19 @@
 //! About tournaments and their games.
 
-use super::left_out::{given, given_or_null};
+use super::{
+    field_by_field::FieldByField,
+    left_out::{given, given_or_null},
+};
 use faceoff_types::{
     LeftAs, RoundNumber, SubmissionId, TeamName, TournamentRules, TournamentSettings,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use utoipa::{IntoParams, ToSchema};
+
+// The macro reads no parameters of a type that it is told.
+type RulesByField = FieldByField<TournamentRules>;
+type SettingsByField = FieldByField<TournamentSettings>;
 
 /// A tournament to open.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]
@@ -19,11 +26,11 @@ pub struct NewTournament {
     pub stage: Option<String>,
     /// What results depend on; what of it is left out is as the challenge had it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<TournamentRules>)]
+    #[schema(value_type = Option<RulesByField>)]
     pub rules: Option<Map<String, Value>>,
     /// What they do not depend on; likewise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<TournamentSettings>)]
+    #[schema(value_type = Option<SettingsByField>)]
     pub settings: Option<Map<String, Value>>,
     /// Its teams; left out, those that the stage's board has as deployable or improvable.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -39,11 +46,11 @@ pub struct TournamentChange {
     pub name: Option<String>,
     /// Field by field, before the first round; null takes one away that need not be there.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<TournamentRules>)]
+    #[schema(value_type = Option<RulesByField>)]
     pub rules: Option<Map<String, Value>>,
     /// Field by field.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schema(value_type = Option<TournamentSettings>)]
+    #[schema(value_type = Option<SettingsByField>)]
     pub settings: Option<Map<String, Value>>,
     /// A valid submission, of any team, against which teams may test theirs; null: none.
     #[serde(

@@ -1,12 +1,16 @@
 //! Who stands where, and how sure that is.
 
 use super::{
-    division, finalised::FinalisedView, ruling::RulingView, sight::Sight, stage, standings,
-    task::TaskView, team::TeamView,
+    baseline::BaselineRow, division, finalised::FinalisedView, ruling::RulingView, sight::Sight,
+    stage, standings, task::TaskView, team::TeamView,
 };
 use crate::{
-    app::AppState, problem::Problem, requests::BoardQuery, standing::Standing,
-    summaries::RunSummaries, views::shown,
+    app::AppState,
+    problem::{Problem, ProblemKind},
+    requests::{BoardBy, BoardQuery},
+    standing::Standing,
+    summaries::RunSummaries,
+    views::shown,
 };
 use faceoff_scoring::{
     EpisodeSummary, Played, RankedEntry, SIGNIFICANCE, TIER_CHANGE_RESAMPLES, joined_summary,
@@ -46,8 +50,12 @@ pub struct BoardView {
     pub perturbations: Option<Box<PerturbationSettings>>,
     /// What rows are made of in the end.
     pub standings: Standings,
-    /// What they are made of at the moment: before a final day, of the newest evaluations, which do not count then.
+    /// What they are made of at the moment: before a final day, of the newest evaluations, which do not count then; or as
+    /// it was asked for.
     pub rows_by: Standings,
+    /// The board as it stood by the results of the days up to this one; absent where all count.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub day: Option<Date>,
     /// The stage is blind: without the organiser's token there are no rows until the organiser opens it.
     pub blind: bool,
     /// The result may still change: it is not signed off.
@@ -74,6 +82,10 @@ pub struct BoardView {
     /// Deployable teams first, then improvable, then non-deployable; inside a tier the higher score,
     /// then the fewer penalty points, then the earlier submission.
     pub rows: Vec<BoardRow>,
+    /// Reference agents of the organisers', in board order, which take no rank from anybody; on the boards of all
+    /// divisions.
+    #[serde(default)]
+    pub baselines: Vec<BaselineRow>,
 }
 
 /// One team on a board.
@@ -127,13 +139,15 @@ pub struct BoardRow {
     pub tasks: BTreeMap<Task, TaskView>,
 }
 
-/// What a board ranks, and whom.
+/// What a board ranks, whom, and by which of their results.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Whose {
     /// One task; `None`: all of them together.
     pub(crate) task: Option<Task>,
     /// The teams of one division; `None`: all teams.
     pub(crate) division: Option<DivisionName>,
+    /// In place of what the stage's standings say.
+    pub(crate) by: Option<Standings>,
 }
 
 impl Whose {
@@ -143,38 +157,60 @@ impl Whose {
 }
 
 impl BoardView {
-    /// The board that a request asks for: the overall one, or that of one task. Whether the caller may see the live
-    /// one of a frozen stage is checked before.
+    /// Whose board a request asks for.
+    ///
+    /// # Errors
+    /// `Unauthenticated` or `Forbidden` if the viewer may not see the live one of a frozen stage.
+    pub(crate) async fn stage_asked(
+        app: &AppState,
+        sight: &Sight,
+        (stage, live): (Option<StageId>, bool),
+    ) -> Result<Stage, Problem> {
+        if live {
+            sight.check_organiser("the board beyond the freeze")?;
+        }
+        match stage {
+            Some(id) => Ok(app.store.stage(id).await?),
+            None => stage::current(app).await,
+        }
+    }
+
+    /// The board that a request asks for: the overall one, or that of one task.
     pub(crate) async fn asked(
         app: &AppState,
         sight: &Sight,
         query: BoardQuery,
         task: Option<Task>,
     ) -> Result<Self, Problem> {
-        if query.live {
-            sight.check_organiser("the board beyond the freeze")?;
-        }
-        let stage = match query.stage {
-            Some(id) => app.store.stage(id).await?,
-            None => stage::current(app).await?,
-        };
+        let stage = Self::stage_asked(app, sight, (query.stage, query.live)).await?;
         let frozen = sight.frozen(stage.id).cloned();
         let scope = BoardScope {
             until: frozen
                 .as_ref()
                 .filter(|_| !query.live)
                 .map(|frozen| frozen.at),
+            until_day: query.day,
             ..BoardScope::default()
         };
         let revision = match query.revision {
             Some(number) => number,
-            None => app.store.board_revision_until(&stage, scope.until).await?,
+            None => app.store.board_revision_within(&stage, &scope).await?,
         };
+        if let Some(day) = query.day
+            && !sight.is_hidden(stage.id)
+        {
+            let days = app.store.board_days(stage.id, revision, &scope).await?;
+            check_has_results(day, &days)?;
+        }
         let division = match query.division {
             Some(name) => Some(division::find(app, &name).await?),
             None => None,
         };
-        let whose = Whose { task, division };
+        let whose = Whose {
+            task,
+            division,
+            by: query.by.map(BoardBy::standings),
+        };
         let board = Self::of(app, sight, &stage, revision, whose, (&scope, Vec::new())).await?;
         Ok(Self {
             frozen: frozen.map(RulingView::from),
@@ -203,9 +239,12 @@ impl BoardView {
         }
         disqualified.retain(|team| whose.is_ranked(team.division.as_ref()));
         let variation = revision.rules.variation;
-        let rows_by = standings::at_the_moment(app, stage).await?;
-        let rows = if sight.is_hidden(stage.id) {
-            Vec::new()
+        let rows_by = match whose.by {
+            Some(by) => by,
+            None => standings::within(app, stage, scope).await?,
+        };
+        let (rows, baselines) = if sight.is_hidden(stage.id) {
+            Default::default()
         } else {
             ranked_rows(app, stage, number, (scope, beside), rows_by, &whose).await?
         };
@@ -221,6 +260,7 @@ impl BoardView {
                 .then_some(variation.perturbations),
             standings: stage.settings.standings,
             rows_by,
+            day: scope.until_day,
             blind: stage.settings.blind,
             provisional: stage.finalised.is_none(),
             finalised: stage.finalised.clone().map(FinalisedView::from),
@@ -231,11 +271,27 @@ impl BoardView {
             frozen: None,
             disqualified,
             rows,
+            baselines,
         })
     }
 }
 
-/// The rows of a board in their order, with what tells them apart.
+/// Refuses a day without a result, of days with one, the last of which is no later than it.
+fn check_has_results(day: Date, days: &[Date]) -> Result<(), Problem> {
+    let why = match days.last() {
+        Some(last) if *last == day => return Ok(()),
+        Some(last) => format!("the one before it that has some is {last}"),
+        None => "none before it has one either".to_owned(),
+    };
+    Err(Problem::new(
+        ProblemKind::NotFound,
+        format!(
+            "{day} has no result on this board, and {why}; GET /api/v1/board/history lists all days that have results"
+        ),
+    ))
+}
+
+/// The rows of a board in their order, with what tells them apart, and the baselines.
 async fn ranked_rows(
     app: &AppState,
     stage: &Stage,
@@ -243,10 +299,13 @@ async fn ranked_rows(
     results: (&BoardScope, Vec<BoardRecord>),
     rows_by: Standings,
     whose: &Whose,
-) -> Result<Vec<BoardRow>, Problem> {
+) -> Result<(Vec<BoardRow>, Vec<BaselineRow>), Problem> {
     let task = whose.task;
     let mut rows = standings::rows(app, stage, revision, results, rows_by, task).await?;
-    rows.retain(|row| whose.is_ranked(row.record.team.profile.division.as_ref()));
+    rows.retain(|row| {
+        let team = &row.record.team;
+        team.is_baseline || whose.is_ranked(team.profile.division.as_ref())
+    });
     let runs: Vec<_> = rows.iter().flat_map(|row| row.runs.clone()).collect();
     let summaries = app.summaries.of(&runs).await?;
     let mismatch_seed = app.store.season().await?.secret.model_mismatch();
@@ -254,15 +313,18 @@ async fn ranked_rows(
         .into_iter()
         .map(|standing| Row::of(standing, &summaries))
         .collect::<Result<_, _>>()?;
-    let ranked = standings::ranked(rows, task, |row| &row.standing.record);
+    let all = standings::ranked(rows, task, |row| &row.standing.record);
+    let (ranked, baselines) =
+        standings::apart(all, |row: &Row| row.standing.record.team.is_baseline);
     let groups = rank_groups(&ranked, |leader, row| {
         let [leader, row] = [leader, row].map(|row| row.played(mismatch_seed));
         Ok::<_, Problem>(leader.told_apart(&row, task))
     })?;
     let rows = ranked.into_iter().zip(groups);
-    Ok(rows
-        .map(|(ranked, rank_group)| row(ranked, rank_group, task))
-        .collect())
+    let rows = rows.map(|(ranked, rank_group)| row(ranked, rank_group, task));
+    // They are in no group.
+    let baselines = baselines.into_iter().map(|ranked| row(ranked, 0, task));
+    Ok((rows.collect(), baselines.map(baseline).collect()))
 }
 
 /// A row with its episodes.
@@ -337,5 +399,30 @@ fn row(ranked: RankedEntry<Row>, rank_group: u32, task: Option<Task>) -> BoardRo
             .iter()
             .map(|(task, result)| (*task, TaskView::new(result, released)))
             .collect(),
+    }
+}
+
+/// Of a row whose rank is the one that it would take.
+fn baseline(row: BoardRow) -> BaselineRow {
+    BaselineRow {
+        would_rank: row.rank,
+        baseline: true,
+        tier: row.tier,
+        tier_change_probability: row.tier_change_probability,
+        team: row.team,
+        team_id: row.team_id,
+        agent: row.agent,
+        evaluation: row.evaluation,
+        evaluations: row.evaluations,
+        day: row.day,
+        extra_turn: row.extra_turn,
+        finished_at: row.finished_at,
+        ruleset: row.ruleset,
+        profile: row.profile,
+        score: row.score,
+        penalty_points: row.penalty_points,
+        released_at: row.released_at,
+        seed: row.seed,
+        tasks: row.tasks,
     }
 }

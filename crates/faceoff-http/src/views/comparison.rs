@@ -5,8 +5,11 @@ use crate::{
     app::AppState,
     problem::{Problem, ProblemKind},
     release::check_released,
+    requests::ComparisonQuery,
 };
-use faceoff_scoring::{Comparison, EpisodeSummary, OverallComparison, Played, TaskComparison};
+use faceoff_scoring::{
+    Comparison, EpisodeSummary, NotPaired, OverallComparison, Played, TaskComparison, WhoSolved,
+};
 use faceoff_store::{Evaluation, EvaluationState, StoreError};
 use faceoff_types::{EvaluationId, EvaluationResult, Profile, Seed, Task, TeamName};
 use jiff::civil::Date;
@@ -31,6 +34,9 @@ pub struct ComparisonView {
     pub tasks: BTreeMap<Task, TaskComparison>,
     /// Of the overall scores.
     pub overall: OverallComparison,
+    /// By task which episodes were solved by whom; absent unless it is asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub episodes: Option<BTreeMap<Task, WhoSolved>>,
 }
 
 /// One side of a comparison.
@@ -109,6 +115,7 @@ impl ComparisonView {
         app: &AppState,
         sight: &Sight,
         [a, b]: [EvaluationId; 2],
+        query: ComparisonQuery,
     ) -> Result<Self, Problem> {
         let (a, b) = (
             Side::load(app, sight, a).await?,
@@ -141,10 +148,13 @@ impl ComparisonView {
         }
         // that of the season, which both share
         let mismatch_seed = app.store.season().await?.secret.model_mismatch();
-        let Comparison { tasks, overall } = a
-            .played(mismatch_seed)
-            .compare(&b.played(mismatch_seed))
-            .map_err(|error| not_paired(error.field(), error.to_string()))?;
+        let (played_a, played_b) = (a.played(mismatch_seed), b.played(mismatch_seed));
+        let differs = |error: NotPaired| not_paired(error.field(), error.to_string());
+        let Comparison { tasks, overall } = played_a.compare(&played_b).map_err(differs)?;
+        let episodes = match query.episodes {
+            true => Some(played_a.who_solved(&played_b).map_err(differs)?),
+            false => None,
+        };
         Ok(Self {
             a: a.view(app).await?,
             b: b.view(app).await?,
@@ -153,6 +163,7 @@ impl ComparisonView {
             profile: a.result.profile,
             tasks,
             overall,
+            episodes,
         })
     }
 }

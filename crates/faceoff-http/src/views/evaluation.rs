@@ -134,16 +134,6 @@ impl EvaluationView {
         Ok(())
     }
 
-    /// All evaluations of a date, of all stages, in the order in which they were queued; without faults and
-    /// logs, which are long, as in all lists.
-    pub(crate) async fn all_on(
-        app: &AppState,
-        sight: &Sight,
-        date: Date,
-    ) -> Result<Vec<Self>, Problem> {
-        Self::all(app, sight, app.store.evaluations_on(date).await?).await
-    }
-
     /// Those of a stage's day.
     pub(crate) async fn of_day(
         app: &AppState,
@@ -171,16 +161,8 @@ impl EvaluationView {
         Self::all(app, sight, evaluations).await
     }
 
-    /// Of a team, newest first.
-    pub(crate) async fn of_team(
-        app: &AppState,
-        sight: &Sight,
-        team: TeamId,
-    ) -> Result<Vec<Self>, Problem> {
-        Self::all(app, sight, app.store.evaluations_of(team).await?).await
-    }
-
-    async fn all(
+    /// These, in their order; without faults and logs, which are long, as in all lists.
+    pub(crate) async fn all(
         app: &AppState,
         sight: &Sight,
         evaluations: Vec<Evaluation>,

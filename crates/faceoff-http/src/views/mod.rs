@@ -8,7 +8,9 @@ pub mod ablation;
 pub mod announcement;
 pub mod archived;
 pub mod attempt;
+pub mod baseline;
 pub mod board;
+mod board_csv;
 pub mod capacity;
 pub mod certainty;
 pub mod comparison;
@@ -17,9 +19,13 @@ mod division;
 pub mod evaluation;
 mod evaluation_status;
 pub mod event;
+pub(crate) mod feed;
 pub mod finalised;
 pub mod game;
+pub(crate) mod health;
+pub mod history;
 pub mod invitation;
+pub mod link;
 pub mod live;
 pub mod me;
 pub mod not_taken;
@@ -42,6 +48,7 @@ pub mod token;
 pub mod tournament;
 pub(crate) mod tournament_sheet;
 pub mod violations;
+pub mod webhook;
 
 /// Text of agents as API and pages show it; what older versions have stored may hold anything.
 fn shown(text: String) -> String {

@@ -295,7 +295,7 @@ impl OutcomeView {
                 // Nothing that counts.
                 let nothing = BoardScope {
                     until: Some(Timestamp::MIN),
-                    without: Vec::new(),
+                    ..BoardScope::default()
                 };
                 let tried = (&nothing, played);
                 let new_board =
@@ -320,8 +320,8 @@ impl OutcomeView {
             _ => None,
         };
         let scope = BoardScope {
-            until: None,
             without: drafts.iter().filter_map(replaces).collect(),
+            ..BoardScope::default()
         };
         let then = (&scope, played);
         let new_board =
@@ -337,31 +337,50 @@ impl OutcomeView {
 /// Whose rank, tier, score or points differ, in the order of the new board, then of the old one.
 fn changes(old: &BoardView, new: &BoardView) -> Vec<ChangeView> {
     let standing = |board: &BoardView, team: TeamId| {
-        let row = board.rows.iter().find(|row| row.team_id == team)?;
-        Some(StandingView {
+        let ranked = board.rows.iter().find(|row| row.team_id == team);
+        let ranked = ranked.map(|row| StandingView {
             rank: row.rank,
             tier: row.tier,
             score: row.score,
             penalty_points: row.penalty_points,
+        });
+        // A baseline stands where it would.
+        ranked.or_else(|| {
+            let row = board.baselines.iter().find(|row| row.team_id == team)?;
+            Some(StandingView {
+                rank: row.would_rank,
+                tier: row.tier,
+                score: row.score,
+                penalty_points: row.penalty_points,
+            })
         })
     };
     let mut seen = BTreeSet::new();
-    let rows = new.rows.iter().chain(&old.rows);
-    rows.filter(|row| seen.insert(row.team_id))
-        .map(|row| ChangeView {
-            team: row.team.clone(),
-            old: standing(old, row.team_id),
-            new: standing(new, row.team_id),
+    let boards = [new, old].into_iter();
+    let teams = boards.flat_map(|board| {
+        let ranked = board.rows.iter().map(|row| (row.team_id, &row.team));
+        let baselines = board.baselines.iter().map(|row| (row.team_id, &row.team));
+        ranked.chain(baselines)
+    });
+    teams
+        .filter(|(id, _)| seen.insert(*id))
+        .map(|(id, team)| ChangeView {
+            team: team.clone(),
+            old: standing(old, id),
+            new: standing(new, id),
         })
         .filter(|change| change.old != change.new)
         .collect()
 }
 
 impl ProposalView {
-    /// All of the season, the newest first, without what they play.
-    pub(crate) async fn all(app: &AppState) -> Result<Vec<Self>, Problem> {
+    /// These, in their order, without what they play.
+    pub(crate) async fn heads(
+        app: &AppState,
+        proposals: Vec<Proposal>,
+    ) -> Result<Vec<Self>, Problem> {
         let mut views = Vec::new();
-        for proposal in app.store.proposals().await? {
+        for proposal in proposals {
             let (proposal, drafts) = app.store.proposal(proposal.id).await?;
             views.push(Self::head(app, &proposal, &drafts).await?);
         }

@@ -8,14 +8,29 @@ use crate::{
 use faceoff_scoring::{BoardEntry, RankedEntry, overall_board, task_board};
 use faceoff_store::{BoardDays, BoardRecord, BoardScope, Stage};
 use faceoff_types::{Standings, Task};
+use jiff::civil::Date;
 
-/// How rows stand at the moment: a stage that waits for its final day shows the newest until then.
-pub(super) async fn at_the_moment(app: &AppState, stage: &Stage) -> Result<Standings, Problem> {
+/// How rows stand within a scope: a stage that waits for its final day shows the newest until that has its cut.
+pub(super) async fn within(
+    app: &AppState,
+    stage: &Stage,
+    scope: &BoardScope,
+) -> Result<Standings, Problem> {
     let standings = stage.settings.standings;
-    if standings == Standings::Final && app.store.final_cut(stage.id).await?.is_none() {
-        return Ok(Standings::Latest);
+    if standings != Standings::Final {
+        return Ok(standings);
     }
-    Ok(standings)
+    let final_cut = app.store.final_cut(stage.id).await?;
+    // A board that was frozen before shows on what it showed.
+    let is_over = final_cut.is_some_and(|at| {
+        scope.until.is_none_or(|until| at <= until)
+            && scope.until_day.is_none_or(|day| stage.day(at).date <= day)
+    });
+    Ok(if is_over {
+        Standings::Final
+    } else {
+        Standings::Latest
+    })
 }
 
 /// One row of each team with a result within the scope by a revision of a stage's rules, in the teams' order of names.
@@ -40,6 +55,7 @@ pub(super) async fn rows(
         by: standings,
         task,
         until: scope.until,
+        until_day: scope.until_day,
     };
     app.rows.get(of, make).await
 }
@@ -76,14 +92,46 @@ async fn made(
             key(a).cmp(&key(b))
         });
     }
+    let counts = Counts {
+        standings,
+        final_day: None,
+        task,
+    };
+    of_records(records, counts)
+}
+
+/// What of a team's records counts.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Counts {
+    pub(super) standings: Standings,
+    /// Given where records are of other days, too.
+    pub(super) final_day: Option<Date>,
+    pub(super) task: Option<Task>,
+}
+
+/// One row of each team, of records that stand team by team, the earlier day first.
+pub(super) fn of_records(
+    records: Vec<BoardRecord>,
+    counts: Counts,
+) -> Result<Vec<Standing>, Problem> {
     let teams = by_team(records);
-    match standings {
-        Standings::Latest | Standings::Final => {
+    match counts.standings {
+        Standings::Latest => {
             let newest = teams.filter_map(|mut days| days.pop());
             Ok(newest.map(Standing::alone).collect())
         }
+        Standings::Final => {
+            let final_day = counts.final_day;
+            let of_day = teams.filter_map(|mut days| {
+                let newest = days.pop()?;
+                final_day
+                    .is_none_or(|day| newest.day == day)
+                    .then_some(newest)
+            });
+            Ok(of_day.map(Standing::alone).collect())
+        }
         Standings::Best => {
-            let best = teams.filter_map(|days| best(days, task));
+            let best = teams.filter_map(|days| best(days, counts.task));
             Ok(best.map(Standing::alone).collect())
         }
         Standings::MeanOfLast(last) => teams
@@ -94,6 +142,21 @@ async fn made(
             })
             .collect(),
     }
+}
+
+/// Takes out of a team's records what cannot count any more, whatever comes later.
+pub(super) fn forget(records: &mut Vec<BoardRecord>, counts: Counts) {
+    let kept = match counts.standings {
+        Standings::Latest | Standings::Final => 1,
+        Standings::MeanOfLast(days) => days as usize,
+        Standings::Best => {
+            let all = std::mem::take(records);
+            records.extend(best(all, counts.task));
+            1
+        }
+    };
+    let older = records.len().saturating_sub(kept);
+    records.drain(..older);
 }
 
 /// Records that stand team by team.
@@ -131,4 +194,23 @@ pub(super) fn ranked<K>(
         None => overall_board(entries.collect()),
         Some(task) => task_board(task, entries.collect()),
     }
+}
+
+/// Those that are ranked, with ranks among themselves, and baselines, each with the rank that it would take.
+pub(super) fn apart<K>(
+    all: Vec<RankedEntry<K>>,
+    is_baseline: impl Fn(&K) -> bool,
+) -> (Vec<RankedEntry<K>>, Vec<RankedEntry<K>>) {
+    let (mut ranked, mut baselines) = (Vec::new(), Vec::new());
+    let mut rank = 1;
+    for entry in all {
+        let entry = RankedEntry { rank, ..entry };
+        if is_baseline(&entry.entry.key) {
+            baselines.push(entry);
+        } else {
+            ranked.push(entry);
+            rank += 1;
+        }
+    }
+    (ranked, baselines)
 }

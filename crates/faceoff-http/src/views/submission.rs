@@ -146,9 +146,16 @@ impl SubmissionView {
         Ok(view)
     }
 
-    /// Of a team, newest first; without their logs, which are long.
+    /// Of a team, newest first.
     pub(crate) async fn of_team(app: &AppState, team: TeamId) -> Result<Vec<Self>, Problem> {
-        let submissions = app.store.submissions_of(team).await?;
+        Self::all(app, app.store.submissions_of(team).await?).await
+    }
+
+    /// These, in their order; without their logs, which are long.
+    pub(crate) async fn all(
+        app: &AppState,
+        submissions: Vec<Submission>,
+    ) -> Result<Vec<Self>, Problem> {
         let (stages, now) = (app.store.stages().await?, app.config.clock.now());
         let without_log = |submission| Self::new(submission, None, &stages, now);
         let mut views: Vec<Self> = submissions.into_iter().map(without_log).collect();

@@ -33,6 +33,9 @@ pub struct TeamView {
     /// Since when it plays no more, by its own wish; null: it plays.
     #[serde(default)]
     pub retired_at: Option<Timestamp>,
+    /// It is a reference agent of the organisers: boards show it apart and do not rank it; absent otherwise.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub baseline: bool,
     /// Does it play no friendly games that other teams ask for? Told of a single team; absent in lists.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub declines_friendly_games: Option<bool>,
@@ -49,6 +52,7 @@ impl From<Team> for TeamView {
             link: team.profile.link,
             division: team.profile.division,
             retired_at: team.retired_at,
+            baseline: team.is_baseline,
             declines_friendly_games: None,
         }
     }

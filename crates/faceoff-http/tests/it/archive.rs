@@ -248,9 +248,15 @@ async fn what_is_exported_is_shown_by_another_server_byte_for_byte() {
 
         let shown = imported(exported).await;
         let [a, b] = season.evaluations;
-        let mut asked: Vec<String> = ["/board", "/board/hit", "/announcements", "/terms"]
-            .map(|path| format!("/api/v1{path}"))
-            .into();
+        let mut asked: Vec<String> = [
+            "/board",
+            "/board/hit",
+            "/board/history",
+            "/announcements",
+            "/terms",
+        ]
+        .map(|path| format!("/api/v1{path}"))
+        .into();
         asked.extend([
             format!("/api/v1/teams/{}", season.alpha.id),
             format!("/api/v1/evaluations/{a}/compare/{b}"),

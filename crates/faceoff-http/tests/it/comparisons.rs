@@ -40,6 +40,15 @@ async fn two_evaluations_of_a_day_are_compared_episode_by_episode() {
     assert_eq!(view["tasks"]["defend"]["p_value"], 1.0);
     assert_eq!(view["overall"]["score_a"], 60.0);
     assert_eq!(view["overall"]["score_b"], 52.0);
+    assert!(view.get("episodes").is_none());
+    let path = format!("{}?episodes=true", compare(a, b));
+    let with_episodes = site.get(&path, None).await.json(200);
+    let hit = &with_episodes["episodes"]["hit"];
+    assert_eq!(hit["both"], json!((0..40).collect::<Vec<_>>()));
+    assert_eq!(hit["only_a"], json!((40..60).collect::<Vec<_>>()));
+    assert_eq!(hit["only_b"], json!([]));
+    assert_eq!(hit["neither"], json!((60..100).collect::<Vec<_>>()));
+    assert_eq!(with_episodes["tasks"], view["tasks"]);
     let back = site.get(&compare(b, a), None).await.json(200);
     assert_eq!(back["tasks"]["hit"]["only_b"], 20);
     assert_eq!(back["overall"]["p_value"], view["overall"]["p_value"]);

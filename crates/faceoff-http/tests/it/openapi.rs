@@ -1,5 +1,6 @@
-use crate::site::Site;
-use serde_json::Value;
+use crate::site::{ADMIN, Answer, GZIP, Site};
+use reqwest::Method;
+use serde_json::{Value, json};
 
 #[tokio::test]
 async fn the_document_lists_what_is_there_and_nothing_else() {
@@ -25,8 +26,10 @@ async fn the_document_lists_what_is_there_and_nothing_else() {
         "DELETE /api/v1/submissions/{id}",
         "DELETE /api/v1/tokens/{id}",
         "DELETE /api/v1/tournaments/{id}/replays",
+        "DELETE /api/v1/webhooks/{id}",
         "GET /api/v1/announcements",
         "GET /api/v1/board",
+        "GET /api/v1/board/history",
         "GET /api/v1/board/{task}",
         "GET /api/v1/evaluations",
         "GET /api/v1/evaluations/{id}",
@@ -34,6 +37,7 @@ async fn the_document_lists_what_is_there_and_nothing_else() {
         "GET /api/v1/evaluations/{id}/dataset",
         "GET /api/v1/evaluations/{id}/violations",
         "GET /api/v1/events",
+        "GET /api/v1/events/stream",
         "GET /api/v1/games/{id}",
         "GET /api/v1/games/{id}/attempts",
         "GET /api/v1/games/{id}/live",
@@ -72,19 +76,26 @@ async fn the_document_lists_what_is_there_and_nothing_else() {
         "GET /api/v1/tournaments/{id}/games",
         "GET /api/v1/tournaments/{id}/head-to-head",
         "GET /api/v1/tournaments/{id}/ratings",
+        "GET /api/v1/webhooks",
+        "GET /api/v1/webhooks/{id}",
+        "GET /api/v1/webhooks/{id}/deliveries",
         "GET /api/v1/whoami",
         "PATCH /api/v1/season",
         "PATCH /api/v1/stages/{id}",
         "PATCH /api/v1/submissions/{id}",
         "PATCH /api/v1/teams/{id}",
         "PATCH /api/v1/tournaments/{id}",
+        "PATCH /api/v1/webhooks/{id}",
         "POST /api/v1/announcements",
         "POST /api/v1/days",
         "POST /api/v1/evaluations/{id}/cancel",
+        "POST /api/v1/evaluations/{id}/dataset/link",
         "POST /api/v1/evaluations/{id}/publish",
         "POST /api/v1/evaluations/{id}/rerun",
         "POST /api/v1/evaluations/{id}/void",
+        "POST /api/v1/games/{id}/recording/link",
         "POST /api/v1/games/{id}/rerun",
+        "POST /api/v1/games/{id}/sides/{side}/link",
         "POST /api/v1/games/{id}/void",
         "POST /api/v1/invitations",
         "POST /api/v1/invitations/accept",
@@ -112,6 +123,7 @@ async fn the_document_lists_what_is_there_and_nothing_else() {
         "POST /api/v1/submissions",
         "POST /api/v1/submissions/{id}/ablation",
         "POST /api/v1/submissions/{id}/activate",
+        "POST /api/v1/submissions/{id}/archive/link",
         "POST /api/v1/submissions/{id}/evaluations",
         "POST /api/v1/submissions/{id}/withdraw",
         "POST /api/v1/teams",
@@ -135,6 +147,9 @@ async fn the_document_lists_what_is_there_and_nothing_else() {
         "POST /api/v1/tournaments/{id}/rounds",
         "POST /api/v1/tournaments/{id}/test-games",
         "POST /api/v1/tournaments/{id}/withdrawal",
+        "POST /api/v1/webhooks",
+        "POST /api/v1/webhooks/{id}/rotate",
+        "POST /api/v1/webhooks/{id}/test",
         "PUT /api/v1/people/{id}/password",
         "PUT /api/v1/questions/{id}/answer",
     ];
@@ -166,4 +181,111 @@ async fn the_document_lists_what_is_there_and_nothing_else() {
         document["components"]["securitySchemes"]["organiser"],
         Value::Null
     );
+}
+
+#[tokio::test]
+async fn every_operation_tells_what_any_of_its_kind_answers() {
+    let site = Site::start().await;
+    let document = site.get("/api/v1/openapi.json", None).await.json(200);
+    let answers = |method: &str, path: &str| -> Vec<String> {
+        let pointer = format!("/paths/{}/{method}/responses", path.replace('/', "~1"));
+        let responses = document.pointer(&pointer).unwrap().as_object().unwrap();
+        responses.keys().cloned().collect()
+    };
+    assert_eq!(
+        answers("get", "/api/v1/health/live"),
+        ["200", "429", "500", "503"]
+    );
+    // It comes page by page.
+    assert_eq!(
+        answers("get", "/api/v1/announcements"),
+        ["200", "400", "422", "429", "500", "503"]
+    );
+    let page = "/paths/~1api~1v1~1announcements/get/responses/200/headers/Link";
+    assert!(document.pointer(page).is_some());
+    // It shows more to whom it knows, takes a query, and says by itself what is the organiser's.
+    assert_eq!(
+        answers("get", "/api/v1/board"),
+        [
+            "200", "304", "400", "401", "403", "404", "429", "500", "503"
+        ]
+    );
+    let dataset = answers("get", "/api/v1/evaluations/{id}/dataset");
+    for status in ["200", "206", "304", "416"] {
+        assert!(dataset.iter().any(|told| told == status), "{status}");
+    }
+    assert_eq!(
+        answers("post", "/api/v1/stages/{id}/freeze"),
+        [
+            "200", "400", "401", "403", "404", "409", "413", "415", "422", "429", "500", "503",
+            "507"
+        ]
+    );
+    let upload = &document["paths"]["/api/v1/submissions"]["post"];
+    let body = &upload["requestBody"]["content"]["application/octet-stream"]["schema"];
+    assert_eq!(body["type"], "string");
+    assert_eq!(body["contentMediaType"], "application/octet-stream");
+    assert_ne!(
+        upload["responses"]["201"]["headers"]["Location"],
+        Value::Null
+    );
+    for (path, item) in document["paths"].as_object().unwrap() {
+        for (method, operation) in item.as_object().unwrap() {
+            for (status, response) in operation["responses"].as_object().unwrap() {
+                let target = response["$ref"].as_str().map(|text| &text[1..]);
+                let response = target.map_or(response, |at| document.pointer(at).unwrap());
+                let told = response["description"].as_str();
+                assert!(
+                    told.is_some_and(|told| !told.is_empty()),
+                    "{method} {path} {status}: {response}"
+                );
+            }
+        }
+    }
+}
+
+#[tokio::test]
+async fn an_upload_takes_every_media_type_that_the_document_names() {
+    let site = Site::start().await;
+    let document = site.get("/api/v1/openapi.json", None).await.json(200);
+    let upload = &document["paths"]["/api/v1/submissions"]["post"];
+    let named = upload["requestBody"]["content"].as_object().unwrap();
+    assert!(named.len() > 1);
+    for (at, media_type) in named.keys().enumerate() {
+        let team = site.team(&format!("Team {at}")).await;
+        let request = site
+            .request(Method::POST, "/api/v1/submissions", Some(&team.token))
+            .header("content-type", media_type)
+            .body(GZIP.to_vec());
+        Answer::of(request.send().await.unwrap()).await.json(201);
+    }
+}
+
+/// Derived types read arrays by position, so that `[null, null]` was a change of the season that was answered as done.
+#[tokio::test]
+async fn an_array_in_the_place_of_an_object_is_refused() {
+    let site = Site::start().await;
+    for (method, path, body) in [
+        (Method::PATCH, "/api/v1/season", json!([null, null])),
+        (Method::POST, "/api/v1/teams", json!(["Alpha"])),
+        (
+            Method::POST,
+            "/api/v1/stages",
+            json!({"name": "A", "weights": [0.4, 0.4, 0.2]}),
+        ),
+        (
+            Method::POST,
+            "/api/v1/stages",
+            json!({"name": "A", "day_deadline": {"never": null}}),
+        ),
+        (
+            Method::POST,
+            "/api/v1/tournaments",
+            json!({"name": "Cup", "rules": {"game_limits": [0.02, 10, 3600.0, 10.0]}}),
+        ),
+    ] {
+        let request = site.request(method, path, Some(ADMIN)).json(&body);
+        let answer = Answer::of(request.send().await.unwrap()).await;
+        assert_eq!(answer.status, 422, "{path} {body}: {answer:?}");
+    }
 }

@@ -27,6 +27,7 @@ const TABLE: &[(&str, &str)] = &[
     ("GET /announcements", "+++++++"),
     ("POST /announcements", "?----++"),
     ("GET /board", "+++++++"),
+    ("GET /board/history", "+++++++"),
     ("GET /board/{task}", "+++++++"),
     ("POST /days", "?----++"),
     ("GET /evaluations", "?++++++"),
@@ -34,10 +35,12 @@ const TABLE: &[(&str, &str)] = &[
     ("POST /evaluations/{id}/cancel", "?----++"),
     ("GET /evaluations/{id}/compare/{other}", "+++++++"),
     ("GET /evaluations/{id}/dataset", "?00++++"),
+    ("POST /evaluations/{id}/dataset/link", "?00++++"),
     ("POST /evaluations/{id}/rerun", "?----++"),
     ("GET /evaluations/{id}/violations", "?00++++"),
     ("POST /evaluations/{id}/void", "?----++"),
     ("GET /events", "?----++"),
+    ("GET /events/stream", "+++++++"),
     ("GET /health", "+++++++"),
     ("GET /health/live", "+++++++"),
     ("GET /invitations", "?++++++"),
@@ -79,6 +82,7 @@ const TABLE: &[(&str, &str)] = &[
     ("POST /submissions/{id}/evaluations", "+++++++"),
     ("POST /submissions/{id}/withdraw", "?00++--"),
     ("GET /submissions/{id}/archive", "?00++++"),
+    ("POST /submissions/{id}/archive/link", "?00++++"),
     ("DELETE /submissions/{id}", "?00++++"),
     ("GET /storage", "?----++"),
     ("GET /teams/{id}/storage", "?00++++"),
@@ -112,6 +116,14 @@ const TABLE: &[(&str, &str)] = &[
     ("POST /stages/{id}/proposals", "?----++"),
     ("POST /stages/{id}/trial", "?----++"),
     ("POST /stages/{id}/unfreeze", "?----++"),
+    ("GET /webhooks", "?++++++"),
+    ("POST /webhooks", "?-+-+++"),
+    ("DELETE /webhooks/{id}", "?00-+++"),
+    ("GET /webhooks/{id}", "?00++++"),
+    ("PATCH /webhooks/{id}", "?00-+++"),
+    ("GET /webhooks/{id}/deliveries", "?00++++"),
+    ("POST /webhooks/{id}/rotate", "?00-+--"),
+    ("POST /webhooks/{id}/test", "?00-+++"),
     ("GET /whoami", "?++++++"),
     // The game of these is one that does not count: the team's, against an agent of no team of the table.
     ("DELETE /games/{id}", "?00++++"),
@@ -120,7 +132,9 @@ const TABLE: &[(&str, &str)] = &[
     ("GET /games/{id}/attempts", "?----++"),
     ("GET /games/{id}/live", "000++++"),
     ("GET /games/{id}/recording", "000--++"),
+    ("POST /games/{id}/recording/link", "?00--++"),
     ("GET /games/{id}/sides/{side}", "000++++"),
+    ("POST /games/{id}/sides/{side}/link", "?00++++"),
     ("GET /games/{id}/sides/{side}/log", "?00++++"),
     ("GET /tournaments", "+++++++"),
     ("GET /tournaments/{id}", "+++++++"),
@@ -177,6 +191,7 @@ fn body(route: &str) -> Value {
         "POST /submissions/{id}/ablation" => json!({ "episodes_per_task": 0 }),
         "PATCH /submissions/{id}" => json!({ "label": "" }),
         "POST /teams" | "POST /tokens" | "POST /tournaments" => json!({ "name": "" }),
+        "POST /webhooks" => json!({ "name": "", "url": "" }),
         "POST /games/{id}/void"
         | "POST /tournaments/{id}/pause"
         | "POST /tournaments/{id}/withdrawal" => {
@@ -282,6 +297,11 @@ impl Cast {
             .unwrap()
             .iter()
             .find(|token| token["team"] == json!(alpha.id));
+        let hook = json!({ "name": "ours", "url": "https://example.org/faceoff" });
+        let hook = site
+            .post("/api/v1/webhooks", Some(&of("Ada")), &hook)
+            .await
+            .json(201);
         let last = |path: &str| path.rsplit('/').next().unwrap().to_owned();
         let ids = BTreeMap::from([
             ("evaluations", last(&evaluation)),
@@ -297,6 +317,7 @@ impl Cast {
                 "00000000-0000-7000-8000-000000000000".into(),
             ),
             ("proposals", "00000000-0000-7000-8000-000000000000".into()),
+            ("webhooks", text(&hook["id"])),
             ("tournaments", game[0].clone()),
             ("games", game[1].clone()),
         ]);
@@ -339,7 +360,18 @@ impl Cast {
             _ if method == Method::GET => request,
             _ => request.json(&body(route)),
         };
-        Answer::of(request.send().await.unwrap()).await
+        let response = request.send().await.unwrap();
+        if route == "GET /events/stream" {
+            // It has no end.
+            let (status, headers) = (response.status(), response.headers().clone());
+            let body = String::new();
+            return Answer {
+                status,
+                headers,
+                body,
+            };
+        }
+        Answer::of(response).await
     }
 }
 
@@ -373,12 +405,21 @@ async fn every_route_answers_each_role_as_the_table_says() {
     assert_eq!(routes, told, "the table has a row for every route");
 
     let mut wrong = Vec::new();
+    // Reading changes nothing: all such routes ask the same people, for whom much has to be done.
+    let mut unchanged: Option<Cast> = None;
     for (route, expected) in TABLE {
         // Who signs out, rotates or revokes is somebody else afterwards.
         let is_drastic = ["DELETE", "rotate", "/token", "accept", "withdraw", "retire"]
             .iter()
             .any(|word| route.contains(word));
-        let mut cast = Cast::gather().await;
+        let only_reads = route.starts_with("GET ");
+        let mut cast = match unchanged.take() {
+            Some(cast) if only_reads => cast,
+            other => {
+                unchanged = other;
+                Cast::gather().await
+            }
+        };
         for (role, expected) in expected.chars().enumerate() {
             if is_drastic && role > 0 {
                 cast = Cast::gather().await;
@@ -408,6 +449,9 @@ async fn every_route_answers_each_role_as_the_table_says() {
                     ROLES[role], answer.status, answer.body
                 ));
             }
+        }
+        if only_reads {
+            unchanged = Some(cast);
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));

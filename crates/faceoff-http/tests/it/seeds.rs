@@ -93,7 +93,10 @@ async fn a_team_that_finishes_early_learns_nothing_of_the_episodes_while_others_
     assert_eq!(finished["result"]["seed"], seed.to_string());
     let board = site.get("/api/v1/board", None).await.json(200);
     assert_eq!(board["rows"][0]["seed"], seed.to_string());
-    assert_eq!(asked_for(&site, &dataset, &first.token).await, [200; 3]);
+    assert_eq!(
+        asked_for(&site, &dataset, &first.token).await,
+        [200, 200, 206]
+    );
     let compare = format!("{early}/compare/{}", other.rsplit('/').next().unwrap());
     assert_eq!(site.get(&compare, None).await.status, 200);
 
@@ -111,7 +114,10 @@ async fn a_team_that_finishes_early_learns_nothing_of_the_episodes_while_others_
         .to_string();
     assert!(!shown(&site, first, &early).await.contains(&tomorrow));
     // Yesterday's dataset stays free while today's evaluations run.
-    assert_eq!(asked_for(&site, &dataset, &first.token).await, [200; 3]);
+    assert_eq!(
+        asked_for(&site, &dataset, &first.token).await,
+        [200, 200, 206]
+    );
 }
 
 #[tokio::test]

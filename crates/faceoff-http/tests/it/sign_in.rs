@@ -1,6 +1,6 @@
 //! The pages on which people join, register and sign in, as a browser uses them.
 
-use crate::site::{ADMIN, Answer, Site, text};
+use crate::site::{ADMIN, Answer, Site, http, text};
 use reqwest::{Method, redirect::Policy};
 use scraper::{Html, Selector};
 use serde_json::json;
@@ -14,9 +14,7 @@ struct Browser<'a> {
 
 impl<'a> Browser<'a> {
     fn new(site: &'a Site) -> Self {
-        let http = reqwest::Client::builder()
-            .no_proxy()
-            .redirect(Policy::none());
+        let http = http().redirect(Policy::none());
         Self {
             site,
             http: http.build().unwrap(),

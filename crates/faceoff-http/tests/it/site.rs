@@ -2,9 +2,11 @@
 //! and the steps that a worker would take.
 
 use faceoff_http::{
-    Capacity, CapacityWatch, ConnectionLimits, HttpConfig, HttpLimits, LeastRate, Offer, router,
-    token::hash_token,
+    Capacity, CapacityWatch, ConnectionLimits, HttpConfig, HttpLimits, LeastRate, LinkKey, Offer,
+    RateLimits, router, token::hash_token,
 };
+use faceoff_metrics::{Metrics, Process};
+use faceoff_notify::WebhookRules;
 use faceoff_store::*;
 use faceoff_types::*;
 use jiff::{SignedDuration, Timestamp};
@@ -21,6 +23,20 @@ pub const ADMIN: &str = "fo_admin_0123456789abcdef";
 pub const MAX_BUNDLE: u64 = 64 * 1024;
 /// The first bytes of a gzip stream; the web side looks no further.
 pub const GZIP: [u8; 4] = [0x1f, 0x8b, 8, 0];
+
+/// Of whatever makes clients. None speaks TLS, so none asks for the machine's certificate authorities.
+pub fn http() -> reqwest::ClientBuilder {
+    reqwest::Client::builder()
+        .no_proxy()
+        .tls_backend_preconfigured(no_tls())
+}
+
+/// Nothing here speaks TLS, so nobody's certificate is believed.
+pub fn no_tls() -> rustls::ClientConfig {
+    rustls::ClientConfig::builder()
+        .with_root_certificates(rustls::RootCertStore::empty())
+        .with_no_client_auth()
+}
 
 pub struct Site {
     pub url: String,
@@ -158,6 +174,13 @@ impl Site {
         Self::configured(patient(), Some(at.parse().unwrap())).await
     }
 
+    /// The same server, whose callers may ask so often only.
+    pub async fn with_rates(mut self, rates: RateLimits) -> Self {
+        self.config.rates = rates;
+        self.restart().await;
+        self
+    }
+
     pub async fn start_with(limits: HttpLimits) -> Self {
         Self::configured(limits, None).await
     }
@@ -194,9 +217,19 @@ impl Site {
                 runtimes: ["native", "python3"].map(str::to_owned).to_vec(),
             },
             offer: offer(),
+            rates: RateLimits::default(),
+            link_key: LinkKey::generate().unwrap(),
+            metrics: Metrics::new("0.0.0"),
+            process: Process::default,
+            webhooks: WebhookRules {
+                enabled: true,
+                allow_http: true,
+                ports: Vec::new(),
+                allow_private: vec!["127.0.0.0/8".parse().unwrap()],
+            },
         };
         let (url, server, ends) = serve(&store, &config).await;
-        let http = reqwest::Client::builder().no_proxy().build().unwrap();
+        let http = http().build().unwrap();
         Self {
             url,
             store,
@@ -233,6 +266,11 @@ impl Site {
                 time: TimeLimits::default(),
             },
             offer: Offer::nothing(),
+            rates: RateLimits::default(),
+            link_key: LinkKey::generate().unwrap(),
+            metrics: Metrics::new("0.0.0"),
+            process: Process::default,
+            webhooks: WebhookRules::default(),
         };
         let (url, server, ends) = serve(&store, &config).await;
         Self {
@@ -241,7 +279,7 @@ impl Site {
             folder,
             config,
             now: Arc::new(Mutex::new(made_at)),
-            http: reqwest::Client::builder().no_proxy().build().unwrap(),
+            http: http().build().unwrap(),
             server,
             ends: Some(ends),
         }
@@ -266,6 +304,10 @@ impl Site {
             clock, capacity, ..
         } = self.config.clone();
         CapacityWatch::new(self.store.clone(), clock, capacity)
+    }
+
+    pub fn clock(&self) -> Clock {
+        self.config.clock.clone()
     }
 
     pub fn now(&self) -> Timestamp {

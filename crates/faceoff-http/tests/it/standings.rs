@@ -250,3 +250,39 @@ async fn a_final_day_decides_and_until_then_the_board_says_that_it_does() {
             .contains("evaluation of the final day")
     );
 }
+
+#[tokio::test]
+async fn a_board_that_was_frozen_before_the_final_day_shows_on_what_it_showed() {
+    let site = Site::start().await;
+    site.played_day(20, [("Alpha", &agent(16, 0)), ("Beta", &agent(4, 0))])
+        .await;
+    set(&site, json!("final")).await;
+    let path = format!("/api/v1/stages/{}", site.stage().await);
+    change(&site, json!({ "closes_at": "2026-03-01T20:00:00Z" }))
+        .await
+        .json(200);
+    let reason = json!({ "reason": "the finale is a surprise" });
+    site.post(&format!("{path}/freeze"), Some(ADMIN), &reason)
+        .await
+        .json(200);
+    let shown = board(&site, "").await["rows"].clone();
+    assert_eq!(shown.as_array().unwrap().len(), 2);
+    site.later(15 * 3600);
+    site.post(&format!("{path}/final"), Some(ADMIN), &json!({}))
+        .await
+        .json(200);
+    site.finish_as(agent(5, 0)).await;
+    let frozen = board(&site, "").await;
+    assert_eq!(
+        (&frozen["rows"], &frozen["rows_by"]),
+        (&shown, &json!("latest"))
+    );
+    let live = site
+        .get("/api/v1/board?live=true", Some(ADMIN))
+        .await
+        .json(200);
+    assert_eq!(
+        (&live["rows_by"], live["rows"].as_array().unwrap().len()),
+        (&json!("final"), 1)
+    );
+}

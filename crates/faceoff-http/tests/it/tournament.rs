@@ -2,7 +2,7 @@
 //! are committed to the real store as a slot does.
 
 mod archived;
-mod cup;
+pub mod cup;
 mod files;
 mod formats;
 mod free_games;

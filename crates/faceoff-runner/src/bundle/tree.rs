@@ -48,11 +48,6 @@ impl<'a> Tree<'a> {
         })
     }
 
-    /// The folder that is being filled.
-    pub fn place_on_disk(&self) -> &Path {
-        &self.into
-    }
-
     /// The entry's path without `.` parts; empty for the archive's own root.
     fn normalise(entry: &str) -> Result<String, BundleError> {
         if entry.is_empty() {

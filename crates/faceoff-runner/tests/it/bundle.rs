@@ -1,5 +1,5 @@
 use crate::archives::{MANIFEST, Tar, write, zip};
-use faceoff_runner::bundle::{Bundle, BundleError, BundleLimits, copy, open, unpack};
+use faceoff_runner::bundle::{Bundle, BundleError, BundleLimits, open, unpack};
 use std::{
     fs,
     os::unix::fs::{MetadataExt, PermissionsExt},
@@ -495,42 +495,6 @@ fn a_folder_is_opened_in_place() {
     );
     let missing = open(&dir.path().join("nope"), scratch.path(), &limits).unwrap_err();
     assert!(matches!(missing, BundleError::Invalid(_)), "{missing}");
-}
-
-#[test]
-fn a_folder_is_copied_under_the_rules_of_an_archive() {
-    let dir = tempfile::tempdir().unwrap();
-    let source = dir.path().join("source");
-    fs::create_dir_all(source.join("lib/deep")).unwrap();
-    write(&source, "agent.toml", MANIFEST.as_bytes());
-    let script = write(&source, "lib/deep/run", b"#!/bin/sh");
-    fs::set_permissions(&script, fs::Permissions::from_mode(0o700)).unwrap();
-    std::os::unix::fs::symlink("lib/deep/run", source.join("run")).unwrap();
-    let limits = BundleLimits::default();
-    let bundle = copy(&source, &dir.path().join("copy"), &limits).unwrap();
-    assert_eq!(fs::read(bundle.dir.join("run")).unwrap(), b"#!/bin/sh");
-    assert_eq!(mode(&bundle.dir.join("lib/deep/run")), 0o755);
-    assert_eq!(mode(&bundle.dir.join("agent.toml")), 0o644);
-
-    // Results may be written below the bundle itself.
-    let inside = copy(&source, &source.join("out/copy"), &limits).unwrap();
-    assert_eq!(fs::read_dir(inside.dir.join("out")).unwrap().count(), 0);
-    fs::remove_dir_all(source.join("out")).unwrap();
-
-    let refusal = |name: &str, limits: &BundleLimits| {
-        copy(&source, &dir.path().join(name), limits)
-            .unwrap_err()
-            .to_string()
-    };
-    let few = BundleLimits { files: 2, ..limits };
-    assert!(refusal("few", &few).contains("more than 2 files"));
-    let small = BundleLimits {
-        unpacked_bytes: 50,
-        ..limits
-    };
-    assert!(refusal("small", &small).contains("unpacks to more than 50 bytes"));
-    std::os::unix::fs::symlink("/etc", source.join("etc")).unwrap();
-    assert!(refusal("link", &limits).contains("\"etc\" is a link that leaves the bundle"));
 }
 
 #[test]

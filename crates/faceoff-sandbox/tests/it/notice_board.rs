@@ -168,10 +168,16 @@ fn no_advice_brings_a_shared_file_into_memory_or_drops_it() {
             "{found} of {pages} pages were brought in"
         );
     }
-    let content = fs::read(&file).unwrap();
-    assert_eq!((content.len(), pages_in_memory(&file)), (8 << 20, pages));
+    // Most of them: a host may take a page back at any time, as some do that lend memory to others. Who could drop the
+    // file would drop all of it.
+    let is_in_memory = |file: &Path| pages_in_memory(file) > pages / 2;
+    let read = (0..100).any(|_| {
+        assert_eq!(fs::read(&file).unwrap().len(), 8 << 20);
+        is_in_memory(&file)
+    });
+    assert!(read, "this host keeps nothing in memory that was just read");
     subject.report();
-    assert_eq!(pages_in_memory(&file), pages, "some were dropped");
+    assert!(is_in_memory(&file), "it was dropped");
 }
 
 #[test]

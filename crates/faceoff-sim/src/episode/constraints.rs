@@ -8,11 +8,11 @@ use crate::{
 };
 use faceoff_types::Violations;
 
-/// Tolerance of the end effector's height, m.
-pub(crate) const HEIGHT_TOLERANCE_M: f64 = 0.02;
+/// Tolerance ± of the end effector's height, m.
+pub const HEIGHT_TOLERANCE_M: f64 = 0.02;
 
 /// Least height of elbow and wrist above the robot's base frame, m.
-pub(crate) const LINK_HEIGHT_M: f64 = 0.25;
+pub const LINK_HEIGHT_M: f64 = 0.25;
 
 /// Constraint values as the maximum over the group's values; violated when above 0. The value of a
 /// joint position is in rad, of a joint velocity in rad/s, the others in m.

@@ -3,6 +3,13 @@
 use super::Event;
 
 impl Event {
+    /// Its name.
+    #[must_use]
+    pub fn kind(&self) -> String {
+        let told = serde_json::to_value(self).unwrap_or_default();
+        told["kind"].as_str().unwrap_or_default().to_owned()
+    }
+
     /// Is there an event of this name?
     ///
     /// # Errors
@@ -22,6 +29,11 @@ impl Event {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_event_has_the_name_that_the_log_has() {
+        assert_eq!(Event::SeasonClosed.kind(), "season_closed");
+    }
 
     #[test]
     fn names_of_events_are_known_with_and_without_fields() {

@@ -5,11 +5,14 @@ use super::Event;
 impl Event {
     /// May everybody know of it, with all of its fields? So they do already: from boards, pages of evaluations,
     /// announcements and the season's page. What is about a single evaluation is public only where that is.
-    pub(crate) const fn is_public(&self) -> bool {
+    #[must_use]
+    pub const fn is_public(&self) -> bool {
         match self {
             Self::TeamCreated { .. }
             | Self::TeamRenamed { .. }
             | Self::TeamDescribed { .. }
+            | Self::TeamMadeBaseline
+            | Self::TeamMadeRanked
             | Self::TeamRetired
             | Self::TeamReturned
             | Self::TeamDisqualified { .. }
@@ -105,6 +108,11 @@ impl Event {
             | Self::ReplaysOrdered { .. }
             | Self::ReplaysCancelled { .. }
             | Self::FriendlyGamesDeclined { .. }
+            | Self::WebhookCreated { .. }
+            | Self::WebhookChanged { .. }
+            | Self::WebhookRotated { .. }
+            | Self::WebhookRemoved { .. }
+            | Self::WebhookDied { .. }
             | Self::UnitGivenBack { .. } => false,
         }
     }

@@ -2,9 +2,9 @@
 
 use crate::{
     column::Instant,
-    database::MIGRATIONS,
     error::{Result, StoreError},
     operations::scrub::check_references,
+    schema::MIGRATIONS,
     store::Store,
     tables::archived::{self, Archived},
 };

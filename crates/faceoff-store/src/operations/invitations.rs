@@ -162,6 +162,7 @@ pub(super) async fn add_team(
         disqualified: None,
         profile,
         retired_at: None,
+        is_baseline: false,
     };
     teams::insert(tx, &team).await?;
     let (id, name) = (team.id, team.name);

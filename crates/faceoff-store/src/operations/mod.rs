@@ -2,6 +2,7 @@
 
 mod activate;
 pub(crate) mod announcements;
+pub(crate) mod backup;
 pub(crate) mod cancel;
 pub(crate) mod claim;
 pub(crate) mod clear;
@@ -45,5 +46,6 @@ pub(crate) mod teams;
 pub(crate) mod tidy;
 pub(crate) mod tokens;
 pub(crate) mod tournament;
+pub(crate) mod webhooks;
 mod withdraw;
 pub(crate) mod work;

@@ -142,6 +142,8 @@ const STEPS: &[(For, &str)] = &[
     (For::Public, "UPDATE stages SET finalised_by = 'organiser' WHERE finalised_by IS NOT NULL"),
     // Keys of every kind.
     (For::Both, "DELETE FROM tokens"),
+    (For::Both, "DELETE FROM webhook_deliveries"),
+    (For::Both, "DELETE FROM webhooks"),
     (For::Both, "DELETE FROM invitations"),
     (For::Both, "UPDATE people SET password = NULL"),
     (For::Both, "UPDATE registrations SET code_hash = randomblob(32)"),

@@ -114,7 +114,7 @@ impl Snapshot {
 }
 
 /// Copies a database with all that is committed, and without its unused pages.
-async fn copy(from: &Path, to: &Path) -> Result<()> {
+pub(crate) async fn copy(from: &Path, to: &Path) -> Result<()> {
     let to = to
         .to_str()
         .ok_or_else(|| StoreError::Artifacts(format!("{}: not a UTF-8 path", to.display())))?;

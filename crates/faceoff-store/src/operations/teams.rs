@@ -38,6 +38,8 @@ pub struct TeamChange {
     pub name: Option<TeamName>,
     /// What it tells of itself, all of it.
     pub profile: Option<TeamProfile>,
+    /// Is it a reference agent of the organisers, which no board ranks?
+    pub baseline: Option<bool>,
 }
 
 impl Store {
@@ -77,7 +79,7 @@ impl Store {
     }
 
     /// Changes a team's name, or what it tells of itself. [`StoreError::TeamNameTaken`] if another has the name,
-    /// [`StoreError::Conflict`] if there is no such division, [`StoreError::SeasonClosed`] once the season is over.
+    /// [`StoreError::Conflict`] if there is no such division, or a signed-off board would rank it otherwise, [`StoreError::SeasonClosed`] once the season is over.
     pub async fn change_team(
         &self,
         actor: Actor,
@@ -109,6 +111,21 @@ impl Store {
                     };
                     tx.record(Subject::Team(id), event);
                 }
+            }
+            if let Some(baseline) = change.baseline.filter(|new| *new != team.is_baseline) {
+                if let Some(stage) = teams::signed_off_with(tx, id).await? {
+                    return Err(StoreError::Conflict(format!(
+                        "the stage {stage:?} is signed off with results of the team, and its ranks would be others: whether \
+                         the team is a baseline stays as it is. Nothing was changed"
+                    )));
+                }
+                teams::set_baseline(tx, id, baseline).await?;
+                let event = if baseline {
+                    Event::TeamMadeBaseline
+                } else {
+                    Event::TeamMadeRanked
+                };
+                tx.record(Subject::Team(id), event);
             }
             teams::find(tx, id).await
         })

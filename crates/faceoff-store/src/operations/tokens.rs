@@ -135,6 +135,25 @@ async fn who(connection: &mut SqliteConnection, token: &Token) -> Result<Option<
     })
 }
 
+/// A token that came, or what it signed, as of `now`.
+async fn held(
+    connection: &mut SqliteConnection,
+    token: Token,
+    now: Timestamp,
+) -> Result<Result<Holder, Refusal>> {
+    if let Some(at) = token.revoked_at {
+        return Ok(Err(Refusal::Revoked(at)));
+    }
+    match token.expires_at {
+        Some(at) if at <= now => return Ok(Err(Refusal::Expired(at))),
+        _ => {}
+    }
+    let who = who(connection, &token).await?;
+    Ok(who
+        .map(|who| Holder { token, who })
+        .ok_or(Refusal::Revoked(now)))
+}
+
 /// Why a token opens nothing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refusal {
@@ -163,17 +182,21 @@ impl Store {
         if token.kind != kind {
             return Ok(Err(Refusal::WrongKind));
         }
-        if let Some(at) = token.revoked_at {
-            return Ok(Err(Refusal::Revoked(at)));
-        }
-        match token.expires_at {
-            Some(at) if at <= now => return Ok(Err(Refusal::Expired(at))),
-            _ => {}
-        }
-        let who = who(&mut connection, &token).await?;
-        Ok(who
-            .map(|who| Holder { token, who })
-            .ok_or(Refusal::Revoked(now)))
+        held(&mut connection, token, now).await
+    }
+
+    /// Who holds the token with this id, as of `now`, for whoever has something that was signed with its
+    /// [hash](Store::token_hash).
+    pub async fn holder_of(&self, id: TokenId, now: Timestamp) -> Result<Result<Holder, Refusal>> {
+        let mut connection = self.database.read.acquire().await?;
+        let token = tokens::find(&mut connection, id).await?;
+        held(&mut connection, token, now).await
+    }
+
+    /// The hash of a token's text, which another secret changes. It is a key to sign with: nobody but the server and
+    /// whoever has the token knows it.
+    pub async fn token_hash(&self, id: TokenId) -> Result<[u8; 32]> {
+        tokens::hash_of(&mut *self.database.read.acquire().await?, id).await
     }
 
     /// Notes that a token was used. Often enough is once in [`LAST_USE`].

@@ -49,6 +49,7 @@ pub(super) struct Row {
     pub(super) link: Option<String>,
     pub(super) division: Option<Text<DivisionName>>,
     pub(super) retired_at: Option<Instant>,
+    pub(super) is_baseline: bool,
     pub(super) submission: Text<SubmissionId>,
     pub(super) submitted_at: Instant,
     pub(super) agent_name: Option<String>,
@@ -75,6 +76,7 @@ impl From<Row> for BoardRecord {
                     division: row.division.map(|name| name.0),
                 },
                 retired_at: row.retired_at.map(|at| at.0),
+                is_baseline: row.is_baseline,
             },
             submission: row.submission.0,
             submitted_at: row.submitted_at.0,
@@ -98,6 +100,7 @@ macro_rules! select_board {
             $name + r#"SELECT t.id AS "team: Text<TeamId>", t.name AS "name: Text<TeamName>",
                       t.created_at AS "invited_at: Instant", t.affiliation, t.link,
                       t.division AS "division: Text<DivisionName>", t.retired_at AS "retired_at: Instant",
+                      t.is_baseline AS "is_baseline: bool",
                       s.id AS "submission: Text<SubmissionId>",
                       s.created_at AS "submitted_at: Instant", s.agent_name,
                       e.id AS "evaluation: Text<EvaluationId>", e.run_id AS "run: Text<RunId>",
@@ -115,6 +118,8 @@ pub(super) use select_board;
 pub struct BoardScope {
     /// What was finished later; `None`: nothing.
     pub until: Option<Timestamp>,
+    /// What is of a later day; `None`: nothing.
+    pub until_day: Option<Date>,
     /// These, as if they did not count.
     pub without: Vec<EvaluationId>,
 }
@@ -122,25 +127,47 @@ pub struct BoardScope {
 impl Store {
     /// The newest of a stage's rules that an evaluation is finished under; those of now before there is any.
     pub async fn board_revision(&self, stage: &Stage) -> Result<u32> {
-        self.board_revision_until(stage, None).await
+        self.board_revision_within(stage, &BoardScope::default())
+            .await
     }
 
-    /// The same of what was finished at `until` or earlier, if that is given.
-    pub async fn board_revision_until(
-        &self,
-        stage: &Stage,
-        until: Option<Timestamp>,
-    ) -> Result<u32> {
-        let (id, until) = (Text(stage.id), until.map(Instant));
+    /// The same of what is within the times of `scope`.
+    pub async fn board_revision_within(&self, stage: &Stage, scope: &BoardScope) -> Result<u32> {
+        let (id, until) = (Text(stage.id), scope.until.map(Instant));
+        let until_day = scope.until_day.map(Text);
         let newest = sqlx::query_scalar!(
             r#"SELECT MAX(revision) AS "revision: u32" FROM evaluations
                WHERE stage_id = ?1 AND state = 'finished' AND voided_at IS NULL
-                 AND (?2 IS NULL OR finished_at <= ?2)"#,
+                 AND (?2 IS NULL OR finished_at <= ?2) AND (?3 IS NULL OR day <= ?3)"#,
             id,
             until,
+            until_day,
         );
         let newest = newest.fetch_one(&self.database.read).await?;
         Ok(newest.unwrap_or(stage.rules.number))
+    }
+
+    /// The days of a stage with results by one revision of its rules within the times of `scope`, the earlier first.
+    pub async fn board_days(
+        &self,
+        stage: StageId,
+        revision: u32,
+        scope: &BoardScope,
+    ) -> Result<Vec<Date>> {
+        let (stage, until) = (Text(stage), scope.until.map(Instant));
+        let until_day = scope.until_day.map(Text);
+        let days = sqlx::query_scalar!(
+            r#"SELECT DISTINCT day AS "day: Text<Date>" FROM evaluations
+               WHERE stage_id = ?1 AND revision = ?2 AND state = 'finished' AND voided_at IS NULL
+                 AND (?3 IS NULL OR finished_at <= ?3) AND (?4 IS NULL OR day <= ?4)
+               ORDER BY day"#,
+            stage,
+            revision,
+            until,
+            until_day,
+        );
+        let days = days.fetch_all(&self.database.read).await?;
+        Ok(days.into_iter().map(|day| day.0).collect())
     }
 
     /// What the board of a stage is made of by one revision of its rules, with nothing left out.
@@ -160,6 +187,7 @@ impl Store {
     ) -> Result<Vec<BoardRecord>> {
         let (stage, until) = (Text(stage), scope.until.map(Instant));
         let without = Json(&scope.without);
+        let until_day = scope.until_day.map(Text);
         let rows = select_board!(
             "/* board */ ",
             r#"FROM teams t
@@ -168,6 +196,7 @@ impl Store {
                                                   AND n.revision = ?2 AND n.state = 'finished'
                                                   AND n.voided_at IS NULL
                                                   AND (?3 IS NULL OR n.finished_at <= ?3)
+                                                  AND (?5 IS NULL OR n.day <= ?5)
                                                   AND n.id NOT IN (SELECT value FROM json_each(?4))
                                                 ORDER BY n.day DESC LIMIT 1)
                JOIN days d ON d.stage_id = e.stage_id AND d.day = e.day
@@ -180,6 +209,7 @@ impl Store {
             revision,
             until,
             without,
+            until_day,
         );
         let rows = rows.fetch_all(&self.database.read).await?;
         Ok(rows.into_iter().map(BoardRecord::from).collect())

@@ -5,7 +5,7 @@ use crate::{
     tables::evaluations::{self, Evaluation, EvaluationRow},
 };
 use faceoff_types::{EvaluationId, StageDay, TeamId};
-use jiff::civil::Date;
+use jiff::{Timestamp, civil::Date};
 use sqlx::SqliteConnection;
 
 /// Adds the progress of those that run.
@@ -37,7 +37,44 @@ pub(crate) async fn find(
     found.pop().ok_or(StoreError::NotFound("evaluation"))
 }
 
+/// Which evaluations a list has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EvaluationsOf {
+    /// A team's, of one date or of all, newest first.
+    Team(TeamId, Option<Date>),
+    /// All of a date, of all stages, in the order in which they were queued.
+    Day(Date),
+}
+
 impl Store {
+    /// Some of a list: the first ones, or those behind another one. `None` if there is no such.
+    pub async fn evaluations_after(
+        &self,
+        of: EvaluationsOf,
+        after: Option<EvaluationId>,
+        limit: u32,
+    ) -> Result<Option<Vec<Evaluation>>> {
+        let mut tx = self.database.read.begin().await?;
+        let behind = match after {
+            None => None,
+            Some(id) => match evaluations::created_at(&mut tx, id).await? {
+                Some(at) => Some((at, Some(id))),
+                None => return Ok(None),
+            },
+        };
+        let rows = match of {
+            EvaluationsOf::Team(team, date) => {
+                let behind = behind.unwrap_or((Timestamp::MAX, None));
+                evaluations::of_team_after(&mut tx, team, date, behind, limit).await?
+            }
+            EvaluationsOf::Day(date) => {
+                let behind = behind.unwrap_or((Timestamp::UNIX_EPOCH, None));
+                evaluations::on_date_after(&mut tx, date, behind, limit).await?
+            }
+        };
+        with_progress(&mut tx, rows).await.map(Some)
+    }
+
     /// The evaluation with this id.
     pub async fn evaluation(&self, id: EvaluationId) -> Result<Evaluation> {
         find(&mut *self.database.read.begin().await?, id).await
@@ -60,7 +97,8 @@ impl Store {
     /// The evaluations of all stages' days of this date, in the order in which they were queued.
     pub async fn evaluations_on(&self, date: Date) -> Result<Vec<Evaluation>> {
         let mut tx = self.database.read.begin().await?;
-        let rows = evaluations::on_date(&mut tx, date).await?;
+        let first = (Timestamp::UNIX_EPOCH, None);
+        let rows = evaluations::on_date_after(&mut tx, date, first, u32::MAX).await?;
         with_progress(&mut tx, rows).await
     }
 }

@@ -12,6 +12,11 @@ impl Store {
         events::after(&mut *self.database.read.acquire().await?, after, limit).await
     }
 
+    /// The id of what happened last; 0 before the first.
+    pub async fn newest_event(&self) -> Result<i64> {
+        events::newest_id(&mut *self.database.read.acquire().await?).await
+    }
+
     /// The id of what happened last that anything but the progress of a run may depend on; 0 before the first.
     pub async fn newest_change(&self) -> Result<i64> {
         events::newest_change(&mut *self.database.read.acquire().await?).await

@@ -2,9 +2,11 @@
 
 pub(crate) mod ablations;
 pub(crate) mod board;
+pub(crate) mod concerns;
 mod days;
 pub(crate) mod evaluations;
 mod events;
+pub(crate) mod numbers;
 pub(crate) mod outlook;
 pub(crate) mod progress;
 pub(crate) mod proposals;

@@ -37,6 +37,7 @@ impl Store {
     ) -> Result<Vec<BoardRecord>> {
         let (stage, until) = (Text(stage), scope.until.map(Instant));
         let without = Json(&scope.without);
+        let until_day = scope.until_day.map(Text);
         let (last, only_final) = match days {
             BoardDays::All => (u32::MAX, false),
             BoardDays::Last(days) => (days, false),
@@ -48,6 +49,7 @@ impl Store {
                      FROM evaluations n
                      WHERE n.stage_id = ?1 AND n.revision = ?2 AND n.state = 'finished'
                        AND n.voided_at IS NULL AND (?5 IS NULL OR n.finished_at <= ?5)
+                       AND (?7 IS NULL OR n.day <= ?7)
                        AND n.id NOT IN (SELECT value FROM json_each(?6))) a
                JOIN evaluations e ON e.rowid = a.row
                JOIN teams t ON t.id = e.team_id
@@ -64,6 +66,7 @@ impl Store {
             only_final,
             until,
             without,
+            until_day,
         );
         let rows = rows.fetch_all(&self.database.read).await?;
         Ok(rows.into_iter().map(BoardRecord::from).collect())

@@ -4,6 +4,7 @@ use crate::{
     tables::submissions::{self, Submission},
 };
 use faceoff_types::{SubmissionId, TeamId};
+use jiff::Timestamp;
 
 impl Store {
     /// The submission with this id.
@@ -14,6 +15,26 @@ impl Store {
     /// A team's submissions, newest first.
     pub async fn submissions_of(&self, team: TeamId) -> Result<Vec<Submission>> {
         submissions::of_team(&mut *self.database.read.acquire().await?, team).await
+    }
+
+    /// Some of them: the first ones, or those behind another one. `None` if there is no such.
+    pub async fn submissions_after(
+        &self,
+        team: TeamId,
+        after: Option<SubmissionId>,
+        limit: u32,
+    ) -> Result<Option<Vec<Submission>>> {
+        let mut tx = self.database.read.begin().await?;
+        let behind = match after {
+            None => (Timestamp::MAX, None),
+            Some(id) => match submissions::created_at(&mut tx, id).await? {
+                Some(at) => (at, Some(id)),
+                None => return Ok(None),
+            },
+        };
+        submissions::of_team_after(&mut tx, team, behind, limit)
+            .await
+            .map(Some)
     }
 
     /// What each team that may play has active, the earliest upload first.

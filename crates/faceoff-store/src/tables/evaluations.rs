@@ -293,6 +293,63 @@ pub(crate) async fn of_team(
     .await?)
 }
 
+/// When an evaluation was queued, if there is one of this id.
+pub(crate) async fn created_at(
+    connection: &mut SqliteConnection,
+    id: EvaluationId,
+) -> Result<Option<Timestamp>> {
+    let id = Text(id);
+    let at = sqlx::query_scalar!(
+        r#"SELECT created_at AS "at: Instant" FROM evaluations WHERE id = ?"#,
+        id
+    );
+    Ok(at.fetch_optional(connection).await?.map(|at| at.0))
+}
+
+/// Some of a team's evaluations, of one date or of all, newest first: those behind one of this time and id.
+pub(crate) async fn of_team_after(
+    connection: &mut SqliteConnection,
+    team: TeamId,
+    date: Option<Date>,
+    (at, id): (Timestamp, Option<EvaluationId>),
+    limit: u32,
+) -> Result<Vec<EvaluationRow>> {
+    let (team, day, at, id) = (Text(team), date.map(Text), Instant(at), id.map(Text));
+    Ok(select_evaluations!(
+        "WHERE e.team_id = ?1 AND (?2 IS NULL OR e.day = ?2)
+           AND e.created_at <= ?3 AND (e.created_at < ?3 OR ?4 IS NULL OR e.id < ?4)
+         ORDER BY e.created_at DESC, e.id DESC LIMIT ?5",
+        team,
+        day,
+        at,
+        id,
+        limit
+    )
+    .fetch_all(connection)
+    .await?)
+}
+
+/// Some of the evaluations of all stages on a date, in the order in which they were queued: those behind one of this time
+/// and id.
+pub(crate) async fn on_date_after(
+    connection: &mut SqliteConnection,
+    date: Date,
+    (at, id): (Timestamp, Option<EvaluationId>),
+    limit: u32,
+) -> Result<Vec<EvaluationRow>> {
+    let (day, at, id) = (Text(date), Instant(at), id.map(Text));
+    Ok(select_evaluations!(
+        "WHERE e.day = ?1 AND e.created_at >= ?2 AND (e.created_at > ?2 OR ?3 IS NULL OR e.id > ?3)
+         ORDER BY e.created_at, e.id LIMIT ?4",
+        day,
+        at,
+        id,
+        limit
+    )
+    .fetch_all(connection)
+    .await?)
+}
+
 /// The evaluations of a stage's day, in the order in which they were queued.
 pub(crate) async fn of_day(
     connection: &mut SqliteConnection,
@@ -306,19 +363,6 @@ pub(crate) async fn of_day(
     )
     .fetch_all(connection)
     .await?)
-}
-
-/// The evaluations of all stages on a date, in the order in which they were queued.
-pub(crate) async fn on_date(
-    connection: &mut SqliteConnection,
-    date: Date,
-) -> Result<Vec<EvaluationRow>> {
-    let day = Text(date);
-    Ok(
-        select_evaluations!("WHERE e.day = ? ORDER BY e.created_at, e.id", day)
-            .fetch_all(connection)
-            .await?,
-    )
 }
 
 /// The evaluation that owns a run, if one does.

@@ -82,6 +82,13 @@ pub(crate) async fn newest_change(connection: &mut SqliteConnection) -> Result<i
     Ok(newest.fetch_optional(connection).await?.unwrap_or_default())
 }
 
+/// The id of the newest event; 0 before the first. None that is gone was newer: a run's progress goes after its end, which
+/// is told.
+pub(crate) async fn newest_id(connection: &mut SqliteConnection) -> Result<i64> {
+    let newest = sqlx::query_scalar!(r#"SELECT id AS "id!" FROM events ORDER BY id DESC LIMIT 1"#);
+    Ok(newest.fetch_optional(connection).await?.unwrap_or_default())
+}
+
 /// Removes what was told of a run while it was played.
 pub(crate) async fn remove_progress(
     connection: &mut SqliteConnection,

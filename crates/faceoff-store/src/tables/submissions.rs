@@ -209,6 +209,42 @@ pub(crate) async fn of_team(
     .collect()
 }
 
+/// When a submission was uploaded, if there is one of this id.
+pub(crate) async fn created_at(
+    connection: &mut SqliteConnection,
+    id: SubmissionId,
+) -> Result<Option<Timestamp>> {
+    let id = Text(id);
+    let at = sqlx::query_scalar!(
+        r#"SELECT created_at AS "at: Instant" FROM submissions WHERE id = ?"#,
+        id
+    );
+    Ok(at.fetch_optional(connection).await?.map(|at| at.0))
+}
+
+/// Some of a team's submissions, newest first: those behind one of this time and id.
+pub(crate) async fn of_team_after(
+    connection: &mut SqliteConnection,
+    team: TeamId,
+    (at, id): (Timestamp, Option<SubmissionId>),
+    limit: u32,
+) -> Result<Vec<Submission>> {
+    let (team, at, id) = (Text(team), Instant(at), id.map(Text));
+    select_submissions!(
+        "WHERE s.team_id = ?1 AND s.created_at <= ?2 AND (s.created_at < ?2 OR ?3 IS NULL OR s.id < ?3)
+         ORDER BY s.created_at DESC, s.id DESC LIMIT ?4",
+        team,
+        at,
+        id,
+        limit
+    )
+    .fetch_all(connection)
+    .await?
+    .into_iter()
+    .map(Submission::try_from)
+    .collect()
+}
+
 /// What each team that may play has active, earliest upload first.
 pub(crate) async fn active(connection: &mut SqliteConnection) -> Result<Vec<Submission>> {
     select_submissions!(

@@ -22,6 +22,8 @@ pub struct Team {
     pub profile: TeamProfile,
     /// Since when it plays no more, by its own wish; its results stay.
     pub retired_at: Option<Timestamp>,
+    /// A reference agent of the organisers: it plays as others do, and no board ranks it.
+    pub is_baseline: bool,
 }
 
 /// What a team tells of itself.
@@ -45,6 +47,7 @@ struct TeamRow {
     link: Option<String>,
     division: Option<Text<DivisionName>>,
     retired_at: Option<Instant>,
+    is_baseline: bool,
 }
 
 impl From<TeamRow> for Team {
@@ -60,6 +63,7 @@ impl From<TeamRow> for Team {
                 division: row.division.map(|name| name.0),
             },
             retired_at: row.retired_at.map(|at| at.0),
+            is_baseline: row.is_baseline,
         }
     }
 }
@@ -73,7 +77,7 @@ macro_rules! select_teams {
                       created_at AS "created_at: Instant",
                       disqualified_at AS "disqualified_at: Instant", disqualified_for,
                       affiliation, link, division AS "division: Text<DivisionName>",
-                      retired_at AS "retired_at: Instant"
+                      retired_at AS "retired_at: Instant", is_baseline AS "is_baseline: bool"
                FROM teams "# + $tail
             $(, $argument)*
         )
@@ -166,6 +170,40 @@ pub(crate) async fn set_retired(
     .execute(connection)
     .await?;
     Ok(())
+}
+
+pub(crate) async fn set_baseline(
+    connection: &mut SqliteConnection,
+    id: TeamId,
+    is_baseline: bool,
+) -> Result<()> {
+    let id = Text(id);
+    sqlx::query!(
+        "UPDATE teams SET is_baseline = ? WHERE id = ?",
+        is_baseline,
+        id
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// The name of a signed-off stage on whose boards the team stands, if there is one.
+pub(crate) async fn signed_off_with(
+    connection: &mut SqliteConnection,
+    id: TeamId,
+) -> Result<Option<String>> {
+    let id = Text(id);
+    Ok(sqlx::query_scalar!(
+        "SELECT g.name FROM stages g
+         WHERE g.finalised_at IS NOT NULL
+           AND EXISTS (SELECT 1 FROM evaluations e
+                       WHERE e.team_id = ? AND e.stage_id = g.id AND e.state = 'finished' AND e.voided_at IS NULL)
+         LIMIT 1",
+        id
+    )
+    .fetch_optional(connection)
+    .await?)
 }
 
 /// Why what a team has uploaded and played is kept, whatever else would have it go.

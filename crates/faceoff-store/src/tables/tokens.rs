@@ -171,6 +171,19 @@ pub(crate) async fn by_hash(
     Ok(row.map(Token::from))
 }
 
+/// What is kept of a token's text.
+pub(crate) async fn hash_of(connection: &mut SqliteConnection, id: TokenId) -> Result<[u8; 32]> {
+    let id = Text(id);
+    sqlx::query_scalar!(
+        r#"SELECT hash AS "hash: Bytes32" FROM tokens WHERE id = ?"#,
+        id
+    )
+    .fetch_optional(connection)
+    .await?
+    .map(|hash| hash.0)
+    .ok_or(StoreError::NotFound("token"))
+}
+
 /// How many of an owner are worth something at `now`.
 pub(crate) async fn count_good(
     connection: &mut SqliteConnection,

@@ -53,7 +53,7 @@ async fn a_frozen_board_leaves_out_what_is_finished_later() {
         ..BoardScope::default()
     };
     let of_stage = f.store.stage(stage).await.unwrap();
-    let revision = f.store.board_revision_until(&of_stage, scope.until).await;
+    let revision = f.store.board_revision_within(&of_stage, &scope).await;
     let revision = revision.unwrap();
     let shown = f.store.board_within(stage, revision, &scope).await.unwrap();
     let scores =
@@ -62,8 +62,8 @@ async fn a_frozen_board_leaves_out_what_is_finished_later() {
     assert_eq!(scores(&f.board().await), [2.0, 2.0], "the live one");
     // Without a row, as if it did not count, the one before counts.
     let without = BoardScope {
-        until: None,
         without: vec![f.board().await[0].evaluation],
+        ..BoardScope::default()
     };
     let shown = f.store.board_within(stage, revision, &without).await;
     assert_eq!(scores(&shown.unwrap()), [1.0, 2.0]);

@@ -48,6 +48,7 @@ const PUBLIC_COLUMNS: &[(&str, &str)] = &[
          meeting purpose reason replay round second_half seed state tournament_id unit_id",
     ),
     ("lanes", "lane rank served_ms urgency"),
+    ("programs", "id schema version"),
     (
         "questions",
         "answer answered_at asked_at id public team_id text",
@@ -83,7 +84,7 @@ const PUBLIC_COLUMNS: &[(&str, &str)] = &[
     ),
     (
         "teams",
-        "affiliation created_at disqualified_at disqualified_for division id link name retired_at retired_by_organiser",
+        "affiliation created_at disqualified_at disqualified_for division id is_baseline link name retired_at retired_by_organiser",
     ),
     ("terms", "since text version"),
     (
@@ -152,6 +153,17 @@ async fn season() -> (Fixture, EvaluationId) {
         .await
         .unwrap();
     f.store.join(joining([7; 32], "Ada"), f.now).await.unwrap();
+    let webhook = NewWebhook {
+        team: Some(alpha.team),
+        name: "ours".into(),
+        url: "https://example.org/".into(),
+        about: Vec::new(),
+        secret: [9; 32],
+    };
+    let webhook = f.store.create_webhook(Actor::Organiser, webhook, f.now);
+    let webhook = webhook.await.unwrap().id;
+    let told = f.store.test_webhook(webhook, "test", "{}", f.now);
+    told.await.unwrap();
     f.later(24 * 3600);
     f.ready_team("Beta").await;
     f.evaluate(alpha.id, &small()).await;
@@ -201,6 +213,8 @@ async fn what_is_open_is_no_result_and_no_key_goes_along() {
             ("evaluations", 1),
             ("tokens", 0),
             ("invitations", 0),
+            ("webhooks", 0),
+            ("webhook_deliveries", 0),
             ("days", 2),
         ] {
             assert_eq!(count(&file, table).await, rows, "{edition}: {table}");

@@ -261,7 +261,7 @@ async fn a_team_is_renamed_and_described_and_retires() {
     };
     let named = |name: &str| TeamChange {
         name: Some(name.parse().unwrap()),
-        profile: None,
+        ..TeamChange::default()
     };
     let taken = change(named("beta")).await;
     assert!(matches!(taken, Err(StoreError::TeamNameTaken(_))));
@@ -273,6 +273,7 @@ async fn a_team_is_renamed_and_described_and_retires() {
             link: Some("https://example.org".into()),
             division: Some(division.parse().unwrap()),
         }),
+        ..TeamChange::default()
     };
     words(
         &change(described("Students")).await.unwrap_err(),

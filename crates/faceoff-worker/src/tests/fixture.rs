@@ -9,6 +9,7 @@ use crate::{
     service::{Intervals, WorkerConfig, run_with},
     slot_threads::SlotThreads,
 };
+use faceoff_metrics::Metrics;
 use faceoff_runner::{
     AgentEnvironment, Assembled, EvaluationMeta, GameAudience, GameReport, GameSpec, Observer,
     PlatformFault, ShardReport, ShardSpec, SmokeReport, SmokeSpec, TimeLimits,
@@ -416,6 +417,7 @@ impl Server {
                 files: 1,
                 unpack_s: 1,
             },
+            metrics: Metrics::new("0.0.0"),
         }
     }
 

@@ -1,5 +1,6 @@
 //! A store, a worker, and teams that upload the agent beside this file.
 
+use faceoff_metrics::Metrics;
 use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::BundleLimits};
 use faceoff_sandbox::{Isolation, Limits, Runtime};
 use faceoff_store::*;
@@ -87,6 +88,7 @@ impl Server {
                 agent_cpus: Vec::new(),
             },
             bundle_limits: BundleLimits::default(),
+            metrics: Metrics::new("0.0.0"),
         };
         let shutdown = CancellationToken::new();
         let clock = Clock::new(Timestamp::now);

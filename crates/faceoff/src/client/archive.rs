@@ -1,6 +1,6 @@
 //! The season's archive, downloaded.
 
-use super::{Client, http::http};
+use super::Client;
 use anyhow::{Context, bail};
 use faceoff_archive::{Edition, Manifest, check};
 use faceoff_http::requests::ArchiveQuery;
@@ -36,7 +36,7 @@ impl Client {
             );
         }
         let patient = Self {
-            http: http(PATIENCE)?,
+            http: self.address.http(PATIENCE)?,
             ..self.clone()
         };
         let query = ArchiveQuery {

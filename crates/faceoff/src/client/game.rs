@@ -2,6 +2,7 @@
 
 use super::{
     Client,
+    download::Downloaded,
     sse::{self, ServerEvent},
 };
 use anyhow::Context;
@@ -11,6 +12,7 @@ use faceoff_http::{
 };
 use faceoff_types::{GameId, Side};
 use futures::{Stream, StreamExt};
+use indicatif::ProgressBar;
 use reqwest::{Method, header};
 use std::path::Path;
 
@@ -41,15 +43,27 @@ impl Client {
         self.act(Method::POST, &format!("/games/{id}/rerun")).await
     }
 
-    /// Downloads a side's own file; returns its size in bytes.
-    pub async fn download_side(&self, id: GameId, side: Side, file: &Path) -> anyhow::Result<u64> {
-        self.download(&format!("/games/{id}/sides/{}", side.number()), file)
-            .await
+    /// Downloads a side's own file.
+    pub async fn download_side(
+        &self,
+        id: GameId,
+        side: Side,
+        file: &Path,
+        bar: &ProgressBar,
+    ) -> anyhow::Result<Downloaded> {
+        let path = format!("/games/{id}/sides/{}", side.number());
+        self.download(&path, file, None, bar).await
     }
 
-    /// Downloads the recording of both sides; returns its size in bytes.
-    pub async fn download_recording(&self, id: GameId, file: &Path) -> anyhow::Result<u64> {
-        self.download(&format!("/games/{id}/recording"), file).await
+    /// Downloads the recording of both sides.
+    pub async fn download_recording(
+        &self,
+        id: GameId,
+        file: &Path,
+        bar: &ProgressBar,
+    ) -> anyhow::Result<Downloaded> {
+        let path = format!("/games/{id}/recording");
+        self.download(&path, file, None, bar).await
     }
 
     /// Team or organiser: the end of what a side's agent wrote.

@@ -3,12 +3,12 @@
 use super::Client;
 use faceoff_http::{
     requests::{
-        Confirmation, Join, NewAnnouncement, NewAnswer, NewInvitation, NewQuestion, NewTerms,
-        NewToken, Reason, SeasonChange, TeamChange,
+        Confirmation, Join, NewAnnouncement, NewAnswer, NewInvitation, NewPassword, NewQuestion,
+        NewTerms, NewToken, Reason, Register, SeasonChange, TeamChange,
     },
     views::{
         announcement::{AnnouncementView, QuestionView, TermsView},
-        invitation::{InvitationView, NewInvitationView, RegistrationView},
+        invitation::{InvitationView, NewInvitationView, NewRegistrationView, RegistrationView},
         person::{JoinedView, PersonView, WhoView},
         season::SeasonView,
         team::TeamView,
@@ -26,7 +26,7 @@ impl Client {
 
     /// The tokens and sessions that we may manage, the newest first.
     pub async fn tokens(&self) -> anyhow::Result<Vec<TokenView>> {
-        self.get("/tokens").await
+        self.list(self.request(Method::GET, "/tokens")).await
     }
 
     /// Makes a token; its text comes this once.
@@ -47,7 +47,7 @@ impl Client {
 
     /// The people whom we may see.
     pub async fn people(&self) -> anyhow::Result<Vec<PersonView>> {
-        self.get("/people").await
+        self.list(self.request(Method::GET, "/people")).await
     }
 
     /// Lets a person do nothing any more; `confirm` is their name.
@@ -61,6 +61,21 @@ impl Client {
             .await
     }
 
+    /// Sets our own password; all our other tokens and sessions are worth nothing from then on.
+    pub async fn set_password(
+        &self,
+        id: PersonId,
+        new: &NewPassword,
+    ) -> anyhow::Result<PersonView> {
+        self.tell(Method::PUT, &format!("/people/{id}/password"), new)
+            .await
+    }
+
+    /// Registers a team; its link comes this once.
+    pub async fn register(&self, new: &Register) -> anyhow::Result<NewRegistrationView> {
+        self.tell(Method::POST, "/registrations", new).await
+    }
+
     /// Makes an invitation; its link comes this once.
     pub async fn invite(&self, new: &NewInvitation) -> anyhow::Result<NewInvitationView> {
         self.tell(Method::POST, "/invitations", new).await
@@ -68,7 +83,7 @@ impl Client {
 
     /// The invitations that we may manage, the newest first.
     pub async fn invitations(&self) -> anyhow::Result<Vec<InvitationView>> {
-        self.get("/invitations").await
+        self.list(self.request(Method::GET, "/invitations")).await
     }
 
     /// Takes an invitation back.
@@ -127,7 +142,7 @@ impl Client {
 
     /// What everybody was told, the newest first.
     pub async fn announcements(&self) -> anyhow::Result<Vec<AnnouncementView>> {
-        self.get("/announcements").await
+        self.list(self.request(Method::GET, "/announcements")).await
     }
 
     /// Organiser: tells everybody.
@@ -138,7 +153,7 @@ impl Client {
 
     /// The questions that we may read, the newest first.
     pub async fn questions(&self) -> anyhow::Result<Vec<QuestionView>> {
-        self.get("/questions").await
+        self.list(self.request(Method::GET, "/questions")).await
     }
 
     /// Team: asks the organisers.
@@ -161,7 +176,7 @@ impl Client {
 
     /// Organiser: all registrations, the newest first.
     pub async fn registrations(&self) -> anyhow::Result<Vec<RegistrationView>> {
-        self.get("/registrations").await
+        self.list(self.request(Method::GET, "/registrations")).await
     }
 
     /// Organiser: lets a registered team take part.

@@ -11,7 +11,7 @@ use reqwest::Method;
 impl Client {
     /// Organiser: all trials and proposals, the newest first.
     pub async fn proposals(&self) -> anyhow::Result<Vec<ProposalView>> {
-        self.get("/proposals").await
+        self.list(self.request(Method::GET, "/proposals")).await
     }
 
     /// Organiser: one, with what it plays and what it would change.

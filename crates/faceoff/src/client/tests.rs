@@ -2,22 +2,28 @@
 
 use super::*;
 use faceoff_http::{
-    Capacity, ConnectionLimits, HttpConfig, HttpLimits, Offer,
+    Capacity, ConnectionLimits, HttpConfig, HttpLimits, LinkKey, Offer, RateLimits,
     requests::DeleteSubmission,
     token::hash_token,
     views::{evaluation::EvaluationStatus, submission::SubmissionStatus},
 };
+use faceoff_metrics::{Metrics, Process};
 use faceoff_store::{Claimed, Store, Work};
 use faceoff_types::{
     Clock, DayDeadline, Profile, Ruleset, SmokeOutcome, StageRules, StageSettings, Standings, Task,
     TimeLimits, Zone,
 };
+use indicatif::ProgressBar;
 use jiff::Timestamp;
 use tempfile::TempDir;
 
 const ADMIN: &str = "fo_admin_test";
 
+mod download;
+mod tls;
+
 struct Site {
+    url: String,
     organiser: Client,
     store: Store,
     folder: TempDir,
@@ -63,6 +69,11 @@ async fn site(max_bundle_bytes: u64) -> Site {
             runtimes: ["native", "python3"].map(str::to_owned).to_vec(),
         },
         offer: Offer::nothing(),
+        rates: RateLimits::default(),
+        link_key: LinkKey::generate().unwrap(),
+        metrics: Metrics::new("0.0.0"),
+        process: Process::default,
+        webhooks: Default::default(),
     };
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let url = format!("http://{}/", listener.local_addr().unwrap());
@@ -74,7 +85,8 @@ async fn site(max_bundle_bytes: u64) -> Site {
         std::future::pending(),
     ));
     Site {
-        organiser: Client::new(&url, Some(ADMIN)).unwrap(),
+        organiser: Client::new(&url, Some(ADMIN), None).unwrap(),
+        url,
         store,
         folder,
     }
@@ -157,10 +169,19 @@ async fn a_folder_is_packed_uploaded_and_followed() {
         client.evaluation(id).await.unwrap().status,
         EvaluationStatus::Queued
     );
-    assert_eq!(site.organiser.board().await.unwrap().rows, []);
+    assert_eq!(
+        site.organiser
+            .board(None, &BoardQuery::default())
+            .await
+            .unwrap()
+            .rows,
+        []
+    );
 
     let dataset = site.folder.path().join("dataset.zip");
-    let error = client.download_dataset(id, &dataset).await.unwrap_err();
+    let bar = ProgressBar::hidden();
+    let error = client.download_dataset(id, &dataset, None, &bar).await;
+    let error = error.unwrap_err();
     assert_eq!(
         error.downcast_ref::<ApiError>().unwrap().status,
         StatusCode::CONFLICT
@@ -175,8 +196,10 @@ async fn a_folder_is_packed_uploaded_and_followed() {
 
     // What arrived can be had again, takes room, and is not deleted while it plays.
     let again = site.folder.path().join("again.tar.gz");
-    let bytes = client.download_submission(uploaded.id, &again).await;
-    assert_eq!(bytes.unwrap(), uploaded.bytes);
+    let bytes = client
+        .download_submission(uploaded.id, &again, &uploaded.blake3, &bar)
+        .await;
+    assert_eq!(bytes.unwrap().bytes, uploaded.bytes);
     assert_eq!(
         std::fs::read(&again).unwrap(),
         std::fs::read(&archive).unwrap()
@@ -233,8 +256,8 @@ async fn a_refusal_keeps_the_servers_words() {
         error.to_string().contains("ask the organiser for one"),
         "{error}"
     );
-    assert!(Client::new("https://127.0.0.1", None).is_err());
-    assert!(Client::new("127.0.0.1:8080", None).is_err());
+    assert!(Client::new("ftp://127.0.0.1", None, None).is_err());
+    assert!(Client::new("127.0.0.1:8080", None, None).is_err());
 }
 
 #[tokio::test]
@@ -248,7 +271,11 @@ async fn a_season_is_closed_by_its_name() {
     assert_eq!(closed.secret, Some(secret));
     assert_eq!(site.organiser.season().await.unwrap(), closed);
     let id = EvaluationId::new();
-    let error = site.organiser.compare(id, id).await.unwrap_err();
+    let error = site
+        .organiser
+        .compare(id, id, ComparisonQuery::default())
+        .await
+        .unwrap_err();
     assert!(error.to_string().contains(&id.to_string()), "{error}");
 }
 

@@ -34,8 +34,7 @@ impl Client {
         round: Option<RoundNumber>,
     ) -> anyhow::Result<Vec<GameView>> {
         let request = self.request(Method::GET, &of(id, "/games"));
-        let request = request.query(&GamesQuery { round });
-        super::read(self.send(request).await?).await
+        self.list(request.query(&GamesQuery { round })).await
     }
 
     /// Ratings of the submissions that played.
@@ -152,7 +151,8 @@ impl Client {
 
     /// Team: its games that do not count, the newest first. Organiser: all.
     pub async fn free_games(&self, id: TournamentId) -> anyhow::Result<Vec<GameView>> {
-        self.get(&of(id, "/free-games")).await
+        self.list(self.request(Method::GET, &of(id, "/free-games")))
+            .await
     }
 
     /// Organiser: has the whole schedule played again so many times.

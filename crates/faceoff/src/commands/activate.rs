@@ -1,7 +1,6 @@
 //! `faceoff activate`: chooses which submission plays next.
 
-use super::{submit::next_cut, team_server::TeamServer};
-use anyhow::Context;
+use super::{next_cut::next_cut, output::print, server::ServerArgs};
 use clap::Args;
 use faceoff_types::SubmissionId;
 
@@ -12,7 +11,7 @@ pub struct ActivateCommand {
     /// The submission's id, as `faceoff submit` printed it
     submission: SubmissionId,
     #[command(flatten)]
-    server: TeamServer,
+    server: ServerArgs,
 }
 
 impl ActivateCommand {
@@ -21,18 +20,20 @@ impl ActivateCommand {
     /// # Errors
     /// If the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
-        tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()
-            .context("starting the async runtime")?
-            .block_on(self.activate())
+        super::block_on(self.activate())
     }
 
     async fn activate(self) -> anyhow::Result<()> {
         let client = self.server.client()?;
         let active = client.activate(self.submission).await?;
-        println!("active: {} ({})", active.file_name, active.id);
-        println!("{}", next_cut(&client.me().await?, active.id));
-        Ok(())
+        let me = client.me().await?;
+        print(self.server.json, &active, || {
+            format!(
+                "active: {} ({})\n{}",
+                active.file_name,
+                active.id,
+                next_cut(&me, active.id)
+            )
+        })
     }
 }

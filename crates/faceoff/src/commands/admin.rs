@@ -6,20 +6,23 @@ mod find;
 mod lines;
 mod news;
 mod people;
+mod played;
 mod proposal;
 mod season;
+mod speaker;
 mod stage;
 mod storage;
 mod teams;
 mod tournament;
 
 use super::{
+    ca_file::CaFile,
+    find_stage::find_stage,
     output::{or_none, print},
-    serve::ADMIN_TOKEN_FILE,
     token::{self, TokenAction},
+    webhook::{self, WebhookAction},
 };
-use crate::{client::Client, config::Config};
-use anyhow::{Context, bail};
+use anyhow::bail;
 use clap::{Args, Subcommand};
 use faceoff_http::{
     requests::Decision,
@@ -30,21 +33,15 @@ use jiff::civil::Date;
 use lines::line;
 use season::of_season;
 use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Organises a running competition.
 #[derive(Debug, Args)]
 pub struct AdminCommand {
-    /// The server
-    #[arg(
-        long,
-        global = true,
-        value_name = "URL",
-        env = "FACEOFF_SERVER",
-        default_value = "http://127.0.0.1:8080"
-    )]
-    server: String,
-    /// The organiser's token [default: the file admin-token in the data folder]
+    /// The server [default: that of faceoff login, or http://127.0.0.1:8080]
+    #[arg(long, global = true, value_name = "URL", env = "FACEOFF_SERVER")]
+    server: Option<String>,
+    /// The organiser's token [default: the file admin-token in the data folder, or that of faceoff login]
     #[arg(
         long,
         global = true,
@@ -55,6 +52,8 @@ pub struct AdminCommand {
     /// The server's data folder, on this machine [default: server.data_dir of faceoff.toml]
     #[arg(long, global = true, value_name = "FOLDER")]
     data_dir: Option<PathBuf>,
+    #[command(flatten)]
+    ca: CaFile,
     /// Print the server's answer as JSON
     #[arg(long, global = true)]
     json: bool,
@@ -80,6 +79,11 @@ enum Action {
     Token {
         #[command(subcommand)]
         action: TokenAction,
+    },
+    /// Have programs told of what happens
+    Webhook {
+        #[command(subcommand)]
+        action: WebhookAction,
     },
     /// Tell everybody
     Announce {
@@ -115,6 +119,8 @@ enum Action {
     Day(day::DayAction),
     #[command(flatten)]
     Storage(storage::StorageAction),
+    #[command(flatten)]
+    Played(played::PlayedAction),
     /// Try a day without counting, or have results evaluated again, and apply or drop that
     Proposal {
         #[command(subcommand)]
@@ -233,19 +239,22 @@ impl AdminCommand {
     }
 
     async fn act(self) -> anyhow::Result<()> {
-        let token = match self.token {
-            Some(token) => token,
-            None => token_of(self.data_dir.as_deref())?,
-        };
-        let client = Client::new(&self.server, Some(token.trim()))?;
+        let client = speaker::client(
+            self.server.as_deref(),
+            self.token.as_deref(),
+            self.data_dir.as_deref(),
+            self.ca.path(),
+        )?;
         match self.action {
             Action::Team(action) => teams::act(&client, self.json, action).await,
             Action::Storage(action) => storage::act(&client, self.json, action).await,
+            Action::Played(action) => played::act(&client, self.json, action).await,
             Action::People { action } => people::people(&client, self.json, action).await,
             Action::Registration { action } => {
                 people::registrations(&client, self.json, action).await
             }
             Action::Token { action } => token::act(&client, self.json, action).await,
+            Action::Webhook { action } => webhook::act(&client, self.json, action).await,
             Action::Announce { title, text } => {
                 news::announce(&client, self.json, title, text).await
             }
@@ -262,7 +271,7 @@ impl AdminCommand {
             Action::Tournament { action } => tournament::act(&client, self.json, *action).await,
             Action::StartDay { stage } => {
                 let stage = match stage {
-                    Some(stage) => Some(stage::find(&client, &stage).await?.id),
+                    Some(stage) => Some(find_stage(&client, &stage).await?.id),
                     None => None,
                 };
                 let day = client.start_day(stage).await?;
@@ -304,7 +313,7 @@ impl AdminCommand {
                 stage,
                 confirm,
             } => {
-                let stage = stage::find(&client, &stage).await?.id;
+                let stage = find_stage(&client, &stage).await?.id;
                 let of = StageDay { stage, date: day };
                 let decision = Decision { reason, confirm };
                 let voided = client.void_day(of, &decision).await?;
@@ -422,20 +431,4 @@ fn event_line(event: &EventView) -> String {
     )
     .trim_end()
     .to_owned()
-}
-
-/// The token from the file that the server made.
-fn token_of(data_dir: Option<&Path>) -> anyhow::Result<String> {
-    let data_dir = match data_dir {
-        Some(data_dir) => data_dir.to_owned(),
-        None => Config::load(None)?.server.data_dir,
-    };
-    let file = data_dir.join(ADMIN_TOKEN_FILE);
-    std::fs::read_to_string(&file).with_context(|| {
-        format!(
-            "reading the organiser's token from {}; name the server's folder with --data-dir, or give \
-             the token with --token or FACEOFF_ADMIN_TOKEN",
-            file.display()
-        )
-    })
 }

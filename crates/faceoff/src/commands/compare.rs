@@ -3,15 +3,16 @@
 
 mod table;
 
-use crate::client::Client;
+use super::{ca_file::CaFile, server::Found};
 use anyhow::Context;
 use clap::Args;
 use faceoff_dataset::Dataset;
-use faceoff_scoring::{Comparison, EpisodeSummary, Played};
-use faceoff_types::{EpisodeOutcome, EvaluationId, Profile};
+use faceoff_http::requests::ComparisonQuery;
+use faceoff_scoring::{Comparison, EpisodeSummary, Played, WhoSolved};
+use faceoff_types::{EpisodeOutcome, EvaluationId, Profile, Task};
 use faceoff_wire::dataset::DatasetManifest;
 use serde::Serialize;
-use std::path::Path;
+use std::{collections::BTreeMap, path::Path};
 
 /// Compares two evaluations that played the same episodes: which of them each solved, McNemar's exact
 /// test, and the difference with its 95 % interval, by task and overall.
@@ -25,6 +26,11 @@ pub struct CompareCommand {
     /// Compare two evaluations of this server, by their ids
     #[arg(long, value_name = "URL")]
     server: Option<String>,
+    #[command(flatten)]
+    ca: CaFile,
+    /// Also list by task which episodes only A, only B, both and neither solved
+    #[arg(long)]
+    episodes: bool,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -39,6 +45,9 @@ struct LocalView<'a> {
     profile: Profile,
     #[serde(flatten)]
     comparison: &'a Comparison,
+    /// With --episodes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    episodes: Option<BTreeMap<Task, WhoSolved>>,
 }
 
 #[derive(Serialize)]
@@ -55,11 +64,7 @@ impl CompareCommand {
     /// field that differs.
     pub fn run(self) -> anyhow::Result<()> {
         match &self.server {
-            Some(server) => tokio::runtime::Builder::new_current_thread()
-                .enable_all()
-                .build()
-                .context("starting the async runtime")?
-                .block_on(self.on_server(server)),
+            Some(server) => super::block_on(self.on_server(server)),
             None => self.locally(),
         }
     }
@@ -70,6 +75,10 @@ impl CompareCommand {
             "the two did not play the same episodes; give both evaluations the same --seed, \
              --mismatch-seed, --profile, --task and --episodes",
         )?;
+        let episodes = match self.episodes {
+            true => Some(played(&a).who_solved(&played(&b))?),
+            false => None,
+        };
         if self.json {
             return print_json(&LocalView {
                 a: LocalSide {
@@ -83,11 +92,15 @@ impl CompareCommand {
                 ruleset: &a.manifest.ruleset,
                 profile: a.manifest.profile,
                 comparison: &comparison,
+                episodes,
             });
         }
         println!("A: {} ({})", a.manifest.agent, self.a);
         println!("B: {} ({})", b.manifest.agent, self.b);
         print!("{}", table::of(&comparison));
+        if let Some(episodes) = &episodes {
+            print!("{}", table::by_whom(episodes));
+        }
         Ok(())
     }
 
@@ -97,8 +110,12 @@ impl CompareCommand {
                 format!("{text:?}: expected the id of an evaluation, as with --server")
             })
         };
-        let client = Client::new(server, None)?;
-        let view = client.compare(id(&self.a)?, id(&self.b)?).await?;
+        // Who has signed in there may compare what is not everybody's yet.
+        let client = Found::of(Some(server), None, self.ca.path())?.client()?;
+        let wanted = ComparisonQuery {
+            episodes: self.episodes,
+        };
+        let view = client.compare(id(&self.a)?, id(&self.b)?, wanted).await?;
         if self.json {
             return print_json(&view);
         }
@@ -109,6 +126,9 @@ impl CompareCommand {
             overall: view.overall,
         };
         print!("{}", table::of(&comparison));
+        if let Some(episodes) = &view.episodes {
+            print!("{}", table::by_whom(episodes));
+        }
         Ok(())
     }
 }

@@ -1,5 +1,6 @@
 //! `faceoff dataset`: looks into a dataset and cuts pieces out of it.
 
+pub(super) mod download;
 mod list;
 mod moved;
 mod slice;
@@ -19,6 +20,8 @@ enum Action {
     List(list::ListArgs),
     /// One episode's control steps as CSV or JSON lines
     Slice(slice::SliceArgs),
+    /// Download the dataset of an evaluation; one that broke off goes on where it was
+    Download(download::DownloadArgs),
     /// Moved to the Python package: python -m faceoff.dataset export
     #[command(hide = true)]
     Export(moved::MovedArgs),
@@ -33,6 +36,7 @@ impl DatasetCommand {
         match self.action {
             Action::List(args) => args.run(),
             Action::Slice(args) => args.run(),
+            Action::Download(args) => args.run(),
             Action::Export(args) => args.run(),
         }
     }

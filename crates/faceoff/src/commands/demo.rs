@@ -1,10 +1,12 @@
 //! `faceoff demo`: a competition day from an empty folder to the board, through the public API.
 
-mod board_table;
-
-use crate::{client::Client, commands::verify};
+use crate::{
+    client::Client,
+    commands::{board::table, verify},
+};
 use anyhow::{Context, bail, ensure};
 use clap::Args;
+use faceoff_http::requests::BoardQuery;
 use faceoff_http::views::{
     evaluation::{EvaluationStatus, EvaluationView},
     submission::{SubmissionStatus, SubmissionView},
@@ -115,14 +117,14 @@ impl DemoCommand {
         let evaluations = follow(&organiser, &day.created).await?;
 
         println!("4. the board\n");
-        let board = organiser.board().await?;
+        let board = organiser.board(None, &BoardQuery::default()).await?;
         ensure!(
             board.rows.len() == evaluations.len(),
             "expected {} rows on the board, got {}",
             evaluations.len(),
             board.rows.len()
         );
-        println!("{}", board_table::render(&board));
+        println!("{}", table::render(&board));
 
         let (name, client, _) = &teams[0];
         let own = evaluations
@@ -130,7 +132,11 @@ impl DemoCommand {
             .find(|evaluation| evaluation.team_name.as_str() == name)
             .context("the first team has no evaluation")?;
         let dataset = self.data_dir.join(format!("{name}-dataset.zip"));
-        let bytes = client.download_dataset(own.id, &dataset).await?;
+        let nobody = ProgressBar::hidden();
+        let done = client
+            .download_dataset(own.id, &dataset, None, &nobody)
+            .await?;
+        let bytes = done.bytes;
         ensure!(bytes > 0, "the dataset of {name} is empty");
         println!(
             "5. dataset of {name}: {} ({:.1} MB)",
@@ -264,7 +270,7 @@ impl Server {
             )
         };
         self.url = url;
-        let visitor = Client::new(&self.url, None)?;
+        let visitor = Client::new(&self.url, None, None)?;
         visitor.health().await?;
         let token = std::fs::read_to_string(self.data_dir.join("admin-token"))
             .context("reading the organiser's token")?;

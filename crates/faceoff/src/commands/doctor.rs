@@ -1,10 +1,15 @@
 //! `faceoff doctor`: what this host offers to agents and their sandbox, what is missing, and the cure.
 
+mod checked;
+mod permissions;
+mod times;
+
 use crate::{
     config::{Config, RuntimeConfig},
     descriptors::Descriptors,
 };
 use anyhow::{Context as _, bail};
+use checked::Checked;
 use clap::Args;
 use faceoff_runner::inventory;
 use faceoff_sandbox::{HostFeature, Isolation, Layer, MemoryImage, Runtime, probe_host};
@@ -38,6 +43,7 @@ struct Findings {
     cpus: Cpus,
     descriptors: DescriptorsFound,
     disks: Vec<DiskFound>,
+    host: Vec<Checked>,
 }
 
 /// The disk of a folder that `serve` writes to.
@@ -153,6 +159,7 @@ impl Findings {
             cpus: cpus(config),
             descriptors: descriptors(config),
             disks: disks(config),
+            host: host(config),
         }
     }
 
@@ -200,6 +207,11 @@ impl Findings {
         for disk in &self.disks {
             writeln!(out, "  {}: {}", disk.folder.display(), disk.found)?;
             print_cure(out, disk.cure.as_deref())?;
+        }
+        writeln!(out, "Host")?;
+        for checked in &self.host {
+            writeln!(out, "  {}: {}", checked.name, checked.found)?;
+            print_cure(out, checked.cure.as_deref())?;
         }
         Ok(())
     }
@@ -368,6 +380,15 @@ fn descriptors(config: &Config) -> DescriptorsFound {
     }
 }
 
+fn host(config: &Config) -> Vec<Checked> {
+    let (data_dir, now) = (&config.server.data_dir, jiff::Timestamp::now());
+    vec![
+        times::clock(data_dir, now),
+        times::zone(&config.evaluation.zone, now),
+        permissions::permissions(data_dir),
+    ]
+}
+
 fn disks(config: &Config) -> Vec<DiskFound> {
     let mut folders = vec![config.server.data_dir.clone(), config.scratch_dir()];
     folders.dedup_by(|second, first| second.starts_with(first));
@@ -426,6 +447,7 @@ mod tests {
             cpus: cpus(&Config::default()),
             descriptors: descriptors(&Config::default()),
             disks: disks(&Config::default()),
+            host: Vec::new(),
         }
     }
 

@@ -4,26 +4,32 @@ mod ablation;
 mod differences;
 mod files;
 mod like_server;
+mod logs;
 mod pool;
 mod profile_run;
+mod said;
 mod table;
 
-use super::local_bundle;
+use super::{ca_file::CaFile, local_bundle, output::print};
 use crate::config::Config;
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use clap::Args;
 use faceoff_dataset::ARCHIVE_FILE;
 use faceoff_runner::AgentEnvironment;
 use faceoff_sandbox::affinity;
-use faceoff_types::{MAX_EPISODES_PER_TASK, Profile, Seed, StageRules, Task};
+use faceoff_types::{
+    AgentFault, EvaluationResult, MAX_EPISODES_PER_TASK, Profile, Seed, StageRules, Task,
+};
 use faceoff_worker::CpuLayout;
 use files::RESULTS;
 use like_server::LikeServer;
 use profile_run::EvalSetup;
+use said::Said;
+use serde::Serialize;
 use std::{fs, path::PathBuf};
 
 /// Plays a bundle through the very evaluator that the server runs, prints the result and writes
-/// `results.json` and `dataset.zip` to a folder. Exit status 0 only if there is a result.
+/// `results.json` and `dataset.zip` to a folder. Exit status 0 only if there is a result, and the agent had no fault.
 #[derive(Debug, Args)]
 pub struct EvalCommand {
     /// The agent: a folder with agent.toml, or a .tar.gz, .tar.zst or .zip
@@ -56,6 +62,12 @@ pub struct EvalCommand {
     /// Run your own agent without isolation, with your own environment
     #[arg(long)]
     no_sandbox: bool,
+    /// End with status 0 also if the agent had faults, as long as there is a result
+    #[arg(long)]
+    allow_faults: bool,
+    /// Print one JSON object, and words to standard error
+    #[arg(long)]
+    json: bool,
     /// Limits, runtimes and given-up layers, and of [evaluation] weights, tier bounds, magnitudes of perturbations and
     /// faults, as a server's configuration states them
     #[arg(long, value_name = "FILE")]
@@ -63,12 +75,31 @@ pub struct EvalCommand {
     /// Play by the rules and limits of this server's stage, and say what this machine has otherwise
     #[arg(long, value_name = "URL")]
     like_server: Option<String>,
+    #[command(flatten)]
+    ca: CaFile,
     /// The stage of that server, by its name or id; may be left out where one is open
     #[arg(long, value_name = "STAGE", requires = "like_server")]
     stage: Option<String>,
 }
 
+/// What is printed with `--json`.
+#[derive(Debug, Serialize)]
+struct Told<'a> {
+    agent: &'a str,
+    /// The file of the result.
+    results: PathBuf,
+    dataset: PathBuf,
+    dataset_blake3: &'a str,
+    faults: &'a [AgentFault],
+    /// As `results.json` has it.
+    result: &'a EvaluationResult,
+}
+
 impl EvalCommand {
+    const fn said(&self) -> Said {
+        if self.json { Said::Apart } else { Said::Beside }
+    }
+
     /// Plays, scores, prints and writes.
     ///
     /// # Errors
@@ -78,7 +109,7 @@ impl EvalCommand {
         let mut config = Config::load(self.config.as_deref())?;
         let like = self.like_server.as_deref();
         let like = like
-            .map(|url| LikeServer::ask(url, self.stage.as_deref()))
+            .map(|url| LikeServer::ask(url, self.ca.path(), self.stage.as_deref()))
             .transpose()?;
         let rules = match &like {
             Some(like) => {
@@ -114,9 +145,9 @@ impl EvalCommand {
         if let Some(like) = &like {
             like.check_runtime(runtime, &envs[0])?;
             for line in like.told(runtime, &envs[0], &self.given_up(&config)) {
-                println!("{line}");
+                self.said().line(format_args!("{line}"));
             }
-            println!("");
+            self.said().line(format_args!(""));
         }
 
         let mismatch_seed = self
@@ -126,27 +157,48 @@ impl EvalCommand {
             .check_robot(mismatch_seed)
             .context("the configuration")?;
         let setup = EvalSetup {
-            tasks: self.tasks,
+            tasks: std::mem::take(&mut self.tasks),
             episodes: self.episodes,
             seed: self.seed,
             mismatch_seed,
             max_faults: config.evaluation.max_faults,
             variation: config.rules().variation,
+            said: self.said(),
             scratch: scratch.path().to_owned(),
             bundle,
             envs,
         };
         if self.ablation {
-            return ablation::run(&setup, &self.out);
+            let faults = ablation::run(&setup, &self.out, self.json)?;
+            return self.allow(faults);
         }
         let played = profile_run::play(&setup, self.profile.unwrap_or(rules.profile), &self.out)?;
-        let agent = &setup.bundle.manifest.name;
-        print!("{}", table::of(agent, &played.result));
-        println!(
-            "\n{}\n{}, BLAKE3 {}",
-            self.out.join(RESULTS).display(),
-            self.out.join(ARCHIVE_FILE).display(),
-            played.archive_blake3
+        let told = Told {
+            agent: &setup.bundle.manifest.name,
+            results: self.out.join(RESULTS),
+            dataset: self.out.join(ARCHIVE_FILE),
+            dataset_blake3: &played.archive_blake3,
+            faults: &played.faults,
+            result: &played.result,
+        };
+        print(self.json, &told, || {
+            format!(
+                "{}\n{}\n{}, BLAKE3 {}",
+                table::of(told.agent, told.result),
+                told.results.display(),
+                told.dataset.display(),
+                told.dataset_blake3
+            )
+        })?;
+        self.allow(played.faults.len())
+    }
+
+    /// Is that so many faults as there may be? What was played counts either way.
+    fn allow(&self, faults: usize) -> anyhow::Result<()> {
+        ensure!(
+            faults == 0 || self.allow_faults,
+            "the agent had {faults} fault{}, told above; the result stands, and --allow-faults ends with status 0",
+            if faults == 1 { "" } else { "s" }
         );
         Ok(())
     }
@@ -172,11 +224,11 @@ impl EvalCommand {
         let cpus = affinity::allowed().context("asking for the CPUs of this process")?;
         let layout = CpuLayout::divide(&cpus, workers, 1);
         if layout.shared && workers > 1 {
-            println!(
+            self.said().line(format_args!(
                 "note: {workers} workers share {} CPUs; results are the same, computation \
                  times may be longer",
                 cpus.len()
-            );
+            ));
         }
         Ok(layout
             .slots

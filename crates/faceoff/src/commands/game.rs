@@ -3,8 +3,8 @@
 mod watch;
 
 use super::{
-    any_server::AnyServer,
-    output::print,
+    output::{download_bar, downloaded, print},
+    server::ServerArgs,
     tournament::{find::find_or_newest, games},
 };
 use crate::client::Client;
@@ -18,10 +18,7 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 pub struct GameCommand {
     #[command(flatten)]
-    server: AnyServer,
-    /// Print the server's answer as JSON
-    #[arg(long, global = true)]
-    json: bool,
+    server: ServerArgs,
     #[command(subcommand)]
     action: Action,
 }
@@ -83,7 +80,7 @@ enum Action {
     },
 }
 
-fn side(text: &str) -> Result<Side, String> {
+pub(super) fn side(text: &str) -> Result<Side, String> {
     let wanted = Side::BOTH
         .into_iter()
         .find(|side| side.number().to_string() == text);
@@ -100,12 +97,12 @@ impl GameCommand {
     }
 
     async fn act(self) -> anyhow::Result<()> {
-        let client = self.server.client()?;
+        let client = self.server.anybody()?;
         match self.action {
             Action::Test { tournament } => {
                 let id = find_or_newest(&client, tournament.as_deref()).await?;
                 let ordered = client.order_test_games(id, None).await?;
-                print(self.json, &ordered, || games::ordered(&ordered))
+                print(self.server.json, &ordered, || games::ordered(&ordered))
             }
             Action::Friendly {
                 opponent,
@@ -113,32 +110,33 @@ impl GameCommand {
             } => {
                 let id = find_or_newest(&client, tournament.as_deref()).await?;
                 let game = client.order_friendly_game(id, opponent).await?;
-                print(self.json, &game, || games::whole(&game))
+                print(self.server.json, &game, || games::whole(&game))
             }
             Action::List { tournament } => {
                 let id = find_or_newest(&client, tournament.as_deref()).await?;
                 let free = client.free_games(id).await?;
-                print(self.json, &free, || games::table(&free))
+                print(self.server.json, &free, || games::table(&free))
             }
             Action::Show { game } => {
                 let game = client.game(game).await?;
-                print(self.json, &game, || games::whole(&game))
+                print(self.server.json, &game, || games::whole(&game))
             }
-            Action::Watch { game } => watch::follow(&client, self.json, game).await,
+            Action::Watch { game } => watch::follow(&client, self.server.json, game).await,
             Action::Download {
                 game,
                 file,
                 side,
                 both,
             } => {
-                let bytes = if both {
-                    client.download_recording(game, &file).await?
+                let bar = download_bar()?;
+                let done = if both {
+                    client.download_recording(game, &file, &bar).await?
                 } else {
                     let side = own_side(&client, &client.game(game).await?, side).await?;
-                    client.download_side(game, side, &file).await?
+                    client.download_side(game, side, &file, &bar).await?
                 };
-                println!("{}: {bytes} bytes", file.display());
-                Ok(())
+                bar.finish_and_clear();
+                print(self.server.json, &done, || downloaded(&done))
             }
             Action::Log { game, side } => {
                 let side = own_side(&client, &client.game(game).await?, side).await?;
@@ -147,14 +145,18 @@ impl GameCommand {
             }
             Action::Cancel { game } => {
                 let game = client.cancel_game(game).await?;
-                print(self.json, &game, || games::whole(&game))
+                print(self.server.json, &game, || games::whole(&game))
             }
         }
     }
 }
 
 /// The side that was asked for, or that of the team whose token it is.
-async fn own_side(client: &Client, game: &GameView, wanted: Option<Side>) -> anyhow::Result<Side> {
+pub(super) async fn own_side(
+    client: &Client,
+    game: &GameView,
+    wanted: Option<Side>,
+) -> anyhow::Result<Side> {
     if let Some(side) = wanted {
         return Ok(side);
     }

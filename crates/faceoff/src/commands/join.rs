@@ -1,14 +1,21 @@
 //! `faceoff join`: follows an invitation.
 
-use super::{output::print, whoami};
-use crate::client::Client;
+use super::{ca_file::CaFile, output::print, password, server::HERE, whoami};
+use crate::{
+    client::Client,
+    credentials::{self, Credentials, Login},
+};
 use anyhow::{Context, bail};
 use clap::Args;
-use faceoff_http::requests::{FoundedTeam, Join};
+use faceoff_http::{
+    requests::{FoundedTeam, Join},
+    views::person::WhoView,
+};
 use faceoff_types::{DivisionName, PersonName, TeamName};
-use std::io::Read;
+use serde::Serialize;
+use std::fs;
 
-/// Follows an invitation and prints the token that comes of it, this once.
+/// Follows an invitation and prints the token that comes of it, this once; with --sign-in keeps it, as faceoff login does.
 #[derive(Debug, Args)]
 pub struct JoinCommand {
     /// The link that you were given, or the code at its end
@@ -16,6 +23,8 @@ pub struct JoinCommand {
     /// The server [default: that of the link, or http://127.0.0.1:8080]
     #[arg(long, value_name = "URL", env = "FACEOFF_SERVER")]
     server: Option<String>,
+    #[command(flatten)]
+    ca: CaFile,
     /// By which you are known and sign in: 1 to 40 letters, digits, spaces and . _ -; not of who comes back
     #[arg(long)]
     name: Option<PersonName>,
@@ -37,6 +46,9 @@ pub struct JoinCommand {
     /// The division that it is in
     #[arg(long, requires = "team")]
     division: Option<DivisionName>,
+    /// Sign in: keep the token as faceoff login does, for the commands to come, and do not print it
+    #[arg(long)]
+    sign_in: bool,
     /// Print the server's answer as JSON
     #[arg(long)]
     json: bool,
@@ -58,6 +70,13 @@ fn parts(link: &str) -> anyhow::Result<(Option<&str>, &str)> {
     Ok((server, code))
 }
 
+/// What is printed of who has signed in: all but the token.
+#[derive(Debug, Serialize)]
+struct SignedIn<'a> {
+    #[serde(flatten)]
+    who: &'a WhoView,
+}
+
 impl JoinCommand {
     /// Joins.
     ///
@@ -65,16 +84,12 @@ impl JoinCommand {
     /// If the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
         let (of_link, code) = parts(&self.link)?;
-        let server = self.server.as_deref().or(of_link);
-        let client = Client::new(server.unwrap_or("http://127.0.0.1:8080"), None)?;
+        // A link goes to the server that it names, whatever others commands go to.
+        let server = of_link.or(self.server.as_deref());
+        let server = server.unwrap_or(HERE);
+        let client = Client::new(server, None, self.ca.path())?;
         let password = match self.password_stdin {
-            true => {
-                let mut text = String::new();
-                std::io::stdin()
-                    .read_to_string(&mut text)
-                    .context("reading the password from standard input")?;
-                Some(text.trim_end_matches(['\r', '\n']).to_owned())
-            }
+            true => Some(password::from_input()?),
             false => None,
         };
         let join = Join {
@@ -89,8 +104,41 @@ impl JoinCommand {
             }),
             accepted_terms: self.accept_terms,
         };
+        // An invitation is good once: what cannot keep the token is found out before.
+        let kept = match self.sign_in {
+            true => {
+                let file = credentials::path()?;
+                Some((Credentials::load(&file)?, file))
+            }
+            false => None,
+        };
+        let ca_file = self.ca.path().map(fs::canonicalize).transpose();
+        let ca_file = ca_file.context("looking for the file of --ca-file")?;
         super::block_on(async {
             let joined = client.join(&join).await?;
+            if let Some((_, file)) = kept {
+                // Looked at again: another command may have written it meanwhile.
+                let mut kept = Credentials::load(&file).inspect_err(|_| {
+                    // It comes this once.
+                    println!("token {}", joined.secret);
+                })?;
+                let login = Login {
+                    token: joined.secret.clone(),
+                    made_here: true,
+                    ca_file,
+                };
+                kept.keep(server, login, true);
+                if let Err(error) = kept.save(&file) {
+                    // It comes this once.
+                    println!("token {}", joined.secret);
+                    return Err(error);
+                }
+                let told = SignedIn { who: &joined.who };
+                return print(self.json, &told, || {
+                    let who = whoami::text(&joined.who);
+                    format!("{who}\nsigned in to {server}, kept in {}", file.display())
+                });
+            }
             print(self.json, &joined, || {
                 format!(
                     "{}\ntoken {}\nIt is not shown again. Commands take it from FACEOFF_TOKEN.",

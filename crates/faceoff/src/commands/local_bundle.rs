@@ -1,13 +1,16 @@
 //! A developer's own bundles, as `eval` and `play` run them.
 
-use crate::config::Config;
+use crate::{config::Config, packing::Selection};
 use anyhow::Context;
 use faceoff_runner::{
     AgentEnvironment,
-    bundle::{self, Bundle, BundleError, BundleLimits},
+    bundle::{self, Bundle, BundleLimits},
 };
 use faceoff_sandbox::{Isolation, Runtime};
-use std::path::Path;
+use std::{
+    fs::{self, File},
+    path::Path,
+};
 use tempfile::TempDir;
 
 /// A folder for bundles and recordings under way, beside the results and not in /tmp: a recording may be
@@ -20,19 +23,23 @@ pub(super) fn scratch_in(out: &Path) -> anyhow::Result<TempDir> {
         .with_context(|| format!("making a folder in {}", out.display()))
 }
 
-/// A folder is copied under the rules of an archive, so that it is refused here if the server would refuse
-/// it; without a sandbox it is used in place.
+/// A folder is packed as `faceoff submit` packs it and unpacked as the server does, so that here is what will be there,
+/// and what the server would refuse is refused; without a sandbox it is used in place.
 pub(super) fn open(
     path: &Path,
     scratch: &Path,
     no_sandbox: bool,
     limits: &BundleLimits,
-) -> Result<Bundle, BundleError> {
-    if path.is_dir() && !no_sandbox {
-        bundle::copy(path, &scratch.join("bundle"), limits)
-    } else {
-        bundle::open(path, scratch, limits)
+) -> anyhow::Result<Bundle> {
+    if !path.is_dir() || no_sandbox {
+        return Ok(bundle::open(path, scratch, limits)?);
     }
+    let archive = scratch.join("bundle.tar.gz");
+    let file = File::create(&archive).with_context(|| format!("making {}", archive.display()))?;
+    Selection::of(path)?.pack(file)?;
+    let bundle = bundle::open(&archive, scratch, limits)?;
+    fs::remove_file(&archive).with_context(|| format!("removing {}", archive.display()))?;
+    Ok(bundle)
 }
 
 /// The server's limits, and what separates the agent from the host, if anything does.

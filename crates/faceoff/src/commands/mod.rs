@@ -1,39 +1,59 @@
 //! One file per subcommand.
 
+mod ablation_text;
 pub mod activate;
 pub mod admin;
-mod any_server;
+pub mod backup;
+pub mod board;
+mod ca_file;
 pub mod compare;
+pub mod completions;
 pub mod dataset;
 pub mod demo;
 pub mod doctor;
 pub mod eval;
+pub mod evaluation;
+mod evaluation_text;
+mod find_stage;
 pub mod game;
 pub mod import;
 pub mod init;
 pub mod join;
+pub mod link;
 mod local_bundle;
+pub mod log;
+pub mod login;
+pub mod logout;
 pub mod new;
+mod next_cut;
 mod output;
+mod password;
+pub mod password_change;
 mod people;
 pub mod play;
 pub mod publish;
+mod queue;
+pub mod register;
 pub mod replay;
+pub mod restore;
 pub mod score;
 pub mod serve;
+mod server;
 pub mod sim;
+mod staging;
+pub mod status;
 mod storage;
 pub mod submissions;
 pub mod submit;
 pub mod team;
-mod team_server;
 pub mod token;
 pub mod tournament;
 pub mod verify;
+pub mod webhook;
 pub mod whoami;
+pub mod withdraw;
 
 use anyhow::Context;
-use std::process::ExitCode;
 
 /// Runs what talks to a server.
 fn block_on<T>(work: impl Future<Output = anyhow::Result<T>>) -> anyhow::Result<T> {
@@ -42,24 +62,4 @@ fn block_on<T>(work: impl Future<Output = anyhow::Result<T>>) -> anyhow::Result<
         .build()
         .context("starting the async runtime")?
         .block_on(work)
-}
-
-/// Success, or the error with its causes on standard error and status 1.
-pub fn exit_code(outcome: anyhow::Result<()>) -> ExitCode {
-    match outcome {
-        Ok(()) => ExitCode::SUCCESS,
-        // The reader of our output went away, as in `faceoff sim trace | head`: nothing to report.
-        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error:#}");
-            ExitCode::FAILURE
-        }
-    }
-}
-
-fn is_broken_pipe(error: &anyhow::Error) -> bool {
-    error
-        .chain()
-        .filter_map(|cause| cause.downcast_ref::<std::io::Error>())
-        .any(|cause| cause.kind() == std::io::ErrorKind::BrokenPipe)
 }

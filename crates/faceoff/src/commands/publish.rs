@@ -1,7 +1,6 @@
 //! `faceoff publish`: makes an evaluation of the team's public before its stage does.
 
-use super::team_server::TeamServer;
-use anyhow::Context;
+use super::{output::print, server::ServerArgs};
 use clap::Args;
 use faceoff_http::views::evaluation::EvaluationStatus;
 use faceoff_types::EvaluationId;
@@ -13,7 +12,7 @@ pub struct PublishCommand {
     /// The evaluation's id
     evaluation: EvaluationId,
     #[command(flatten)]
-    server: TeamServer,
+    server: ServerArgs,
 }
 
 impl PublishCommand {
@@ -22,26 +21,24 @@ impl PublishCommand {
     /// # Errors
     /// If the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
-        tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()
-            .context("starting the async runtime")?
-            .block_on(self.publish())
+        super::block_on(self.publish())
     }
 
     async fn publish(self) -> anyhow::Result<()> {
         let published = self.server.client()?.publish(self.evaluation).await?;
-        println!(
-            "public: the evaluation of {} ({})",
-            published.day, published.id
-        );
-        if let EvaluationStatus::Finished {
-            dataset: Some(path),
-            ..
-        } = published.status
-        {
-            println!("dataset {path}");
-        }
-        Ok(())
+        print(self.server.json, &published, || {
+            let mut told = format!(
+                "public: the evaluation of {} ({})",
+                published.day, published.id
+            );
+            if let EvaluationStatus::Finished {
+                dataset: Some(path),
+                ..
+            } = &published.status
+            {
+                told.push_str(&format!("\ndataset {path}"));
+            }
+            told
+        })
     }
 }

@@ -5,10 +5,12 @@ mod plots;
 mod recorded;
 mod table_view;
 
+use super::output::print;
 use anyhow::{Context, bail};
 use clap::Args;
 use faceoff_types::Task;
 use recorded::Recorded;
+use serde_json::json;
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -29,6 +31,9 @@ pub struct ReplayCommand {
     /// Where to write it: a page (.html) or a picture (.svg); one that is there is replaced
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+    /// Print why it ended as JSON
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,11 +68,22 @@ impl ReplayCommand {
             Format::Svg => page::svg(&recorded)?,
         };
         fs::write(&self.out, text).with_context(|| format!("writing {}", self.out.display()))?;
-        println!("{}\n{}", recorded.headline(), recorded.why);
-        for loss in recorded.losses() {
-            println!("{loss}");
-        }
-        println!("{}", self.out.display());
-        Ok(())
+        let losses = recorded.losses();
+        let told = json!({
+            "episode": recorded.headline(),
+            "why": recorded.why,
+            "losses": losses,
+            "file": self.out,
+        });
+        print(self.json, &told, || {
+            let head = [recorded.headline(), recorded.why.clone()];
+            let file = self.out.display().to_string();
+            let lines: Vec<String> = head
+                .into_iter()
+                .chain(losses.clone())
+                .chain([file])
+                .collect();
+            lines.join("\n")
+        })
     }
 }

@@ -4,20 +4,25 @@ mod answering;
 mod archived;
 mod folder;
 mod looking_in;
+mod watching;
 
-pub use folder::ADMIN_TOKEN_FILE;
+pub use folder::{ADMIN_TOKEN_FILE, claim};
 
-use crate::{config::Config, descriptors::Descriptors, log::LogFormat};
+use super::staging::private;
+use crate::{client, config::Config, descriptors::Descriptors, log::LogFormat, machine};
 use answering::{answer, signalled};
 use anyhow::{Context, bail};
 use clap::Args;
 use faceoff_http::{Capacity, CapacityWatch, ConnectionLimits, HttpConfig, Offer};
+use faceoff_metrics::Metrics;
+use faceoff_notify::Deliverer;
 use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime, affinity, probe_host};
 use faceoff_store::{Actor, Room, Store};
 use faceoff_types::Clock;
 use faceoff_worker::{CpuLayout, SlotThreads, WorkerConfig};
-use folder::{empty_folder, private_folder, set_admin_token};
+use folder::{empty_folder, link_key, set_admin_token};
 use jiff::Timestamp;
+use sd_notify::NotifyState;
 use std::{collections::BTreeMap, io::Write as _, net::SocketAddr, path::PathBuf, thread};
 use tokio::{net::TcpListener, task::JoinSet};
 use tokio_util::sync::CancellationToken;
@@ -148,17 +153,27 @@ async fn serve(
     offer: Offer,
 ) -> anyhow::Result<()> {
     let data_dir = config.server.data_dir.clone();
-    private_folder(&data_dir)?;
+    private(&data_dir)?;
+    let _claimed = claim(&data_dir)?;
     let upload_dir = data_dir.join("uploads");
     // What a crash left half uploaded belongs to no submission.
     empty_folder(&upload_dir)?;
     let scratch_dir = config.scratch_dir();
-    private_folder(&scratch_dir)?;
+    private(&scratch_dir)?;
     let watched = vec![data_dir.clone(), scratch_dir.clone()];
     let store = Store::open(&data_dir)
         .await
         .with_context(|| format!("opening the data folder {}", data_dir.display()))?
         .with_room(Room::new(watched, config.server.min_free_bytes));
+    if let Some(upgrade) = store.upgrade() {
+        tracing::info!(
+            from = upgrade.from.as_deref().unwrap_or("an earlier version"),
+            from_schema = upgrade.from_schema,
+            to = upgrade.to.version,
+            to_schema = upgrade.to.schema,
+            "the database is upgraded"
+        );
+    }
     let now = Timestamp::now();
     set_admin_token(&store, &data_dir, now).await?;
     if let Some(name) = &config.season.name {
@@ -199,18 +214,35 @@ async fn serve(
         runtimes: agent.runtimes.keys().cloned().collect(),
     };
     let watch = CapacityWatch::new(store.clone(), clock.clone(), capacity.clone());
-    let router = faceoff_http::router(
-        store.clone(),
-        HttpConfig {
-            max_bundle_bytes: config.bundle.packed_bytes,
-            public_url: config.server.public_url.clone(),
-            upload_dir,
-            clock: clock.clone(),
-            limits: config.uploads.limits(),
-            capacity,
-            offer,
-        },
-    );
+    let metrics = Metrics::new(env!("CARGO_PKG_VERSION"));
+    let site = HttpConfig {
+        max_bundle_bytes: config.bundle.packed_bytes,
+        public_url: config.server.public_url.clone(),
+        upload_dir,
+        clock: clock.clone(),
+        limits: config.uploads.limits(),
+        capacity,
+        offer,
+        webhooks: config.webhooks.clone(),
+        rates: config.rates.limits(),
+        link_key: link_key(&data_dir)?,
+        metrics: metrics.clone(),
+        process: machine::process,
+    };
+    let watched_at = match config.server.metrics_listen {
+        Some(address) => Some(watching::listen(address).await?),
+        None => None,
+    };
+    let router = faceoff_http::router(store.clone(), site.clone());
+    let tls = client::trusting_tls(None).unwrap_or_else(|error| {
+        // No evaluation depends on it, and what happens meanwhile is told once they are there.
+        tracing::error!(%error, "webhooks behind TLS are told nothing: install the package ca-certificates and start again");
+        client::no_tls()
+    });
+    let rules = config.webhooks.clone();
+    let tells_webhooks = rules.enabled;
+    let deliverer = Deliverer::new(store.clone(), clock.clone(), rules, tls)
+        .context("setting up what tells webhooks")?;
     // For as long as agents run.
     let _image = in_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
     let workers = WorkerConfig {
@@ -220,6 +252,7 @@ async fn serve(
         scratch_dir,
         agent,
         bundle_limits: config.bundle,
+        metrics: metrics.clone(),
     };
     tracing::info!(
         %address,
@@ -247,10 +280,25 @@ async fn serve(
         watch.run(asked_to_end.cancelled_owned()).await;
         Ok(())
     });
+    parts.spawn(watching::count(store.clone(), metrics, shutdown.clone()));
+    if let Some(listener) = watched_at {
+        let store = store.clone();
+        parts.spawn(watching::answer(listener, store, site, shutdown.clone()));
+    }
+    let asked_to_end = shutdown.clone();
+    parts.spawn(async move {
+        if tells_webhooks {
+            deliverer.run(asked_to_end).await;
+        } else {
+            asked_to_end.cancelled().await;
+        }
+        Ok(())
+    });
     parts.spawn(answer(listener, router, connections, shutdown.clone()));
     // For the program that started this one, whatever is logged: from now on a connection is answered,
     // and a port that the system chose is known. That nobody listens is no fault.
     let _ = writeln!(std::io::stdout(), "http://{address}");
+    tell_host(NotifyState::Ready);
 
     let signal = signalled()?;
     let mut outcome = Ok(());
@@ -258,6 +306,7 @@ async fn serve(
         name = signal => tracing::info!(signal = name, "ending: slots give their work back"),
         Some(part) = parts.join_next() => outcome = ended_early(part),
     }
+    tell_host(NotifyState::Stopping);
     shutdown.cancel();
     let rest = async {
         while let Some(part) = parts.join_next().await {
@@ -279,6 +328,13 @@ async fn serve(
         name = second => tracing::warn!(signal = name, "ending at once"),
     }
     outcome
+}
+
+/// Tells the service manager that started this program, if there is one that wants to know.
+fn tell_host(state: NotifyState<'_>) {
+    if let Err(error) = sd_notify::notify(&[state]) {
+        tracing::warn!(%error, "the service manager was not told how this program stands");
+    }
 }
 
 /// A part of the server came to its end although nobody asked it to.

@@ -3,7 +3,7 @@
 use faceoff_http::views::storage::StorageView;
 
 /// Bytes as people read them; powers of 1000.
-fn bytes(bytes: u64) -> String {
+pub(super) fn bytes(bytes: u64) -> String {
     #[expect(clippy::cast_precision_loss, reason = "one decimal of it is shown")]
     let mut shown = bytes as f64;
     for unit in ["bytes", "kB", "MB", "GB"] {

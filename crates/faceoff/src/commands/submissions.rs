@@ -1,9 +1,13 @@
 //! `faceoff submissions`: a team's uploads, and what it does with them.
 
 use super::{
-    submit::next_cut,
-    team_server::{TeamServer, in_queue},
+    ablation_text::ablation,
+    next_cut::next_cut,
+    output::{download_bar, downloaded, or_none, print},
+    queue::in_queue,
+    server::ServerArgs,
 };
+use crate::client::Client;
 use clap::{Args, Subcommand};
 use faceoff_http::{
     requests::{DeleteSubmission, SubmissionChange},
@@ -18,6 +22,8 @@ use std::path::PathBuf;
 /// Lists the team's submissions, names them, takes one back, downloads or deletes one.
 #[derive(Debug, Args)]
 pub struct SubmissionsCommand {
+    #[command(flatten)]
+    server: ServerArgs,
     #[command(subcommand)]
     action: Action,
 }
@@ -25,23 +31,15 @@ pub struct SubmissionsCommand {
 #[derive(Debug, Subcommand)]
 enum Action {
     /// List them, the newest first
-    List {
-        #[command(flatten)]
-        server: TeamServer,
-    },
+    List,
     /// Tell what plays for the team today, what waits, where it stands in the queue, and what happens next
-    Status {
-        #[command(flatten)]
-        server: TeamServer,
-    },
+    Status,
     /// Give one a name that only the team and the organiser see
     Label {
         /// The submission's id
         submission: SubmissionId,
         /// 1 to 80 characters; left out, it has none
         label: Option<String>,
-        #[command(flatten)]
-        server: TeamServer,
     },
     /// Write about one what only the team and the organiser read
     Note {
@@ -49,8 +47,6 @@ enum Action {
         submission: SubmissionId,
         /// 1 to 2000 characters; left out, there is none
         note: Option<String>,
-        #[command(flatten)]
-        server: TeamServer,
     },
     /// Download the archive of one, as it was uploaded
     Download {
@@ -58,8 +54,6 @@ enum Action {
         submission: SubmissionId,
         /// Where to
         file: PathBuf,
-        #[command(flatten)]
-        server: TeamServer,
     },
     /// Have the archive of one removed for good: nobody plays it again, its results stay; without --confirm, say what
     /// that would do
@@ -72,15 +66,16 @@ enum Action {
         /// The name of its archive
         #[arg(long, value_name = "FILE_NAME")]
         confirm: Option<String>,
-        #[command(flatten)]
-        server: TeamServer,
+    },
+    /// Show what each perturbation costs one, if the organisers have had that played
+    Ablation {
+        /// The submission's id
+        submission: SubmissionId,
     },
     /// Take one back: it plays no further day, unless `faceoff activate` chooses it again
     Withdraw {
         /// The submission's id
         submission: SubmissionId,
-        #[command(flatten)]
-        server: TeamServer,
     },
 }
 
@@ -94,86 +89,84 @@ impl SubmissionsCommand {
     }
 
     async fn act(self) -> anyhow::Result<()> {
+        let json = self.server.json;
+        let client = self.server.client()?;
         match self.action {
-            Action::List { server } => {
-                let submissions = server.client()?.submissions().await?;
-                if submissions.is_empty() {
-                    println!("nothing was uploaded yet: faceoff submit BUNDLE");
-                }
-                for submission in &submissions {
-                    println!("{}", line(submission));
-                }
+            Action::List => {
+                let submissions = client.submissions().await?;
+                print(json, &submissions, || {
+                    or_none(
+                        submissions.iter().map(line).collect(),
+                        "nothing was uploaded yet: faceoff submit BUNDLE",
+                    )
+                })
             }
-            Action::Status { server } => {
-                let client = server.client()?;
+            Action::Status => {
                 let me = client.me().await?;
-                for line in status(&me) {
-                    println!("{line}");
-                }
+                print(json, &me, || status(&me).join("\n"))
             }
-            Action::Label {
-                submission,
-                label,
-                server,
-            } => {
+            Action::Label { submission, label } => {
                 let change = SubmissionChange {
                     label: Some(label),
                     ..SubmissionChange::default()
                 };
-                let described = server.client()?.describe(submission, &change).await?;
-                println!("{}", line(&described));
+                let described = client.describe(submission, &change).await?;
+                print(json, &described, || line(&described))
             }
-            Action::Note {
-                submission,
-                note,
-                server,
-            } => {
+            Action::Note { submission, note } => {
                 let change = SubmissionChange {
                     note: Some(note),
                     ..SubmissionChange::default()
                 };
-                let described = server.client()?.describe(submission, &change).await?;
-                println!("{}", line(&described));
+                let described = client.describe(submission, &change).await?;
+                print(json, &described, || line(&described))
             }
-            Action::Download {
-                submission,
-                file,
-                server,
-            } => {
-                let client = server.client()?;
-                let bytes = client.download_submission(submission, &file).await?;
-                println!("{}: {bytes} bytes", file.display());
+            Action::Download { submission, file } => {
+                let bar = download_bar()?;
+                let hash = client.submission(submission).await?.blake3;
+                let done = client
+                    .download_submission(submission, &file, &hash, &bar)
+                    .await?;
+                bar.finish_and_clear();
+                print(json, &done, || downloaded(&done))
             }
             Action::Delete {
                 submission,
                 reason,
                 confirm,
-                server,
             } => {
                 let wanted = DeleteSubmission { confirm, reason };
-                let client = server.client()?;
                 let deleted = client.delete_submission(submission, &wanted).await?;
-                println!("{}", line(&deleted));
+                print(json, &deleted, || line(&deleted))
             }
-            Action::Withdraw { submission, server } => {
-                let client = server.client()?;
-                let withdrawn = client.withdraw(submission).await?;
-                println!("{}", line(&withdrawn));
-                let me = client.me().await?;
-                match me.active_submission {
-                    Some(active) => println!("{}", next_cut(&me, active)),
-                    None => println!(
-                        "nothing of the team is active: upload another, or choose one with faceoff activate ID"
-                    ),
-                }
+            Action::Ablation { submission } => {
+                let newest = client.ablation(submission).await?;
+                print(json, &newest, || ablation(&newest))
             }
+            Action::Withdraw { submission } => withdraw(&client, json, submission).await,
         }
-        Ok(())
     }
 }
 
+/// Takes a submission back, and tells what plays in its place.
+pub(super) async fn withdraw(
+    client: &Client,
+    json: bool,
+    submission: SubmissionId,
+) -> anyhow::Result<()> {
+    let withdrawn = client.withdraw(submission).await?;
+    let me = client.me().await?;
+    print(json, &withdrawn, || {
+        let next = match me.active_submission {
+            Some(active) => next_cut(&me, active),
+            None => "nothing of the team is active: upload another, or choose one with faceoff activate ID".to_owned(),
+        };
+        format!("{}\n{next}", line(&withdrawn))
+    })
+}
+
 /// How the team stands today, line by line.
-fn status(me: &MeView) -> Vec<String> {
+pub(super) fn status(me: &MeView) -> Vec<String> {
     let mut lines = Vec::new();
     match (&me.turn.evaluation, &me.turn.next) {
         (Some(evaluation), next) => {
@@ -205,7 +198,7 @@ fn status(me: &MeView) -> Vec<String> {
     lines
 }
 
-fn line(submission: &SubmissionView) -> String {
+pub(super) fn line(submission: &SubmissionView) -> String {
     let state = match &submission.status {
         SubmissionStatus::Validating => match &submission.queue {
             Some(queue) => format!("validating, {}", in_queue(queue)),

@@ -1,27 +1,31 @@
 //! `faceoff submit`: uploads an agent and says whether it starts.
 
-use super::team_server::TeamServer;
-use crate::client::Client;
+mod packed;
+
+use super::{next_cut::next_cut, output::print, server::ServerArgs};
+use crate::{client::Client, packing::BundleFile};
 use anyhow::{Context, bail};
 use clap::Args;
-use faceoff_http::views::{
-    me::MeView,
-    submission::{SubmissionStatus, SubmissionView},
-};
-use faceoff_types::{SmokeTiming, SubmissionId};
+use faceoff_http::views::submission::{SubmissionStatus, SubmissionView};
+use faceoff_types::SmokeTiming;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{path::PathBuf, time::Duration};
 
 /// How often the server is asked for news.
 const POLL: Duration = Duration::from_millis(500);
 
-/// Uploads a bundle and follows it until its verdict; exit status 0 only if it is valid.
+/// Uploads a bundle and follows it until its verdict; exit status 0 only if it is valid. Of a folder all goes in but what
+/// no agent needs (histories, caches, environments, builds, editors' files: --dry-run tells) and what its file
+/// .faceoffignore names, in the syntax of .gitignore; a line `!NAME` there has something go in all the same.
 #[derive(Debug, Args)]
 pub struct SubmitCommand {
     /// The agent: a .tar.gz, .tar.zst or .zip, or a folder with agent.toml, which is packed
     bundle: PathBuf,
+    /// List what of a folder would go in and what would not, and upload nothing
+    #[arg(long)]
+    dry_run: bool,
     #[command(flatten)]
-    server: TeamServer,
+    server: ServerArgs,
 }
 
 impl SubmitCommand {
@@ -30,44 +34,49 @@ impl SubmitCommand {
     /// # Errors
     /// If the server cannot be reached or refuses, or the agent is not valid.
     pub fn run(self) -> anyhow::Result<()> {
-        tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()
-            .context("starting the async runtime")?
-            .block_on(self.submit())
+        super::block_on(self.submit())
     }
 
     async fn submit(self) -> anyhow::Result<()> {
+        let json = self.server.json;
+        let bundle = self.bundle.clone();
+        let bundle = tokio::task::spawn_blocking(move || BundleFile::open(&bundle));
+        let bundle = bundle.await.context("packing the bundle")??;
+        if self.dry_run {
+            let contents = packed::Contents::of(&bundle);
+            return print(json, &contents, || contents.listed());
+        }
         let client = self.server.client()?;
+        if let Some(selection) = bundle.selection() {
+            // Beside the answer, which --json leaves alone on standard output.
+            for line in packed::told(selection, bundle.bytes()) {
+                eprintln!("{line}");
+            }
+        }
         let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template(
-            "uploading {bar:40} {bytes}/{total_bytes}",
+            "uploading {bar:40} {bytes}/{total_bytes}, {bytes_per_sec}, {eta} left",
         )?);
-        let submission = client.upload_with(&self.bundle, &bar).await?;
+        let submission = client.upload_with(&bundle, &bar).await?;
         bar.finish_and_clear();
-        println!(
-            "uploaded {} as submission {}",
-            submission.file_name, submission.id
-        );
-        if let Some(same) = submission.same_as {
-            println!("it is the same archive as submission {same}");
+        if !json {
+            println!(
+                "uploaded {} as submission {}",
+                submission.file_name, submission.id
+            );
+            if let Some(same) = submission.same_as {
+                println!("it is the same archive as submission {same}");
+            }
         }
 
         let submission = verdict(&client, submission).await?;
-        let agent = submission.agent_name.as_deref().unwrap_or("the agent");
-        for timing in &submission.timing {
-            print_timing(timing);
+        if json {
+            print(json, &submission, String::new)?;
+        } else {
+            print_verdict(&client, &submission).await?;
         }
         match submission.status {
-            SubmissionStatus::Valid { log } => {
-                print_log(log.as_deref());
-                println!("valid: {agent} starts, answers and keeps time");
-                println!("{}", next_cut(&client.me().await?, submission.id));
-                Ok(())
-            }
-            SubmissionStatus::Invalid { reason, log } => {
-                print_log(log.as_deref());
-                bail!("invalid: {reason}")
-            }
+            SubmissionStatus::Valid { .. } => Ok(()),
+            SubmissionStatus::Invalid { reason, .. } => bail!("invalid: {reason}"),
             SubmissionStatus::ValidationError { reason } => {
                 bail!("the server failed to check the bundle ({reason}); submit it again")
             }
@@ -76,32 +85,22 @@ impl SubmitCommand {
     }
 }
 
-/// When a submission of the team's plays.
-pub(super) fn next_cut(me: &MeView, submission: SubmissionId) -> String {
-    match (&me.next_cut, me.active_submission) {
-        (None, _) => "no day comes any more: the season or its last stage is closed".to_owned(),
-        (Some(cut), Some(active)) if active == submission => {
-            let (here, elsewhere): (Vec<_>, Vec<_>) =
-                me.not_taken.iter().partition(|one| one.stage == cut.stage);
-            let mut told = match here.first() {
-                Some(one) => format!(
-                    "it is active and does not play at the next cut ({cut}): {}",
-                    one.reason
-                ),
-                None => format!("it is active and plays at the next cut: {cut}"),
-            };
-            for one in elsewhere {
-                told.push_str(&format!("\nit plays no day of one stage: {}", one.reason));
-            }
-            told
-        }
-        (Some(cut), _) => format!(
-            "another submission is active and plays at the next cut ({cut}); to choose this one: faceoff \
-             activate {submission}"
-        ),
+async fn print_verdict(client: &Client, submission: &SubmissionView) -> anyhow::Result<()> {
+    for timing in &submission.timing {
+        print_timing(timing);
     }
+    match &submission.status {
+        SubmissionStatus::Valid { log } => {
+            let agent = submission.agent_name.as_deref().unwrap_or("the agent");
+            print_log(log.as_deref());
+            println!("valid: {agent} starts, answers and keeps time");
+            println!("{}", next_cut(&client.me().await?, submission.id));
+        }
+        SubmissionStatus::Invalid { log, .. } => print_log(log.as_deref()),
+        SubmissionStatus::ValidationError { .. } | SubmissionStatus::Validating => {}
+    }
+    Ok(())
 }
-
 async fn verdict(
     client: &Client,
     mut submission: SubmissionView,

@@ -3,8 +3,8 @@
 use super::{
     output::{or_none, print},
     people::{invitation_line, invitation_lines, invited, person_line},
+    server::ServerArgs,
     storage::storage_line,
-    team_server::TeamServer,
 };
 use crate::client::Client;
 use anyhow::{Context, bail};
@@ -20,10 +20,7 @@ use jiff::Timestamp;
 #[derive(Debug, Args)]
 pub struct TeamCommand {
     #[command(flatten)]
-    server: TeamServer,
-    /// Print the server's answer as JSON
-    #[arg(long)]
-    json: bool,
+    server: ServerArgs,
     #[command(subcommand)]
     action: Action,
 }
@@ -98,7 +95,7 @@ impl TeamCommand {
     /// # Errors
     /// If the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
-        super::block_on(async { act(&self.server.client()?, self.json, self.action).await })
+        super::block_on(async { act(&self.server.client()?, self.server.json, self.action).await })
     }
 }
 
@@ -134,6 +131,7 @@ async fn act(client: &Client, json: bool, action: Action) -> anyhow::Result<()> 
                 affiliation: affiliation.map(or_null),
                 link: link.map(or_null),
                 division: None,
+                baseline: None,
                 declines_friendly_games,
             };
             let team = client.change_team(own_team(client).await?, &change).await?;
@@ -236,6 +234,10 @@ pub(super) fn team_text(team: &TeamView) -> String {
         ("affiliation", team.affiliation.clone()),
         ("link", team.link.clone()),
         ("division", division),
+        (
+            "baseline",
+            team.baseline.then(|| "yes: it is not ranked".to_owned()),
+        ),
         ("retired", team.retired_at.map(shown)),
         (
             "disqualified",

@@ -2,7 +2,7 @@
 
 use super::{
     output::{or_none, print},
-    team_server::TeamServer,
+    server::ServerArgs,
 };
 use crate::client::Client;
 use anyhow::Context;
@@ -15,10 +15,7 @@ use jiff::{SignedDuration, Timestamp};
 #[derive(Debug, Args)]
 pub struct TokenCommand {
     #[command(flatten)]
-    server: TeamServer,
-    /// Print the server's answer as JSON
-    #[arg(long)]
-    json: bool,
+    server: ServerArgs,
     #[command(subcommand)]
     action: TokenAction,
 }
@@ -59,7 +56,7 @@ impl TokenCommand {
     /// # Errors
     /// If the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
-        super::block_on(async { act(&self.server.client()?, self.json, self.action).await })
+        super::block_on(async { act(&self.server.client()?, self.server.json, self.action).await })
     }
 }
 

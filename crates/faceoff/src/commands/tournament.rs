@@ -4,7 +4,7 @@ pub(super) mod find;
 pub(super) mod games;
 pub(super) mod text;
 
-use super::{any_server::AnyServer, output::print, score::table};
+use super::{output::print, score::table, server::ServerArgs};
 use clap::{Args, Subcommand};
 use faceoff_http::requests::Decision;
 use faceoff_types::RoundNumber;
@@ -14,10 +14,7 @@ use find::{find, find_or_newest};
 #[derive(Debug, Args)]
 pub struct TournamentCommand {
     #[command(flatten)]
-    server: AnyServer,
-    /// Print the server's answer as JSON
-    #[arg(long, global = true)]
-    json: bool,
+    server: ServerArgs,
     #[command(subcommand)]
     action: Action,
 }
@@ -71,21 +68,21 @@ impl TournamentCommand {
     }
 
     async fn act(self) -> anyhow::Result<()> {
-        let client = self.server.client()?;
+        let client = self.server.anybody()?;
         match self.action {
             Action::List => {
                 let tournaments = client.tournaments().await?;
-                print(self.json, &tournaments, || text::list(&tournaments))
+                print(self.server.json, &tournaments, || text::list(&tournaments))
             }
             Action::Show { tournament } => {
                 let id = find_or_newest(&client, tournament.as_deref()).await?;
                 let tournament = client.tournament(id).await?;
-                print(self.json, &tournament, || text::whole(&tournament))
+                print(self.server.json, &tournament, || text::whole(&tournament))
             }
             Action::Games { tournament, round } => {
                 let id = find_or_newest(&client, tournament.as_deref()).await?;
                 let games = client.games(id, round).await?;
-                print(self.json, &games, || games::table(&games))
+                print(self.server.json, &games, || games::table(&games))
             }
             Action::Ratings { tournament } => {
                 let id = find_or_newest(&client, tournament.as_deref()).await?;
@@ -93,14 +90,14 @@ impl TournamentCommand {
                     ratings: client.ratings(id).await?,
                     head_to_head: client.head_to_head(id).await?,
                 };
-                print(self.json, &told, || {
+                print(self.server.json, &told, || {
                     table::strengths(&told.ratings, &told.head_to_head)
                 })
             }
             Action::Certainty { tournament } => {
                 let id = find_or_newest(&client, tournament.as_deref()).await?;
                 let certainty = client.certainty(id).await?;
-                print(self.json, &certainty, || text::certainty(&certainty))
+                print(self.server.json, &certainty, || text::certainty(&certainty))
             }
             Action::Withdraw {
                 tournament,
@@ -110,7 +107,7 @@ impl TournamentCommand {
                 let id = find(&client, &tournament).await?;
                 let decision = Decision { reason, confirm };
                 let left = client.withdraw_from_tournament(id, &decision).await?;
-                print(self.json, &left, || text::whole(&left))
+                print(self.server.json, &left, || text::whole(&left))
             }
         }
     }

@@ -3,6 +3,7 @@
 mod failure;
 mod game;
 
+use crate::exit::Exit;
 use anyhow::Context;
 use clap::Args;
 use faceoff_dataset::{
@@ -19,7 +20,6 @@ use serde::Serialize;
 use std::{
     num::NonZero,
     path::{Path, PathBuf},
-    process::ExitCode,
     thread,
     time::{Duration, Instant},
 };
@@ -93,9 +93,9 @@ struct Simulated {
 impl VerifyCommand {
     /// Verifies, prints what was found, and returns the exit status.
     #[must_use]
-    pub fn run(self) -> ExitCode {
+    pub fn run(self) -> Exit {
         let outcome = self.recording();
-        let (summary, code) = match outcome {
+        let (summary, exit) = match outcome {
             Ok(simulated) => {
                 if !self.json {
                     let said = match &simulated {
@@ -110,11 +110,11 @@ impl VerifyCommand {
                     error: None,
                     simulated: Some(simulated),
                 };
-                (summary, ExitCode::SUCCESS)
+                (summary, Exit::Done)
             }
             Err(failure) => {
                 eprintln!("error: {}: {failure}", self.dataset.display());
-                let code = failure.code();
+                let exit = failure.exit();
                 let summary = Summary {
                     verified: false,
                     error: Some(failure.to_string()),
@@ -124,7 +124,7 @@ impl VerifyCommand {
                     },
                     simulated: None,
                 };
-                (summary, code)
+                (summary, exit)
             }
         };
         if self.json {
@@ -132,11 +132,11 @@ impl VerifyCommand {
                 Ok(line) => println!("{line}"),
                 Err(error) => {
                     eprintln!("error: writing the summary: {error}");
-                    return ExitCode::from(2);
+                    return Exit::Failed;
                 }
             }
         }
-        code
+        exit
     }
 
     fn recording(&self) -> Result<Recording, Failure> {

@@ -1,17 +1,28 @@
 //! `faceoff whoami`: whom a token speaks for.
 
-use super::{output::print, team_server::TeamServer};
+use super::{
+    output::print,
+    server::{ServerArgs, Source},
+};
 use clap::Args;
 use faceoff_http::views::person::WhoView;
+use serde::Serialize;
 
-/// Says whom the token speaks for.
+/// Says whom the token speaks for, to which server, and where both come from.
 #[derive(Debug, Args)]
 pub struct WhoamiCommand {
     #[command(flatten)]
-    server: TeamServer,
-    /// Print the server's answer as JSON
-    #[arg(long)]
-    json: bool,
+    server: ServerArgs,
+}
+
+/// What is printed with `--json`.
+#[derive(Debug, Serialize)]
+struct Me<'a> {
+    #[serde(flatten)]
+    who: &'a WhoView,
+    server: &'a str,
+    server_from: Source,
+    token_from: Source,
 }
 
 impl WhoamiCommand {
@@ -21,8 +32,23 @@ impl WhoamiCommand {
     /// If the server cannot be reached or refuses.
     pub fn run(self) -> anyhow::Result<()> {
         super::block_on(async {
+            let found = self.server.found()?;
             let who = self.server.client()?.whoami().await?;
-            print(self.json, &who, || text(&who))
+            let me = Me {
+                who: &who,
+                server: &found.server,
+                server_from: found.server_from,
+                token_from: found.token_from,
+            };
+            print(self.server.json, &me, || {
+                format!(
+                    "{}\nserver {} ({}), token by {}",
+                    text(&who),
+                    me.server,
+                    me.server_from.words("--server", "FACEOFF_SERVER"),
+                    me.token_from.words("--token", "FACEOFF_TOKEN")
+                )
+            })
         })
     }
 }

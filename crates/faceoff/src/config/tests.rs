@@ -47,6 +47,10 @@ fn every_section_is_read() {
         [connections]
         exempt = ["10.0.0.1"]
         head_s = 5
+        [rates]
+        token_per_s = 0
+        [webhooks]
+        allow_private = ["10.1.0.0/16"]
         [sandbox]
         given_up = ["cgroup-memory"]
         [runtimes.julia]
@@ -56,6 +60,10 @@ fn every_section_is_read() {
     )
     .unwrap();
     assert_eq!(config.server.listen.port(), 80);
+    let inner = "10.1.2.3".parse().unwrap();
+    assert!(config.webhooks.check_address(inner).is_ok());
+    assert_eq!(config.webhooks.ports, [443, 8443]);
+    assert_eq!(config.rates.limits().token, None);
     assert_eq!(config.season.name.as_deref(), Some("Practice"));
     assert_eq!(config.rules().episodes_per_task, 7);
     assert_eq!(config.evaluation.at, Some(jiff::civil::time(0, 30, 0, 0)));

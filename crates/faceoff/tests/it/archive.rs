@@ -1,7 +1,11 @@
 //! The season's archive as an organiser takes it along: exported from a site, imported, and served by the program.
 
 use faceoff_archive::{Edition, Entry, FORMAT, Manifest, Writer};
-use faceoff_http::{Capacity, ConnectionLimits, HttpConfig, HttpLimits, Offer, token::hash_token};
+use faceoff_http::{
+    Capacity, ConnectionLimits, HttpConfig, HttpLimits, LinkKey, Offer, RateLimits,
+    token::hash_token,
+};
+use faceoff_metrics::{Metrics, Process};
 use faceoff_store::{Actor, Claimed, Store, UploadQuota, Work};
 use faceoff_types::{
     BundleRef, Clock, EvaluationId, EvaluationResult, Profile, Ruleset, SmokeOutcome, StageRules,
@@ -99,6 +103,11 @@ async fn site() -> Site {
             time: TimeLimits::default(),
         },
         offer: Offer::nothing(),
+        rates: RateLimits::default(),
+        link_key: LinkKey::generate().unwrap(),
+        metrics: Metrics::new("0.0.0"),
+        process: Process::default,
+        webhooks: Default::default(),
     };
     let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.unwrap();
     let url = format!("http://{}", listener.local_addr().unwrap());
@@ -271,7 +280,14 @@ impl Drop for Served {
 }
 
 async fn text(url: String, token: Option<&str>) -> (u16, String) {
-    let client = reqwest::Client::builder().no_proxy().build().unwrap();
+    let nobody = rustls::ClientConfig::builder()
+        .with_root_certificates(rustls::RootCertStore::empty())
+        .with_no_client_auth();
+    let client = reqwest::Client::builder()
+        .no_proxy()
+        .tls_backend_preconfigured(nobody)
+        .build()
+        .unwrap();
     let request = client.get(url);
     let request = match token {
         Some(token) => request.bearer_auth(token),

@@ -69,6 +69,23 @@ fn local_evaluations_are_compared_if_they_played_the_same_episodes() {
     assert!(output.status.success(), "{}", text(&output.stderr));
     let view: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(view["a"]["agent"], "hold");
+    assert!(view.get("episodes").is_none());
+    let output = faceoff(&["compare", "a", "b", "--episodes", "--json"], folder);
+    let listed: Value = serde_json::from_slice(&output.stdout).unwrap();
+    for (task, of) in view["tasks"].as_object().unwrap() {
+        let episodes = &listed["episodes"][task];
+        let mut all = Vec::new();
+        for whom in ["both", "only_a", "only_b", "neither"] {
+            let list = episodes[whom].as_array().unwrap();
+            assert_eq!(of[whom], list.len(), "{task}, {whom}");
+            all.extend(list.iter().map(|episode| episode.as_u64().unwrap()));
+        }
+        all.sort_unstable();
+        assert_eq!(all, [0, 1, 2, 3], "{task}");
+    }
+    let output = faceoff(&["compare", "a", "b", "--episodes"], folder);
+    let table = text(&output.stdout);
+    assert!(table.contains("\nepisodes\nhit      only A   "), "{table}");
     let results = |out: &str| -> Value {
         let file = folder.join(out).join("results.json");
         serde_json::from_slice(&fs::read(file).unwrap()).unwrap()

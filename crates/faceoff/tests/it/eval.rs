@@ -123,6 +123,85 @@ fn an_agent_that_fails_is_told_with_fault_and_log_and_leaves_no_score() {
 }
 
 #[test]
+fn a_fault_is_told_with_its_traceback_and_ends_with_status_1_beside_the_result() {
+    let dir = tempfile::tempdir().unwrap();
+    let bundle = dir.path().join("bundle");
+    fs::create_dir(&bundle).unwrap();
+    for file in ["agent.toml", "protocol.py"] {
+        fs::copy(hold().join(file), bundle.join(file)).unwrap();
+    }
+    let source = fs::read_to_string(hold().join("agent.py")).unwrap();
+    let broken = "        if self.task == 'defend':\n            print('\\x1b[31mlooking')\n            1 / 0\n        if self.pose is None";
+    let source = source.replace("        if self.pose is None", broken);
+    fs::write(bundle.join("agent.py"), source).unwrap();
+    let out = dir.path().join("out");
+    let args = ["--task", "hit,defend", "--episodes", "2"];
+    let output = eval(&bundle, &out, &args);
+    assert_eq!(output.status.code(), Some(1));
+    let (told, stderr) = (text(&output.stdout), text(&output.stderr));
+    for words in [
+        "fault: defend, episode 0, step 0",
+        "what the agent wrote before the first fault:\n  \\u001b[31mlooking\n  Traceback (most recent call last):",
+        "  ZeroDivisionError: division by zero",
+        "penalty points",
+    ] {
+        assert!(told.contains(words), "{words:?} is not in {told}");
+    }
+    assert!(stderr.contains("the agent had 2 faults"), "{stderr}");
+    assert!(out.join("results.json").exists() && out.join("dataset.zip").exists());
+    let log = fs::read_to_string(out.join("agent.log")).unwrap();
+    assert_eq!(log.matches("Traceback").count(), 2, "{log}");
+
+    let allowed = eval(
+        &bundle,
+        &out,
+        &[&args[..], &["--allow-faults", "--json"]].concat(),
+    );
+    assert!(allowed.status.success(), "{}", text(&allowed.stderr));
+    let told: serde_json::Value = serde_json::from_slice(&allowed.stdout).unwrap();
+    assert_eq!(told["faults"].as_array().unwrap().len(), 2, "{told:#}");
+    assert_eq!(told["result"]["tasks"]["defend"]["episodes"], 2);
+    assert!(text(&allowed.stderr).contains("ZeroDivisionError"));
+}
+
+#[test]
+fn a_bundle_is_evaluated_from_its_own_folder_again_and_again() {
+    let dir = tempfile::tempdir().unwrap();
+    for file in ["agent.toml", "agent.py", "protocol.py"] {
+        fs::copy(hold().join(file), dir.path().join(file)).unwrap();
+    }
+    let here = |args: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_faceoff"))
+            .args(args)
+            .current_dir(dir.path())
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        text(&output.stdout)
+    };
+    let eval = [
+        "eval",
+        ".",
+        "--task",
+        "defend",
+        "--episodes",
+        "1",
+        "--config",
+        PATIENT,
+    ];
+    for out in [
+        &["--out", "faceoff-eval"][..],
+        &["--out", "results/a"],
+        &["--out", "results/a"],
+    ] {
+        here(&[&eval[..], out].concat());
+    }
+    let packed = here(&["submit", ".", "--dry-run", "--json"]);
+    let packed: serde_json::Value = serde_json::from_str(&packed).unwrap();
+    assert_eq!(packed["left_out"], serde_json::json!(["faceoff-eval"]));
+}
+
+#[test]
 fn what_cannot_be_evaluated_is_refused_with_a_reason() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("out");

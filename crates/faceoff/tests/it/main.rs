@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a helper's failure is its test's")]
 
 mod archive;
+mod command_line;
 mod compare;
 mod dataset;
 mod eval;

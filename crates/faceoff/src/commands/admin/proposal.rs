@@ -1,9 +1,11 @@
 //! `faceoff admin proposal`: what is tried without counting, and what is evaluated again.
 
-use super::stage;
 use crate::{
     client::Client,
-    commands::output::{or_none, print},
+    commands::{
+        find_stage::find_stage,
+        output::{or_none, print},
+    },
 };
 use clap::Subcommand;
 use faceoff_http::{
@@ -87,7 +89,7 @@ pub(super) async fn act(client: &Client, json: bool, action: ProposalAction) -> 
             reason,
             submission,
         } => {
-            let stage = stage::find(client, &stage).await?;
+            let stage = find_stage(client, &stage).await?;
             client
                 .trial(stage.id, &Trial { submission, reason })
                 .await?
@@ -108,7 +110,7 @@ pub(super) async fn act(client: &Client, json: bool, action: ProposalAction) -> 
             stage,
             new_rules,
         } => {
-            let stage = stage::find(client, &stage).await?;
+            let stage = find_stage(client, &stage).await?;
             let wanted = NewProposal {
                 evaluation: None,
                 day: Some(day),

@@ -2,9 +2,12 @@
 
 use crate::{
     client::Client,
-    commands::output::{or_none, print},
+    commands::{
+        find_stage::find_stage,
+        output::{or_none, print},
+    },
 };
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, ensure};
 use clap::{Args, Subcommand};
 use faceoff_http::{
     requests::{NewStage, StageChange},
@@ -14,7 +17,7 @@ use faceoff_http::{
     },
 };
 use faceoff_types::{
-    DayDeadline, PerturbationSettings, Profile, Publishes, Retention, Runtimes, Schedule, StageId,
+    DayDeadline, PerturbationSettings, Profile, Publishes, Retention, Runtimes, Schedule,
     StageLimits, StageUploads, Standings, Task, TaskWeights, TierBounds, Zone,
 };
 use jiff::{
@@ -219,19 +222,6 @@ fn instant(text: &str, zone: &Zone) -> anyhow::Result<Timestamp> {
         .timestamp())
 }
 
-pub(super) async fn find(client: &Client, wanted: &str) -> anyhow::Result<StageView> {
-    let stages = client.stages().await?;
-    let id: Option<StageId> = wanted.parse().ok();
-    let named = |stage: &StageView| stage.name.as_str().eq_ignore_ascii_case(wanted);
-    let found = stages
-        .into_iter()
-        .find(|stage| Some(stage.id) == id || named(stage));
-    match found {
-        Some(stage) => Ok(stage),
-        None => bail!("no stage is named {wanted:?}; faceoff admin stage list names them"),
-    }
-}
-
 pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> anyhow::Result<()> {
     match action {
         StageAction::List => {
@@ -241,7 +231,7 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
             })
         }
         StageAction::Capacity { stage } => {
-            let stage = find(client, &stage).await?;
+            let stage = find_stage(client, &stage).await?;
             let capacity = client.capacity(stage.id).await?;
             print(json, &capacity, || {
                 let mut lines = vec![format!("{}, {} slots", capacity.stage_name, capacity.slots)];
@@ -293,7 +283,7 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
             no_schedule,
             confirm,
         } => {
-            let stage = find(client, &stage).await?;
+            let stage = find_stage(client, &stage).await?;
             let zone = wanted.zone.clone().unwrap_or_else(|| stage.zone.clone());
             let at = |text: &Option<String>| {
                 let at = text.as_deref().map(|text| instant(text, &zone));
@@ -329,14 +319,14 @@ pub(super) async fn act(client: &Client, json: bool, action: StageAction) -> any
             print(json, &changed, || told(&changed))
         }
         StageAction::Final { stage } => {
-            let stage = find(client, &stage).await?;
+            let stage = find_stage(client, &stage).await?;
             let day = client.start_final_day(stage.id).await?;
             print(json, &day, || {
                 format!("{}: final day, {} started", day.day, day.created.len())
             })
         }
         StageAction::Finalise { stage, confirm } => {
-            let stage = find(client, &stage).await?;
+            let stage = find_stage(client, &stage).await?;
             let done = client.finalise(stage.id, confirm).await?;
             print(json, &done, || told(&done))
         }

@@ -3,7 +3,7 @@
 use crate::{
     client::Client,
     commands::{
-        output::{or_none, print},
+        output::{download_bar, downloaded, or_none, print},
         storage::storage_line,
     },
 };
@@ -44,9 +44,13 @@ pub(super) async fn act(client: &Client, json: bool, action: StorageAction) -> a
             })
         }
         StorageAction::DownloadSubmission { submission, file } => {
-            let bytes = client.download_submission(submission, &file).await?;
-            println!("{}: {bytes} bytes", file.display());
-            Ok(())
+            let bar = download_bar()?;
+            let hash = client.submission(submission).await?.blake3;
+            let done = client
+                .download_submission(submission, &file, &hash, &bar)
+                .await?;
+            bar.finish_and_clear();
+            print(json, &done, || downloaded(&done))
         }
         StorageAction::DeleteSubmission {
             submission,

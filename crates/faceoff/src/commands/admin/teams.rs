@@ -1,4 +1,4 @@
-//! `faceoff admin create-team`, `change-team`, `new-token`, `disqualify`, `reinstate` and `teams`.
+//! `faceoff admin create-team`, `change-team`, `new-token`, `disqualify`, `reinstate`, `retire-team`, `return-team` and `teams`.
 
 use super::find::find_team;
 use crate::{
@@ -20,7 +20,7 @@ pub(super) enum TeamAction {
         /// 1 to 40 letters, digits, spaces and . _ -
         name: String,
     },
-    /// Change a team's name or division
+    /// Change a team's name or division, or say whether it is ranked
     ChangeTeam {
         /// The team's name or id
         team: String,
@@ -30,6 +30,12 @@ pub(super) enum TeamAction {
         /// The division that it is in; empty: none
         #[arg(long)]
         division: Option<String>,
+        /// It is a reference agent of yours: boards show it apart, and rank the teams without it
+        #[arg(long, conflicts_with = "no_baseline")]
+        baseline: bool,
+        /// It is ranked as any team
+        #[arg(long)]
+        no_baseline: bool,
     },
     /// Replace a team's own tokens by one; the old ones are worth nothing from then on
     NewToken {
@@ -53,12 +59,34 @@ pub(super) enum TeamAction {
         /// Kept in the log
         reason: String,
     },
+    /// Take a team out of all days to come; without --confirm, say what that would do
+    RetireTeam {
+        /// The team's name or id
+        team: String,
+        /// The team's name
+        #[arg(long, value_name = "TEAM")]
+        confirm: Option<String>,
+    },
+    /// Let a team play again that has retired
+    ReturnTeam {
+        /// The team's name or id
+        team: String,
+    },
     /// List the teams
     Teams,
 }
 
 pub(super) async fn act(client: &Client, json: bool, action: TeamAction) -> anyhow::Result<()> {
     match action {
+        TeamAction::RetireTeam { team, confirm } => {
+            let id = find_team(client, &team).await?;
+            let team = client.retire_team(id, confirm).await?;
+            print(json, &team, || team_text(&team))
+        }
+        TeamAction::ReturnTeam { team } => {
+            let team = client.return_team(find_team(client, &team).await?).await?;
+            print(json, &team, || team_text(&team))
+        }
         TeamAction::CreateTeam { name } => {
             let created = client.create_team(&name).await?;
             print(json, &created, || {
@@ -72,6 +100,8 @@ pub(super) async fn act(client: &Client, json: bool, action: TeamAction) -> anyh
             team,
             rename,
             division,
+            baseline,
+            no_baseline,
         } => {
             let team = find_team(client, &team).await?;
             let division = match division.as_deref().map(str::trim) {
@@ -82,6 +112,7 @@ pub(super) async fn act(client: &Client, json: bool, action: TeamAction) -> anyh
             let change = TeamChange {
                 name: rename,
                 division,
+                baseline: (baseline || no_baseline).then_some(baseline),
                 ..TeamChange::default()
             };
             let team = client.change_team(team, &change).await?;

@@ -1,5 +1,6 @@
-use faceoff_scoring::Comparison;
-use std::fmt::Write as _;
+use faceoff_scoring::{Comparison, WhoSolved};
+use faceoff_types::Task;
+use std::{collections::BTreeMap, fmt::Write as _};
 
 /// The comparison as a table for a terminal.
 pub(super) fn of(comparison: &Comparison) -> String {
@@ -52,6 +53,37 @@ fn write(out: &mut String, comparison: &Comparison) -> std::fmt::Result {
     )
 }
 
+/// The episodes by who solved them.
+pub(super) fn by_whom(episodes: &BTreeMap<Task, WhoSolved>) -> String {
+    let mut out = String::new();
+    for (task, of) in episodes {
+        for (whom, list) in [
+            ("only A", &of.only_a),
+            ("only B", &of.only_b),
+            ("both", &of.both),
+            ("neither", &of.neither),
+        ] {
+            let list = ranges(list);
+            writeln!(out, "{task:<8} {whom:<8} {list}").expect("writing to memory cannot fail");
+        }
+    }
+    format!("\nepisodes\n{out}")
+}
+
+/// 1-3 5 7-8, or a dash.
+fn ranges(numbers: &[u32]) -> String {
+    if numbers.is_empty() {
+        return "–".to_owned();
+    }
+    let runs = numbers.chunk_by(|one, next| one + 1 == *next);
+    let run = |run: &[u32]| match run {
+        [first, .., last] => format!("{first}-{last}"),
+        [only] => only.to_string(),
+        [] => String::new(),
+    };
+    runs.map(run).collect::<Vec<_>>().join(" ")
+}
+
 fn p_value(p: f64) -> String {
     if p < 1e-4 {
         format!("{p:.1e}")
@@ -65,5 +97,17 @@ fn verdict(told_apart: bool, difference: f64) -> &'static str {
         (false, _) => "not told apart",
         (true, true) => "A is ahead",
         (true, false) => "B is ahead",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn episodes_that_follow_each_other_are_a_range() {
+        assert_eq!(ranges(&[]), "–");
+        assert_eq!(ranges(&[4]), "4");
+        assert_eq!(ranges(&[0, 1, 2, 5, 7, 8]), "0-2 5 7-8");
     }
 }

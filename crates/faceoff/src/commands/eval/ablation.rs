@@ -4,6 +4,7 @@ use super::{
     files::{ABLATION, write_json},
     profile_run::{EvalSetup, play},
 };
+use crate::commands::output::print;
 use anyhow::Context;
 use faceoff_scoring::{EpisodeSummary, ProfileEffect};
 use faceoff_types::{Profile, RULESET, Seed, Task};
@@ -19,18 +20,20 @@ struct AblationFile {
     tasks: BTreeMap<Task, Vec<ProfileEffect>>,
 }
 
-/// Plays every profile, each into a folder of its name, and compares them.
-pub(super) fn run(setup: &EvalSetup, out: &Path) -> anyhow::Result<()> {
+/// Plays every profile, each into a folder of its name, and compares them; how many faults the agent had.
+pub(super) fn run(setup: &EvalSetup, out: &Path, json: bool) -> anyhow::Result<usize> {
+    let mut faults = 0;
     let mut runs = BTreeMap::new();
     for profile in Profile::ABLATION {
         let played = play(setup, profile, &out.join(profile.as_str()))
             .with_context(|| format!("profile {profile}"))?;
+        faults += played.faults.len();
         let summary = EpisodeSummary::of(&played.outcomes, &setup.variation.tier_bounds);
         runs.insert(profile, summary.context("comparing the profiles")?);
     }
     let tasks = faceoff_scoring::ablation(&runs).context("comparing the profiles")?;
     let agent = setup.bundle.manifest.name.clone();
-    print!("{}", table(&agent, setup.seed, &tasks));
+    let told = table(&agent, setup.seed, &tasks);
     let path = out.join(ABLATION);
     let file = AblationFile {
         ruleset: RULESET,
@@ -39,8 +42,8 @@ pub(super) fn run(setup: &EvalSetup, out: &Path) -> anyhow::Result<()> {
         tasks,
     };
     write_json(&path, &file)?;
-    println!("\n{}", path.display());
-    Ok(())
+    print(json, &file, || format!("{told}\n{}", path.display()))?;
+    Ok(faults)
 }
 
 /// The comparison as a table for a terminal.

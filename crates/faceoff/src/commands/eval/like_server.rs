@@ -9,6 +9,7 @@ use faceoff_http::views::{
 };
 use faceoff_runner::{AgentEnvironment, inventory};
 use faceoff_types::{RULESET, Ruleset};
+use std::path::Path;
 
 /// A stage of a server, as it plays.
 #[derive(Debug)]
@@ -24,8 +25,8 @@ impl LikeServer {
     ///
     /// # Errors
     /// If it does not answer, plays by other rules than this program knows, or has no such stage.
-    pub fn ask(url: &str, stage: Option<&str>) -> anyhow::Result<Self> {
-        let client = Client::new(url, None)?;
+    pub fn ask(url: &str, ca_file: Option<&Path>, stage: Option<&str>) -> anyhow::Result<Self> {
+        let client = Client::new(url, None, ca_file)?;
         let cannot = || format!("cannot evaluate like the server at {url}");
         block_on(async {
             let server = client.runtimes().await?;

@@ -1,3 +1,4 @@
+use super::logs::Logs;
 use anyhow::Context;
 use faceoff_runner::{
     AgentEnvironment, Observer, PlatformFault, ShardSpec, bundle::Bundle, run_shard,
@@ -28,12 +29,10 @@ pub(super) enum Verdict {
         faults: Vec<AgentFault>,
         /// Of all episodes, in (task, episode) order.
         outcomes: Vec<EpisodeOutcome>,
+        logs: Logs,
     },
     /// Too many faults.
-    Failed {
-        faults: Vec<AgentFault>,
-        log: String,
-    },
+    Failed { faults: Vec<AgentFault>, logs: Logs },
 }
 
 /// Threads that take shard after shard, and what they share.
@@ -41,7 +40,7 @@ struct Pool {
     jobs: Mutex<VecDeque<Job>>,
     faults: Mutex<Vec<AgentFault>>,
     outcomes: Mutex<Vec<EpisodeOutcome>>,
-    logs: Mutex<String>,
+    logs: Mutex<Logs>,
     fault_count: AtomicU32,
     max_faults: u32,
     stop: AtomicBool,
@@ -108,19 +107,23 @@ pub(super) fn play_all(
         .into_inner()
         .unwrap_or_else(PoisonError::into_inner);
     faults.sort_by_key(|fault| (fault.contest, fault.episode));
-    let log = pool
+    let logs = pool
         .logs
         .into_inner()
         .unwrap_or_else(PoisonError::into_inner);
     if faults.len() > max_faults as usize {
-        Ok(Verdict::Failed { faults, log })
+        Ok(Verdict::Failed { faults, logs })
     } else {
         let mut outcomes = pool
             .outcomes
             .into_inner()
             .unwrap_or_else(PoisonError::into_inner);
         outcomes.sort_by_key(|outcome| (outcome.task, outcome.episode));
-        Ok(Verdict::Played { faults, outcomes })
+        Ok(Verdict::Played {
+            faults,
+            outcomes,
+            logs,
+        })
     }
 }
 
@@ -159,7 +162,7 @@ impl Observer for Worker<'_> {
     }
 
     fn log(&mut self, log: &str) {
-        lock(&self.0.logs).push_str(log);
+        lock(&self.0.logs).add(log);
     }
 
     fn cancelled(&self) -> bool {

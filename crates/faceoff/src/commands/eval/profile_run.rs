@@ -2,7 +2,9 @@
 
 use super::{
     files::{LOG, RESULTS, remove_earlier, write_json},
+    logs::Logs,
     pool::{Job, Verdict, play_all},
+    said::Said,
 };
 use anyhow::{Context, bail};
 use faceoff_dataset::{ARCHIVE_FILE, Assembled, assemble};
@@ -30,6 +32,7 @@ pub(super) struct EvalSetup {
     pub max_faults: u32,
     /// What is played and scored by otherwise than the ruleset has it.
     pub variation: Variation,
+    pub said: Said,
     /// For recordings under way.
     pub scratch: PathBuf,
 }
@@ -40,6 +43,8 @@ pub(super) struct Played {
     pub result: EvaluationResult,
     pub outcomes: Vec<EpisodeOutcome>,
     pub archive_blake3: String,
+    /// The agent's.
+    pub faults: Vec<AgentFault>,
 }
 
 /// Plays all episodes in one profile and leaves `results.json` and `dataset.zip` in `out`.
@@ -48,16 +53,24 @@ pub(super) fn play(setup: &EvalSetup, profile: Profile, out: &Path) -> anyhow::R
     remove_earlier(out)?;
     let jobs = jobs(setup, profile);
     let dirs: Vec<PathBuf> = jobs.iter().map(|job| job.out.clone()).collect();
-    let outcomes = match play_all(&setup.bundle, &setup.envs, jobs)? {
-        Verdict::Played { faults, outcomes } => {
-            print_faults(&faults);
-            outcomes
+    let (outcomes, faults) = match play_all(&setup.bundle, &setup.envs, jobs)? {
+        Verdict::Played {
+            faults,
+            outcomes,
+            logs,
+        } => {
+            print_faults(setup.said, &faults, &logs);
+            if !faults.is_empty() {
+                let path = write_log(out, &logs)?;
+                setup
+                    .said
+                    .line(format_args!("the agent's log is in {}", path.display()));
+            }
+            (outcomes, faults)
         }
-        Verdict::Failed { faults, log } => {
-            let path = out.join(LOG);
-            fs::write(&path, &log).with_context(|| format!("writing {}", path.display()))?;
-            print_faults(&faults);
-            print_log_tail(&log);
+        Verdict::Failed { faults, logs } => {
+            let path = write_log(out, &logs)?;
+            print_faults(setup.said, &faults, &logs);
             let last = faults.last().map(ToString::to_string).unwrap_or_default();
             bail!(
                 "the agent failed: more than {} faults, so there is no score; the last one: \
@@ -86,6 +99,7 @@ pub(super) fn play(setup: &EvalSetup, profile: Profile, out: &Path) -> anyhow::R
         result,
         outcomes,
         archive_blake3: archive.blake3,
+        faults,
     })
 }
 
@@ -116,17 +130,34 @@ fn jobs(setup: &EvalSetup, profile: Profile) -> Vec<Job> {
     jobs
 }
 
-fn print_faults(faults: &[AgentFault]) {
+/// All of them, and of the first what the agent wrote before it.
+fn print_faults(said: Said, faults: &[AgentFault], logs: &Logs) {
+    const LINES: usize = 40;
     for fault in faults {
-        println!("fault: {fault}");
+        said.line(format_args!("fault: {fault}"));
+    }
+    let Some(first) = faults.first() else {
+        return;
+    };
+    let lines = logs.before(first);
+    if lines.is_empty() {
+        said.line(format_args!(
+            "before the first fault the agent wrote nothing to its standard error"
+        ));
+        return;
+    }
+    said.line(format_args!("what the agent wrote before the first fault:"));
+    let left_out = lines.len().saturating_sub(LINES);
+    if left_out > 0 {
+        said.line(format_args!("  … {left_out} lines more"));
+    }
+    for line in &lines[left_out..] {
+        said.line(format_args!("  {line}"));
     }
 }
 
-fn print_log_tail(log: &str) {
-    const LINES: usize = 20;
-    let lines: Vec<&str> = log.lines().collect();
-    println!("the end of the agent's log:");
-    for line in &lines[lines.len().saturating_sub(LINES)..] {
-        println!("  {line}");
-    }
+fn write_log(out: &Path, logs: &Logs) -> anyhow::Result<PathBuf> {
+    let path = out.join(LOG);
+    fs::write(&path, logs.whole()).with_context(|| format!("writing {}", path.display()))?;
+    Ok(path)
 }

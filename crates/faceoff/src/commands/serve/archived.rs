@@ -2,11 +2,12 @@
 
 use super::{
     answering::{answer, signalled},
-    folder::{empty_folder, set_admin_token},
+    folder::{claim, empty_folder, link_key, set_admin_token},
 };
-use crate::config::Config;
+use crate::{config::Config, machine};
 use anyhow::Context;
 use faceoff_http::{Capacity, ConnectionLimits, HttpConfig, Offer};
+use faceoff_metrics::Metrics;
 use faceoff_store::{Archived, Room, Store};
 use faceoff_types::Clock;
 use jiff::Timestamp;
@@ -24,6 +25,7 @@ pub async fn serve(
     archived: Archived,
 ) -> anyhow::Result<()> {
     let data_dir = config.server.data_dir.clone();
+    let _claimed = claim(&data_dir)?;
     let upload_dir = data_dir.join("uploads");
     // What a kill has left of an archive that was being made of it.
     empty_folder(&upload_dir)?;
@@ -61,6 +63,11 @@ pub async fn serve(
                 time: config.time.clone(),
             },
             offer: Offer::nothing(),
+            rates: config.rates.limits(),
+            link_key: link_key(&data_dir)?,
+            metrics: Metrics::new(env!("CARGO_PKG_VERSION")),
+            process: machine::process,
+            webhooks: config.webhooks.clone(),
         },
     );
     let season = store.season().await.context("reading the season")?.name;

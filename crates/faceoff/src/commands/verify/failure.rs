@@ -1,9 +1,9 @@
+use crate::exit::Exit;
 use anyhow::anyhow;
 use faceoff_dataset::{
     DatasetError,
     verify::{SeasonMismatch, VerifyError},
 };
-use std::process::ExitCode;
 
 /// Why there is no "verified".
 #[derive(Debug, thiserror::Error)]
@@ -33,14 +33,13 @@ impl From<DatasetError> for Failure {
 }
 
 impl Failure {
-    /// 1 for what differs, 2 for what could not be compared.
-    pub(super) fn code(&self) -> ExitCode {
+    pub(super) fn exit(&self) -> Exit {
         match self {
             Self::Season { .. }
             | Self::Verify(
                 VerifyError::Differs(_) | VerifyError::Dataset(DatasetError::Altered(_)),
-            ) => ExitCode::from(1),
-            Self::Verify(_) | Self::Here(_) => ExitCode::from(2),
+            ) => Exit::Failed,
+            Self::Verify(_) | Self::Here(_) => Exit::Misused,
         }
     }
 }

@@ -1,0 +1,92 @@
+//! Types with flattened parts, told as generators of clients read them.
+//!
+//! A struct with a flattened enum is derived as all of (one of its variants, its own fields). That is right, and no
+//! class can be made of it; one of (a variant with the fields) is the same and can.
+
+use std::{collections::BTreeMap, mem};
+use utoipa::openapi::{
+    Object, RefOr, Schema, Type,
+    schema::{OneOf, SchemaType},
+};
+
+type Schemas = BTreeMap<String, RefOr<Schema>>;
+
+/// Multiplies out whatever is all of several things.
+pub(super) fn multiply_out(schemas: &mut Schemas) {
+    let composed: Vec<(String, RefOr<Schema>)> = schemas
+        .iter()
+        .filter(|(_, schema)| is_composed(schema))
+        .filter_map(|(name, schema)| Some((name.clone(), flat(schema, schemas)?)))
+        .collect();
+    schemas.extend(composed);
+}
+
+/// Is it all of several things, or one of some that are?
+fn is_composed(schema: &RefOr<Schema>) -> bool {
+    match schema {
+        RefOr::T(Schema::AllOf(_)) => true,
+        RefOr::T(Schema::OneOf(one)) => one.items.iter().any(is_composed),
+        _ => false,
+    }
+}
+
+fn flat(schema: &RefOr<Schema>, schemas: &Schemas) -> Option<RefOr<Schema>> {
+    let mut variants = variants(schema, schemas)?;
+    let own = match schema {
+        RefOr::T(Schema::AllOf(all)) => all.description.clone(),
+        RefOr::T(Schema::OneOf(one)) => one.description.clone(),
+        _ => None,
+    };
+    if variants.len() == 1 {
+        let mut only = variants.remove(0);
+        only.description = own.or(only.description);
+        return Some(only.into());
+    }
+    let mut one = OneOf::new();
+    one.description = own;
+    one.items = variants
+        .into_iter()
+        .map(|object| RefOr::T(Schema::Object(object)))
+        .collect();
+    Some(RefOr::T(Schema::OneOf(one)))
+}
+
+/// The objects of which it is one; none if it can also be something else.
+fn variants(schema: &RefOr<Schema>, schemas: &Schemas) -> Option<Vec<Object>> {
+    match schema {
+        RefOr::Ref(reference) => {
+            let (_, name) = reference.ref_location.rsplit_once('/')?;
+            variants(schemas.get(name)?, schemas)
+        }
+        RefOr::T(Schema::Object(object)) => {
+            let is_object = object.schema_type == SchemaType::Type(Type::Object);
+            is_object.then(|| vec![object.clone()])
+        }
+        RefOr::T(Schema::OneOf(one)) => {
+            let parts = one.items.iter().map(|item| variants(item, schemas));
+            Some(parts.collect::<Option<Vec<_>>>()?.concat())
+        }
+        RefOr::T(Schema::AllOf(all)) => {
+            let mut products = vec![Object::new()];
+            for item in &all.items {
+                let factors = variants(item, schemas)?;
+                products = products
+                    .iter()
+                    .flat_map(|left| factors.iter().map(move |right| joined(left, right)))
+                    .collect();
+            }
+            Some(products)
+        }
+        RefOr::T(_) => None,
+    }
+}
+
+/// An object with the fields of both.
+fn joined(left: &Object, right: &Object) -> Object {
+    let mut both = left.clone();
+    both.required.extend(right.required.iter().cloned());
+    both.properties.extend(right.properties.clone());
+    let described = mem::take(&mut both.description);
+    both.description = described.or_else(|| right.description.clone());
+    both
+}

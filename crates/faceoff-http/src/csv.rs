@@ -1,0 +1,59 @@
+//! Tables for spreadsheets.
+
+/// Lines of fields; quoted where they must be.
+pub(crate) struct Table(String);
+
+impl Table {
+    pub(crate) fn new(columns: &[&str]) -> Self {
+        let mut table = Self(String::new());
+        table.row(columns.iter().map(|column| (*column).to_owned()));
+        table
+    }
+
+    pub(crate) fn row(&mut self, fields: impl IntoIterator<Item = String>) {
+        for (number, field) in fields.into_iter().enumerate() {
+            if number > 0 {
+                self.0.push(',');
+            }
+            if field.contains([',', '"', '\n', '\r']) {
+                self.0.push('"');
+                self.0.push_str(&field.replace('"', "\"\""));
+                self.0.push('"');
+            } else {
+                self.0.push_str(&field);
+            }
+        }
+        self.0.push_str("\r\n");
+    }
+
+    pub(crate) fn into_bytes(self) -> Vec<u8> {
+        self.0.into_bytes()
+    }
+}
+
+/// A stranger's words: what a spreadsheet would take for a formula begins with an apostrophe.
+pub(crate) fn words(text: &str) -> String {
+    match text.chars().next() {
+        Some('=' | '+' | '-' | '@' | '\t' | '\r') => format!("'{text}"),
+        _ => text.to_owned(),
+    }
+}
+
+/// Of what there may be none.
+pub(crate) fn or_empty(value: Option<impl ToString>) -> String {
+    value.map(|value| value.to_string()).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fields_are_quoted_and_formulas_are_words() {
+        let mut table = Table::new(&["a", "b"]);
+        table.row([words("=1+1"), "x, \"y\"\nz".to_owned()]);
+        let text = String::from_utf8(table.into_bytes()).unwrap();
+        assert_eq!(text, "a,b\r\n'=1+1,\"x, \"\"y\"\"\nz\"\r\n");
+        assert_eq!(words("plain"), "plain");
+    }
+}

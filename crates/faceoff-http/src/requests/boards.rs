@@ -1,0 +1,97 @@
+//! About boards.
+
+use faceoff_types::{DivisionName, StageId, Standings, Task};
+use jiff::civil::Date;
+use serde::{Deserialize, Serialize};
+use utoipa::{IntoParams, ToSchema};
+
+/// Which board.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct BoardQuery {
+    /// Whose; without it that of the stage that is open, or of the nearest.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stage: Option<StageId>,
+    /// By which of the stage's rules; without it by the newest with results. No board mixes two.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub revision: Option<u32>,
+    /// Of the teams of one of the season's divisions alone, ranked among themselves; without it of all teams.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub division: Option<DivisionName>,
+    /// As it stood by the results of the days up to this one, a day that has some; without it by all.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub day: Option<Date>,
+    /// Which result of a team its row is, whatever the stage's standings say.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[param(inline)]
+    pub by: Option<BoardBy>,
+    /// The organiser: with what was finished since the boards were frozen.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[param(required = false)]
+    pub live: bool,
+    /// As what it is sent; without it as the header `Accept` says, and JSON if that says nothing.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[param(inline)]
+    pub format: Option<BoardFormat>,
+}
+
+/// Which result of a team its row on a board is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum BoardBy {
+    /// The one that stands highest by the board's order.
+    Best,
+    /// The newest.
+    Latest,
+}
+
+impl BoardBy {
+    pub(crate) const fn standings(self) -> Standings {
+        match self {
+            Self::Best => Standings::Best,
+            Self::Latest => Standings::Latest,
+        }
+    }
+}
+
+/// As what a board is sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum BoardFormat {
+    /// As everything else.
+    Json,
+    /// A table for spreadsheets, with a line of names.
+    Csv,
+}
+
+/// What all teams have played, day by day.
+#[derive(Debug, Clone, Default, Serialize, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub struct HistoryQuery {
+    /// Of which stage; without it that of the stage that is open, or of the nearest.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stage: Option<StageId>,
+    /// By which of the stage's rules; without it by the newest with results.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub revision: Option<u32>,
+    /// Of the teams of one of the season's divisions alone, ranked among themselves; without it of all teams.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub division: Option<DivisionName>,
+    /// Ranked by this task alone; without it by all together.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub task: Option<Task>,
+    /// By which result of a team it was ranked, whatever the stage's standings say.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[param(inline)]
+    pub by: Option<BoardBy>,
+    /// The organiser: with what was finished since the boards were frozen.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[param(required = false)]
+    pub live: bool,
+    /// As what it is sent, as for a board.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[param(inline)]
+    pub format: Option<BoardFormat>,
+}

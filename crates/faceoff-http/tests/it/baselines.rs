@@ -1,0 +1,140 @@
+//! The organisers' reference agents, which are ranked apart.
+
+use crate::site::{ADMIN, Answer, Site, TestTeam, result, text};
+use reqwest::Method;
+use serde_json::{Value, json};
+
+async fn change(site: &Site, team: &TestTeam, token: &str, change: &Value) -> Answer {
+    let path = format!("/api/v1/teams/{}", team.id);
+    let request = site.request(Method::PATCH, &path, Some(token));
+    Answer::of(request.json(change).send().await.unwrap()).await
+}
+
+/// A reference agent between two teams, marked by the organiser.
+async fn three_teams(site: &Site) -> [TestTeam; 3] {
+    let teams = [
+        site.team("Alpha").await,
+        site.team("Reference").await,
+        site.team("Beta").await,
+    ];
+    for team in &teams {
+        site.valid_submission(team, "a").await;
+    }
+    site.post("/api/v1/days", Some(ADMIN), &json!({}))
+        .await
+        .json(200);
+    for rate in [0.9, 0.7, 0.5] {
+        site.finish(&result([rate; 3], 10.0)).await;
+    }
+    teams
+}
+
+#[tokio::test]
+async fn a_baseline_takes_no_rank_from_anybody() {
+    let site = Site::start().await;
+    let [_, reference, _] = three_teams(&site).await;
+    let names = |board: &Value| -> Vec<(u64, String)> {
+        let rows = board["rows"].as_array().unwrap().iter();
+        rows.map(|row| (row["rank"].as_u64().unwrap(), text(&row["team"])))
+            .collect()
+    };
+    let before = site.get("/api/v1/board", None).await.json(200);
+    assert_eq!(names(&before)[2], (3, "Beta".to_owned()));
+    assert_eq!(before["baselines"], json!([]));
+    let mark = json!({ "baseline": true });
+    let marked = change(&site, &reference, ADMIN, &mark).await.json(200);
+    assert_eq!(marked["baseline"], true);
+    for path in ["/api/v1/board", "/api/v1/board/hit"] {
+        let board = site.get(path, None).await.json(200);
+        let expected = [(1, "Alpha".to_owned()), (2, "Beta".to_owned())];
+        assert_eq!(names(&board), expected);
+        let baseline = &board["baselines"][0];
+        assert_eq!(baseline["team"], "Reference");
+        assert_eq!(baseline["baseline"], true);
+        assert_eq!(baseline["would_rank"], 2);
+        assert_eq!(baseline["score"].as_f64(), Some(70.0));
+        assert_eq!(baseline.get("rank"), None);
+        let table = site.get(&format!("{path}?format=csv"), None).await.body;
+        let mut lines = csv::Reader::from_reader(table.as_bytes());
+        let columns = lines.headers().unwrap().clone();
+        let last = lines.records().last().unwrap().unwrap();
+        let field = |name: &str| {
+            let at = columns.iter().position(|column| column == name).unwrap();
+            last[at].to_owned()
+        };
+        let told = ["rank", "baseline", "would_rank", "team"].map(field);
+        assert_eq!(told, ["", "true", "2", "Reference"]);
+    }
+    let history = site.get("/api/v1/board/history", None).await.json(200);
+    let last = &history["rows"][2];
+    assert_eq!(
+        (&last["team"], &last["rank"]),
+        (&json!("Reference"), &Value::Null)
+    );
+    assert_eq!(
+        (&last["baseline"], &last["would_rank"]),
+        (&json!(true), &json!(2))
+    );
+    for page in ["/", "/tasks/hit"] {
+        let page = site.get(page, None).await.body;
+        assert!(
+            page.contains("<h2 id=\"baselines\">Baselines</h2>"),
+            "{page}"
+        );
+        assert!(page.contains("(2)"), "{page}");
+    }
+    let kind = "/api/v1/events?kind=team_made_baseline";
+    let log = site.get(kind, Some(ADMIN)).await.json(200);
+    assert_eq!(log["events"].as_array().unwrap().len(), 1);
+    let unmark = json!({ "baseline": false });
+    let unmarked = change(&site, &reference, ADMIN, &unmark).await.json(200);
+    assert_eq!(unmarked.get("baseline"), None);
+    let board = site.get("/api/v1/board", None).await.json(200);
+    assert_eq!(names(&board), names(&before));
+}
+
+#[tokio::test]
+async fn only_an_organiser_marks_a_baseline_and_it_enters_no_tournament_by_the_board() {
+    let site = Site::start().await;
+    let [alpha, reference, _] = three_teams(&site).await;
+    let mark = json!({ "baseline": true });
+    change(&site, &reference, &reference.token, &mark)
+        .await
+        .problem(403, "forbidden", &[]);
+    change(&site, &reference, ADMIN, &mark).await.json(200);
+    let opened = site
+        .post(
+            "/api/v1/tournaments",
+            Some(ADMIN),
+            &json!({ "name": "Cup" }),
+        )
+        .await
+        .json(201);
+    let entrants = opened["entrants"].as_array().unwrap().iter();
+    let names: Vec<_> = entrants.map(|one| text(&one["team_name"])).collect();
+    assert_eq!(names, ["Alpha", "Beta"]);
+    // A result that is signed off stays as it is.
+    let stage = format!("/api/v1/stages/{}", site.stage().await);
+    let closes = json!({ "closes_at": "2026-03-01T10:01:00Z" });
+    let close = site.request(Method::PATCH, &stage, Some(ADMIN));
+    Answer::of(close.json(&closes).send().await.unwrap())
+        .await
+        .json(200);
+    site.later(60);
+    let name = text(&site.get(&stage, None).await.json(200)["name"]);
+    site.post(
+        &format!("{stage}/finalise"),
+        Some(ADMIN),
+        &json!({ "confirm": name }),
+    )
+    .await
+    .json(200);
+    for team in [&alpha, &reference] {
+        let other = json!({ "baseline": team.id == alpha.id });
+        change(&site, team, ADMIN, &other).await.problem(
+            409,
+            "conflict",
+            &["signed off", "stays as it is"],
+        );
+    }
+}

@@ -1,0 +1,349 @@
+//! Boards as programs read them: tables, tags, days and their history.
+
+use crate::site::{ADMIN, Answer, Site, TestTeam, result, text};
+use reqwest::Method;
+use serde_json::{Value, json};
+use std::{collections::BTreeMap, io::Read};
+
+/// Two teams on three days: each day's scores, and what the second one calls its agent.
+async fn three_days(site: &Site) -> [TestTeam; 2] {
+    let teams = [site.team("Alpha").await, site.team("Beta").await];
+    site.valid_submission(&teams[0], "plain").await;
+    site.valid_submission(&teams[1], "=HYPERLINK(\"http://x\", 1),\n")
+        .await;
+    for (at, [alpha, beta]) in [[0.5, 0.4], [0.6, 0.9], [0.7, 0.3]].into_iter().enumerate() {
+        if at > 0 {
+            site.next_day();
+        }
+        one_day(site, &[alpha, beta]).await;
+    }
+    teams
+}
+
+async fn one_day(site: &Site, rates: &[f64]) {
+    let started = site.post("/api/v1/days", Some(ADMIN), &json!({})).await;
+    started.json(200);
+    for rate in rates {
+        site.finish(&result([*rate; 3], 10.0)).await;
+    }
+}
+
+/// Read by a reader of such tables; by the names of the columns.
+fn table(answer: &Answer) -> Vec<BTreeMap<String, String>> {
+    assert_eq!(answer.status, 200, "{}", answer.body);
+    assert!(answer.header("content-type").starts_with("text/csv"));
+    csv::Reader::from_reader(answer.body.as_bytes())
+        .deserialize()
+        .collect::<Result<_, _>>()
+        .unwrap()
+}
+
+async fn with(site: &Site, path: &str, headers: &[(&str, &str)], token: Option<&str>) -> Answer {
+    let mut request = site.request(Method::GET, path, token);
+    for (name, value) in headers {
+        request = request.header(*name, *value);
+    }
+    Answer::of(request.send().await.unwrap()).await
+}
+
+fn teams(board: &Value) -> Vec<(String, u64)> {
+    let rows = board["rows"].as_array().unwrap().iter();
+    rows.map(|row| (text(&row["team"]), row["rank"].as_u64().unwrap()))
+        .collect()
+}
+
+#[tokio::test]
+async fn a_board_is_a_table_that_says_what_its_rows_say() {
+    let site = Site::start().await;
+    three_days(&site).await;
+    let board = site.get("/api/v1/board", None).await.json(200);
+    let by_query = table(&site.get("/api/v1/board?format=csv", None).await);
+    let accept = [("accept", "text/csv;q=0.9, text/plain")];
+    let by_header = table(&with(&site, "/api/v1/board", &accept, None).await);
+    assert_eq!(by_query, by_header);
+    assert_eq!(by_query.len(), 2);
+    for (line, row) in by_query.iter().zip(board["rows"].as_array().unwrap()) {
+        let hit = &row["tasks"]["hit"];
+        for (column, told) in [
+            ("rank", &row["rank"]),
+            ("rank_group", &row["rank_group"]),
+            ("team", &row["team"]),
+            ("team_id", &row["team_id"]),
+            ("tier", &row["tier"]),
+            ("score", &row["score"]),
+            ("penalty_points", &row["penalty_points"]),
+            ("day", &row["day"]),
+            ("evaluation", &row["evaluation"]),
+            ("seed", &row["seed"]),
+            ("hit_success_rate", &hit["success_rate"]),
+            ("hit_ci95_low", &hit["success_ci95"][0]),
+            ("hit_violations_ee", &hit["violations"]["ee"]),
+            (
+                "hit_computation_time_p99_s",
+                &hit["computation_time_s"]["p99"],
+            ),
+        ] {
+            let expected = match told {
+                Value::String(text) => text.clone(),
+                Value::Number(number) => {
+                    let told: f64 = line[column].parse().unwrap();
+                    assert_eq!(Some(told), number.as_f64(), "{column}");
+                    continue;
+                }
+                other => panic!("{column}: {other}"),
+            };
+            assert_eq!(line[column], expected, "{column}");
+        }
+        assert_eq!(line["baseline"], "false");
+    }
+    // No spreadsheet takes a stranger's words for a formula.
+    let agent = &by_query.iter().find(|line| line["team"] == "Beta").unwrap()["agent"];
+    assert!(
+        agent.starts_with("'=HYPERLINK(\"http://x\", 1),"),
+        "{agent:?}"
+    );
+    let json = [("accept", "text/csv, application/json")];
+    with(&site, "/api/v1/board", &json, None).await.json(200);
+    let task = table(&site.get("/api/v1/board/hit?format=csv", None).await);
+    assert_eq!(task.len(), 2);
+    site.get("/api/v1/board?format=xml", None)
+        .await
+        .problem(400, "invalid-request", &["format"]);
+}
+
+#[tokio::test]
+async fn a_board_that_has_not_changed_is_not_sent_again() {
+    let site = Site::start().await;
+    let [alpha, _] = three_days(&site).await;
+    for path in [
+        "/api/v1/board",
+        "/api/v1/board/hit?format=csv",
+        "/api/v1/board/history",
+    ] {
+        let first = site.get(path, None).await;
+        let tag = first.header("etag").to_owned();
+        assert!(tag.starts_with("W/\"board-"), "{tag}");
+        assert_eq!(first.header("cache-control"), "private, no-cache");
+        assert_eq!(first.header("vary"), "authorization, cookie, accept");
+        let known = [("if-none-match", tag.as_str())];
+        let again = with(&site, path, &known, None).await;
+        assert_eq!((again.status.as_u16(), again.body.as_str()), (304, ""));
+        assert_eq!(again.header("etag"), tag);
+        assert_eq!(again.header("vary"), "authorization, cookie, accept");
+        // To a team it is the same, to the organiser it may be another.
+        let team = with(&site, path, &known, Some(&alpha.token)).await;
+        assert_eq!(team.status, 304);
+        let organiser = with(&site, path, &known, Some(ADMIN)).await;
+        assert_eq!(organiser.status, 200);
+        let other = format!(
+            "{path}{}revision=1",
+            if path.contains('?') { "&" } else { "?" }
+        );
+        assert_eq!(with(&site, &other, &known, None).await.status, 200);
+        let head = site.request(Method::HEAD, path, None).send().await.unwrap();
+        assert_eq!(head.headers()["etag"], tag.as_str());
+        assert_eq!(
+            head.headers()["content-length"],
+            first.header("content-length")
+        );
+    }
+    // What is played is no news before it is a result.
+    site.next_day();
+    let started = site.post("/api/v1/days", Some(ADMIN), &json!({})).await;
+    started.json(200);
+    let (claim, ..) = site.claim_shard().await;
+    let before = site.get("/api/v1/board", None).await;
+    let known = [("if-none-match", before.header("etag"))];
+    let progress = site.store.heartbeat(&claim, 3, 60, site.now());
+    assert!(progress.await.unwrap());
+    site.store.release(&claim, site.now()).await.unwrap();
+    let again = with(&site, "/api/v1/board", &known, None).await;
+    assert_eq!(again.status, 304);
+    site.finish(&result([0.8; 3], 10.0)).await;
+    let changed = with(&site, "/api/v1/board", &known, None).await.json(200);
+    let score = changed["rows"][0]["score"].as_f64().unwrap();
+    assert_eq!(score.round(), 80.0);
+}
+
+#[tokio::test]
+async fn a_board_is_shown_as_it_stood_on_a_day() {
+    let site = Site::start().await;
+    three_days(&site).await;
+    let place = |name: &str, rank| (name.to_owned(), rank);
+    for (query, first, second) in [
+        ("?day=2026-03-01", "Alpha", "Beta"),
+        ("?day=2026-03-02", "Beta", "Alpha"),
+        ("?day=2026-03-03", "Alpha", "Beta"),
+        ("?by=best", "Beta", "Alpha"),
+        ("?by=best&day=2026-03-01", "Alpha", "Beta"),
+        ("?by=latest", "Alpha", "Beta"),
+    ] {
+        let board = site.get(&format!("/api/v1/board{query}"), None).await;
+        let board = board.json(200);
+        assert_eq!(
+            teams(&board),
+            [place(first, 1), place(second, 2)],
+            "{query}"
+        );
+        let by = if query.contains("best") {
+            "best"
+        } else {
+            "latest"
+        };
+        assert_eq!(board["rows_by"], by);
+        assert_eq!(board["standings"], "latest");
+        let day = query.split("day=").nth(1);
+        assert_eq!(board["day"].as_str(), day);
+    }
+    for (day, words) in [
+        ("2026-02-28", "none before it"),
+        (
+            "2026-03-04",
+            "the one before it that has some is 2026-03-03",
+        ),
+    ] {
+        site.get(&format!("/api/v1/board?day={day}"), None)
+            .await
+            .problem(404, "not-found", &[day, words]);
+    }
+    let page = site.get("/?day=2026-03-02", None).await;
+    assert!(
+        page.body.contains("of the days up to 2026-03-02"),
+        "{}",
+        page.body
+    );
+}
+
+#[tokio::test]
+async fn the_history_tells_each_days_results_and_ranks() {
+    let site = Site::start().await;
+    three_days(&site).await;
+    let told = |history: &Value| -> Vec<(String, String, u64, f64)> {
+        let rows = history["rows"].as_array().unwrap().iter();
+        rows.map(|row| {
+            let rank = row["rank"].as_u64().unwrap();
+            let score = row["score"].as_f64().unwrap().round();
+            (text(&row["day"]), text(&row["team"]), rank, score)
+        })
+        .collect()
+    };
+    let row = |day: &str, team: &str, rank, score| {
+        (format!("2026-03-{day}"), team.to_owned(), rank, score)
+    };
+    let history = site.get("/api/v1/board/history", None).await.json(200);
+    assert_eq!(
+        told(&history),
+        [
+            row("01", "Alpha", 1, 50.0),
+            row("01", "Beta", 2, 40.0),
+            row("02", "Beta", 1, 90.0),
+            row("02", "Alpha", 2, 60.0),
+            row("03", "Alpha", 1, 70.0),
+            row("03", "Beta", 2, 30.0),
+        ]
+    );
+    assert_eq!(
+        history["days"],
+        json!(["2026-03-01", "2026-03-02", "2026-03-03"])
+    );
+    assert_eq!(history["rows"][0]["tasks"]["hit"]["success_rate"], 0.5);
+    // By the best, the last day changes no rank.
+    let best = site
+        .get("/api/v1/board/history?by=best&task=hit", None)
+        .await;
+    let best = told(&best.json(200));
+    assert_eq!(
+        best[4..],
+        [row("03", "Beta", 1, 30.0), row("03", "Alpha", 2, 70.0)]
+    );
+    let lines = table(&site.get("/api/v1/board/history?format=csv", None).await);
+    assert_eq!(lines.len(), 6);
+    assert_eq!(
+        (
+            lines[2]["day"].as_str(),
+            lines[2]["team"].as_str(),
+            lines[2]["rank"].as_str()
+        ),
+        ("2026-03-02", "Beta", "1")
+    );
+    assert_eq!(lines[2]["prepare_success_rate"], "0.9");
+}
+
+#[tokio::test]
+async fn neither_days_nor_history_look_behind_a_freeze() {
+    let site = Site::start().await;
+    three_days(&site).await;
+    let stage = format!("/api/v1/stages/{}", site.stage().await);
+    let why = json!({ "reason": "a surprise" });
+    site.post(&format!("{stage}/freeze"), Some(ADMIN), &why)
+        .await
+        .json(200);
+    site.next_day();
+    one_day(&site, &[0.1, 0.2]).await;
+    let history = "/api/v1/board/history";
+    for token in [None, Some(ADMIN)] {
+        let told = site.get(history, token).await.json(200);
+        assert_eq!(told["days"].as_array().unwrap().len(), 3);
+        assert_eq!(told["frozen"]["reason"], "a surprise");
+    }
+    let live = format!("{history}?live=true");
+    site.get(&live, None)
+        .await
+        .problem(401, "unauthenticated", &[]);
+    let live = site.get(&live, Some(ADMIN)).await.json(200);
+    assert_eq!(live["days"].as_array().unwrap().len(), 4);
+    let day = "/api/v1/board?day=2026-03-04";
+    site.get(day, None)
+        .await
+        .problem(404, "not-found", &["2026-03-03"]);
+    let live = site
+        .get(&format!("{day}&live=true"), Some(ADMIN))
+        .await
+        .json(200);
+    assert_eq!(teams(&live)[0].0, "Beta");
+}
+
+#[tokio::test]
+async fn texts_are_compressed_for_who_takes_that_and_files_are_not() {
+    let site = Site::start().await;
+    let [alpha, _] = three_days(&site).await;
+    let plain = site.get("/api/v1/board", None).await;
+    assert!(!plain.headers.contains_key("content-encoding"));
+    let ask = async |path: &str| {
+        let request = site.request(Method::GET, path, Some(&alpha.token));
+        let sent = request
+            .header("accept-encoding", "gzip")
+            .send()
+            .await
+            .unwrap();
+        let headers = sent.headers().clone();
+        (headers, sent.bytes().await.unwrap())
+    };
+    let (headers, body) = ask("/api/v1/board").await;
+    assert_eq!(headers["content-encoding"], "gzip");
+    let by = headers
+        .get_all("vary")
+        .iter()
+        .map(|value| value.to_str().unwrap());
+    assert_eq!(
+        by.collect::<Vec<_>>().join(", "),
+        "authorization, cookie, accept, accept-encoding"
+    );
+    assert!(body.len() < plain.body.len() / 2);
+    let mut unpacked = String::new();
+    let mut reader = flate2::read::GzDecoder::new(&body[..]);
+    reader.read_to_string(&mut unpacked).unwrap();
+    let [unpacked, plain]: [Value; 2] =
+        [&unpacked, &plain.body].map(|text| serde_json::from_str(text).unwrap());
+    assert_eq!(unpacked, plain);
+    let list = site
+        .get("/api/v1/evaluations", Some(&alpha.token))
+        .await
+        .json(200);
+    let dataset = format!("/api/v1/evaluations/{}/dataset", text(&list[0]["id"]));
+    let (headers, body) = ask(&dataset).await;
+    assert!(!headers.contains_key("content-encoding"));
+    assert_eq!(&body[..], b"PK the recorded dataset");
+    let (headers, _) = ask("/api/v1/whoami").await;
+    assert!(!headers.contains_key("content-encoding"), "it is small");
+}

@@ -1,0 +1,124 @@
+//! The feed of news, read back by a feed reader.
+
+use crate::site::{ADMIN, Answer, Site, result};
+use atom_syndication::Feed;
+use reqwest::Method;
+use serde_json::json;
+
+const PATH: &str = "/feed.atom";
+
+async fn read(site: &Site) -> (Answer, Feed) {
+    let answer = site.get(PATH, None).await;
+    assert_eq!(answer.status, 200, "{}", answer.body);
+    assert_eq!(
+        answer.header("content-type"),
+        "application/atom+xml; charset=utf-8"
+    );
+    let feed = Feed::read_from(answer.body.as_bytes()).unwrap();
+    (answer, feed)
+}
+
+fn titles(feed: &Feed) -> Vec<String> {
+    let entries = feed.entries().iter();
+    entries
+        .map(|entry| entry.title().as_str().to_owned())
+        .collect()
+}
+
+#[tokio::test]
+async fn news_is_told_the_newest_first_by_ids_that_stay() {
+    let site = Site::start().await;
+    let (_, before) = read(&site).await;
+    assert_eq!(before.title().as_str(), "Test season · Faceoff");
+    assert_eq!(titles(&before), ["Qualifying is open"]);
+    site.later(60);
+    site.ranked_teams(&[
+        ("Alpha", result([0.511; 3], 10.0)),
+        ("Beta", result([0.7; 3], 20.0)),
+    ])
+    .await;
+    site.later(60);
+    let odd = "<b>odd</b> & \"more\" ]]> 🙂";
+    let told = json!({ "title": odd, "text": format!("{odd}\n\nand so on") });
+    let path = "/api/v1/announcements";
+    site.post(path, Some(ADMIN), &told).await.json(201);
+    site.later(60);
+    let cup = json!({ "name": "Cup", "teams": ["Alpha", "Beta"] });
+    let cup = site.post("/api/v1/tournaments", Some(ADMIN), &cup).await;
+    assert_eq!(cup.status, 201, "{}", cup.body);
+    site.later(60);
+    let rounds = format!("{}/rounds", cup.header("location"));
+    let started = site.post(&rounds, Some(ADMIN), &json!({})).await;
+    assert!(started.status.is_success(), "{}", started.body);
+
+    let (answer, feed) = read(&site).await;
+    assert_eq!(
+        titles(&feed),
+        [
+            "Cup: round 1 has begun",
+            "The tournament Cup is open",
+            odd,
+            "Qualifying: the day 2026-03-01 is released",
+            "Qualifying is open"
+        ]
+    );
+    assert!(!answer.body.contains("51.1"), "no score");
+    assert_eq!(feed.id(), before.id());
+    assert_eq!(feed.entries()[4].id(), before.entries()[0].id());
+    let announced = &feed.entries()[2];
+    let content = announced.content().unwrap();
+    assert_eq!(content.content_type(), Some("text"));
+    assert_eq!(
+        content.value(),
+        Some(format!("{odd}\n\nand so on").as_str())
+    );
+    assert_eq!(announced.links()[0].href(), "/announcements");
+    assert_eq!(feed.updated(), feed.entries()[0].updated());
+    for entry in feed.entries() {
+        assert!(entry.id().starts_with("urn:uuid:"));
+        let followed = site.get(entry.links()[0].href(), None).await;
+        assert_eq!(followed.status, 200, "{entry:?}");
+    }
+    let mut ids: Vec<&str> = feed.entries().iter().map(|entry| entry.id()).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    assert_eq!(ids.len(), 5);
+    // Pages lead there.
+    let page = site.get("/announcements", None).await.body;
+    let link = r#"<link rel="alternate" type="application/atom+xml""#;
+    assert!(page.contains(link), "{page}");
+}
+
+#[tokio::test]
+async fn who_has_it_is_told_so() {
+    let site = Site::start().await;
+    let (answer, _) = read(&site).await;
+    let (tag, modified) = (answer.header("etag"), answer.header("last-modified"));
+    assert_eq!(modified, "Sun, 01 Mar 2026 10:00:00 GMT");
+    let ask = async |name: &str, value: &str| {
+        let request = site.request(Method::GET, PATH, None).header(name, value);
+        Answer::of(request.send().await.unwrap()).await
+    };
+    for (name, value) in [
+        ("if-none-match", tag.to_owned()),
+        ("if-none-match", format!("\"other\", W/{tag}")),
+        ("if-modified-since", modified.to_owned()),
+    ] {
+        let known = ask(name, &value).await;
+        assert_eq!((known.status.as_u16(), known.body.as_str()), (304, ""));
+        assert_eq!(known.header("etag"), tag);
+    }
+    for (name, value) in [
+        ("if-none-match", "\"other\""),
+        ("if-modified-since", "Sun, 01 Mar 2026 09:59:59 GMT"),
+        ("if-modified-since", "yesterday"),
+    ] {
+        assert_eq!(ask(name, value).await.status, 200, "{value}");
+    }
+    site.later(60);
+    let told = json!({ "title": "News", "text": "of this test" });
+    let path = "/api/v1/announcements";
+    site.post(path, Some(ADMIN), &told).await.json(201);
+    assert_eq!(ask("if-none-match", tag).await.status, 200);
+    assert_eq!(ask("if-modified-since", modified).await.status, 200);
+}

@@ -1,0 +1,99 @@
+//! What watches the server: alive, ready, and its numbers.
+
+use crate::site::*;
+use faceoff_http::HttpLimits;
+use faceoff_store::Room;
+
+/// A number of the text by its name and labels.
+fn number(text: &str, name: &str) -> f64 {
+    let line = text
+        .lines()
+        .find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
+    let value = line.unwrap_or_else(|| panic!("{name} is not in\n{text}"));
+    value.trim().parse().unwrap()
+}
+
+#[tokio::test]
+async fn a_server_that_is_not_ready_is_alive() {
+    let mut site = Site::start().await;
+    assert_eq!(site.get("/livez", None).await.json(200)["status"], "alive");
+    assert_eq!(site.get("/readyz", None).await.json(200)["status"], "ok");
+    let room = Room::new(vec![site.folder.path().to_owned()], u64::MAX);
+    site.store = site.store.clone().with_room(room);
+    site.restart().await;
+    let ready = site.get("/readyz", None).await;
+    let problem = ready.problem(503, "not-ready", &["bytes are free"]);
+    assert_eq!(problem["room"], "short");
+    site.get("/livez", None).await.json(200);
+    site.store.close().await;
+    site.later(1); // one probe a second
+    let ready = site.get("/readyz", None).await;
+    ready.problem(503, "not-ready", &["the database cannot be written"]);
+    site.get("/livez", None).await.json(200);
+}
+
+#[tokio::test]
+async fn a_server_at_its_limit_is_alive() {
+    let limits = HttpLimits {
+        requests: 0,
+        ..patient()
+    };
+    let site = Site::start_with(limits).await;
+    site.get("/readyz", None).await.problem(503, "busy", &[]);
+    site.get("/livez", None).await.json(200);
+}
+
+#[tokio::test]
+async fn the_numbers_are_the_organisers() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    site.get("/metrics", None)
+        .await
+        .problem(401, "unauthenticated", &[]);
+    site.get("/metrics", Some(&team.token))
+        .await
+        .problem(403, "forbidden", &[]);
+    let text = site.get("/metrics", Some(ADMIN)).await;
+    assert_eq!(text.status, 200);
+    let media_type = text.header("content-type");
+    assert!(
+        media_type.starts_with("application/openmetrics-text"),
+        "{media_type}"
+    );
+    assert!(text.body.ends_with("# EOF\n"));
+}
+
+#[tokio::test]
+async fn the_numbers_follow_what_happens() {
+    let site = Site::start().await;
+    let team = site.team("Alpha").await;
+    let numbers = async || site.get("/metrics", Some(ADMIN)).await.body;
+    let before = numbers().await;
+    assert_eq!(number(&before, "faceoff_evaluations_open"), 0.0);
+    assert_eq!(number(&before, "faceoff_slots"), 2.0);
+    assert_eq!(number(&before, "faceoff_database_writable"), 1.0);
+    assert!(
+        number(
+            &before,
+            "faceoff_http_requests_total{method=\"POST\",route=\"/api/v1/teams\",status=\"201\"}"
+        ) >= 1.0
+    );
+
+    let submission = site.valid_submission(&team, "striker").await;
+    site.evaluate(&team, &submission).await;
+    site.later(90);
+    let during = numbers().await;
+    assert_eq!(number(&during, "faceoff_evaluations_open"), 1.0);
+    let waiting = "faceoff_queue_units{state=\"waiting\"}";
+    assert!(number(&during, waiting) >= 1.0);
+    assert_eq!(number(&during, "faceoff_queue_oldest_wait_seconds"), 90.0);
+    assert_eq!(number(&during, "faceoff_queue_paused"), 0.0);
+    let pause = serde_json::json!({ "reason": "a test" });
+    site.post("/api/v1/queue/pause", Some(ADMIN), &pause).await;
+    assert_eq!(number(&numbers().await, "faceoff_queue_paused"), 1.0);
+    // Nobody's name is in it, nor anybody's id.
+    let after = numbers().await;
+    for secret in ["Alpha", team.id.as_str()] {
+        assert!(!after.contains(secret), "{secret} is in\n{after}");
+    }
+}

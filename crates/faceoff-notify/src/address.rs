@@ -1,0 +1,312 @@
+//! Which addresses may be connected to for a stranger: public ones on the Internet, and what the operator allows.
+
+use ipnet::{IpNet, Ipv4Net, Ipv6Net};
+use reqwest::Url;
+use serde::{Deserialize, Serialize};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
+
+/// Longest URL.
+const MAX_URL: usize = 1000;
+
+/// Where webhooks may be.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct WebhookRules {
+    /// Are they told at all?
+    pub enabled: bool,
+    /// May they be told without TLS?
+    pub allow_http: bool,
+    /// Ports that they may have; empty: any.
+    pub ports: Vec<u16>,
+    /// Networks that are not public, where they may be all the same.
+    pub allow_private: Vec<IpNet>,
+}
+
+impl Default for WebhookRules {
+    fn default() -> Self {
+        Self {
+            enabled: true,
+            allow_http: false,
+            ports: vec![443, 8443],
+            allow_private: Vec::new(),
+        }
+    }
+}
+
+/// Why nothing is sent to an address.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum NotPublic {
+    /// The host itself.
+    #[error("a loopback address")]
+    Loopback,
+    /// The operator's or a neighbour's network.
+    #[error("an address of a private network")]
+    Private,
+    /// What a network has for itself: routers, cloud metadata.
+    #[error("a link-local address")]
+    LinkLocal,
+    /// Many hosts.
+    #[error("a multicast or broadcast address")]
+    Multicast,
+    /// Nobody's, or for documents, measurements and translation.
+    #[error("an address that is nobody's on the Internet")]
+    Reserved,
+}
+
+const fn v4(a: u8, b: u8, c: u8, length: u8) -> Ipv4Net {
+    Ipv4Net::new_assert(Ipv4Addr::new(a, b, c, 0), length)
+}
+
+const fn v6(a: u16, b: u16, length: u8) -> Ipv6Net {
+    Ipv6Net::new_assert(Ipv6Addr::new(a, b, 0, 0, 0, 0, 0, 0), length)
+}
+
+/// Of the registry of IPv4 addresses for special purposes (RFC 6890 and later) what is not reachable everywhere.
+const V4: [(Ipv4Net, NotPublic); 16] = [
+    (v4(0, 0, 0, 8), NotPublic::Reserved),
+    (v4(10, 0, 0, 8), NotPublic::Private),
+    (v4(100, 64, 0, 10), NotPublic::Private), // a provider's own
+    (v4(127, 0, 0, 8), NotPublic::Loopback),
+    (v4(169, 254, 0, 16), NotPublic::LinkLocal),
+    (v4(172, 16, 0, 12), NotPublic::Private),
+    (v4(192, 0, 0, 24), NotPublic::Reserved),
+    (v4(192, 0, 2, 24), NotPublic::Reserved), // documents
+    (v4(192, 88, 99, 24), NotPublic::Reserved),
+    (v4(192, 168, 0, 16), NotPublic::Private),
+    (v4(198, 18, 0, 15), NotPublic::Private), // measurements
+    (v4(198, 51, 100, 24), NotPublic::Reserved), // documents
+    (v4(203, 0, 113, 24), NotPublic::Reserved), // documents
+    (v4(224, 0, 0, 4), NotPublic::Multicast),
+    (v4(255, 255, 255, 24), NotPublic::Multicast),
+    (v4(240, 0, 0, 4), NotPublic::Reserved),
+];
+
+/// Of IPv6: only 2000::/3 is anybody's, but for some of it.
+const V6: [(Ipv6Net, NotPublic); 7] = [
+    (v6(0xfc00, 0, 7), NotPublic::Private),
+    (v6(0xfe80, 0, 10), NotPublic::LinkLocal),
+    (v6(0xff00, 0, 8), NotPublic::Multicast),
+    (v6(0x2001, 0, 23), NotPublic::Reserved), // Teredo and other protocols
+    (v6(0x2001, 0xdb8, 32), NotPublic::Reserved), // documents
+    (v6(0x2002, 0, 16), NotPublic::Reserved), // an IPv4 address inside of an IPv6 one
+    (v6(0x3fff, 0, 20), NotPublic::Reserved), // documents
+];
+
+/// Where addresses of IPv6 on the Internet are.
+const GLOBAL: Ipv6Net = v6(0x2000, 0, 3);
+
+fn check_public(address: IpAddr) -> Result<(), NotPublic> {
+    match address {
+        IpAddr::V4(address) => V4
+            .iter()
+            .find(|(net, _)| net.contains(&address))
+            .map_or(Ok(()), |(_, why)| Err(*why)),
+        IpAddr::V6(Ipv6Addr::LOCALHOST) => Err(NotPublic::Loopback),
+        IpAddr::V6(address) => {
+            let found = V6.iter().find(|(net, _)| net.contains(&address));
+            match found {
+                Some((_, why)) => Err(*why),
+                None if GLOBAL.contains(&address) => Ok(()),
+                None => Err(NotPublic::Reserved),
+            }
+        }
+    }
+}
+
+impl WebhookRules {
+    /// May anything be sent there?
+    ///
+    /// # Errors
+    /// If the address is not public and the operator has not allowed it.
+    pub fn check_address(&self, address: IpAddr) -> Result<(), NotPublic> {
+        // An IPv4 address that is written as one of IPv6 leads to the same host.
+        let address = address.to_canonical();
+        if self.allow_private.iter().any(|net| net.contains(&address)) {
+            return Ok(());
+        }
+        check_public(address)
+    }
+
+    /// Takes a webhook's URL apart. A name is not looked up: whatever it means when something is sent counts.
+    ///
+    /// # Errors
+    /// What was expected and what came.
+    pub fn check_url(&self, text: &str) -> Result<Url, String> {
+        if text.len() > MAX_URL {
+            return Err(format!(
+                "expected at most {MAX_URL} bytes, got {}",
+                text.len()
+            ));
+        }
+        let url = Url::parse(text).map_err(|error| {
+            format!("expected a URL as https://example.org/faceoff, got {text:?}: {error}")
+        })?;
+        match url.scheme() {
+            "https" => {}
+            "http" if self.allow_http => {}
+            other => {
+                return Err(format!(
+                    "expected a URL that begins with https://, got {other}:"
+                ));
+            }
+        }
+        if !url.username().is_empty() || url.password().is_some() {
+            return Err(
+                "expected no name and password in the URL: the signature says who sends".into(),
+            );
+        }
+        if url.fragment().is_some() {
+            return Err("expected no fragment (#…), which is never sent".into());
+        }
+        let port = url.port_or_known_default().unwrap_or_default();
+        let is_usual = url.port().is_none();
+        if !is_usual && !self.ports.is_empty() && !self.ports.contains(&port) {
+            return Err(format!(
+                "expected one of the ports {:?}, got {port}",
+                self.ports
+            ));
+        }
+        if let Some(address) = literal(&url) {
+            self.check_address(address).map_err(|why| {
+                format!("expected an address on the Internet, got {why}: {address}")
+            })?;
+        }
+        Ok(url)
+    }
+}
+
+/// The address that a URL's host is, if it is no name.
+pub(crate) fn literal(url: &Url) -> Option<IpAddr> {
+    let host = url.host_str()?;
+    let host = host.strip_prefix('[').unwrap_or(host);
+    host.strip_suffix(']').unwrap_or(host).parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_addresses_of_the_internet_are_public() {
+        for public in [
+            "1.1.1.1",
+            "8.8.8.8",
+            "100.63.255.255",
+            "100.128.0.1",
+            "172.15.0.1",
+            "172.32.0.1",
+            "192.0.1.1",
+            "198.20.0.1",
+            "223.255.255.255",
+            "2606:4700:4700::1111",
+            "2a00:1450::1",
+            "::ffff:1.1.1.1",
+        ] {
+            let address = public.parse().unwrap();
+            let checked = WebhookRules::default().check_address(address);
+            assert_eq!(checked, Ok(()), "{public}");
+        }
+        for (private, why) in [
+            ("0.0.0.0", NotPublic::Reserved),
+            ("0.1.2.3", NotPublic::Reserved),
+            ("10.0.0.1", NotPublic::Private),
+            ("100.64.0.1", NotPublic::Private),
+            ("100.127.255.255", NotPublic::Private),
+            ("127.0.0.1", NotPublic::Loopback),
+            ("127.255.255.254", NotPublic::Loopback),
+            ("169.254.169.254", NotPublic::LinkLocal),
+            ("172.16.0.1", NotPublic::Private),
+            ("172.31.255.255", NotPublic::Private),
+            ("192.0.0.1", NotPublic::Reserved),
+            ("192.0.2.1", NotPublic::Reserved),
+            ("192.88.99.1", NotPublic::Reserved),
+            ("192.168.1.1", NotPublic::Private),
+            ("198.18.0.1", NotPublic::Private),
+            ("198.19.255.255", NotPublic::Private),
+            ("198.51.100.1", NotPublic::Reserved),
+            ("203.0.113.1", NotPublic::Reserved),
+            ("224.0.0.1", NotPublic::Multicast),
+            ("239.255.255.255", NotPublic::Multicast),
+            ("240.0.0.1", NotPublic::Reserved),
+            ("255.255.255.255", NotPublic::Multicast),
+            ("::", NotPublic::Reserved),
+            ("::1", NotPublic::Loopback),
+            ("::ffff:127.0.0.1", NotPublic::Loopback),
+            ("::ffff:10.0.0.1", NotPublic::Private),
+            ("::7f00:1", NotPublic::Reserved),
+            ("64:ff9b::7f00:1", NotPublic::Reserved),
+            ("100::1", NotPublic::Reserved),
+            ("2001::1", NotPublic::Reserved),
+            ("2001:db8::1", NotPublic::Reserved),
+            ("2002:7f00:1::", NotPublic::Reserved),
+            ("3fff::1", NotPublic::Reserved),
+            ("fc00::1", NotPublic::Private),
+            ("fdff::1", NotPublic::Private),
+            ("fe80::1", NotPublic::LinkLocal),
+            ("fec0::1", NotPublic::Reserved),
+            ("ff02::1", NotPublic::Multicast),
+        ] {
+            let address = private.parse().unwrap();
+            let checked = WebhookRules::default().check_address(address);
+            assert_eq!(checked, Err(why), "{private}");
+        }
+    }
+
+    #[test]
+    fn an_operator_allows_networks_by_name() {
+        let rules = WebhookRules {
+            allow_private: vec!["10.1.0.0/16".parse().unwrap()],
+            ..WebhookRules::default()
+        };
+        for (address, allowed) in [
+            ("10.1.2.3", true),
+            ("::ffff:10.1.2.3", true),
+            ("10.2.0.1", false),
+        ] {
+            let checked = rules.check_address(address.parse().unwrap());
+            assert_eq!(checked.is_ok(), allowed, "{address}");
+        }
+    }
+
+    #[test]
+    fn an_address_in_any_spelling_is_found_in_a_url() {
+        let rules = WebhookRules::default();
+        for good in [
+            "https://example.org/faceoff?a=b",
+            "https://example.org:8443/",
+            "https://1.1.1.1/",
+            "https://localhost/", // looked up when something is sent
+        ] {
+            rules.check_url(good).unwrap();
+        }
+        for (bad, word) in [
+            ("example.org", "https://example.org"),
+            ("http://example.org/", "https"),
+            ("ftp://example.org/", "https"),
+            ("file:///etc/passwd", "https"),
+            ("https://a:b@example.org/", "password"),
+            ("https://example.org/#x", "fragment"),
+            ("https://example.org:22/", "ports"),
+            ("https://127.0.0.1/", "loopback"),
+            ("https://127.1/", "loopback"),
+            ("https://2130706433/", "loopback"),
+            ("https://0x7f.0.0.1/", "loopback"),
+            ("https://0177.0.0.1/", "loopback"),
+            ("https://[::1]/", "loopback"),
+            ("https://[::ffff:127.0.0.1]/", "loopback"),
+            ("https://[fe80::1]/", "link-local"),
+            ("https://169.254.169.254/latest/meta-data", "link-local"),
+            ("https://0.0.0.0/", "nobody's"),
+        ] {
+            let error = rules.check_url(bad).unwrap_err();
+            assert!(error.contains(word), "{bad}: {error}");
+        }
+        let long = format!("https://example.org/{}", "a".repeat(MAX_URL));
+        assert!(rules.check_url(&long).unwrap_err().contains("at most"));
+        let by_http = WebhookRules {
+            allow_http: true,
+            ..rules
+        };
+        by_http.check_url("http://example.org/").unwrap();
+    }
+}

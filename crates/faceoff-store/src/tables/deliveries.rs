@@ -1,0 +1,260 @@
+//! What webhooks are told, and what came of it.
+
+use crate::{
+    column::Instant,
+    error::{Result, StoreError},
+};
+use faceoff_types::{DeliveryId, WebhookId};
+use jiff::Timestamp;
+use sqlx::{SqliteConnection, types::Text};
+
+/// One thing told to one webhook.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Delivery {
+    /// As the receiver reads it, however often it is sent.
+    pub id: DeliveryId,
+    /// To whom.
+    pub webhook: WebhookId,
+    /// Of which event; none: a test.
+    pub event: Option<i64>,
+    /// What happened, by name.
+    pub kind: String,
+    /// What is sent.
+    pub body: String,
+    /// When it was noted.
+    pub created_at: Timestamp,
+    /// So often it was sent.
+    pub attempts: u32,
+    /// What came of the last time.
+    pub last: Option<DeliveryAttempt>,
+    /// How it stands.
+    pub state: DeliveryState,
+}
+
+/// How a delivery stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DeliveryState {
+    /// It is sent, again.
+    Waiting {
+        /// When.
+        next_at: Timestamp,
+    },
+    /// It was taken.
+    Delivered {
+        /// When.
+        at: Timestamp,
+    },
+    /// It is not sent any more.
+    GivenUp {
+        /// Since when.
+        at: Timestamp,
+    },
+}
+
+/// What came of an attempt.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DeliveryAttempt {
+    /// When.
+    pub at: Timestamp,
+    /// The status that was answered, if there was an answer.
+    pub status: Option<u16>,
+    /// What was wrong, in words; none: nothing.
+    pub error: Option<String>,
+}
+
+struct Row {
+    id: Text<DeliveryId>,
+    webhook_id: Text<WebhookId>,
+    event_id: Option<i64>,
+    kind: String,
+    body: String,
+    created_at: Instant,
+    attempts: u32,
+    next_at: Option<Instant>,
+    is_delivered: bool,
+    settled_at: Option<Instant>,
+    last_at: Option<Instant>,
+    last_status: Option<u16>,
+    last_error: Option<String>,
+}
+
+impl TryFrom<Row> for Delivery {
+    type Error = StoreError;
+
+    fn try_from(row: Row) -> Result<Self> {
+        let state = match (row.next_at, row.settled_at) {
+            (Some(next_at), None) => DeliveryState::Waiting { next_at: next_at.0 },
+            (None, Some(at)) if row.is_delivered => DeliveryState::Delivered { at: at.0 },
+            (None, Some(at)) => DeliveryState::GivenUp { at: at.0 },
+            _ => {
+                let what = format!("delivery {}: neither waiting nor settled", row.id.0);
+                return Err(StoreError::Damaged(what));
+            }
+        };
+        Ok(Self {
+            id: row.id.0,
+            webhook: row.webhook_id.0,
+            event: row.event_id,
+            kind: row.kind,
+            body: row.body,
+            created_at: row.created_at.0,
+            attempts: row.attempts,
+            last: row.last_at.map(|at| DeliveryAttempt {
+                at: at.0,
+                status: row.last_status,
+                error: row.last_error,
+            }),
+            state,
+        })
+    }
+}
+
+/// `SELECT` of whole deliveries; the argument is what follows `FROM webhook_deliveries`.
+macro_rules! select_deliveries {
+    ($tail:literal $(, $argument:expr)*) => {
+        sqlx::query_as!(
+            Row,
+            r#"SELECT id AS "id: Text<DeliveryId>", webhook_id AS "webhook_id: Text<WebhookId>", event_id, kind, body,
+                      created_at AS "created_at: Instant", attempts AS "attempts: u32", next_at AS "next_at: Instant",
+                      state = 'delivered' AS "is_delivered!: bool", settled_at AS "settled_at: Instant",
+                      last_at AS "last_at: Instant", last_status AS "last_status: u16", last_error
+               FROM webhook_deliveries "# + $tail
+            $(, $argument)*
+        )
+    };
+}
+
+fn all_of(rows: Vec<Row>) -> Result<Vec<Delivery>> {
+    rows.into_iter().map(Delivery::try_from).collect()
+}
+
+/// Of each webhook that is alive what has been due for longest at `now`, the longest first.
+pub(crate) async fn due(
+    connection: &mut SqliteConnection,
+    now: Timestamp,
+) -> Result<Vec<Delivery>> {
+    let now = Instant(now);
+    let rows = select_deliveries!(
+        "WHERE id IN (SELECT first.id FROM (SELECT d.id, MIN(d.next_at) FROM webhook_deliveries d
+                        INDEXED BY webhook_deliveries_due WHERE d.state = 'waiting' AND d.next_at <= ?1
+                        GROUP BY d.webhook_id) first)
+           AND webhook_id IN (SELECT id FROM webhooks WHERE dead_at IS NULL)
+         ORDER BY next_at",
+        now
+    );
+    all_of(rows.fetch_all(connection).await?)
+}
+
+/// When the next one is to be sent, if one waits.
+pub(crate) async fn next_due(connection: &mut SqliteConnection) -> Result<Option<Timestamp>> {
+    let next = sqlx::query_scalar!(
+        r#"SELECT next_at AS "next_at!: Instant" FROM webhook_deliveries
+           WHERE state = 'waiting' AND next_at IS NOT NULL
+             AND webhook_id IN (SELECT id FROM webhooks WHERE dead_at IS NULL) ORDER BY next_at LIMIT 1"#
+    );
+    Ok(next.fetch_optional(connection).await?.map(|at| at.0))
+}
+
+/// A webhook's, the newest first.
+pub(crate) async fn of(
+    connection: &mut SqliteConnection,
+    webhook: WebhookId,
+    limit: u32,
+) -> Result<Vec<Delivery>> {
+    let webhook = Text(webhook);
+    let rows = select_deliveries!(
+        "WHERE webhook_id = ?1 ORDER BY created_at DESC, id DESC LIMIT ?2",
+        webhook,
+        limit
+    );
+    all_of(rows.fetch_all(connection).await?)
+}
+
+pub(crate) async fn find(connection: &mut SqliteConnection, id: DeliveryId) -> Result<Delivery> {
+    let id = Text(id);
+    let row = select_deliveries!("WHERE id = ?", id)
+        .fetch_optional(connection)
+        .await?;
+    row.ok_or(StoreError::NotFound("delivery"))?.try_into()
+}
+
+/// One to be sent at once.
+pub(crate) async fn insert(connection: &mut SqliteConnection, delivery: &Delivery) -> Result<()> {
+    let (id, webhook, at) = (
+        Text(delivery.id),
+        Text(delivery.webhook),
+        Instant(delivery.created_at),
+    );
+    sqlx::query!(
+        "INSERT INTO webhook_deliveries (id, webhook_id, event_id, kind, body, created_at, attempts, next_at, state)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, 0, ?6, 'waiting')",
+        id,
+        webhook,
+        delivery.event,
+        delivery.kind,
+        delivery.body,
+        at,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Notes what came of an attempt, and how it stands then.
+pub(crate) async fn set_attempt(
+    connection: &mut SqliteConnection,
+    id: DeliveryId,
+    attempt: &DeliveryAttempt,
+    state: DeliveryState,
+) -> Result<()> {
+    let (id, at) = (Text(id), Instant(attempt.at));
+    let (name, next_at, settled_at) = match state {
+        DeliveryState::Waiting { next_at } => ("waiting", Some(Instant(next_at)), None),
+        DeliveryState::Delivered { at } => ("delivered", None, Some(Instant(at))),
+        DeliveryState::GivenUp { at } => ("given_up", None, Some(Instant(at))),
+    };
+    sqlx::query!(
+        "UPDATE webhook_deliveries SET attempts = attempts + 1, last_at = ?, last_status = ?, last_error = ?, state = ?,
+           next_at = ?, settled_at = ? WHERE id = ?",
+        at,
+        attempt.status,
+        attempt.error,
+        name,
+        next_at,
+        settled_at,
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Gives up what waits of a webhook.
+pub(crate) async fn give_up(
+    connection: &mut SqliteConnection,
+    webhook: WebhookId,
+    at: Timestamp,
+) -> Result<()> {
+    let (webhook, at) = (Text(webhook), Instant(at));
+    sqlx::query!(
+        "UPDATE webhook_deliveries SET state = 'given_up', next_at = NULL, settled_at = ?
+         WHERE webhook_id = ? AND state = 'waiting'",
+        at,
+        webhook,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Forgets what was settled before; how many.
+pub(crate) async fn forget(connection: &mut SqliteConnection, before: Timestamp) -> Result<u64> {
+    let before = Instant(before);
+    let gone = sqlx::query!(
+        "DELETE FROM webhook_deliveries WHERE state <> 'waiting' AND settled_at < ?",
+        before
+    )
+    .execute(connection)
+    .await?;
+    Ok(gone.rows_affected())
+}

@@ -1,0 +1,31 @@
+use faceoff_http::views::ablation::{AblationStatus, AblationView};
+
+/// An ablation, in words.
+pub(super) fn ablation(view: &AblationView) -> String {
+    let mut lines = vec![format!(
+        "ablation of {}, {} episodes of each task and profile",
+        view.submission, view.episodes_per_task
+    )];
+    match &view.status {
+        AblationStatus::Open { progress } => lines.push(format!(
+            "{} of {} episodes are played",
+            progress.episodes_done, progress.episodes_total
+        )),
+        AblationStatus::Failed { reason, .. } => lines.push(format!("no result: {reason}")),
+        AblationStatus::Finished { tasks, .. } => {
+            for (task, effects) in tasks {
+                lines.extend(effects.iter().map(|effect| {
+                    format!(
+                        "{task:<8} {:<17} {:>6.1} %, {:+.1} to ideal, p {:.4}, {:.1} penalty points",
+                        effect.profile.to_string(),
+                        100.0 * effect.success_rate,
+                        100.0 * effect.difference,
+                        effect.p_value,
+                        effect.penalty_points
+                    )
+                }));
+            }
+        }
+    }
+    lines.join("\n")
+}

@@ -1,0 +1,41 @@
+use faceoff_http::{Rate, RateLimits};
+use serde::{Deserialize, Serialize};
+use std::num::NonZeroU32;
+
+/// `[rates]`: how often somebody may ask. 0 requests per second are no bound.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RatesConfig {
+    /// Requests per second of one address, or IPv6 network of 64 bits, in the mean.
+    pub address_per_s: u32,
+    /// And so many at once.
+    pub address_burst: NonZeroU32,
+    /// Requests per second with one token or session, in the mean.
+    pub token_per_s: u32,
+    /// And so many at once.
+    pub token_burst: NonZeroU32,
+}
+
+impl Default for RatesConfig {
+    fn default() -> Self {
+        const BURST: NonZeroU32 = NonZeroU32::new(1000).expect("1000 is not 0");
+        Self {
+            address_per_s: 100,
+            address_burst: BURST,
+            token_per_s: 100,
+            token_burst: BURST,
+        }
+    }
+}
+
+impl RatesConfig {
+    /// As the web side takes them.
+    #[must_use]
+    pub fn limits(&self) -> RateLimits {
+        let rate = |per_s, burst| NonZeroU32::new(per_s).map(|per_s| Rate { per_s, burst });
+        RateLimits {
+            address: rate(self.address_per_s, self.address_burst),
+            token: rate(self.token_per_s, self.token_burst),
+        }
+    }
+}

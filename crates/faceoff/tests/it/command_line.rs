@@ -1,0 +1,71 @@
+//! What the program says of itself.
+
+use std::process::Command;
+
+fn faceoff(args: &[&str]) -> (Option<i32>, String, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_faceoff"))
+        .args(args)
+        .output()
+        .unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (
+        output.status.code(),
+        text(output.stdout),
+        text(output.stderr),
+    )
+}
+
+/// The commands that a help lists.
+fn commands(help: &str) -> Vec<String> {
+    let (_, listed) = help.split_once("\nCommands:\n").unwrap_or_default();
+    listed
+        .lines()
+        .take_while(|line| !line.is_empty())
+        // A description that goes on is further in.
+        .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|name| *name != "help")
+        .map(str::to_owned)
+        .collect()
+}
+
+#[test]
+fn every_command_has_a_help() {
+    let mut todo: Vec<Vec<String>> = vec![Vec::new()];
+    let mut seen = 0;
+    while let Some(path) = todo.pop() {
+        let mut args: Vec<&str> = path.iter().map(String::as_str).collect();
+        args.push("--help");
+        let (code, help, error) = faceoff(&args);
+        assert_eq!(code, Some(0), "{path:?}: {error}");
+        assert!(help.contains("Usage: faceoff"), "{path:?}: {help}");
+        seen += 1;
+        for command in commands(&help) {
+            let mut path = path.clone();
+            path.push(command);
+            todo.push(path);
+        }
+    }
+    assert!(seen > 100, "{seen} commands were found");
+}
+
+#[test]
+fn each_shell_gets_its_completions() {
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let (code, script, error) = faceoff(&["completions", shell]);
+        assert_eq!(code, Some(0), "{shell}: {error}");
+        for word in ["faceoff", "submit", "like-server"] {
+            assert!(
+                script.contains(word),
+                "{shell}: {word} is not in its script"
+            );
+        }
+    }
+    assert_eq!(faceoff(&["completions", "tcsh"]).0, Some(2));
+}
+
+#[test]
+fn a_server_that_is_not_there_is_told_by_the_status() {
+    let (code, out, error) = faceoff(&["board", "--server", "http://127.0.0.1:1", "--token", "x"]);
+    assert_eq!((code, out.as_str()), (Some(4), ""), "{error}");
+}
