@@ -18,7 +18,10 @@ pub(crate) const BOUND_BYTES: u64 = (16 + 4) << 20;
 /// So many writes are more than twice the bound: each is some 20 KB of log.
 const TEAMS: u32 = 2000;
 
-const CONFIG: &str = "[workers]\nslots = 1\n[season]\nname = \"Growth\"\n";
+const CONFIG: &str = concat!(
+    include_str!("../patient.toml"),
+    "[workers]\nslots = 1\n[season]\nname = \"Growth\"\n"
+);
 
 /// The log's size now.
 fn log_bytes(data_dir: &Path) -> u64 {
