@@ -224,6 +224,15 @@ fn a_team_submits_a_folder_follows_it_and_gets_its_dataset_back() {
     let board = ada(&["board", "--json"]).json();
     assert_eq!(board["rows"], serde_json::json!([]));
     assert!(ada(&["board", "hit"]).done().contains("no results yet"));
+    let offered = ada(&["runtimes", "--json"]).json();
+    assert_eq!(offered["network"], "none", "{offered:#}");
+    let told = ada(&["runtimes"]).done();
+    assert!(told.contains("python3") && told.contains("glibc"), "{told}");
+    let season = ada(&["season", "--json"]).json();
+    assert_eq!(season["closed_at"], Value::Null, "{season:#}");
+    assert!(ada(&["season"]).done().contains("commitment "));
+    assert_eq!(ada(&["health", "--json"]).json()["status"], "ok");
+    assert!(ada(&["health"]).done().starts_with("ok, version "));
     ada(&["board", "--division", "Open"]).not_done(REFUSED, &["404"]);
     ada(&["board", "--stage", "Final"]).not_done(FAILED, &["no stage is named"]);
 

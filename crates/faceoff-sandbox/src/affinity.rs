@@ -41,19 +41,27 @@ pub fn pin_current_thread(cpus: &[usize]) -> io::Result<()> {
     Ok(())
 }
 
-/// By how much the nice value is raised of what gives way: beside a thread of ordinary priority it has a
-/// tenth of a CPU, which keeps a server answering and its leases alive.
-const WAY_GIVEN: i32 = 10;
+/// By how much the nice value is raised of what gives way on CPUs that are no agent's: beside a simulator that is never idle it
+/// has a third of a CPU. A simulator's time costs nobody points; with less, whoever looks on waits for ten milliseconds and more
+/// at each of a request's turns.
+const WAY_GIVEN: i32 = 3;
+/// … and where agents may run: a tenth, which keeps a server answering and its leases alive.
+const WAY_GIVEN_TO_AGENTS: i32 = 10;
 
-/// Has the calling thread, and the threads that it starts from now on, stay on these CPUs, with none given
-/// where it is, and give way to other threads there. There is no way back.
+/// Has the calling thread, and the threads that it starts from now on, stay on these CPUs, none of them an agent's, and give way to
+/// other threads there; with none given it stays where it is, and gives way to agents. There is no way back.
 ///
 /// # Errors
 /// When none of the CPUs is there for this process.
 pub fn give_way(cpus: &[usize]) -> io::Result<()> {
     pin_current_thread(cpus)?;
+    let given = if cpus.is_empty() {
+        WAY_GIVEN_TO_AGENTS
+    } else {
+        WAY_GIVEN
+    };
     // To Linux a priority is a thread's.
-    Ok(setpriority_process(None, niceness()? + WAY_GIVEN)?)
+    Ok(setpriority_process(None, niceness()? + given)?)
 }
 
 /// The nice value of the calling thread.

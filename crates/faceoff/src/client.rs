@@ -31,6 +31,7 @@ use faceoff_http::{
         day::DayView,
         evaluation::EvaluationView,
         event::EventsView,
+        health::HealthView,
         me::MeView,
         runtimes::RuntimesView,
         season::SeasonView,
@@ -100,14 +101,12 @@ impl Client {
         }
     }
 
-    /// Does the server answer?
+    /// Is the server fit for work?
     ///
     /// # Errors
-    /// If it does not, or not well.
-    pub async fn health(&self) -> anyhow::Result<()> {
-        self.send(self.request(Method::GET, "/health"))
-            .await
-            .map(drop)
+    /// If it does not answer, or is not: what is missing.
+    pub async fn health(&self) -> anyhow::Result<HealthView> {
+        self.get("/health").await
     }
 
     /// The board of a task, or the overall one.

@@ -22,7 +22,8 @@ use utoipa::{
 #[openapi(
     info(
         title = "Faceoff",
-        description = "Competition server for robot learning: teams upload agents, the server evaluates them daily.",
+        description = "Competition server for robot learning: teams upload agents, the server evaluates them daily. \
+                       Whatever can be asked with GET can be asked with HEAD: the same headers, and no body.",
         license(name = "MIT OR Apache-2.0")
     ),
     components(schemas(ProblemBody)),

@@ -6,24 +6,24 @@ use crate::{
     problem::{Problem, ProblemKind},
 };
 use faceoff_store::QueueHealth;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 /// The server does all that it is for.
-#[derive(Debug, Serialize, ToSchema)]
-pub(crate) struct HealthView {
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct HealthView {
     /// Always `ok`; anything else is a problem with status 503.
     #[schema(example = "ok")]
-    status: &'static str,
+    pub status: String,
     /// Version of the server.
-    version: &'static str,
+    pub version: String,
     /// Units of work that are being done.
-    running: u32,
+    pub running: u32,
     /// Units of work that could be begun.
-    waiting: u32,
+    pub waiting: u32,
     /// The organiser holds the queue: since when, and why; absent otherwise.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    paused: Option<RulingView>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub paused: Option<RulingView>,
 }
 
 /// The process answers.
@@ -88,8 +88,8 @@ impl HealthView {
         }
         if missing.is_empty() {
             return Ok(Self {
-                status: "ok",
-                version: env!("CARGO_PKG_VERSION"),
+                status: "ok".to_owned(),
+                version: env!("CARGO_PKG_VERSION").to_owned(),
                 running,
                 waiting,
                 paused: match health.queue {

@@ -22,7 +22,7 @@ pub mod event;
 pub(crate) mod feed;
 pub mod finalised;
 pub mod game;
-pub(crate) mod health;
+pub mod health;
 pub mod history;
 pub mod invitation;
 pub mod link;

@@ -8,7 +8,6 @@ mod news;
 mod people;
 mod played;
 mod proposal;
-mod season;
 mod speaker;
 mod stage;
 mod storage;
@@ -19,6 +18,7 @@ use super::{
     ca_file::CaFile,
     find_stage::find_stage,
     output::{or_none, print},
+    season::of_season,
     token::{self, TokenAction},
     webhook::{self, WebhookAction},
 };
@@ -31,7 +31,6 @@ use faceoff_http::{
 use faceoff_types::{EvaluationId, QuestionId, StageDay};
 use jiff::civil::Date;
 use lines::line;
-use season::of_season;
 use serde_json::Value;
 use std::path::PathBuf;
 

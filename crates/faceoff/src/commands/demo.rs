@@ -1,20 +1,23 @@
 //! `faceoff demo`: a competition day from an empty folder to the board, through the public API.
 
 use crate::{
-    client::Client,
-    commands::{board::table, verify},
+    client::{Client, Downloaded},
+    commands::{board::table, output::print, verify},
 };
 use anyhow::{Context, bail, ensure};
 use clap::Args;
 use faceoff_http::requests::BoardQuery;
 use faceoff_http::views::{
+    board::BoardView,
     evaluation::{EvaluationStatus, EvaluationView},
     submission::{SubmissionStatus, SubmissionView},
 };
 use faceoff_types::{EvaluationId, MAX_EPISODES_PER_TASK};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+use serde::Serialize;
 use std::{
     collections::BTreeMap,
+    fmt,
     net::{SocketAddr, TcpListener},
     path::{Path, PathBuf},
     process::Stdio,
@@ -50,6 +53,35 @@ pub struct DemoCommand {
     /// Stop after the board instead of serving it until Ctrl-C
     #[arg(long)]
     no_serve: bool,
+    /// Print the board and what was downloaded as JSON, and the steps to standard error
+    #[arg(long)]
+    json: bool,
+}
+
+/// What is printed with `--json`.
+#[derive(Debug, Serialize)]
+struct Played<'a> {
+    /// Where the board is served, unless with `--no-serve`.
+    server: &'a str,
+    data_dir: &'a Path,
+    board: &'a BoardView,
+    dataset: &'a Downloaded,
+}
+
+/// Where the steps of the day are told.
+#[derive(Debug, Clone, Copy)]
+struct Told {
+    beside_json: bool,
+}
+
+impl Told {
+    fn step(self, line: fmt::Arguments<'_>) {
+        if self.beside_json {
+            eprintln!("{line}");
+        } else {
+            println!("{line}");
+        }
+    }
 }
 
 impl DemoCommand {
@@ -74,8 +106,14 @@ impl DemoCommand {
             )
         })?;
         fresh_folder(&self.data_dir)?;
+        let told = Told {
+            beside_json: self.json,
+        };
 
-        println!("1. starting the server on {}", self.data_dir.display());
+        told.step(format_args!(
+            "1. starting the server on {}",
+            self.data_dir.display()
+        ));
         let log = self.data_dir.join("server.log");
         let mut server = Server::start(self.listen, &self.data_dir, self.episodes, &log)?;
         let organiser = server.ready().await.with_context(|| {
@@ -86,10 +124,10 @@ impl DemoCommand {
             )
         })?;
 
-        println!(
+        told.step(format_args!(
             "2. creating {} teams and uploading their agents",
             self.bundles.len()
-        );
+        ));
         let mut teams = Vec::new();
         for bundle in &self.bundles {
             let name = team_name(bundle)?;
@@ -100,13 +138,13 @@ impl DemoCommand {
         }
         for (name, client, submission) in &teams {
             let verdict = validated(client, submission).await?;
-            println!("   {name}: {verdict}");
+            told.step(format_args!("   {name}: {verdict}"));
         }
 
-        println!(
+        told.step(format_args!(
             "3. evaluating: hit, defend, prepare × {} episodes",
             self.episodes
-        );
+        ));
         let day = organiser.start_day(None).await?;
         ensure!(
             day.created.len() == teams.len(),
@@ -116,7 +154,7 @@ impl DemoCommand {
         );
         let evaluations = follow(&organiser, &day.created).await?;
 
-        println!("4. the board\n");
+        told.step(format_args!("4. the board\n"));
         let board = organiser.board(None, &BoardQuery::default()).await?;
         ensure!(
             board.rows.len() == evaluations.len(),
@@ -124,7 +162,7 @@ impl DemoCommand {
             evaluations.len(),
             board.rows.len()
         );
-        println!("{}", table::render(&board));
+        told.step(format_args!("{}", table::render(&board)));
 
         let (name, client, _) = &teams[0];
         let own = evaluations
@@ -138,23 +176,35 @@ impl DemoCommand {
             .await?;
         let bytes = done.bytes;
         ensure!(bytes > 0, "the dataset of {name} is empty");
-        println!(
+        told.step(format_args!(
             "5. dataset of {name}: {} ({:.1} MB)",
             dataset.display(),
             bytes as f64 / 1e6
-        );
+        ));
 
         let verifying = tokio::task::spawn_blocking(move || verify::verified_line(&dataset));
         let verified = verifying.await.context("verifying the dataset")?;
-        println!("   {}", verified.context("the dataset is not verified")?);
+        told.step(format_args!(
+            "   {}",
+            verified.context("the dataset is not verified")?
+        ));
 
+        if self.json {
+            let played = Played {
+                server: &server.url,
+                data_dir: &self.data_dir,
+                board: &board,
+                dataset: &done,
+            };
+            print(true, &played, String::new)?;
+        }
         if self.no_serve {
             return server.stop().await;
         }
-        println!(
+        told.step(format_args!(
             "\nThe same board: {}/   (Ctrl-C ends the server)",
             server.url
-        );
+        ));
         tokio::select! {
             stopped = tokio::signal::ctrl_c() => stopped.context("waiting for Ctrl-C")?,
             ended = server.child.wait() => bail!(

@@ -1,8 +1,10 @@
 //! `faceoff init`: a configuration to begin with.
 
+use super::output::print;
 use crate::config::{COMMENTED, DEFAULT_FILE};
 use anyhow::{Context, bail};
 use clap::Args;
+use serde_json::json;
 use std::{
     fs::File,
     io::{ErrorKind, Write as _},
@@ -15,6 +17,9 @@ pub struct InitCommand {
     /// The file to write; one that exists is left as it is
     #[arg(default_value = DEFAULT_FILE)]
     file: PathBuf,
+    /// Print what was written as JSON
+    #[arg(long)]
+    json: bool,
 }
 
 impl InitCommand {
@@ -33,10 +38,11 @@ impl InitCommand {
         };
         file.write_all(COMMENTED.as_bytes())
             .with_context(|| format!("writing {shown}"))?;
-        println!("wrote {shown}");
-        println!(
-            "next: change what you like, then `faceoff doctor --config {shown}` and `faceoff serve --config {shown}`"
-        );
-        Ok(())
+        print(self.json, &json!({ "file": self.file }), || {
+            format!(
+                "wrote {shown}\nnext: change what you like, then `faceoff doctor --config {shown}` and \
+                 `faceoff serve --config {shown}`"
+            )
+        })
     }
 }

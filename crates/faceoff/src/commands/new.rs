@@ -3,9 +3,11 @@
 mod example;
 mod templates;
 
+use super::output::print;
 use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
 use example::Example;
+use serde_json::json;
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -22,6 +24,9 @@ pub struct NewCommand {
     /// What it can do from the start
     #[arg(long, value_enum, default_value_t = Example::Defender)]
     example: Example,
+    /// Print what was made as JSON
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -51,6 +56,7 @@ impl NewCommand {
             Language::Python => templates::python(self.example),
             Language::Rust => templates::rust(self.example),
         };
+        let mut written = Vec::new();
         for (path, text) in files {
             let path = self.folder.join(path);
             let parent = path.parent().unwrap_or(&self.folder);
@@ -60,6 +66,7 @@ impl NewCommand {
                 .replace("{{task}}", self.example.task())
                 .replace("{{version}}", env!("CARGO_PKG_VERSION"));
             fs::write(&path, text).with_context(|| format!("writing {}", path.display()))?;
+            written.push(path);
         }
         let (folder, task) = (self.folder.display(), self.example.task());
         // A bundle is uploaded with all that lies in it: results lie beside it.
@@ -67,12 +74,14 @@ impl NewCommand {
             Language::Python => ("python3 -m unittest", ".", "../"),
             Language::Rust => ("cargo test && sh pack.sh", "bundle", ""),
         };
-        println!(
-            "{folder}: an agent that plays {task}; README.md says what is what. Now:\n\n  cd {folder}\n  {tested}\n  \
-             faceoff eval {bundle} --task {task} --episodes 20 --out {beside}result\n  \
-             faceoff replay {beside}result --task {task} --episode 0 --out {beside}look.html"
-        );
-        Ok(())
+        let made = json!({ "folder": self.folder, "name": name, "task": task, "files": written });
+        print(self.json, &made, || {
+            format!(
+                "{folder}: an agent that plays {task}; README.md says what is what. Now:\n\n  cd {folder}\n  {tested}\n  \
+                 faceoff eval {bundle} --task {task} --episodes 20 --out {beside}result\n  \
+                 faceoff replay {beside}result --task {task} --episode 0 --out {beside}look.html"
+            )
+        })
     }
 }
 

@@ -1,7 +1,30 @@
-//! The season in words.
+//! `faceoff season`: what is played, and by what commitment.
 
+use super::{output::print, server::ServerArgs};
+use clap::Args;
 use faceoff_http::views::season::SeasonView;
 
+/// Shows the season: its name, its commitment, its state.
+#[derive(Debug, Args)]
+pub struct SeasonCommand {
+    #[command(flatten)]
+    server: ServerArgs,
+}
+
+impl SeasonCommand {
+    /// Asks the server.
+    ///
+    /// # Errors
+    /// If it cannot be reached.
+    pub fn run(self) -> anyhow::Result<()> {
+        super::block_on(async {
+            let season = self.server.anybody()?.season().await?;
+            print(self.server.json, &season, || of_season(&season))
+        })
+    }
+}
+
+/// The season in words.
 pub(super) fn of_season(season: &SeasonView) -> String {
     let state = match (season.closed_at, season.secret) {
         (Some(closed_at), Some(secret)) => {
