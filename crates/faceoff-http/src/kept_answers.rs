@@ -23,7 +23,7 @@ const LARGEST_BYTES: usize = 64 << 20;
 
 /// Pages that anybody may see, by their paths; below the last ones, too.
 const PAGES: [&str; 4] = ["/", "/season", "/announcements", "/feed.atom"];
-const BELOW: [&str; 1] = ["/tasks/"];
+const BELOW: [&str; 2] = ["/tasks/", "/teams/"];
 /// Likewise of the API.
 const RESOURCES: [&str; 4] = ["/board", "/season", "/stages", "/announcements"];
 const RESOURCES_BELOW: [&str; 2] = ["/board/", "/stages/"];

@@ -26,7 +26,8 @@ use crate::{
 use askama::Template;
 use axum::{extract::State, response::Response};
 use faceoff_types::{
-    DivisionName, EvaluationId, StageDay, Task, TaskWeights, Tier, TierBounds, ViolationCounts,
+    DivisionName, EvaluationId, StageDay, Task, TaskWeights, TeamId, Tier, TierBounds,
+    ViolationCounts,
 };
 use figures::Rate;
 use jiff::{Timestamp, civil};
@@ -39,6 +40,7 @@ struct Who {
     /// Of the tier on this board.
     tier_change: String,
     team: String,
+    team_id: TeamId,
     division: Option<DivisionName>,
     agent: Option<String>,
     evaluation: EvaluationId,
@@ -90,6 +92,7 @@ impl Who {
                 .tier_change_probability
                 .map_or_else(|| "not computed of means".to_owned(), figures::chance),
             team: row.team.to_string(),
+            team_id: row.team_id,
             division: row.division.clone(),
             agent: row.agent.clone(),
             evaluation: row.evaluation,

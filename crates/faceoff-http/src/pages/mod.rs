@@ -8,6 +8,7 @@ mod announcements;
 mod assets;
 mod baselines;
 mod board;
+mod chart;
 mod comparison;
 mod evaluation;
 mod feed;
@@ -21,6 +22,7 @@ mod register;
 mod season;
 mod sign_in;
 mod standing;
+mod team;
 mod unknown;
 
 pub(crate) use unknown::{for_whom, unknown_method, unknown_path};
@@ -39,6 +41,7 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
     Router::new()
         .route("/", get(board::overall))
         .route("/tasks/{task}", get(board::by_task))
+        .route("/teams/{id}", get(team::page))
         .route("/evaluations/{id}", get(evaluation::page))
         .route("/evaluations/{id}/compare/{other}", get(comparison::page))
         .route("/season", get(season::page))

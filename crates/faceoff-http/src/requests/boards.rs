@@ -65,6 +65,15 @@ pub enum BoardFormat {
     Csv,
 }
 
+/// Of which stage a team's page tells.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TeamPageQuery {
+    /// Without it of the one that is open, or of the nearest.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stage: Option<StageId>,
+}
+
 /// What all teams have played, day by day.
 #[derive(Debug, Clone, Default, Serialize, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]

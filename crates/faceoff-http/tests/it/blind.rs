@@ -62,6 +62,7 @@ async fn nobody_but_the_organiser_learns_how_anybody_did() {
         "/tasks/hit".to_owned(),
         "/season".to_owned(),
         of_alpha.replace("/api/v1", ""),
+        format!("/teams/{}", alpha.id),
     ];
 
     for token in [None, Some(&alpha.token), Some(&beta.token)] {

@@ -1,37 +1,12 @@
-use crate::site::{Site, result};
+use crate::{
+    html::{page, texts},
+    site::{Site, result},
+};
 use faceoff_scoring::{
     COMPUTATION_TIME_MAX_POINTS, EE_POINTS, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS,
 };
-use scraper::{Html, Selector};
+use scraper::Selector;
 use serde_json::json;
-
-/// The page, which must be valid HTML.
-async fn page(site: &Site, path: &str) -> Html {
-    let answer = site.get(path, None).await;
-    assert_eq!(answer.status, 200, "{}", answer.body);
-    assert!(!answer.body.contains("<script") && !answer.body.contains("style="));
-    let html = Html::parse_document(&answer.body);
-    assert!(
-        html.errors.is_empty(),
-        "{path}: {:?}\n{}",
-        html.errors,
-        answer.body
-    );
-    html
-}
-
-fn texts(html: &Html, selector: &str) -> Vec<String> {
-    html.select(&Selector::parse(selector).unwrap())
-        .map(|element| {
-            element
-                .text()
-                .collect::<String>()
-                .split_whitespace()
-                .collect::<Vec<_>>()
-                .join(" ")
-        })
-        .collect()
-}
 
 /// Five teams of the paper's qualifying table, in another order than the board's.
 const TEAMS: [(&str, [f64; 3], f64); 5] = [
@@ -66,10 +41,10 @@ async fn the_board_shows_tiers_in_order_with_rates_intervals_points_and_score() 
         ["✓ Deployable", "▲ Improvable", "✕ Non-deployable"]
     );
     let names: Vec<_> = ORDER.iter().map(|(_, name)| *name).collect();
-    assert_eq!(texts(&html, ".board th.team a"), names);
+    assert_eq!(texts(&html, ".board th.team > a"), names);
     assert_eq!(texts(&html, ".board td.rank"), ["1", "2", "3", "4", "5"]);
     for (tier, name) in ORDER {
-        let rows = texts(&html, &format!("tbody[data-tier={tier}] th.team a"));
+        let rows = texts(&html, &format!("tbody[data-tier={tier}] th.team > a"));
         assert!(
             rows.contains(&name.to_owned()),
             "{name} is not among {tier}: {rows:?}"
@@ -222,7 +197,7 @@ async fn a_tasks_board_ranks_by_the_task_alone() {
 
     let html = page(&site, "/tasks/prepare").await;
     assert_eq!(
-        texts(&html, ".board th.team a"),
+        texts(&html, ".board th.team > a"),
         [
             "AiRLIHockey",
             "Reckless",

@@ -158,7 +158,7 @@ async fn the_boards_pages_lead_to_the_divisions() {
     };
     for path in ["/", "/tasks/hit"] {
         let whole = page(path).await;
-        assert_eq!(texts(&whole, ".board th.team a"), ["A", "B", "C", "D"]);
+        assert_eq!(texts(&whole, ".board th.team > a"), ["A", "B", "C", "D"]);
         let notes = texts(&whole, ".board th.team .note");
         for (note, division) in notes.iter().zip(["Bachelor students", "Open"]) {
             assert!(note.starts_with(&format!("{division} · ")), "{note}");
@@ -171,7 +171,7 @@ async fn the_boards_pages_lead_to_the_divisions() {
             format!("{path}{}", link.attr("href").unwrap())
         };
         let students = page(&leads_to("Bachelor students")).await;
-        assert_eq!(texts(&students, ".board th.team a"), ["A", "C"]);
+        assert_eq!(texts(&students, ".board th.team > a"), ["A", "C"]);
         assert_eq!(texts(&students, ".board td.rank"), ["1", "2"]);
         let lead = texts(&students, ".lead").join(" ");
         assert!(lead.contains("Division Bachelor students"), "{lead}");

@@ -1,0 +1,33 @@
+//! Pages as a browser reads them.
+
+use crate::site::Site;
+use scraper::{Html, Selector};
+
+/// The page, which must be valid HTML.
+pub async fn page(site: &Site, path: &str) -> Html {
+    let answer = site.get(path, None).await;
+    assert_eq!(answer.status, 200, "{}", answer.body);
+    assert!(!answer.body.contains("<script") && !answer.body.contains("style="));
+    let html = Html::parse_document(&answer.body);
+    assert!(
+        html.errors.is_empty(),
+        "{path}: {:?}\n{}",
+        html.errors,
+        answer.body
+    );
+    html
+}
+
+/// The words of what a selector finds, one by one.
+pub fn texts(html: &Html, selector: &str) -> Vec<String> {
+    html.select(&Selector::parse(selector).unwrap())
+        .map(|element| {
+            element
+                .text()
+                .collect::<String>()
+                .split_whitespace()
+                .collect::<Vec<_>>()
+                .join(" ")
+        })
+        .collect()
+}
