@@ -74,9 +74,10 @@ use std::sync::Arc;
 pub fn router(store: Store, config: HttpConfig) -> Router {
     let patience = config.limits.answer;
     let app = Arc::new(AppState::new(store, config));
+    let (api, document) = api::router(patience);
     let site = Router::new()
-        .merge(api::router(patience))
-        .merge(pages::router(patience))
+        .merge(api)
+        .merge(pages::router(patience, document))
         .merge(probes::router(patience))
         .fallback(pages::unknown_path)
         .method_not_allowed_fallback(pages::unknown_method)

@@ -53,12 +53,13 @@ mod webhooks;
 use crate::{app::App, extract::MAX_JSON_BYTES, layers, paths::API_BASE};
 use axum::{Json, Router, extract::DefaultBodyLimit, middleware, routing::get};
 use document::Document;
+use serde_json::Value;
 use std::{sync::Arc, time::Duration};
 use utoipa::OpenApi;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 /// All routes. `patience` bounds the time of every answer but an upload's.
-pub(crate) fn router(patience: Duration) -> Router<App> {
+pub(crate) fn router(patience: Duration) -> (Router<App>, Arc<Value>) {
     let resources = OpenApiRouter::with_openapi(Document::openapi())
         .routes(routes!(health::health))
         .routes(routes!(health::live))
@@ -205,11 +206,13 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .split_for_parts();
     document.info = Document::openapi().info;
     let document = Arc::new(document::told(document));
-    router.route(
+    let answered = Arc::clone(&document);
+    let router = router.route(
         &format!("{API_BASE}/openapi.json"),
         get(move || {
-            let document = Arc::clone(&document);
+            let document = Arc::clone(&answered);
             async move { Json((*document).clone()) }
         }),
-    )
+    );
+    (router, document)
 }

@@ -8,6 +8,8 @@ use std::sync::LazyLock;
 
 pub(super) const STYLE_PATH: &str = "/static/faceoff.css";
 pub(super) const ICON_PATH: &str = "/static/faceoff.svg";
+/// The board, as previews of links show it: one of the documentation's pictures.
+pub(super) const PREVIEW_PATH: &str = "/docs/images/board.png";
 
 const STYLE: &str = include_str!("../../../../web/static/faceoff.css");
 const ICON: &str = include_str!("../../../../web/static/faceoff.svg");

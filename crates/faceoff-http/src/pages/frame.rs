@@ -18,6 +18,8 @@ pub(super) struct Frame {
     pub(super) current: String,
     pub(super) style: &'static str,
     pub(super) icon: &'static str,
+    /// Address of the picture that a preview of a link to the page shows; none where the server does not know its own.
+    pub(super) preview: Option<String>,
 }
 
 impl Frame {
@@ -35,6 +37,11 @@ impl Frame {
                     archived.made_at.strftime("%Y-%m-%d at %H:%M UTC")
                 )
             }),
+            preview: app
+                .config
+                .public_url
+                .as_deref()
+                .map(|base| format!("{base}{}", assets::PREVIEW_PATH)),
             ..Self::new(season, current)
         }
     }
@@ -49,6 +56,7 @@ impl Frame {
             current: current.into(),
             style: assets::style_url(),
             icon: assets::ICON_PATH,
+            preview: None,
         }
     }
 }

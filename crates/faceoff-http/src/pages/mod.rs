@@ -10,6 +10,7 @@ mod baselines;
 mod board;
 mod chart;
 mod comparison;
+mod docs;
 mod evaluation;
 mod feed;
 mod figures;
@@ -19,6 +20,7 @@ mod join;
 mod log;
 mod problems;
 mod register;
+mod robots;
 mod season;
 mod sign_in;
 mod standing;
@@ -34,10 +36,11 @@ use axum::{
     middleware,
     routing::{get, post},
 };
-use std::time::Duration;
+use serde_json::Value;
+use std::{sync::Arc, time::Duration};
 
-/// All pages and their assets.
-pub(crate) fn router(patience: Duration) -> Router<App> {
+/// All pages and their assets. `api` is the API's OpenAPI document, which the documentation shows.
+pub(crate) fn router(patience: Duration, api: Arc<Value>) -> Router<App> {
     Router::new()
         .route("/", get(board::overall))
         .route("/tasks/{task}", get(board::by_task))
@@ -56,6 +59,8 @@ pub(crate) fn router(patience: Duration) -> Router<App> {
         .route("/register", get(register::page).post(register::submit))
         .route("/log", get(log::page))
         .route(feed::FEED_PATH, get(feed::feed))
+        .route("/robots.txt", get(robots::robots))
+        .merge(docs::router(api))
         .route(assets::STYLE_PATH, get(assets::style))
         .route(assets::ICON_PATH, get(assets::icon))
         .layer(middleware::from_fn_with_state(patience, layers::time_out))

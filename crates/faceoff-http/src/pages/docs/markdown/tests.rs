@@ -1,0 +1,128 @@
+use super::*;
+
+struct OnePage;
+
+impl Site for OnePage {
+    fn page(&self, file: &str) -> Option<(&str, String)> {
+        (file == "rules.md").then(|| ("The rules", "/docs/rules".into()))
+    }
+
+    fn picture(&self, file: &str) -> Option<String> {
+        (file == "images/robot.svg").then(|| "/docs/images/robot.svg".into())
+    }
+}
+
+fn html(markdown: &str) -> String {
+    document(markdown, "/docs/page", "Page", &OnePage).html
+}
+
+#[test]
+fn html_is_shown_as_text() {
+    let page = html(
+        "# A <b>\n\nx <script>alert(1)</script> [<i>](#a) ![<u>](images/robot.svg)\n\n<div onclick=\"x\">\n</div>\n",
+    );
+    for raw in ["<b>", "<script", "<i>", "<u>", "<div onclick"] {
+        assert!(!page.contains(raw), "{page}");
+    }
+    assert!(
+        page.contains("&lt;script&gt;alert(1)&lt;/script&gt;"),
+        "{page}"
+    );
+    let told = prose("a <b> [`Item`] `<PATH>`");
+    assert_eq!(
+        told.html,
+        "<p>a &lt;b&gt; <code>Item</code> <code>&lt;PATH&gt;</code></p>\n"
+    );
+    assert_eq!(told.plain, "a <b> Item <PATH>");
+}
+
+#[test]
+fn links_lead_to_pages_of_this_site_or_name_a_file() {
+    for (markdown, link) in [
+        (
+            "[rules.md](rules.md)",
+            r#"<a href="/docs/rules">The rules</a>"#,
+        ),
+        (
+            "[who](rules.md#who-leaves)",
+            r#"<a href="/docs/rules#who-leaves">who</a>"#,
+        ),
+        ("[here](#there)", r##"<a href="#there">here</a>"##),
+        (
+            "[Rust](https://rustup.rs)",
+            r#"<a href="https://rustup.rs">Rust</a>"#,
+        ),
+        (
+            "[agents/examples](../agents/examples/README.md)",
+            "<code>agents/examples/README.md</code>",
+        ),
+        (
+            "[the *list*](../docker/list.txt)",
+            "the <em>list</em> (<code>docker/list.txt</code>)",
+        ),
+        ("[x](javascript:alert)", "x (<code>javascript:alert</code>)"),
+    ] {
+        assert_eq!(html(markdown), format!("<p>{link}</p>\n"), "{markdown}");
+    }
+}
+
+#[test]
+fn headings_have_the_ids_that_github_gives_them() {
+    for (heading, id) in [
+        (
+            "The day: its cut and its release",
+            "the-day-its-cut-and-its-release",
+        ),
+        ("What is `kept`?", "what-is-kept"),
+        ("Time – measured, fairly", "time--measured-fairly"),
+        ("Über snake_case", "über-snake_case"),
+    ] {
+        let markdown = format!("## {heading}\n\n## {heading}\n");
+        let rendered = document(&markdown, "/docs/page", "Page", &OnePage);
+        let ids: Vec<&str> = rendered
+            .contents
+            .iter()
+            .map(|entry| entry.id.as_str())
+            .collect();
+        assert_eq!(ids, [id, &format!("{id}-1")]);
+    }
+}
+
+#[test]
+fn tables_scroll_by_themselves_and_align_by_class() {
+    let page = html("## Masses\n\n| what | kg |\n|---|--:|\n| puck | 0.01 |\n");
+    assert!(
+        page.contains(
+            r#"<div class="wide" role="region" aria-label="Table 1: Masses" tabindex="0">"#
+        )
+    );
+    assert!(
+        page.contains(r#"<th scope="col" class="number">kg</th>"#),
+        "{page}"
+    );
+    assert!(page.contains(r#"<td class="number">0.01</td>"#), "{page}");
+    assert!(!page.contains("style="));
+}
+
+#[test]
+fn sections_hold_the_words_below_their_headings() {
+    let rendered = document(
+        "# Page\n\nIntro\nhere.\n\n## One\n\nA **b**c.\n\n- d\n- e\n\n### Two\n\n```\ncode\n```\n\n| x | y |\n|---|---|\n| [rules.md](rules.md) | 2 |\n",
+        "/docs/page",
+        "Page",
+        &OnePage,
+    );
+    let sections: Vec<(&str, &str, &str)> = rendered
+        .sections
+        .iter()
+        .map(|section| (&*section.heading, &*section.href, &*section.text))
+        .collect();
+    assert_eq!(
+        sections,
+        [
+            ("Page", "/docs/page", "Intro here."),
+            ("One", "/docs/page#one", "A bc. d e"),
+            ("Two", "/docs/page#two", "code x y The rules 2"),
+        ]
+    );
+}
