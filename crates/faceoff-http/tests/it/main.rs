@@ -17,6 +17,7 @@ mod capacity_log;
 mod comparisons;
 mod days;
 mod divisions;
+mod docs;
 mod downloads;
 mod evaluations;
 mod event_stream;

@@ -181,6 +181,13 @@ impl Site {
         self
     }
 
+    /// The same server, which knows the address that others know it by.
+    pub async fn at(mut self, public_url: &str) -> Self {
+        self.config.public_url = Some(public_url.to_owned());
+        self.restart().await;
+        self
+    }
+
     pub async fn start_with(limits: HttpLimits) -> Self {
         Self::configured(limits, None).await
     }

@@ -21,6 +21,8 @@ pub(super) struct Reference {
     pub(super) about: Prose,
     pub(super) groups: Vec<Group>,
     pub(super) schemas: Vec<Schema>,
+    /// The answers of many operations, by name.
+    pub(super) answers: Vec<Answer>,
     /// How to show that one may ask, by name.
     pub(super) tokens: Vec<(String, Prose)>,
 }
@@ -44,6 +46,8 @@ pub(super) struct Operation {
     pub(super) parameters: Vec<Parameter>,
     pub(super) body: Option<Body>,
     pub(super) answers: Vec<Answer>,
+    /// Those that other operations have, too: by status the name in [`Reference::answers`].
+    pub(super) shared: Vec<(String, String)>,
 }
 
 /// Who may ask.
@@ -69,7 +73,8 @@ pub(super) struct Body {
 
 #[derive(Debug)]
 pub(super) struct Answer {
-    pub(super) status: String,
+    /// Its status; of one that many operations have, its name.
+    pub(super) name: String,
     pub(super) about: Prose,
     pub(super) media: Vec<Media>,
     pub(super) headers: Vec<String>,
@@ -141,6 +146,9 @@ impl Reference {
             schemas: entries(&components["schemas"])
                 .map(|(name, schema)| Schema::of(name, schema))
                 .collect(),
+            answers: entries(&components["responses"])
+                .map(|(name, answer)| Answer::of(name, answer))
+                .collect(),
             tokens: tokens.collect(),
         }
     }
@@ -172,12 +180,12 @@ fn operations(document: &Value, tag: &str) -> Vec<Operation> {
         methods.map(move |(method, operation)| (path, method, operation))
     });
     all.filter(|(_, _, operation)| list(&operation["tags"]).any(|one| one == tag))
-        .map(|(path, method, operation)| Operation::of(document, path, method, operation))
+        .map(|(path, method, operation)| Operation::of(path, method, operation))
         .collect()
 }
 
 impl Operation {
-    fn of(document: &Value, path: &str, method: &str, operation: &Value) -> Self {
+    fn of(path: &str, method: &str, operation: &Value) -> Self {
         let parameters = list(&operation["parameters"]).map(|parameter| Parameter {
             place: text(&parameter["in"]),
             field: Field {
@@ -192,17 +200,14 @@ impl Operation {
             about: about(body),
             media: media(body),
         });
-        let answers = entries(&operation["responses"]).map(|(status, answer)| {
-            let answer = resolved(document, answer);
-            Answer {
-                status: status.clone(),
-                about: about(answer),
-                media: media(answer),
-                headers: entries(&answer["headers"])
-                    .map(|(name, _)| name.clone())
-                    .collect(),
-            }
-        });
+        let (shared, own): (Vec<_>, Vec<_>) =
+            entries(&operation["responses"]).partition(|(_, answer)| answer["$ref"].is_string());
+        let shared = shared
+            .into_iter()
+            .map(|(status, answer)| (status.clone(), last(&answer["$ref"])));
+        let answers = own
+            .into_iter()
+            .map(|(status, answer)| Answer::of(status, answer));
         Self {
             id: text(&operation["operationId"]),
             method: method.to_uppercase(),
@@ -213,6 +218,7 @@ impl Operation {
             parameters: parameters.collect(),
             body,
             answers: answers.collect(),
+            shared: shared.collect(),
         }
     }
 
@@ -222,6 +228,18 @@ impl Operation {
         let told = [&self.summary, &self.about].map(|told| told.plain.clone());
         let told = told.into_iter().chain(parameters);
         told.collect::<Vec<_>>().join(" ")
+    }
+}
+
+impl Answer {
+    fn of(name: &str, answer: &Value) -> Self {
+        let headers = entries(&answer["headers"]).map(|(name, _)| name.clone());
+        Self {
+            name: name.to_owned(),
+            about: about(answer),
+            media: media(answer),
+            headers: headers.collect(),
+        }
     }
 }
 
@@ -281,7 +299,7 @@ impl Variant {
     }
 }
 
-/// What a body or an answer may be. Of a problem all that matters is its status.
+/// What a body or an answer may be.
 fn media(body: &Value) -> Vec<Media> {
     let media = entries(&body["content"]).map(|(name, content)| Media {
         name: name.clone(),
@@ -290,14 +308,10 @@ fn media(body: &Value) -> Vec<Media> {
     media.collect()
 }
 
-/// What stands where a reference points, of this document.
-fn resolved<'a>(document: &'a Value, value: &'a Value) -> &'a Value {
-    let pointer = value["$ref"]
-        .as_str()
-        .and_then(|name| name.strip_prefix('#'));
-    pointer
-        .and_then(|pointer| document.pointer(pointer))
-        .unwrap_or(value)
+/// Of a reference the name that it ends with.
+fn last(reference: &Value) -> String {
+    let name = reference.as_str().and_then(|path| path.rsplit('/').next());
+    name.unwrap_or_default().to_owned()
 }
 
 fn list(value: &Value) -> impl Iterator<Item = &Value> {

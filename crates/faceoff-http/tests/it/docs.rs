@@ -1,0 +1,309 @@
+//! The documentation on the site: every page, every link of it, and the search.
+
+use crate::site::{Answer, Site};
+use reqwest::Method;
+use scraper::{Html, Selector};
+use std::collections::{BTreeMap, BTreeSet};
+
+const DOCUMENTS: [&str; 15] = [
+    "start",
+    "rules",
+    "protocol",
+    "robot",
+    "python",
+    "sandbox",
+    "tournament",
+    "dataset",
+    "verifying",
+    "archive",
+    "cli",
+    "api",
+    "simulator",
+    "security",
+    "operating",
+];
+/// Bytes of a page before it is compressed; a phone on a slow line gets a quarter of them.
+const LARGEST_PAGE: usize = 150_000;
+
+fn all<'a>(page: &'a Html, selector: &str) -> Vec<scraper::ElementRef<'a>> {
+    page.select(&Selector::parse(selector).unwrap()).collect()
+}
+
+fn attributes(page: &Html, selector: &str, name: &str) -> Vec<String> {
+    let elements = all(page, selector);
+    let values = elements.iter().filter_map(|element| element.attr(name));
+    values.map(str::to_owned).collect()
+}
+
+fn words(element: scraper::ElementRef<'_>) -> String {
+    let texts = element.text().flat_map(str::split_whitespace);
+    texts.collect::<Vec<_>>().join(" ")
+}
+
+async fn read(site: &Site, path: &str) -> Html {
+    let answer = site.get(path, None).await;
+    assert_eq!(answer.status, 200, "{path}: {}", answer.body);
+    assert_eq!(answer.header("content-type"), "text/html; charset=utf-8");
+    Html::parse_document(&answer.body)
+}
+
+async fn search(site: &Site, question: &str) -> Html {
+    let query = [("q", question)];
+    let request = site.request(Method::GET, "/docs/search", None);
+    let answer = Answer::of(request.query(&query).send().await.unwrap()).await;
+    assert_eq!(answer.status, 200, "{}", answer.body);
+    Html::parse_document(&answer.body)
+}
+
+#[tokio::test]
+async fn every_link_of_the_documentation_leads_somewhere() {
+    let site = Site::start().await;
+    let mut open = vec!["/docs".to_owned()];
+    let mut ids: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    let mut links: Vec<(String, String)> = Vec::new();
+    while let Some(path) = open.pop() {
+        if ids.contains_key(&path) {
+            continue;
+        }
+        let answer = site.get(&path, None).await;
+        assert_eq!(answer.status, 200, "{path}, linked from {links:?}");
+        if !path.starts_with("/docs") || path.starts_with("/docs/images/") {
+            ids.insert(path, BTreeSet::new());
+            continue;
+        }
+        assert!(
+            answer.body.len() < LARGEST_PAGE,
+            "{path}: {} bytes",
+            answer.body.len()
+        );
+        let page = Html::parse_document(&answer.body);
+        assert_eq!(all(&page, "h1").len(), 1, "{path}");
+        // What the pages' policy would not run or show, and what would be another's.
+        for never in ["script", "style", "[style]", "[onclick]", "iframe"] {
+            assert_eq!(all(&page, never).len(), 0, "{path}: {never}");
+        }
+        for picture in attributes(&page, "img", "src") {
+            assert!(picture.starts_with('/'), "{path}: {picture}");
+            open.push(picture);
+        }
+        let own = attributes(&page, "[id]", "id");
+        let unique: BTreeSet<String> = own.iter().cloned().collect();
+        assert_eq!(unique.len(), own.len(), "{path}: an id twice in {own:?}");
+        for labelled in attributes(&page, "[aria-labelledby]", "aria-labelledby") {
+            assert!(unique.contains(&labelled), "{path}: {labelled}");
+        }
+        // A table that is too wide scrolls in a region of its own, which the keyboard reaches.
+        let tables = all(&page, "table").len();
+        let regions = all(&page, r#".wide[role="region"][tabindex="0"] > table"#);
+        assert_eq!(regions.len(), tables, "{path}");
+        let mut names = attributes(&page, r#"[role="region"]"#, "aria-label");
+        names.extend(attributes(&page, r#"[role="region"]"#, "aria-labelledby"));
+        let different: BTreeSet<&String> = names.iter().collect();
+        assert_eq!(different.len(), tables, "{path}: {names:?}");
+        ids.insert(path.clone(), unique);
+        for link in attributes(&page, "a", "href") {
+            if link.starts_with("http://") || link.starts_with("https://") {
+                continue;
+            }
+            let (to, anchor) = link.split_once('#').unwrap_or((&link, ""));
+            let to = if to.is_empty() { &path } else { to };
+            assert!(to.starts_with('/'), "{path}: {link}");
+            // These ask who is there.
+            if to != "/account" {
+                open.push(to.to_owned());
+            }
+            if !anchor.is_empty() {
+                links.push((path.clone(), format!("{to}#{anchor}")));
+            }
+        }
+    }
+    for (from, link) in links {
+        let (to, anchor) = link.split_once('#').unwrap();
+        assert!(ids[to].contains(anchor), "{from}: nothing is at {link}");
+    }
+    for name in DOCUMENTS {
+        assert!(ids.contains_key(&format!("/docs/{name}")), "{name}");
+    }
+    for path in ["/docs/api-reference/public", "/docs/api-reference/schemas"] {
+        assert!(ids.contains_key(path), "{path}");
+    }
+    assert!(ids.contains_key("/docs/images/robot.svg"));
+}
+
+#[tokio::test]
+async fn the_reference_has_every_operation_and_every_type() {
+    let site = Site::start().await;
+    let document = site.get("/api/v1/openapi.json", None).await.json(200);
+    let mut shown = BTreeSet::new();
+    for tag in document["tags"].as_array().unwrap() {
+        let tag = tag["name"].as_str().unwrap();
+        let page = read(&site, &format!("/docs/api-reference/{tag}")).await;
+        shown.extend(all(&page, "h2").into_iter().map(words));
+    }
+    let mut told = BTreeSet::new();
+    for (path, methods) in document["paths"].as_object().unwrap() {
+        for method in methods.as_object().unwrap().keys() {
+            told.insert(format!("{} {path}", method.to_uppercase()));
+        }
+    }
+    assert_eq!(shown, told);
+    let page = read(&site, "/docs/api-reference/schemas").await;
+    let listed: BTreeSet<String> = all(&page, "dt").into_iter().map(words).collect();
+    let schemas = document["components"]["schemas"].as_object().unwrap();
+    let schemas: BTreeSet<String> = schemas.keys().cloned().collect();
+    assert_eq!(listed, schemas);
+    // An operation as somebody reads it.
+    let page = read(&site, "/docs/api-reference/public").await;
+    let sections = all(&page, ".operation");
+    let board = sections.into_iter().map(words);
+    let board = board
+        .into_iter()
+        .find(|section| section.starts_with("GET /api/v1/board #"))
+        .unwrap();
+    for told in [
+        "The overall board.",
+        "Without a token, or with one of: team or organiser.",
+        "stage query StageId Whose;",
+        "200 as asked BoardView text/csv: string",
+        "404 no such stage, revision or division, or no result of that day Problem",
+    ] {
+        assert!(board.contains(told), "{told}: {board}");
+    }
+}
+
+#[tokio::test]
+async fn a_search_finds_sections_and_marks_the_words() {
+    let site = Site::start().await;
+    let page = search(&site, "Frozen BOARDS").await;
+    let first = all(&page, ".found li a")[0];
+    assert_eq!(first.attr("href"), Some("/docs/api#frozen-boards"));
+    assert_eq!(words(first), "Frozen boards");
+    let marked: Vec<String> = first
+        .select(&Selector::parse("mark").unwrap())
+        .map(words)
+        .collect();
+    assert_eq!(marked, ["Frozen", "boards"]);
+    // Operations and types, too.
+    let page = search(&site, "BoardView").await;
+    let links = attributes(&page, ".found li a", "href");
+    assert_eq!(links[0], "/docs/api-reference/schemas/BoardView");
+
+    let page = search(&site, "quidditch").await;
+    let said = words(all(&page, "main")[0]);
+    assert!(said.contains("Nothing was found for “quidditch”"), "{said}");
+    let page = search(&site, "").await;
+    let said = words(all(&page, "main")[0]);
+    assert!(said.contains("Say what to look for"), "{said}");
+}
+
+#[tokio::test]
+async fn a_question_is_shown_as_text_and_is_bounded() {
+    let site = Site::start().await;
+    let question = "<script>alert(\"1\")</script>";
+    let page = search(&site, question).await;
+    assert_eq!(all(&page, "script").len(), 0);
+    assert_eq!(attributes(&page, "#q", "value"), [question]);
+    assert!(words(all(&page, "main")[0]).contains(question));
+
+    let longest = "ä".repeat(200);
+    search(&site, &longest).await;
+    let longer = format!("/docs/search?q={}", "a".repeat(201));
+    let answer = site.get(&longer, None).await;
+    assert_eq!(answer.status, 400);
+    assert_eq!(answer.header("content-type"), "text/html; charset=utf-8");
+    let said = "q: expected at most 200 characters to look for, got 201";
+    assert!(answer.body.contains(said), "{}", answer.body);
+}
+
+#[tokio::test]
+async fn what_the_documentation_has_not_is_a_page_that_says_so() {
+    let site = Site::start().await;
+    for (path, said) in [
+        ("/docs/nothing", "the documentation has no page nothing"),
+        ("/docs/start.md", "the documentation has no page start.md"),
+        ("/docs/api-reference/nobody", "no operations named nobody"),
+        ("/docs/api-reference/schemas/Nothing", "no schema Nothing"),
+        ("/docs/images/nothing.svg", "no picture nothing.svg"),
+    ] {
+        let answer = site.get(path, None).await;
+        assert_eq!(answer.status, 404, "{path}");
+        assert!(answer.body.contains(said), "{path}: {}", answer.body);
+    }
+}
+
+#[tokio::test]
+async fn who_has_a_page_is_told_so() {
+    let site = Site::start().await;
+    for path in [
+        "/docs",
+        "/docs/rules",
+        "/docs/api-reference",
+        "/docs/search?q=puck",
+        "/docs/images/board.png",
+    ] {
+        let answer = site.get(path, None).await;
+        let request = site.request(Method::GET, path, None);
+        let request = request.header("if-none-match", answer.header("etag"));
+        let known = Answer::of(request.send().await.unwrap()).await;
+        assert_eq!((known.status.as_u16(), &*known.body), (304, ""), "{path}");
+        for header in ["etag", "cache-control"] {
+            assert_eq!(known.header(header), answer.header(header), "{path}");
+        }
+        assert!(answer.header("cache-control").starts_with("public"));
+    }
+}
+
+#[tokio::test]
+async fn a_link_that_is_shared_has_a_title_and_the_board() {
+    let site = Site::start().await;
+    let of = |page: &Html, property: &str| {
+        attributes(page, &format!(r#"meta[property="{property}"]"#), "content")
+    };
+    let page = read(&site, "/docs/robot").await;
+    assert_eq!(of(&page, "og:title"), ["The robot and the table · Faceoff"]);
+    assert_eq!(of(&page, "og:type"), ["website"]);
+    assert_eq!(
+        of(&page, "og:description"),
+        attributes(&page, r#"meta[name="description"]"#, "content")
+    );
+    // Its address is none that previews could use: the server does not know its own.
+    assert_eq!(of(&page, "og:image"), [""; 0]);
+
+    let site = site.at("https://faceoff.example.org").await;
+    for path in ["/", "/docs", "/season"] {
+        let page = read(&site, path).await;
+        let [picture] = &of(&page, "og:image")[..] else {
+            panic!("{path} has one picture");
+        };
+        let at = picture.strip_prefix("https://faceoff.example.org").unwrap();
+        let answer = site.get(at, None).await;
+        assert_eq!(answer.status, 200);
+        assert_eq!(answer.header("content-type"), "image/png");
+    }
+}
+
+#[tokio::test]
+async fn robots_read_pages_and_documentation_alone() {
+    let site = Site::start().await;
+    let answer = site.get("/robots.txt", None).await;
+    assert_eq!(answer.status, 200);
+    assert_eq!(answer.header("content-type"), "text/plain; charset=utf-8");
+    let refused: BTreeSet<&str> = answer
+        .body
+        .lines()
+        .filter_map(|line| line.strip_prefix("Disallow: "))
+        .collect();
+    for path in ["/api/", "/account", "/sign-in", "/join", "/log"] {
+        assert!(refused.contains(path), "{path}: {}", answer.body);
+    }
+    for path in [
+        "/",
+        "/docs/rules",
+        "/season",
+        "/tasks/hit",
+        "/evaluations/1",
+    ] {
+        let is_refused = refused.iter().any(|prefix| path.starts_with(prefix));
+        assert!(!is_refused, "{path}: {}", answer.body);
+    }
+}
