@@ -1,0 +1,73 @@
+import { ClipError } from "./error";
+
+/**
+ * Reads fields of a clip's header, each by the type that it must have. A message names the field by its
+ * path, so that whoever writes clips finds the fault at once.
+ */
+export class Fields {
+  private constructor(
+    private readonly value: Readonly<Record<string, unknown>>,
+    private readonly path: string,
+  ) {}
+
+  static of(value: unknown, path: string): Fields {
+    if (typeof value !== "object" || value === null || Array.isArray(value)) {
+      throw new ClipError(`${path} must be an object`);
+    }
+    return new Fields(value as Record<string, unknown>, path);
+  }
+
+  has(name: string): boolean {
+    return this.value[name] !== undefined && this.value[name] !== null;
+  }
+
+  text(name: string): string {
+    const value = this.value[name];
+    if (typeof value !== "string") throw this.wrong(name, "text");
+    return value;
+  }
+
+  number(name: string): number {
+    const value = this.value[name];
+    if (typeof value !== "number" || !Number.isFinite(value)) throw this.wrong(name, "a number");
+    return value;
+  }
+
+  /** A whole number from `least` to `most`. */
+  whole(name: string, least: number, most: number): number {
+    const value = this.number(name);
+    if (!Number.isInteger(value) || value < least || value > most) {
+      throw this.wrong(name, `a whole number from ${least} to ${most}`);
+    }
+    return value;
+  }
+
+  flag(name: string): boolean {
+    const value = this.value[name];
+    if (typeof value !== "boolean") throw this.wrong(name, "true or false");
+    return value;
+  }
+
+  /** The entries of a list; none where the field is absent. */
+  list(name: string): { at: string; value: unknown }[] {
+    if (!this.has(name)) return [];
+    const value = this.value[name];
+    if (!Array.isArray(value)) throw this.wrong(name, "a list");
+    return value.map((entry: unknown, i) => ({ at: `${this.path}.${name}[${i}]`, value: entry }));
+  }
+
+  objects(name: string): Fields[] {
+    return this.list(name).map((entry) => Fields.of(entry.value, entry.at));
+  }
+
+  inside(name: string): Fields {
+    return Fields.of(this.value[name], `${this.path}.${name}`);
+  }
+
+  wrong(name: string, expected: string): ClipError {
+    const came = JSON.stringify(this.value[name]) as string | undefined;
+    return new ClipError(
+      `${this.path}.${name} must be ${expected}, but is ${came === undefined ? "missing" : came.slice(0, 40)}`,
+    );
+  }
+}

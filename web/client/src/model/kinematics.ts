@@ -1,0 +1,118 @@
+import { JOINTS, MODEL } from "./model";
+
+/** A frame: rotation (row-major) and origin, in one array of twelve: r00 r01 r02 r10 … r22 x y z. */
+export type Frame = Float64Array;
+
+/** Angles of hinges, rad. */
+export type Angles = ArrayLike<number>;
+
+const LINK_FRAMES: readonly Frame[] = MODEL.links.map((link) =>
+  fixed(link.orientation_wxyz, link.position_m),
+);
+
+/** A mallet that hangs straight down, as the universal joint's controller keeps it. */
+const DOWNWARDS = [1, 0, 0, 0, -1, 0, 0, 0, -1];
+
+/** Angles of a universal joint that nobody wrote down: the mallet is taken to hang straight down. */
+export const UNWRITTEN: Angles = [NaN, NaN];
+
+/**
+ * Forward kinematics of one arm in the table frame. The frames belong to the instance and are written anew by
+ * each `set`: a replay asks for them sixty times a second, and must not make garbage of them.
+ */
+export class Kinematics {
+  /** Link frames 1 … 7, turned by their joints. */
+  readonly links: readonly Frame[] = Array.from({ length: JOINTS }, () => new Float64Array(12));
+  /** The end effector ("striker joint link"), fixed on link 7. */
+  readonly endEffector: Frame = new Float64Array(12);
+  /** The mallet, on the universal joint; its cylinder lies along its z. */
+  readonly mallet: Frame = new Float64Array(12);
+  /** Centre of the mallet's cylinder. */
+  readonly malletCentre = new Float64Array(3);
+  readonly base: Frame;
+
+  /** `side` 0: robot 1 at negative x; 1: robot 2, opposite, turned by half a turn. */
+  constructor(readonly side: 0 | 1) {
+    const base = MODEL.bases[side];
+    const cos = Math.round(Math.cos(base.turn_rad));
+    this.base = new Float64Array([cos, 0, 0, 0, cos, 0, 0, 0, 1, base.x_m, base.y_m, base.z_m]);
+  }
+
+  set(q: Angles, universal: Angles = UNWRITTEN): void {
+    let parent = this.base;
+    for (let i = 0; i < JOINTS; i++) {
+      compose(parent, LINK_FRAMES[i], this.links[i]);
+      turnZ(this.links[i], q[i]);
+      parent = this.links[i];
+    }
+    const ee = this.endEffector;
+    ee.set(parent);
+    along(parent, MODEL.end_effector_z_m, ee, 9);
+    this.mallet.set(ee);
+    if (Number.isNaN(universal[0])) {
+      this.mallet.set(DOWNWARDS);
+    } else {
+      // Hinge y, then hinge x.
+      turnY(this.mallet, universal[0]);
+      turnX(this.mallet, universal[1]);
+    }
+    along(this.mallet, MODEL.mallet.centre_z_m, this.malletCentre, 0);
+  }
+
+  /** A height of the table frame in the robot's base frame, in which the constraints are written. */
+  heightAboveBase(z: number): number {
+    return z - this.base[11];
+  }
+}
+
+/** The point at distance z along a frame's z. */
+function along(frame: Frame, z: number, out: Float64Array, at: number): void {
+  out[at] = frame[9] + frame[2] * z;
+  out[at + 1] = frame[10] + frame[5] * z;
+  out[at + 2] = frame[11] + frame[8] * z;
+}
+
+function compose(a: Frame, b: Frame, out: Frame): void {
+  for (let row = 0; row < 3; row++) {
+    const r = row * 3;
+    for (let column = 0; column < 3; column++) {
+      out[r + column] = a[r] * b[column] + a[r + 1] * b[3 + column] + a[r + 2] * b[6 + column];
+    }
+    out[9 + row] = a[9 + row] + a[r] * b[9] + a[r + 1] * b[10] + a[r + 2] * b[11];
+  }
+}
+
+function turnZ(frame: Frame, angle: number): void {
+  mix(frame, 0, 1, angle);
+}
+
+function turnY(frame: Frame, angle: number): void {
+  mix(frame, 2, 0, angle);
+}
+
+function turnX(frame: Frame, angle: number): void {
+  mix(frame, 1, 2, angle);
+}
+
+/** Turns the frame about its own third axis, from its column `u` towards its column `v`. */
+function mix(frame: Frame, u: number, v: number, angle: number): void {
+  const cos = Math.cos(angle);
+  const sin = Math.sin(angle);
+  for (let row = 0; row < 9; row += 3) {
+    const a = frame[row + u];
+    const b = frame[row + v];
+    frame[row + u] = a * cos + b * sin;
+    frame[row + v] = b * cos - a * sin;
+  }
+}
+
+function fixed(orientation: readonly number[], position: readonly number[]): Frame {
+  const [w, x, y, z] = orientation;
+  const [px, py, pz] = position;
+  return new Float64Array([
+    1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+    2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+    2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y),
+    px, py, pz,
+  ]); // prettier-ignore
+}

@@ -1,0 +1,45 @@
+import type { Angles, Kinematics } from "./kinematics";
+import { JOINTS, MODEL, RANGES, VELOCITY_LIMITS } from "./model";
+
+const LIMITS = MODEL.constraints;
+
+/** Least distance of a joint from 95 % of its range, rad; negative beyond it. */
+export function jointPositionMargin(q: Angles): number {
+  let least = Infinity;
+  for (let i = 0; i < JOINTS; i++)
+    least = Math.min(least, LIMITS.limit_fraction * RANGES[i] - Math.abs(q[i]));
+  return least;
+}
+
+/** Least distance of a joint velocity from 95 % of its limit, rad/s. */
+export function jointVelocityMargin(dq: Angles): number {
+  let least = Infinity;
+  for (let i = 0; i < JOINTS; i++) {
+    least = Math.min(least, LIMITS.limit_fraction * VELOCITY_LIMITS[i] - Math.abs(dq[i]));
+  }
+  return least;
+}
+
+/** A joint's speed as a share of its limit. */
+export function velocityShare(joint: number, velocity: number): number {
+  return Math.abs(velocity) / VELOCITY_LIMITS[joint];
+}
+
+/** Distance of the end effector's height from the edge of its tolerance, m. */
+export function heightMargin(arm: Kinematics): number {
+  const height = arm.heightAboveBase(arm.endEffector[11]);
+  return LIMITS.ee_height_tolerance_m - Math.abs(height - LIMITS.ee_height_m);
+}
+
+/** Distance of the end effector from the nearest edge of its part of the table, m: the own short side and both long ones. */
+export function tableMargin(arm: Kinematics): number {
+  const { half_length_m, half_width_m } = MODEL.table;
+  const radius = MODEL.mallet.radius_m;
+  const forward = arm.side === 0 ? arm.endEffector[9] : -arm.endEffector[9];
+  return Math.min(forward + (half_length_m - radius), half_width_m - radius - Math.abs(arm.endEffector[10]));
+}
+
+/** Height of the lower of elbow (link 4) and wrist (link 7) above what is allowed, m. */
+export function linkMargin(arm: Kinematics): number {
+  return arm.heightAboveBase(Math.min(arm.links[3][11], arm.links[6][11])) - LIMITS.link_height_m;
+}

@@ -1,0 +1,20 @@
+/** Cubic through p0 with slope v0 and p1 with slope v1, `h` apart, at `tau` from the first. */
+export function hermite(p0: number, v0: number, p1: number, v1: number, h: number, tau: number): number {
+  const s = tau / h;
+  const s2 = s * s;
+  const s3 = s2 * s;
+  return (
+    p0 * (2 * s3 - 3 * s2 + 1) + v0 * h * (s3 - 2 * s2 + s) + p1 * (3 * s2 - 2 * s3) + v1 * h * (s3 - s2)
+  );
+}
+
+/** Parabola through both points that starts with slope v0. */
+export function leaving(p0: number, v0: number, p1: number, h: number, tau: number): number {
+  const s = tau / h;
+  return p0 + v0 * tau + (p1 - p0 - v0 * h) * s * s;
+}
+
+/** Parabola through both points that ends with slope v1. */
+export function arriving(p0: number, p1: number, v1: number, h: number, tau: number): number {
+  return leaving(p1, -v1, p0, h, h - tau);
+}

@@ -1,0 +1,145 @@
+import type { Contact, Motion } from "../clip/motion";
+import { JOINTS } from "../model/model";
+import { arriving, hermite, leaving } from "./hermite";
+
+/** One arm's joints at an instant. */
+export interface ArmPose {
+  readonly q: Float64Array;
+  readonly universal: Float64Array;
+}
+
+/** Everything drawn at an instant; one instance is written again and again. */
+export interface Pose {
+  x: number;
+  y: number;
+  yaw: number;
+  readonly arms: readonly [ArmPose, ArmPose];
+}
+
+export function newPose(): Pose {
+  const arm = (): ArmPose => ({ q: new Float64Array(JOINTS), universal: new Float64Array(2) });
+  return { x: 0, y: 0, yaw: 0, arms: [arm(), arm()] };
+}
+
+/**
+ * Motion between samples. Puck and joints follow cubics by their velocities; where the puck touched something it
+ * passes through the recorded place of the contact instead, and where a rally ended nothing moves on to the next.
+ */
+export class Interpolation {
+  /** By interval (sample − first): index of its first contact in `contacts`, −1 for none. */
+  private readonly firstContact: Int32Array;
+  private readonly held: Uint8Array;
+
+  constructor(readonly motion: Motion) {
+    const intervals = Math.max(motion.samples - 1, 0);
+    this.firstContact = new Int32Array(intervals).fill(-1);
+    this.held = new Uint8Array(intervals);
+    motion.contacts.forEach((contact, i) => {
+      const interval = this.intervalOf(contact);
+      if (interval >= 0 && interval < intervals && this.firstContact[interval] < 0)
+        this.firstContact[interval] = i;
+    });
+    for (const end of motion.breaks) {
+      const interval = end.sample - motion.first;
+      if (interval >= 0 && interval < intervals) this.held[interval] = 1;
+    }
+  }
+
+  /** Writes the pose at `position`, in control steps from sample 0; held at the clip's ends outside of it. */
+  at(position: number, pose: Pose): void {
+    const { motion } = this;
+    const local = Math.min(Math.max(position - motion.first, 0), motion.samples - 1);
+    const from = Math.min(Math.floor(local), Math.max(motion.samples - 2, 0));
+    const still = motion.samples < 2 || (this.held[from] === 1 && local < from + 1);
+    const to = still ? from : from + 1;
+    const share = still ? 0 : local - from;
+    this.puck(from, to, share, pose);
+    for (let i = 0; i < motion.arms.length; i++) this.arm(i, from, to, share, pose.arms[i]);
+  }
+
+  private puck(from: number, to: number, share: number, pose: Pose): void {
+    const { x, y, yaw, vx, vy } = this.motion.puck;
+    const h = this.motion.stepS;
+    if (share === 0) {
+      pose.x = x[from];
+      pose.y = y[from];
+    } else if (share === 1) {
+      pose.x = x[to];
+      pose.y = y[to];
+    } else if (vx === null || vy === null) {
+      pose.x = x[from] + (x[to] - x[from]) * share;
+      pose.y = y[from] + (y[to] - y[from]) * share;
+    } else if (this.firstContact[from] >= 0) {
+      this.throughContacts(from, to, share * h, vx, vy, pose);
+    } else {
+      pose.x = hermite(x[from], vx[from], x[to], vx[to], h, share * h);
+      pose.y = hermite(y[from], vy[from], y[to], vy[to], h, share * h);
+    }
+    pose.yaw = yaw === null ? 0 : yaw[from] + nearestTurn(yaw[to] - yaw[from]) * share;
+  }
+
+  /**
+   * Through the places of the interval's contacts. Velocities are known at the samples only: the piece before the
+   * first contact starts with its sample's, the piece after the last one ends with its own, those between are straight.
+   */
+  private throughContacts(
+    from: number,
+    to: number,
+    tau: number,
+    vx: Float64Array,
+    vy: Float64Array,
+    pose: Pose,
+  ): void {
+    const { puck, contacts, stepS } = this.motion;
+    const start = (from + this.motion.first) * stepS;
+    let t0 = 0;
+    let x0 = puck.x[from];
+    let y0 = puck.y[from];
+    let atSample = true;
+    for (let i = this.firstContact[from]; i < contacts.length && this.intervalOf(contacts[i]) === from; i++) {
+      const contact = contacts[i];
+      const t1 = contact.t - start;
+      if (tau < t1) {
+        const h = t1 - t0;
+        if (atSample) {
+          pose.x = leaving(x0, vx[from], contact.x, h, tau);
+          pose.y = leaving(y0, vy[from], contact.y, h, tau);
+        } else {
+          pose.x = x0 + ((contact.x - x0) * (tau - t0)) / h;
+          pose.y = y0 + ((contact.y - y0) * (tau - t0)) / h;
+        }
+        return;
+      }
+      t0 = t1;
+      x0 = contact.x;
+      y0 = contact.y;
+      atSample = false;
+    }
+    pose.x = arriving(x0, puck.x[to], vx[to], stepS - t0, tau - t0);
+    pose.y = arriving(y0, puck.y[to], vy[to], stepS - t0, tau - t0);
+  }
+
+  private arm(index: number, from: number, to: number, share: number, pose: ArmPose): void {
+    const { q, dq, universal } = this.motion.arms[index];
+    const h = this.motion.stepS;
+    for (let i = 0; i < JOINTS; i++) {
+      pose.q[i] =
+        dq === null
+          ? q[i][from] + (q[i][to] - q[i][from]) * share
+          : hermite(q[i][from], dq[i][from], q[i][to], dq[i][to], h, from === to ? 0 : share * h);
+    }
+    for (let i = 0; i < 2; i++) {
+      pose.universal[i] =
+        universal === null ? NaN : universal[i][from] + (universal[i][to] - universal[i][from]) * share;
+    }
+  }
+
+  private intervalOf(contact: Contact): number {
+    return Math.floor(contact.t / this.motion.stepS) - this.motion.first;
+  }
+}
+
+/** The same turn by less than half a revolution. */
+function nearestTurn(angle: number): number {
+  return angle - Math.round(angle / (2 * Math.PI)) * 2 * Math.PI;
+}
