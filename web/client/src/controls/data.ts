@@ -1,0 +1,108 @@
+import { columnName, columnsOf, csvOf } from "../replay/csv";
+import type { Part } from "../replay/source";
+import { button, h } from "./dom";
+import { fixed } from "./words";
+
+/** Samples before and after the cursor. */
+const AROUND = 5;
+
+/** The samples around the cursor as a table, and all of them as a file. */
+export class DataTable {
+  readonly element: HTMLDetailsElement;
+  private readonly head = h("tr");
+  private readonly body = h("tbody");
+  private part: Part | null = null;
+  private cells: HTMLElement[][] = [];
+  private rows: HTMLElement[] = [];
+  private step = -1;
+
+  constructor(private readonly title: string) {
+    const save = button("Save all as CSV", () => {
+      if (this.part !== null)
+        saveFile(
+          new Blob([csvOf(this.part)], { type: "text/csv" }),
+          `${fileName(this.title, this.part)}.csv`,
+        );
+    });
+    this.element = h(
+      "details",
+      { class: "data" },
+      h("summary", {}, "Data as a table"),
+      h("p", {}, save),
+      h(
+        "div",
+        {
+          class: "wide",
+          attributes: { tabindex: "0", role: "region", "aria-label": "Samples around the cursor" },
+        },
+        h("table", {}, h("thead", {}, this.head), this.body),
+      ),
+    );
+    this.element.addEventListener("toggle", () => {
+      this.fill();
+    });
+  }
+
+  show(part: Part): void {
+    this.part = part;
+    const columns = columnsOf(part);
+    this.head.replaceChildren(
+      ...["sample", "time_s", ...columns.map(columnName)].map((name) =>
+        h("th", { class: "number", attributes: { scope: "col" } }, name),
+      ),
+    );
+    this.rows = [];
+    this.cells = Array.from({ length: 2 * AROUND + 1 }, () => {
+      const sample = h("th", { class: "number", attributes: { scope: "row" } });
+      const cells = Array.from({ length: columns.length + 1 }, () => h("td", { class: "number" }));
+      this.rows.push(h("tr", {}, sample, ...cells));
+      return [sample, ...cells];
+    });
+    this.body.replaceChildren(...this.rows);
+    this.fill();
+  }
+
+  update(step: number): void {
+    if (step === this.step) return;
+    this.step = step;
+    this.fill();
+  }
+
+  private fill(): void {
+    const { part } = this;
+    if (!this.element.open || part === null) return;
+    const { first, samples, stepS } = part.motion;
+    const columns = columnsOf(part);
+    this.cells.forEach((cells, row) => {
+      const k = this.step - first + row - AROUND;
+      const there = k >= 0 && k < samples;
+      this.rows[row].hidden = !there;
+      if (!there) return;
+      if (row === AROUND) this.rows[row].setAttribute("aria-current", "step");
+      cells[0].textContent = String(first + k);
+      cells[1].textContent = fixed((first + k) * stepS, 2);
+      columns.forEach((column, i) => {
+        const value = column.values[k];
+        cells[i + 2].textContent = Number.isNaN(value) ? "–" : fixed(value, 4);
+      });
+    });
+  }
+}
+
+export function fileName(title: string, part: Part): string {
+  const words = title
+    .toLowerCase()
+    .replaceAll(/[^a-z0-9]+/g, "-")
+    .replaceAll(/^-|-$/g, "");
+  return `${words || "replay"}-${part.motion.first}`;
+}
+
+export function saveFile(content: Blob, name: string): void {
+  const address = URL.createObjectURL(content);
+  const link = h("a", { attributes: { href: address, download: name } });
+  link.click();
+  // The browser has taken it by the next turn of the event loop, or a little later.
+  setTimeout(() => {
+    URL.revokeObjectURL(address);
+  }, 10_000);
+}

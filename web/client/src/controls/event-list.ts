@@ -1,0 +1,51 @@
+import type { ReplayEvent } from "../replay/events";
+import { h } from "./dom";
+import { seconds } from "./words";
+
+/** All events as buttons that lead to them. */
+export class EventList {
+  readonly element: HTMLDetailsElement;
+  private readonly list = h("ol");
+  private readonly summary = h("summary", {}, "Events");
+  private buttons: HTMLButtonElement[] = [];
+  private events: readonly ReplayEvent[] = [];
+  private current = -1;
+
+  constructor(private readonly go: (event: ReplayEvent) => void) {
+    this.element = h("details", { class: "events", attributes: { open: "" } }, this.summary, this.list);
+  }
+
+  show(events: readonly ReplayEvent[], stepS: number, note: string): void {
+    this.events = events;
+    this.current = -1;
+    this.summary.textContent = events.length === 0 ? `No events${note}` : `Events (${events.length}${note})`;
+    this.buttons = events.map((event) =>
+      h(
+        "button",
+        {
+          attributes: { type: "button" },
+          on: {
+            click: () => {
+              this.go(event);
+            },
+          },
+        },
+        h("span", { class: "when" }, seconds(event.position, stepS)),
+        h("span", { class: `mark-sign ${event.kind}`, attributes: { "aria-hidden": "true" } }, event.sign),
+        h("span", {}, event.text),
+      ),
+    );
+    this.list.replaceChildren(...this.buttons.map((button) => h("li", {}, button)));
+  }
+
+  /** Marks the latest event at a position. */
+  update(position: number): void {
+    let current = -1;
+    while (current + 1 < this.events.length && this.events[current + 1].position <= position + 1e-6)
+      current++;
+    if (current === this.current) return;
+    this.buttons[this.current]?.removeAttribute("aria-current");
+    this.buttons[current]?.setAttribute("aria-current", "step");
+    this.current = current;
+  }
+}

@@ -1,0 +1,56 @@
+import type { Layers } from "../replay/shown";
+import { h } from "./dom";
+
+interface Choice {
+  readonly layer: Exclude<keyof Layers, "whole">;
+  readonly name: string;
+  /** A short line drawn as the picture draws it. */
+  readonly sample: string;
+}
+
+const CHOICES: readonly Choice[] = [
+  { layer: "puck", name: "Puck’s path", sample: "trail" },
+  { layer: "real", name: "Mallet’s path", sample: "real" },
+  { layer: "commanded", name: "Commanded path", sample: "commanded" },
+  { layer: "seen", name: "Observed puck", sample: "seen" },
+];
+
+/** What is drawn beside table, puck and arms. */
+export class LayerChoice {
+  readonly element: HTMLElement;
+  private readonly rows = new Map<keyof Layers, HTMLElement>();
+
+  constructor(layers: Layers, changed: () => void) {
+    const boxes = CHOICES.map(({ layer, name, sample }) => {
+      const box = h("input", { attributes: { type: "checkbox" } });
+      box.checked = layers[layer];
+      box.addEventListener("change", () => {
+        layers[layer] = box.checked;
+        changed();
+      });
+      const row = h("label", {}, box, h("span", { class: `sample ${sample}` }), name);
+      this.rows.set(layer, row);
+      return row;
+    });
+    const span = h("select", {}, h("option", {}, "last second"), h("option", {}, "whole"));
+    span.selectedIndex = layers.whole ? 1 : 0;
+    span.addEventListener("change", () => {
+      layers.whole = span.selectedIndex === 1;
+      changed();
+    });
+    this.element = h(
+      "div",
+      { class: "row layers", attributes: { role: "group", "aria-label": "Drawn" } },
+      ...boxes,
+      h("label", {}, "Paths of the ", span),
+    );
+  }
+
+  /** Choices that have nothing to show are not offered. */
+  update(has: { seen: boolean; commanded: boolean }): void {
+    const seen = this.rows.get("seen");
+    const commanded = this.rows.get("commanded");
+    if (seen !== undefined) seen.hidden = !has.seen;
+    if (commanded !== undefined) commanded.hidden = !has.commanded;
+  }
+}

@@ -1,0 +1,116 @@
+import type { Clock } from "../replay/clock";
+import type { ReplayEvent } from "../replay/events";
+import { h, say } from "./dom";
+import { seconds, stepWords } from "./words";
+
+/** More marks than this stand so close that they say nothing; the list has them all. */
+const MOST_MARKS = 300;
+
+/** The slider, and above it a mark for each event. */
+export class Timeline {
+  readonly element: HTMLElement;
+  private readonly slider = h("input", {
+    class: "slider",
+    attributes: { type: "range", min: "0", step: "1" },
+  });
+  private readonly marks = h("div", {
+    class: "marks",
+    attributes: { role: "group", "aria-label": "Events on the time line" },
+  });
+  private readonly tip = h("span", { class: "tip", attributes: { hidden: "" } });
+  private events: readonly ReplayEvent[] = [];
+  private buttons: HTMLButtonElement[] = [];
+  private last = -1;
+  private step = -1;
+
+  constructor(
+    clock: Clock,
+    private readonly go: (event: ReplayEvent) => void,
+    title: string,
+  ) {
+    this.slider.setAttribute("aria-label", `Time of ${title}`);
+    this.slider.addEventListener("input", () => {
+      clock.pause();
+      clock.seek(Number(this.slider.value));
+    });
+    // Arrow keys go from mark to mark, so that all of them take one stop of the tab key.
+    this.marks.addEventListener("keydown", (event) => {
+      const by = event.key === "ArrowRight" ? 1 : event.key === "ArrowLeft" ? -1 : 0;
+      const from = this.buttons.findIndex((mark) => mark === document.activeElement);
+      if (by === 0 || from < 0) return;
+      event.preventDefault();
+      event.stopPropagation();
+      const next = this.buttons[Math.min(Math.max(from + by, 0), this.buttons.length - 1)];
+      this.buttons[from].tabIndex = -1;
+      next.tabIndex = 0;
+      next.focus();
+    });
+    this.element = h("div", { class: "timeline" }, this.marks, this.slider);
+  }
+
+  update(step: number, last: number, stepS: number): void {
+    if (last !== this.last) {
+      this.last = last;
+      this.slider.max = String(last);
+      this.place(stepS);
+    }
+    if (step !== this.step) {
+      this.step = step;
+      this.slider.value = String(step);
+      this.slider.setAttribute("aria-valuetext", stepWords(step, last, stepS));
+    }
+  }
+
+  show(events: readonly ReplayEvent[], stepS: number): void {
+    this.events = events;
+    this.place(stepS);
+  }
+
+  private place(stepS: number): void {
+    if (this.last <= 0) return;
+    const share = (position: number): string =>
+      `${(100 * Math.min(Math.max(position / this.last, 0), 1)).toFixed(3)}%`;
+    const spans: HTMLElement[] = [];
+    this.buttons = [];
+    for (const event of this.events.slice(0, MOST_MARKS)) {
+      if (event.until > event.position) {
+        const span = h("span", { class: `span ${event.kind}` });
+        span.style.left = share(event.position);
+        span.style.width = share(event.until - event.position);
+        spans.push(span);
+      }
+      const words = `${seconds(event.position, stepS)}: ${event.text}`;
+      const mark = h(
+        "button",
+        {
+          class: `mark ${event.kind}`,
+          attributes: { type: "button", tabindex: this.buttons.length === 0 ? "0" : "-1", "aria-label": words },
+          on: {
+            click: () => {
+              this.go(event);
+            },
+            pointerenter: () => { this.tell(words, event.position); },
+            focus: () => { this.tell(words, event.position); },
+            pointerleave: () => { this.tip.hidden = true; },
+            blur: () => { this.tip.hidden = true; },
+          },
+        },
+        event.sign,
+      ); // prettier-ignore
+      mark.style.left = share(event.position);
+      this.buttons.push(mark);
+    }
+    this.marks.replaceChildren(...spans, ...this.buttons, this.tip);
+    this.marks.hidden = this.buttons.length === 0;
+  }
+
+  /** The tip stands over its mark and stays inside of the picture's width. */
+  private tell(words: string, position: number): void {
+    say(this.tip, words);
+    this.tip.hidden = false;
+    const width = this.marks.clientWidth;
+    const half = this.tip.offsetWidth / 2;
+    const centre = Math.min(Math.max((position / this.last) * width, half), Math.max(width - half, half));
+    this.tip.style.left = `${centre - half}px`;
+  }
+}

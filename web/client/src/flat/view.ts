@@ -1,0 +1,160 @@
+import type { Contest } from "../clip/motion";
+import { MODEL } from "../model/model";
+import { between, type Path } from "../motion/paths";
+import type { Palette } from "../replay/palette";
+import { trail, type Shown, type View } from "../replay/shown";
+import { drawArm, drawMallet, type ArmColours } from "./arm";
+import { Projection } from "./projection";
+import { drawTable } from "./table";
+
+const COMMANDED = [5, 3];
+const SEEN = [4, 3];
+const SOLID: number[] = [];
+
+/** The table from above, to scale, with its axes. Needs no WebGL. */
+export class FlatView implements View {
+  readonly canvas = document.createElement("canvas");
+  private readonly context: CanvasRenderingContext2D;
+  private readonly under = document.createElement("canvas");
+  private at = new Projection(1, 1);
+  private ratio = 1;
+  private palette: Palette | null = null;
+  private arms: readonly [ArmColours, ArmColours] | null = null;
+  private drawnFor: Contest | null = null;
+
+  constructor() {
+    const context = this.canvas.getContext("2d");
+    if (context === null) throw new Error("this browser draws no pictures");
+    this.context = context;
+  }
+
+  resize(width: number, height: number, ratio: number): void {
+    for (const canvas of [this.canvas, this.under]) {
+      canvas.width = Math.max(Math.round(width * ratio), 1);
+      canvas.height = Math.max(Math.round(height * ratio), 1);
+    }
+    this.ratio = ratio;
+    this.at = new Projection(width, height);
+    this.drawnFor = null;
+  }
+
+  paint(palette: Palette): void {
+    this.palette = palette;
+    this.arms = [
+      { link: palette["rp-joint"], mallet: palette["rp-mallet"], outline: palette["rp-table"] },
+      { link: palette["rp-other-joint"], mallet: palette["rp-other-mallet"], outline: palette["rp-table"] },
+    ];
+    this.drawnFor = null;
+  }
+
+  draw(shown: Shown): number {
+    const { context, at, palette, arms } = this;
+    if (palette === null || arms === null) return 0;
+    const { motion, paths, observed } = shown.part;
+    this.still(palette, motion.contest);
+    context.setTransform(1, 0, 0, 1, 0, 0);
+    context.drawImage(this.under, 0, 0);
+    context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
+
+    for (let i = 0; i < motion.arms.length; i++) drawArm(context, at, shown.arms[i], arms[i]);
+    const [from, to] = trail(shown);
+    if (shown.layers.puck) {
+      this.line(paths.puck, from, to, palette["rp-trail"], SOLID);
+      this.contacts(shown, from, to, palette);
+    }
+    for (let i = 0; i < motion.arms.length; i++) drawMallet(context, at, shown.arms[i], arms[i]);
+    if (shown.layers.real) {
+      for (const path of paths.real) this.line(path, from, to, palette.ink, SOLID);
+    }
+    if (shown.layers.commanded && paths.commanded !== null) {
+      this.line(paths.commanded, from, to, palette["rp-commanded"], COMMANDED);
+    }
+    this.puck(shown, palette);
+    if (observed !== null && shown.layers.seen) this.seen(shown, palette);
+    return 0;
+  }
+
+  private still(palette: Palette, contest: Contest): void {
+    if (this.drawnFor === contest) return;
+    const context = this.under.getContext("2d");
+    if (context === null) return;
+    context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
+    drawTable(context, this.at, palette, contest);
+    this.drawnFor = contest;
+  }
+
+  private line(path: Path, from: number, to: number, colour: string, dashes: number[]): void {
+    const { context, at } = this;
+    const [first, last] = between(path, from, to);
+    context.strokeStyle = colour;
+    context.lineWidth = 1.5;
+    context.setLineDash(dashes);
+    context.beginPath();
+    let pen = false;
+    for (let i = first; i <= last; i++) {
+      const x = at.x(path.places[3 * i]);
+      const y = at.y(path.places[3 * i + 1]);
+      if (pen) context.lineTo(x, y);
+      else context.moveTo(x, y);
+      pen = path.gap[i] === 0;
+    }
+    context.stroke();
+    context.setLineDash(SOLID);
+  }
+
+  private contacts(shown: Shown, from: number, to: number, palette: Palette): void {
+    const { context, at } = this;
+    const { contacts, stepS } = shown.part.motion;
+    context.strokeStyle = palette["rp-trail"];
+    context.lineWidth = 1;
+    context.beginPath();
+    for (const contact of contacts) {
+      const position = contact.t / stepS;
+      if (position < from || position > to) continue;
+      const x = at.x(contact.x);
+      const y = at.y(contact.y);
+      context.moveTo(x + 3, y);
+      context.arc(x, y, 3, 0, 2 * Math.PI);
+    }
+    context.stroke();
+  }
+
+  private puck(shown: Shown, palette: Palette): void {
+    const { context, at } = this;
+    const { x, y, yaw } = shown.pose;
+    const radius = at.length(MODEL.puck.radius_m);
+    context.fillStyle = palette["rp-puck"];
+    context.beginPath();
+    context.arc(at.x(x), at.y(y), radius, 0, 2 * Math.PI);
+    context.fill();
+    // Which way it is turned.
+    context.strokeStyle = palette["rp-table"];
+    context.lineWidth = Math.max(radius * 0.18, 1);
+    context.beginPath();
+    context.moveTo(at.x(x), at.y(y));
+    context.lineTo(at.x(x) + radius * 0.85 * Math.cos(yaw), at.y(y) - radius * 0.85 * Math.sin(yaw));
+    context.stroke();
+  }
+
+  private seen(shown: Shown, palette: Palette): void {
+    if (Number.isNaN(shown.seenX)) return;
+    const { context, at } = this;
+    const x = at.x(shown.seenX);
+    const y = at.y(shown.seenY);
+    const radius = at.length(MODEL.puck.radius_m);
+    context.strokeStyle = palette["rp-seen"];
+    context.lineWidth = 2;
+    context.setLineDash(SEEN);
+    context.beginPath();
+    context.arc(x, y, radius, 0, 2 * Math.PI);
+    context.stroke();
+    context.setLineDash(SOLID);
+    if (!shown.lost) return;
+    context.beginPath();
+    context.moveTo(x - radius, y - radius);
+    context.lineTo(x + radius, y + radius);
+    context.moveTo(x - radius, y + radius);
+    context.lineTo(x + radius, y - radius);
+    context.stroke();
+  }
+}

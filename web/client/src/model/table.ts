@@ -1,0 +1,48 @@
+import type { Contest } from "../clip/motion";
+import { MODEL } from "./model";
+
+export type Point = readonly [x: number, y: number];
+
+/** Half the size of the table with its rims, m. */
+export const OUTER = {
+  x: MODEL.table.outer_half_length_m,
+  y: MODEL.table.half_width_m + MODEL.table.rim_width_m,
+};
+
+/** As the reference's collision shapes approximate each rounding. */
+const CHORDS = 7;
+
+/**
+ * Outline of the rim on the side of positive y, from above; the other one is its mirror image. The goal is open
+ * behind its line, and its posts are rounded on both sides.
+ */
+export function rimOutline(): Point[] {
+  const { half_length_m, half_width_m, goal_edge_from_m, goal_edge_to_m, goal_half_width_m, post_radius_m } =
+    MODEL.table;
+  const right: Point[] = [[OUTER.x, OUTER.y]];
+  for (let i = 0; i <= CHORDS; i++) right.push(onPost(goal_edge_to_m, 0 - (i / CHORDS) * (Math.PI / 2)));
+  for (let i = 0; i <= CHORDS; i++) {
+    right.push(onPost(goal_edge_from_m, -Math.PI / 2 - (i / CHORDS) * (Math.PI / 2)));
+  }
+  right.push([half_length_m, half_width_m]);
+  const left = right.map(([x, y]): Point => [-x, y]).reverse();
+  return [...right, ...left];
+
+  function onPost(x: number, angle: number): Point {
+    return [
+      x + post_radius_m * Math.cos(angle),
+      goal_half_width_m + post_radius_m + post_radius_m * Math.sin(angle),
+    ];
+  }
+}
+
+/** Where the puck must be at the end for a success; a game has no such place. */
+export interface Region {
+  readonly x_from_m: number;
+  readonly x_to_m: number;
+  readonly half_width_m: number;
+}
+
+export function successRegion(contest: Contest): Region | null {
+  return contest === "game" ? null : MODEL.success_regions[contest];
+}

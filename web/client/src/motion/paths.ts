@@ -1,0 +1,116 @@
+import type { Motion } from "../clip/motion";
+import type { Observed } from "../clip/observed";
+import { Kinematics } from "../model/kinematics";
+import { JOINTS } from "../model/model";
+import { Interpolation, newPose } from "./pose";
+
+/** A line through space with the position (in control steps) of each of its points. */
+export interface Path {
+  readonly at: Float64Array;
+  /** x, y, z one after the other, table frame. */
+  readonly places: Float32Array;
+  /** 1 where no line leads from this point to the next one: a rally was over, or nothing was written. */
+  readonly gap: Uint8Array;
+}
+
+/** The lines that can be drawn of one part of a replay. */
+export interface Paths {
+  readonly puck: Path;
+  /** End effector by the joints as they were, per arm. */
+  readonly real: readonly Path[];
+  /** End effector by the commanded joints, where the viewer may see them. */
+  readonly commanded: Path | null;
+}
+
+/** Points of the puck's line in each control step, beside its contacts. */
+const PUCK_POINTS = 4;
+const MALLET_POINTS = 4;
+const PUCK_Z = 0.002;
+
+export function pathsOf(motion: Motion, interpolation: Interpolation, observed: Observed | null): Paths {
+  const command = observed?.command ?? null;
+  return {
+    puck: puckPath(motion, interpolation),
+    real: motion.arms.map((_, side) => realPath(motion, interpolation, side === 0 ? 0 : 1)),
+    commanded: observed === null || command === null ? null : commandedPath(observed, command),
+  };
+}
+
+/** Indices of the points between two positions, as [first, last]; last < first if there are none. */
+export function between(path: Path, from: number, to: number): [number, number] {
+  return [firstAt(path.at, from), firstAt(path.at, to + 1e-9) - 1];
+}
+
+function firstAt(sorted: Float64Array, value: number): number {
+  let low = 0;
+  let high = sorted.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (sorted[middle] < value) low = middle + 1;
+    else high = middle;
+  }
+  return low;
+}
+
+function puckPath(motion: Motion, interpolation: Interpolation): Path {
+  const last = motion.first + motion.samples - 1;
+  const at: number[] = motion.contacts
+    .map((contact) => contact.t / motion.stepS)
+    .filter((position) => position > motion.first && position < last);
+  for (let k = 0; k < motion.samples; k++) {
+    for (let i = 0; i < (k < motion.samples - 1 ? PUCK_POINTS : 1); i++)
+      at.push(motion.first + k + i / PUCK_POINTS);
+  }
+  at.sort((a, b) => a - b);
+  const ends = new Set(motion.breaks.map((end) => end.sample));
+  const places = new Float32Array(3 * at.length);
+  const gap = new Uint8Array(at.length);
+  const pose = newPose();
+  at.forEach((position, i) => {
+    interpolation.at(position, pose);
+    places.set([pose.x, pose.y, PUCK_Z], 3 * i);
+    if (ends.has(Math.floor(position))) gap[i] = 1;
+  });
+  return { at: Float64Array.from(at), places, gap };
+}
+
+/** In quarters of steps, so that the line ends where the mallet is while that moves from sample to sample. */
+function realPath(motion: Motion, interpolation: Interpolation, side: 0 | 1): Path {
+  const count = (motion.samples - 1) * MALLET_POINTS + 1;
+  const at = new Float64Array(count);
+  const places = new Float32Array(3 * count);
+  const gap = new Uint8Array(count);
+  const ends = new Set(motion.breaks.map((end) => end.sample));
+  const arm = new Kinematics(side);
+  const pose = newPose();
+  for (let i = 0; i < count; i++) {
+    at[i] = motion.first + i / MALLET_POINTS;
+    interpolation.at(at[i], pose);
+    arm.set(pose.arms[side].q);
+    places.set(arm.endEffector.subarray(9, 12), 3 * i);
+    if (ends.has(Math.floor(at[i]))) gap[i] = 1;
+  }
+  return { at, places, gap };
+}
+
+function commandedPath(observed: Observed, command: readonly Float64Array[]): Path {
+  const { first, samples, side } = observed;
+  const at = new Float64Array(samples);
+  const places = new Float32Array(3 * samples);
+  const gap = new Uint8Array(samples);
+  const arm = new Kinematics(side);
+  const q = new Float64Array(JOINTS);
+  for (let k = 0; k < samples; k++) {
+    at[k] = first + k;
+    for (let i = 0; i < JOINTS; i++) q[i] = command[i][k];
+    if (Number.isNaN(q[0])) {
+      // Nothing was commanded for this sample: no line leads to it or from it.
+      gap[k] = 1;
+      if (k > 0) gap[k - 1] = 1;
+      continue;
+    }
+    arm.set(q);
+    places.set(arm.endEffector.subarray(9, 12), 3 * k);
+  }
+  return { at, places, gap };
+}

@@ -1,0 +1,30 @@
+import type { Column } from "../clip/column";
+import type { Part } from "./source";
+
+/** Names of columns with their units, as they stand above the data: `puck_x_m`, `dq_1_rad_s`. */
+export function columnName(column: Column): string {
+  const unit = column.unit.replaceAll(/[^a-z0-9]+/gi, "_");
+  return unit === "" || unit === "1" ? column.name : `${column.name}_${unit}`;
+}
+
+/** All columns of a part, those of the motion first. */
+export function columnsOf(part: Part): readonly Column[] {
+  return [...part.motion.columns, ...(part.observed?.columns ?? [])];
+}
+
+/** The whole part as comma-separated values, one line per sample; empty where a sample has no value. */
+export function csvOf(part: Part): string {
+  const columns = columnsOf(part);
+  const lines = [["sample", "time_s", ...columns.map(columnName)].join(",")];
+  for (let k = 0; k < part.motion.samples; k++) {
+    const sample = part.motion.first + k;
+    const values = columns.map((column) => plain(column.values[k]));
+    lines.push([sample, plain(sample * part.motion.stepS), ...values].join(","));
+  }
+  return lines.join("\n") + "\n";
+}
+
+/** Without the noise of the last binary digits. */
+function plain(value: number | undefined): string {
+  return value === undefined || Number.isNaN(value) ? "" : String(Number(value.toPrecision(12)));
+}

@@ -1,0 +1,120 @@
+import type { Group, Motion, Violation } from "../clip/motion";
+import type { Observed } from "../clip/observed";
+import { fixed } from "../controls/words";
+
+export type Kind = "contact" | "violation" | "rally" | "lost" | "late" | "end";
+
+/** Something that happened, as it stands on the time line and in the list. */
+export interface ReplayEvent {
+  readonly kind: Kind;
+  /** In control steps from sample 0. */
+  readonly position: number;
+  /** Where it went on to; the same as `position` for an instant. */
+  readonly until: number;
+  readonly text: string;
+  readonly sign: string;
+}
+
+const SIGNS: Record<Kind, string> = {
+  contact: "•",
+  violation: "▲",
+  rally: "◆",
+  lost: "○",
+  late: "◷",
+  end: "■",
+};
+
+/** What the reader calls a group of constraints, and its unit. */
+export const GROUPS: Record<Group, { name: string; unit: string; scale: number }> = {
+  ee: { name: "end effector out of bounds", unit: "mm", scale: 1000 },
+  link: { name: "elbow or wrist too low", unit: "mm", scale: 1000 },
+  joint_pos: { name: "joint position beyond 95 % of its range", unit: "rad", scale: 1 },
+  joint_vel: { name: "joint velocity beyond 95 % of its limit", unit: "rad/s", scale: 1 },
+};
+
+const TOUCHED = { rim: "the rim", mallet: "the mallet", opponent_mallet: "the opponent's mallet" };
+
+/** Everything that happened in a part, in the order of time. */
+export function eventsOf(motion: Motion, observed: Observed | null): ReplayEvent[] {
+  const game = motion.contest === "game";
+  const events: ReplayEvent[] = [];
+  const add = (kind: Kind, position: number, until: number, text: string, sign = SIGNS[kind]): void => {
+    events.push({ kind, position, until, text, sign });
+  };
+
+  for (const contact of motion.contacts) {
+    const at = contact.t / motion.stepS;
+    const what =
+      game && contact.what !== "rim"
+        ? `mallet ${contact.what === "mallet" ? "A" : "B"}`
+        : TOUCHED[contact.what];
+    add("contact", at, at, `puck meets ${what} at (${fixed(contact.x, 2)}, ${fixed(contact.y, 2)}) m`);
+  }
+  for (const violation of motion.violations) {
+    const whose =
+      motion.arms.length > 1 && (game || violation.side === 1) ? `${sideName(motion, violation.side)}: ` : "";
+    add("violation", violation.from, violation.to, whose + violationWords(violation));
+  }
+  for (const end of motion.breaks)
+    add("rally", end.sample, end.sample, rallyWords(end.what, end.by, end.score));
+  for (const lost of observed?.lost ?? []) {
+    add("lost", lost.from, lost.to, `camera lost the puck for ${lost.to - lost.from + 1} steps`);
+  }
+  for (const [from, to] of runs(observed?.late ?? [])) {
+    const times = observed?.computationTimeS ?? null;
+    let worst = 0;
+    for (let k = from; k <= to; k++) worst = Math.max(worst, times?.[k - (observed?.first ?? 0)] ?? 0);
+    const steps = from === to ? "answer late" : `${to - from + 1} answers late`;
+    add("late", from, to, worst > 0 ? `${steps}, up to ${fixed(worst * 1000, 0)} ms` : steps);
+  }
+  if (motion.end !== null) {
+    const { success, steps } = motion.end;
+    add("end", steps, steps, endWords(motion), success === null ? SIGNS.end : success ? "✓" : "✕");
+  }
+  return events.sort((a, b) => a.position - b.position);
+}
+
+/** The sentence that tells how it ended. */
+export function endWords(motion: Motion): string {
+  const end = motion.end;
+  if (end === null) return "";
+  const why = end.why || end.end.replaceAll("_", " ");
+  if (end.success === null) return `End: ${why}`;
+  return `${end.success ? "Success" : "No success"}: ${why}`;
+}
+
+export function sideName(motion: Motion, side: 0 | 1): string {
+  if (motion.contest === "game") return side === 0 ? "A" : "B";
+  return side === 0 ? "robot" : "opponent";
+}
+
+function violationWords(violation: Violation): string {
+  const { name, unit, scale } = GROUPS[violation.group];
+  const span =
+    violation.from === violation.to ? `step ${violation.from}` : `steps ${violation.from} to ${violation.to}`;
+  return `${name}, ${span}, by ${fixed(violation.worst * scale, unit === "mm" ? 1 : 3)} ${unit}`;
+}
+
+function rallyWords(what: string, by: 0 | 1 | null, score: readonly [number, number] | null): string {
+  const whose = by === null ? "" : ` by ${by === 0 ? "A" : "B"}`;
+  const words: Record<string, string> = {
+    goal: `goal${whose}`,
+    foul: `foul${whose}`,
+    stuck: "puck stuck in the middle",
+    left_table: "puck left the table",
+    diverged: `simulation diverged${whose}`,
+  };
+  const stands = score === null ? "" : `, ${score[0]} : ${score[1]}`;
+  return (words[what] ?? what.replaceAll("_", " ") + whose) + stands;
+}
+
+/** Neighbouring numbers drawn together. */
+function runs(sorted: readonly number[]): [number, number][] {
+  const found: [number, number][] = [];
+  for (const n of [...sorted].sort((a, b) => a - b)) {
+    const last = found.at(-1);
+    if (last !== undefined && n <= last[1] + 1) last[1] = n;
+    else found.push([n, n]);
+  }
+  return found;
+}

@@ -1,0 +1,129 @@
+import { h, say } from "../controls/dom";
+import { FlatView } from "../flat/view";
+import { View3D } from "../view3d/view";
+import type { Camera } from "./fragment";
+import type { Palette } from "./palette";
+import type { Shown, View } from "./shown";
+
+/** The picture, in space or flat, and the few words that stand in it. */
+export class Stage {
+  readonly element: HTMLElement;
+  readonly solid: View3D | null;
+  /** Why there is no picture in space; null if there is one. */
+  unavailable: string | null = null;
+  private readonly plane = new FlatView();
+  private readonly note = h("p", { class: "stage-note", attributes: { hidden: "" } });
+  private readonly state = h("p", { class: "stage-state", attributes: { hidden: "" } });
+  private readonly outcome = h("p", { class: "stage-outcome", attributes: { hidden: "" } });
+  private readonly score = h("p", { class: "stage-score", attributes: { hidden: "" } });
+  private wantsFlat = false;
+  private ratio = 1;
+
+  /** `changed`: the picture must be drawn anew; `switched`: another view is shown. */
+  constructor(
+    title: string,
+    still: boolean,
+    changed: () => void,
+    private readonly switched: () => void,
+  ) {
+    this.solid = this.openSolid(still, changed);
+    this.element = h(
+      "div",
+      { class: "stage", attributes: { tabindex: "0", role: "group", "aria-label": `Picture: ${title}` } },
+      this.plane.canvas,
+      this.score,
+      this.state,
+      this.outcome,
+      this.note,
+    );
+    if (this.solid !== null) this.element.prepend(this.solid.canvas);
+    for (const canvas of this.element.querySelectorAll("canvas")) canvas.setAttribute("aria-hidden", "true");
+    new ResizeObserver(() => {
+      this.resize();
+      changed();
+    }).observe(this.element);
+    this.choose();
+  }
+
+  get flat(): boolean {
+    return this.wantsFlat || this.unavailable !== null;
+  }
+
+  setFlat(flat: boolean): void {
+    this.wantsFlat = flat;
+    this.choose();
+  }
+
+  setCamera(camera: Camera): void {
+    this.solid?.orbit.preset(camera);
+  }
+
+  paint(palette: Palette): void {
+    this.plane.paint(palette);
+    this.solid?.paint(palette);
+  }
+
+  draw(shown: Shown): number {
+    return this.view().draw(shown);
+  }
+
+  /** Words in the picture; empty ones are not there. */
+  tell(words: { state: string; outcome: string; good: boolean; score: string }): void {
+    write(this.state, words.state);
+    write(this.score, words.score);
+    write(this.outcome, words.outcome);
+    this.outcome.classList.toggle("good", words.good);
+  }
+
+  /** The picture as it is now, as PNG. */
+  picture(shown: Shown): Promise<Blob | null> {
+    const view = this.view();
+    // A drawing of WebGL is there until the browser has shown it: draw and read in one go.
+    view.draw(shown);
+    return new Promise((resolve) => {
+      view.canvas.toBlob(resolve, "image/png");
+    });
+  }
+
+  private view(): View {
+    return this.flat || this.solid === null ? this.plane : this.solid;
+  }
+
+  private openSolid(still: boolean, changed: () => void): View3D | null {
+    try {
+      const view = new View3D(still, changed);
+      view.canvas.addEventListener("webglcontextlost", (event) => {
+        event.preventDefault();
+        this.unavailable = "The browser took the 3-D drawing away: the flat view is shown.";
+        this.choose();
+      });
+      view.canvas.addEventListener("webglcontextrestored", () => {
+        this.unavailable = null;
+        this.choose();
+      });
+      return view;
+    } catch {
+      this.unavailable = "This browser offers no 3-D drawing (WebGL): the flat view is shown.";
+      return null;
+    }
+  }
+
+  private choose(): void {
+    this.plane.canvas.hidden = !this.flat;
+    if (this.solid !== null) this.solid.canvas.hidden = this.flat;
+    write(this.note, this.unavailable ?? "");
+    this.switched();
+  }
+
+  private resize(): void {
+    const { clientWidth, clientHeight } = this.element;
+    this.ratio = Math.min(devicePixelRatio, 2);
+    this.plane.resize(clientWidth, clientHeight, this.ratio);
+    this.solid?.resize(clientWidth, clientHeight, this.ratio);
+  }
+}
+
+function write(element: HTMLElement, text: string): void {
+  say(element, text);
+  if (element.hidden !== (text === "")) element.hidden = text === "";
+}

@@ -1,0 +1,77 @@
+import { h, say } from "../controls/dom";
+import { fixed } from "../controls/words";
+import type { Palette } from "../replay/palette";
+import { plot, rangeOf } from "./plot";
+import type { Series } from "./series";
+
+/** One small plot with its value at the cursor. */
+export class Strip {
+  readonly element: HTMLElement;
+  private readonly canvas = h("canvas", { attributes: { role: "img" } });
+  private readonly cursor = h("span", { class: "cursor" });
+  private readonly value = h("span", { class: "value" });
+  private readonly field: HTMLElement;
+  private width = 0;
+
+  constructor(
+    private readonly series: Series,
+    private readonly first: number,
+    private readonly samples: number,
+    seek: (sample: number) => void,
+  ) {
+    const [low, high] = rangeOf(series);
+    const scale = `from ${fixed(low, series.digits)} to ${fixed(high, series.digits)} ${series.unit}`;
+    const limit = `limit ${fixed(series.limit, series.digits)} ${series.unit}`;
+    const broken = series.broken.length === 0 ? "" : `; ${series.broken.length} times recorded as broken`;
+    this.canvas.setAttribute("aria-label", `${series.title}, ${scale}, ${limit}${broken}`);
+    this.field = h("div", { class: "field" }, this.canvas, this.cursor);
+    this.element = h(
+      "div",
+      { class: "strip" },
+      h(
+        "div",
+        { class: "label" },
+        h("span", { class: "title" }, series.title),
+        this.value,
+        h(
+          "span",
+          { class: "scale" },
+          `${fixed(low, series.digits)} … ${fixed(high, series.digits)} ${series.unit}`,
+        ),
+      ),
+      this.field,
+    );
+    const follow = (event: PointerEvent): void => {
+      const box = this.field.getBoundingClientRect();
+      const share = Math.min(Math.max((event.clientX - box.left) / box.width, 0), 1);
+      seek(first + Math.round(share * (samples - 1)));
+    };
+    this.field.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return;
+      this.field.setPointerCapture(event.pointerId);
+      follow(event);
+    });
+    this.field.addEventListener("pointermove", (event) => {
+      if (this.field.hasPointerCapture(event.pointerId)) follow(event);
+    });
+  }
+
+  draw(palette: Palette, ratio: number): void {
+    const { clientWidth: width, clientHeight: height } = this.field;
+    this.width = width;
+    this.canvas.width = Math.max(Math.round(width * ratio), 1);
+    this.canvas.height = Math.max(Math.round(height * ratio), 1);
+    const context = this.canvas.getContext("2d");
+    if (context === null) return;
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    plot(context, width, height, this.series, this.first, this.samples, palette);
+  }
+
+  update(position: number): void {
+    const share = this.samples < 2 ? 0 : (position - this.first) / (this.samples - 1);
+    const x = Math.min(Math.max(share, 0), 1) * this.width;
+    this.cursor.style.transform = `translateX(${x.toFixed(1)}px)`;
+    const k = Math.min(Math.max(Math.floor(position + 1e-6) - this.first, 0), this.samples - 1);
+    say(this.value, this.series.words(k));
+  }
+}

@@ -1,0 +1,32 @@
+import type { Orbit } from "./orbit";
+
+/**
+ * Dragging turns the camera. With a finger only sideways: a drag along the page scrolls it, as everywhere else, and
+ * the buttons turn the camera up and down.
+ */
+export function followPointer(canvas: HTMLCanvasElement, orbit: Orbit): void {
+  let x = 0;
+  let y = 0;
+  canvas.addEventListener("pointerdown", (event) => {
+    if (event.button !== 0) return;
+    canvas.setPointerCapture(event.pointerId);
+    x = event.clientX;
+    y = event.clientY;
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    if (!canvas.hasPointerCapture(event.pointerId)) return;
+    orbit.drag(event.clientX - x, event.clientY - y);
+    x = event.clientX;
+    y = event.clientY;
+  });
+  canvas.addEventListener(
+    "wheel",
+    (event) => {
+      // The bare wheel scrolls the page.
+      if (!event.ctrlKey) return;
+      event.preventDefault();
+      orbit.closer(event.deltaY < 0 ? 1 : -1);
+    },
+    { passive: false },
+  );
+}

@@ -1,0 +1,115 @@
+import {
+  BoxGeometry,
+  DoubleSide,
+  ExtrudeGeometry,
+  Group,
+  Mesh,
+  MeshBasicMaterial,
+  MeshLambertMaterial,
+  PlaneGeometry,
+  ShadowMaterial,
+  Shape,
+  Vector2,
+} from "three";
+import type { Contest } from "../clip/motion";
+import { MODEL } from "../model/model";
+import { OUTER, rimOutline, successRegion } from "../model/table";
+import type { Palette } from "../replay/palette";
+import { Painted, type Piece } from "./painted";
+import { mark } from "./shapes";
+
+/** Looks only, m: rims high enough to be seen as such and low enough to see the puck behind them. */
+const RIM_HEIGHT = 0.028;
+const FLOOR_Z = MODEL.bases[0].z_m;
+const LINE_WIDTH = 0.006;
+const DASH = 0.04;
+
+/** What stands still: table, rims, lines, the place where the puck has to end, and the floor for shadows. */
+export class TableModel {
+  readonly group = new Group();
+  private readonly surface = new MeshLambertMaterial();
+  private readonly rims = new MeshLambertMaterial();
+  private readonly lines: Painted;
+  private readonly region = new MeshBasicMaterial({
+    transparent: true,
+    opacity: 0.1,
+    depthWrite: false,
+    side: DoubleSide,
+  });
+
+  constructor(contest: Contest) {
+    const slab = new Mesh(new BoxGeometry(2 * OUTER.x, 2 * OUTER.y, -FLOOR_Z), this.surface);
+    slab.position.z = FLOOR_Z / 2;
+    slab.receiveShadow = true;
+
+    const outline = rimOutline();
+    const shapes = [1, -1].map((mirror) => new Shape(outline.map(([x, y]) => new Vector2(x, mirror * y))));
+    const rims = new Mesh(new ExtrudeGeometry(shapes, { depth: RIM_HEIGHT, bevelEnabled: false }), this.rims);
+    rims.receiveShadow = true;
+
+    const floor = new Mesh(new PlaneGeometry(9, 9), new ShadowMaterial({ opacity: 0.16 }));
+    floor.position.z = FLOOR_Z;
+    floor.receiveShadow = true;
+
+    this.lines = new Painted(linePieces(contest));
+    this.group.add(
+      slab,
+      rims,
+      floor,
+      new Mesh(this.lines.geometry, new MeshBasicMaterial({ vertexColors: true })),
+    );
+
+    const place = successRegion(contest);
+    if (place !== null) {
+      const field = new Mesh(
+        new PlaneGeometry(place.x_to_m - place.x_from_m, 2 * place.half_width_m),
+        this.region,
+      );
+      field.position.set((place.x_from_m + place.x_to_m) / 2, 0, 0.0004);
+      this.group.add(field);
+    }
+  }
+
+  paint(palette: Palette): void {
+    this.surface.color.set(palette["rp-table"]);
+    this.rims.color.set(palette["rp-rim"]);
+    this.region.color.set(palette.good);
+    this.lines.paint(palette);
+  }
+}
+
+function linePieces(contest: Contest): Piece[] {
+  const { half_length_m, half_width_m, goal_half_width_m } = MODEL.table;
+  const pieces: Piece[] = [[mark(0, -half_width_m, 0, half_width_m, LINE_WIDTH, 0.0005), "rp-mark"]];
+  for (const x of [-half_length_m, half_length_m]) {
+    pieces.push([mark(x, -goal_half_width_m, x, goal_half_width_m, LINE_WIDTH, 0.0005), "rp-mark"]);
+  }
+  const place = successRegion(contest);
+  if (place === null) return pieces;
+  const { x_from_m: x0, x_to_m: x1, half_width_m: y } = place;
+  const sides = [
+    [x0, -y, x0, y],
+    [x1, -y, x1, y],
+    [x0, y, x1, y],
+    [x0, -y, x1, -y],
+  ];
+  for (const [ax, ay, bx, by] of sides) {
+    const dashes = Math.max(Math.floor(Math.hypot(bx - ax, by - ay) / DASH), 1);
+    for (let i = 0; i < dashes; i++) {
+      const a = i / dashes;
+      const b = (i + 0.55) / dashes;
+      pieces.push([
+        mark(
+          ax + (bx - ax) * a,
+          ay + (by - ay) * a,
+          ax + (bx - ax) * b,
+          ay + (by - ay) * b,
+          LINE_WIDTH / 2,
+          0.0006,
+        ),
+        "good",
+      ]);
+    }
+  }
+  return pieces;
+}
