@@ -55,6 +55,8 @@ fn record(spec: &ShardSpec, out: &Path) {
                 state: &state,
                 constraints: Default::default(),
                 next_observation: &observation,
+                puck_lost: false,
+                impacts: &[],
             });
         }
         let outcome = EpisodeOutcome {
@@ -111,7 +113,11 @@ fn slice(criterion: &mut Criterion) {
         variation: Default::default(),
     };
     let archive = dir.path().join("dataset.zip");
-    let megabytes = assemble(&meta, &shards, &archive).unwrap().archive.bytes / 1_000_000;
+    let megabytes = assemble(&meta, &shards, &archive, None)
+        .unwrap()
+        .archive
+        .bytes
+        / 1_000_000;
     let read = |columns: Option<&[String]>| {
         let dataset = Dataset::open_unread(&archive).unwrap();
         dataset.episode(Task::Prepare, 777, columns).unwrap()

@@ -22,7 +22,7 @@ use faceoff_wire::{
 use fs_err as fs;
 use std::{
     collections::BTreeMap,
-    io::Write,
+    io::{self, BufWriter, Write},
     path::{Path, PathBuf},
 };
 
@@ -33,11 +33,14 @@ pub struct Assembled {
     pub result: EvaluationResult,
     /// Size and hash of the archive: published, they vouch for every byte of it.
     pub archive: FileDigest,
+    /// Was there anything to draw replays from?
+    pub clips: bool,
 }
 
 /// Joins the recordings of all shards of an evaluation, in any order, into one zip archive:
 /// `steps.parquet`, `episodes.parquet`, `violations.json`, `results.json`, `calibration.json`,
-/// `agent.log` and `manifest.json` with the hashes of the others.
+/// `agent.log` and `manifest.json` with the hashes of the others. What replays are drawn from goes to a pack of
+/// its own, `clips`, if one is wanted; shards of earlier layouts have none.
 ///
 /// Nothing is simulated again. The archive is written under a temporary name and renamed; the same
 /// shards give the same bytes. Memory grows with the episodes, not with their steps.
@@ -49,6 +52,7 @@ pub fn assemble(
     meta: &EvaluationMeta,
     shard_dirs: &[PathBuf],
     archive: &Path,
+    clips: Option<&Path>,
 ) -> Result<Assembled, RecordingError> {
     let mut shards = shard_dirs
         .iter()
@@ -78,6 +82,10 @@ pub fn assemble(
         Ok(archive) => Ok(Assembled {
             result: scored.result,
             archive,
+            clips: match clips {
+                Some(path) => join_clips(&shards, path)?,
+                None => false,
+            },
         }),
         Err(error) => {
             if let Err(error) = fs::remove_file(&partial) {
@@ -86,6 +94,21 @@ pub fn assemble(
             Err(error)
         }
     }
+}
+
+/// Joins what clips there are; `false` if there are none.
+fn join_clips(shards: &[ShardRecording], path: &Path) -> Result<bool, RecordingError> {
+    let packs: Vec<PathBuf> = shards
+        .iter()
+        .filter_map(|shard| shard.clips.clone())
+        .collect();
+    if packs.is_empty() {
+        return Ok(false);
+    }
+    let out = faceoff_replay::join(&packs, BufWriter::new(fs::File::create(path)?))?;
+    let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
+    file.sync_all()?;
+    Ok(true)
 }
 
 fn write(

@@ -1,3 +1,4 @@
+use faceoff_replay::ReplayError;
 use faceoff_types::tells_of_full_disk;
 use std::{error::Error, fmt::Display, io};
 
@@ -25,6 +26,15 @@ impl RecordingError {
             } else {
                 Self::Unusable(text)
             }
+        }
+    }
+}
+
+impl From<ReplayError> for RecordingError {
+    fn from(error: ReplayError) -> Self {
+        match error {
+            ReplayError::Io(error) => Self::Io(error),
+            unreadable @ ReplayError::Unreadable { .. } => Self::Unusable(unreadable.to_string()),
         }
     }
 }

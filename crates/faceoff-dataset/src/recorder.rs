@@ -1,34 +1,40 @@
 use crate::{
     error::RecordingError,
-    files::{EPISODES_FILE, STEPS_FILE},
+    files::{CLIPS_FILE, EPISODES_FILE, STEPS_FILE},
     shard_folder::ShardFolder,
     table::{EpisodeRows, StepRows, TableWriter},
 };
 use faceoff_episode::{EpisodeStart, RecordError, StepRow, StepSink};
+use faceoff_replay::ClipRecorder;
 use faceoff_types::{EpisodeOutcome, Task};
+use fs_err::File;
+use std::io::BufWriter;
 
-/// Writes both tables of a shard as it is played. Memory is bounded by one episode and one row group,
+/// Writes both tables of a shard and its clips as it is played. Memory is bounded by one episode and one row group,
 /// whatever the shard's size.
 pub struct Recorder {
     steps: StepRows,
     steps_file: TableWriter,
     episodes: EpisodeRows,
     episodes_file: TableWriter,
+    clips: ClipRecorder<BufWriter<File>>,
 }
 
 /// Episodes that are held before they go to the file.
 const EPISODES_BATCH: usize = 256;
 
 impl Recorder {
-    /// Opens both tables in the folder, under temporary names.
+    /// Opens all three in the folder, under temporary names.
     ///
     /// # Errors
     /// [`RecordingError::Io`].
     pub fn create(folder: &ShardFolder, task: Task) -> Result<Self, RecordingError> {
         let (steps, episodes) = (StepRows::new(task), EpisodeRows::new());
+        let clips = File::create(folder.partial(CLIPS_FILE))?;
         Ok(Self {
             steps_file: TableWriter::create(&folder.partial(STEPS_FILE), steps.schema())?,
             episodes_file: TableWriter::create(&folder.partial(EPISODES_FILE), episodes.schema())?,
+            clips: ClipRecorder::new(task, BufWriter::new(clips))?,
             steps,
             episodes,
         })
@@ -47,14 +53,19 @@ impl Recorder {
         Ok(())
     }
 
-    /// Writes what is left and closes both tables.
+    /// Writes what is left and closes all three.
     ///
     /// # Errors
     /// [`RecordingError::Io`], or if the tables cannot be written.
     pub fn finish(mut self) -> Result<(), RecordingError> {
         self.episodes_file.write(self.episodes.take())?;
         self.episodes_file.finish()?;
-        self.steps_file.finish()
+        self.steps_file.finish()?;
+        let clips = self.clips.finish()?;
+        let clips = clips
+            .into_inner()
+            .map_err(std::io::IntoInnerError::into_error)?;
+        Ok(clips.sync_all()?)
     }
 }
 
@@ -70,18 +81,22 @@ impl StepSink for Recorder {
     fn begin(&mut self, start: EpisodeStart<'_>) {
         self.steps.begin(start.episode);
         self.episodes.begin(&start);
+        self.clips.begin(start);
     }
 
     fn observe(&mut self, observation: &[f64]) {
         self.steps.observe(observation);
+        self.clips.observe(observation);
     }
 
     fn step(&mut self, row: &StepRow<'_>) {
         self.steps.push(row);
         self.episodes.step(row);
+        self.clips.step(row);
     }
 
     fn end(&mut self, outcome: &EpisodeOutcome, host_noise_reruns: u32) -> Result<(), RecordError> {
+        self.clips.end(outcome, host_noise_reruns)?;
         self.end_episode(outcome, host_noise_reruns)
             .map_err(|error| RecordError {
                 what: "recording an episode".to_owned(),

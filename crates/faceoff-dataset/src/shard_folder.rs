@@ -1,7 +1,7 @@
 use crate::{
     digest,
     error::RecordingError,
-    files::{EPISODES_FILE, LOG_FILE, STEPS_FILE},
+    files::{CLIPS_FILE, EPISODES_FILE, LOG_FILE, STEPS_FILE},
     shard::ShardReport,
     simulator::simulator_id,
     table::ShardTable,
@@ -23,14 +23,16 @@ const REPORT_FILE: &str = "report.json";
 /// Written last: a folder with this file is complete.
 const SHARD_FILE: &str = "shard.json";
 /// Name and version of a shard folder's layout; private to the platform.
-const SHARD_SCHEMA: &str = "faceoff-shard/4";
-/// The layouts before: 2, whose tables split integers by bytes and have no index of pages, and 3, whose
+const SHARD_SCHEMA: &str = "faceoff-shard/5";
+/// The layout before, which has no clips.
+const WITHOUT_CLIPS_SCHEMA: &str = "faceoff-shard/4";
+/// The layouts before that: 2, whose tables split integers by bytes and have no index of pages, and 3, whose
 /// steps do not tell the host's time. An evaluation that was under way when the program was replaced has
 /// such shards.
 const OLD_SHARD_SCHEMAS: [&str; 2] = ["faceoff-shard/2", "faceoff-shard/3"];
 
 /// The files that `shard.json` lists.
-const FILES: [&str; 4] = [STEPS_FILE, EPISODES_FILE, LOG_FILE, REPORT_FILE];
+const FILES: [&str; 5] = [STEPS_FILE, EPISODES_FILE, LOG_FILE, REPORT_FILE, CLIPS_FILE];
 
 /// `shard.json`.
 #[derive(Debug, Serialize, Deserialize)]
@@ -121,6 +123,8 @@ pub(crate) struct ShardRecording {
     pub report: ShardReport,
     pub steps: ShardTable,
     pub episodes: ShardTable,
+    /// Its pack of clips; absent of earlier layouts.
+    pub clips: Option<PathBuf>,
 }
 
 impl ShardRecording {
@@ -138,11 +142,11 @@ impl ShardRecording {
         let text = fs::read(dir.join(SHARD_FILE)).map_err(|e| unread(SHARD_FILE)(&e))?;
         let shard: ShardFile = serde_json::from_slice(&text).map_err(|e| unread(SHARD_FILE)(&e))?;
         let part = match &*shard.schema {
-            SHARD_SCHEMA => ShardTable::Ready,
+            SHARD_SCHEMA | WITHOUT_CLIPS_SCHEMA => ShardTable::Ready,
             old if OLD_SHARD_SCHEMAS.contains(&old) => ShardTable::Old,
             other => {
                 return Err(damaged(format!(
-                    "its layout is {other}; this version joins {} and {SHARD_SCHEMA}",
+                    "its layout is {other}; this version joins {}, {WITHOUT_CLIPS_SCHEMA} and {SHARD_SCHEMA}",
                     OLD_SHARD_SCHEMAS.join(", ")
                 )));
             }
@@ -159,7 +163,9 @@ impl ShardRecording {
                 shard.simulator.version
             )));
         }
-        for name in FILES {
+        let has_clips = shard.schema == SHARD_SCHEMA;
+        let files = FILES.into_iter();
+        for name in files.filter(|name| has_clips || *name != CLIPS_FILE) {
             let Some(expected) = shard.files.get(name) else {
                 return Err(damaged(format!("{SHARD_FILE} does not know {name}")));
             };
@@ -182,6 +188,7 @@ impl ShardRecording {
             report,
             steps: part(dir.join(STEPS_FILE)),
             episodes: part(dir.join(EPISODES_FILE)),
+            clips: has_clips.then(|| dir.join(CLIPS_FILE)),
         })
     }
 }

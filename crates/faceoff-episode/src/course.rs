@@ -143,6 +143,8 @@ impl<S: StepSink> Course<S> {
             state: &self.world.state(),
             constraints: outcome.constraints,
             next_observation: self.world.observation(),
+            puck_lost: self.world.is_puck_lost(),
+            impacts: self.world.world().impacts(),
         });
         let detail = match self.world.divergence() {
             Some(divergence) => Some(divergence.what.to_string()),

@@ -220,6 +220,8 @@ impl<S: GameSink> GameCourse<S> {
             step,
             sides,
             state: &played.state,
+            puck_lost: played.puck_lost,
+            impacts: &played.impacts,
         })?;
         if self.game.steps().is_multiple_of(WINDOW_STEPS) {
             self.sides.iter_mut().for_each(SideCourse::end_window);

@@ -1,7 +1,7 @@
 //! What goes into a game from outside, and what is recorded of it. Pairs are the first side's first.
 
 use crate::record::{Answered, Nowhere, RecordError};
-use faceoff_sim::{ConstraintValues, GameState, RallyEnd};
+use faceoff_sim::{ConstraintValues, GameState, Impact, RallyEnd};
 use faceoff_types::{AgentFault, AgentFaultKind, Interpolation, Side};
 
 /// What a side did wrong, before anybody has said where.
@@ -164,6 +164,10 @@ pub struct GameStepRow<'a> {
     pub sides: [SideStep<'a>; 2],
     /// The true state after the step.
     pub state: &'a GameState,
+    /// Had tracking lost the puck after the step, for both?
+    pub puck_lost: bool,
+    /// The contacts of the puck that began in the step.
+    pub impacts: &'a [Impact],
 }
 
 /// Why a rally is over.

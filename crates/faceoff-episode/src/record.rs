@@ -1,6 +1,6 @@
 //! What is recorded of an episode, and where it goes.
 
-use faceoff_sim::{ConstraintValues, EpisodeState};
+use faceoff_sim::{ConstraintValues, EpisodeState, Impact};
 use faceoff_types::{EpisodeOutcome, Interpolation, Seed};
 
 /// The measurements of one answered step.
@@ -43,6 +43,10 @@ pub struct StepRow<'a> {
     pub constraints: ConstraintValues,
     /// The observation after the step.
     pub next_observation: &'a [f64],
+    /// Had tracking lost the puck after the step? Its observation then repeats an earlier place.
+    pub puck_lost: bool,
+    /// The contacts of the puck that began in the step.
+    pub impacts: &'a [Impact],
 }
 
 /// A recording that could not be written; never the agent's fault.

@@ -18,6 +18,7 @@ mod conditions;
 mod config;
 mod csv;
 mod ending;
+mod episode_path;
 mod event_reader;
 mod extract;
 mod in_flight;

@@ -1,6 +1,7 @@
 //! What clients send to the API.
 
 mod boards;
+mod episodes;
 mod field_by_field;
 mod left_out;
 mod links;
@@ -9,6 +10,7 @@ mod tournaments;
 mod webhooks;
 
 pub use boards::*;
+pub use episodes::*;
 pub use links::*;
 pub use people::*;
 pub use tournaments::*;

@@ -42,4 +42,4 @@ pub use dynamics::path::LanePath;
 pub use faceoff_types::{Interpolation, JOINTS, PerturbationSettings, SUBSTEPS};
 pub use robot::plant::Plant;
 pub use together::{step_together, step_together_by};
-pub use world::{Bounds, Divergence, MalletState, Runaway, World};
+pub use world::{Bounds, Divergence, Impact, Impacts, MalletState, Met, Runaway, World};

@@ -17,6 +17,9 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 /// The bytes of an artifact, in order.
 pub type ArtifactStream = BoxStream<'static, Result<Bytes>>;
 
+/// What follows a dataset's key in that of its clips: they come and go with it.
+const CLIPS: &str = ".clips";
+
 /// Bytes in memory per piece of a copy.
 const PIECE_BYTES: usize = 1 << 20;
 
@@ -72,6 +75,26 @@ impl Artifacts {
         }
         upload.finish().await.map_err(artifact_error)?;
         Ok(())
+    }
+
+    /// Stores a dataset, and first what its replays are drawn from: whoever finds the dataset finds them.
+    pub async fn put_dataset(&self, key: &str, archive: &Path, clips: Option<&Path>) -> Result<()> {
+        if let Some(clips) = clips {
+            self.put_file(&Self::clips_of(key), clips).await?;
+        }
+        self.put_file(key, archive).await
+    }
+
+    /// The key of what a dataset's replays are drawn from. Not all datasets have it: those of older programs do not.
+    #[must_use]
+    pub fn clips_of(dataset: &str) -> String {
+        format!("{dataset}{CLIPS}")
+    }
+
+    /// Removes a dataset and what its replays are drawn from; what does not exist is no error.
+    pub async fn delete_dataset(&self, key: &str) -> Result<()> {
+        self.delete(&Self::clips_of(key)).await?;
+        self.delete(key).await
     }
 
     /// Copies an artifact to a new file and flushes it to disk.
@@ -194,7 +217,8 @@ impl Artifacts {
         self.delete_others(prefix, "").await
     }
 
-    /// Removes every artifact under `prefix/` but the one with the key `kept`, or those under `kept/`.
+    /// Removes every artifact under `prefix/` but the one with the key `kept`, or those under `kept/`, or the clips of a
+    /// dataset of that key.
     pub async fn delete_others(&self, prefix: &str, kept: &str) -> Result<()> {
         let listed: Vec<_> = self
             .objects
@@ -204,10 +228,10 @@ impl Artifacts {
             .await
             .map_err(artifact_error)?;
         for location in listed {
-            let is_kept = location
-                .as_ref()
-                .strip_prefix(kept)
-                .is_some_and(|rest| !kept.is_empty() && (rest.is_empty() || rest.starts_with('/')));
+            let is_kept = location.as_ref().strip_prefix(kept).is_some_and(|rest| {
+                let is_of_it = rest.is_empty() || rest.starts_with('/') || rest == CLIPS;
+                is_of_it && !kept.is_empty()
+            });
             if !is_kept {
                 self.delete(location.as_ref()).await?;
             }

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 /// Why an episode ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub enum EpisodeEnd {
     /// All control steps were played.
     Horizon,

@@ -52,6 +52,7 @@ pub(crate) trait Evaluator: Send + Sync {
         meta: &EvaluationMeta,
         recordings: &[PathBuf],
         archive: &Path,
+        clips: &Path,
     ) -> Result<Assembled, PlatformFault>;
 }
 
@@ -110,7 +111,9 @@ impl Evaluator for Runner {
         meta: &EvaluationMeta,
         recordings: &[PathBuf],
         archive: &Path,
+        clips: &Path,
     ) -> Result<Assembled, PlatformFault> {
-        Ok(faceoff_runner::assemble(meta, recordings, archive)?)
+        let assembled = faceoff_runner::assemble(meta, recordings, archive, Some(clips))?;
+        Ok(assembled)
     }
 }

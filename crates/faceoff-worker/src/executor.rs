@@ -274,9 +274,12 @@ impl Executor {
         let work = self.folder("dataset")?;
         let recordings = self.fetch_recordings(recordings, work.path())?;
         let archive = work.path().join("dataset.zip");
-        let assembled = self.evaluator.assemble(meta, &recordings, &archive)?;
+        let clips = work.path().join("clips");
+        let assembled = self
+            .evaluator
+            .assemble(meta, &recordings, &archive, &clips)?;
         self.server
-            .store_dataset(dataset, &archive)
+            .store_dataset(dataset, &archive, assembled.clips.then_some(&*clips))
             .context("storing the dataset")?;
         Ok(WorkReport::Finalise {
             dataset: dataset.to_owned(),

@@ -207,7 +207,7 @@ impl LocalServer {
             }
             (Holding::Held, None) => Ok(()),
             // no other lease names this key
-            (Holding::Lost, _) => artifacts.delete(dataset).await,
+            (Holding::Lost, _) => artifacts.delete_dataset(dataset).await,
         };
         if let Err(error) = tidied {
             tracing::warn!(dataset, %error, "a dataset that nobody needs is left");
@@ -364,8 +364,8 @@ impl WorkServer for LocalServer {
         })
     }
 
-    fn store_dataset(&self, key: &str, archive: &Path) -> anyhow::Result<()> {
-        let stored = self.store.artifacts().put_file(key, archive);
+    fn store_dataset(&self, key: &str, archive: &Path, clips: Option<&Path>) -> anyhow::Result<()> {
+        let stored = self.store.artifacts().put_dataset(key, archive, clips);
         Ok(self.runtime.block_on(stored)?)
     }
 }

@@ -42,8 +42,8 @@ pub(crate) trait WorkServer: Send + Sync {
     /// Stores the files of a folder as a recording.
     fn store_recording(&self, key: &str, folder: &Path) -> anyhow::Result<()>;
 
-    /// Stores a dataset; nobody sees it before the commit that names it.
-    fn store_dataset(&self, key: &str, archive: &Path) -> anyhow::Result<()>;
+    /// Stores a dataset, with what replays are drawn from; nobody sees it before the commit that names it.
+    fn store_dataset(&self, key: &str, archive: &Path, clips: Option<&Path>) -> anyhow::Result<()>;
 }
 
 /// The answer to a claim.

@@ -4,6 +4,7 @@
 
 mod assemble;
 mod by_index;
+mod clips;
 mod forgery;
 mod game;
 mod layout_2;

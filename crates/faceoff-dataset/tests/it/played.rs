@@ -155,6 +155,8 @@ fn converse(
             state: &world.state(),
             constraints: outcome.constraints,
             next_observation: world.observation(),
+            puck_lost: world.is_puck_lost(),
+            impacts: world.world().impacts(),
         });
         if let Some(divergence) = world.divergence() {
             let mut outcome = failed(task, Some(episode), Some(step), episode, world, &times_s);
@@ -262,7 +264,7 @@ impl Evaluation {
 
     pub fn assemble(&self, name: &str) -> Result<(Assembled, PathBuf), RecordingError> {
         let archive = self.dir.path().join(name);
-        assemble(&self.meta, &self.shards, &archive).map(|assembled| (assembled, archive))
+        assemble(&self.meta, &self.shards, &archive, None).map(|assembled| (assembled, archive))
     }
 
     /// Assembled to `dataset.zip`, which is unpacked to `dataset`.

@@ -6,6 +6,7 @@ mod announcements;
 mod board;
 mod bundle_stream;
 mod capacity;
+mod clips;
 mod comparisons;
 mod datasets;
 mod days;
@@ -158,6 +159,9 @@ pub(crate) fn router(patience: Duration) -> (Router<App>, Arc<Value>) {
         .routes(routes!(datasets::dataset))
         .routes(routes!(datasets::link_dataset))
         .routes(routes!(datasets::violations))
+        .routes(routes!(clips::episodes))
+        .routes(routes!(clips::motion))
+        .routes(routes!(clips::observed))
         .routes(routes!(datasets::publish_evaluation))
         .routes(routes!(comparisons::compare))
         .routes(routes!(

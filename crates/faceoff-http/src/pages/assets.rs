@@ -8,20 +8,47 @@ use std::sync::LazyLock;
 
 pub(super) const STYLE_PATH: &str = "/static/faceoff.css";
 pub(super) const ICON_PATH: &str = "/static/faceoff.svg";
+pub(super) const EPISODES_STYLE_PATH: &str = "/static/episodes.css";
+pub(super) const REPLAY_STYLE_PATH: &str = "/static/replay.css";
+pub(super) const REPLAY_SCRIPT_PATH: &str = "/static/replay.js";
 /// The board, as previews of links show it: one of the documentation's pictures.
 pub(super) const PREVIEW_PATH: &str = "/docs/images/board.png";
 
 const STYLE: &str = include_str!("../../../../web/static/faceoff.css");
+const EPISODES_STYLE: &str = include_str!("../../../../web/static/episodes.css");
+const REPLAY_STYLE: &str = include_str!("../../../../web/static/replay.css");
+/// Made of `web/client` by `make web`.
+const REPLAY_SCRIPT: &str = include_str!("../../../../web/client/dist/replay.js");
 const ICON: &str = include_str!("../../../../web/static/faceoff.svg");
 
 /// Where the pages load the styles from. The hash changes with the content, so that a browser may
 /// keep them for good and still never shows a new page with old styles.
 pub(super) fn style_url() -> &'static str {
-    static URL: LazyLock<String> = LazyLock::new(|| {
-        let hash = blake3::hash(STYLE.as_bytes()).to_hex();
-        format!("{STYLE_PATH}?{}", &hash[..12])
-    });
+    static URL: LazyLock<String> = LazyLock::new(|| hashed(STYLE_PATH, STYLE));
     &URL
+}
+
+/// Where pages of episodes load their styles from.
+pub(super) fn episodes_style_url() -> &'static str {
+    static URL: LazyLock<String> = LazyLock::new(|| hashed(EPISODES_STYLE_PATH, EPISODES_STYLE));
+    &URL
+}
+
+/// Where a replay's page loads its own styles from.
+pub(super) fn replay_style_url() -> &'static str {
+    static URL: LazyLock<String> = LazyLock::new(|| hashed(REPLAY_STYLE_PATH, REPLAY_STYLE));
+    &URL
+}
+
+/// Where a replay's page loads its script from.
+pub(super) fn replay_script_url() -> &'static str {
+    static URL: LazyLock<String> = LazyLock::new(|| hashed(REPLAY_SCRIPT_PATH, REPLAY_SCRIPT));
+    &URL
+}
+
+fn hashed(path: &str, content: &str) -> String {
+    let hash = blake3::hash(content.as_bytes()).to_hex();
+    format!("{path}?{}", &hash[..12])
 }
 
 fn asset(media_type: &'static str, content: &'static str) -> impl IntoResponse {
@@ -41,4 +68,16 @@ pub(super) async fn style() -> impl IntoResponse {
 
 pub(super) async fn icon() -> impl IntoResponse {
     asset("image/svg+xml", ICON)
+}
+
+pub(super) async fn episodes_style() -> impl IntoResponse {
+    asset("text/css; charset=utf-8", EPISODES_STYLE)
+}
+
+pub(super) async fn replay_style() -> impl IntoResponse {
+    asset("text/css; charset=utf-8", REPLAY_STYLE)
+}
+
+pub(super) async fn replay_script() -> impl IntoResponse {
+    asset("text/javascript; charset=utf-8", REPLAY_SCRIPT)
 }

@@ -13,6 +13,7 @@ use crate::{
     viewer::Viewer,
     views::{
         ablation,
+        clips::Clips,
         evaluation::{EvaluationStatus, EvaluationView, Progress, ResultView},
         queue::QueueView,
         ruling::RulingView,
@@ -282,6 +283,8 @@ struct Page {
     profile: Profile,
     /// Path of the page of its submission's ablation, if there is one.
     ablation: Option<String>,
+    /// Are its episodes shown, each with a replay?
+    has_episodes: bool,
     /// Said when there is no result.
     state: String,
     /// Is its dataset there for everybody?
@@ -352,6 +355,7 @@ pub(super) async fn page(
         extra_turn: view.extra_turn.clone(),
         day: view.day,
         profile: view.profile,
+        has_episodes: finished.is_some() && Clips::of(&app, &sight, id).await.is_ok(),
         ablation: ablation.then(|| format!("/submissions/{}/ablation", submission.id)),
         state: match frozen {
             Some(frozen) => format!(

@@ -97,6 +97,12 @@ pub(super) fn share(count: u32, episodes: u32) -> String {
     format!("{count} ({percent:.0} %)")
 }
 
+/// Some of all, in percent without decimals.
+pub(super) fn percent(some: usize, all: usize) -> String {
+    let count = |count: usize| u32::try_from(count).map_or(f64::INFINITY, f64::from);
+    format!("{:.0} %", 100.0 * count(some) / count(all.max(1)))
+}
+
 /// A sign beside the tier's name, since colour alone must not carry it.
 pub(super) const fn tier_sign(tier: Tier) -> &'static str {
     match tier {

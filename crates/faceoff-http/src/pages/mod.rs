@@ -11,6 +11,8 @@ mod board;
 mod chart;
 mod comparison;
 mod docs;
+mod episode_words;
+mod episodes;
 mod evaluation;
 mod feed;
 mod figures;
@@ -20,10 +22,12 @@ mod join;
 mod log;
 mod problems;
 mod register;
+mod replay;
 mod robots;
 mod season;
 mod sign_in;
 mod standing;
+mod table_drawing;
 mod team;
 mod unknown;
 
@@ -47,6 +51,15 @@ pub(crate) fn router(patience: Duration, api: Arc<Value>) -> Router<App> {
         .route("/teams/{id}", get(team::page))
         .route("/evaluations/{id}", get(evaluation::page))
         .route("/evaluations/{id}/compare/{other}", get(comparison::page))
+        .route("/evaluations/{id}/episodes", get(episodes::page))
+        .route(
+            "/evaluations/{id}/episodes/{task}/{episode}",
+            get(replay::page),
+        )
+        .route(
+            "/evaluations/{id}/episodes/{task}/{episode}/embed",
+            get(replay::embedded),
+        )
         .route("/season", get(season::page))
         .route("/submissions/{id}/ablation", get(ablation::page))
         .route("/help", get(help::page))
@@ -63,6 +76,9 @@ pub(crate) fn router(patience: Duration, api: Arc<Value>) -> Router<App> {
         .merge(docs::router(api))
         .route(assets::STYLE_PATH, get(assets::style))
         .route(assets::ICON_PATH, get(assets::icon))
+        .route(assets::EPISODES_STYLE_PATH, get(assets::episodes_style))
+        .route(assets::REPLAY_STYLE_PATH, get(assets::replay_style))
+        .route(assets::REPLAY_SCRIPT_PATH, get(assets::replay_script))
         .layer(middleware::from_fn_with_state(patience, layers::time_out))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES))
 }

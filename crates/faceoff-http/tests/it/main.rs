@@ -14,6 +14,7 @@ mod board_data;
 mod board_load;
 mod capacity;
 mod capacity_log;
+mod clips;
 mod comparisons;
 mod days;
 mod divisions;

@@ -37,6 +37,15 @@ const TABLE: &[(&str, &str)] = &[
     ("GET /evaluations/{id}/dataset", "?00++++"),
     ("POST /evaluations/{id}/dataset/link", "?00++++"),
     ("POST /evaluations/{id}/rerun", "?----++"),
+    ("GET /evaluations/{id}/episodes", "+++++++"),
+    (
+        "GET /evaluations/{id}/episodes/{task}/{episode}/motion",
+        "+++++++",
+    ),
+    (
+        "GET /evaluations/{id}/episodes/{task}/{episode}/observed",
+        "+++++++",
+    ),
     ("GET /evaluations/{id}/violations", "?00++++"),
     ("POST /evaluations/{id}/void", "?----++"),
     ("GET /events", "?----++"),
@@ -344,6 +353,7 @@ impl Cast {
             .replace("{task}", "hit")
             .replace("{day}", "2020-01-01")
             .replace("{side}", "1")
+            .replace("{episode}", "0")
             .replace("{version}", "7");
         format!("/api/v1{path}")
     }

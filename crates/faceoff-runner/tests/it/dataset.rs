@@ -67,7 +67,7 @@ fn one_worker_and_three_record_the_same() {
             }
         });
         let archive = dir.path().join(format!("{name}.zip"));
-        let mut result = assemble(&meta(), &dirs, &archive).unwrap().result;
+        let mut result = assemble(&meta(), &dirs, &archive, None).unwrap().result;
         let out = dir.path().join(name);
         let mut zip = ZipArchive::new(File::open(&archive).unwrap()).unwrap();
         zip.extract(&out).unwrap();
@@ -110,7 +110,7 @@ fn verified(agent: &Agent, task: Task, episodes: u32) -> Verified {
     let shard = dir.path().join("shard");
     run(&spec(task, 0..episodes), agent, &sandboxed(), &shard).unwrap();
     let archive = dir.path().join("dataset.zip");
-    assemble(&meta(), &[shard], &archive).unwrap();
+    assemble(&meta(), &[shard], &archive, None).unwrap();
     let workers = NonZero::new(2).unwrap();
     verify(&Dataset::open(&archive).unwrap(), workers, &|| ()).unwrap()
 }
@@ -158,7 +158,7 @@ fn a_world_that_an_agent_makes_diverge_is_its_fault_and_verifies() {
     assert!(report.log.contains("made the simulated world diverge"));
 
     let archive = dir.path().join("dataset.zip");
-    assemble(&meta(), &[shard], &archive).unwrap();
+    assemble(&meta(), &[shard], &archive, None).unwrap();
     let dataset = Dataset::open(&archive).unwrap();
     let workers = NonZero::new(2).unwrap();
     assert_eq!(verify(&dataset, workers, &|| ()).unwrap().episodes, 2);

@@ -31,6 +31,7 @@ pub struct Episode {
     channel: AgentChannel,
     table: TableFactors,
     steps: u32,
+    puck_lost: bool,
     violations: Violations,
 }
 
@@ -72,6 +73,7 @@ impl Episode {
             opponent,
             table,
             steps: 0,
+            puck_lost: false,
             violations: Violations::default(),
         }
     }
@@ -116,8 +118,8 @@ impl Episode {
 
     /// A control step's end: what the agent is told, and what the step led to.
     pub(crate) fn observe(&mut self) -> StepOutcome {
-        let lost = self.table.is_lost();
-        self.channel.look(&self.world, lost);
+        self.puck_lost = self.table.is_lost();
+        self.channel.look(&self.world, self.puck_lost);
         self.steps += 1;
 
         let constraints = self.constraints();
@@ -133,6 +135,12 @@ impl Episode {
     #[must_use]
     pub fn divergence(&self) -> Option<Divergence> {
         self.world.divergence()
+    }
+
+    /// Has tracking lost the puck, so that its observation repeats an earlier place?
+    #[must_use]
+    pub fn is_puck_lost(&self) -> bool {
+        self.puck_lost
     }
 
     /// Control steps played.

@@ -11,7 +11,7 @@ use crate::{
     perturbation::table_factors::TableFactors,
     robot::plant::Plant,
     stream::Stream,
-    world::{Bounds, Divergence, World},
+    world::{Bounds, Divergence, Impacts, World},
 };
 use faceoff_types::{
     Factors, Interpolation, PerturbationSettings, Ruleset, Seed, Violations, WINDOW_STEPS,
@@ -68,6 +68,10 @@ pub struct GameStep {
     pub state: GameState,
     /// How the world diverged, if that ended the rally.
     pub divergence: Option<Divergence>,
+    /// Had tracking lost the puck after this step?
+    pub puck_lost: bool,
+    /// The contacts of the puck that began in this step.
+    pub impacts: Impacts,
 }
 
 impl Game {
@@ -124,6 +128,7 @@ impl Game {
             values.mark(violations);
         }
         let divergence = world.divergence();
+        let impacts = *world.impacts();
         let rally_end = match divergence {
             Some(Divergence { by, .. }) => {
                 let end = RallyEnd::Diverged { by };
@@ -146,6 +151,8 @@ impl Game {
             window,
             state,
             divergence,
+            puck_lost: lost,
+            impacts,
         }
     }
 

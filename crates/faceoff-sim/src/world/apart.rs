@@ -3,6 +3,7 @@
 
 use super::{
     arm_lanes::ArmLanes,
+    contacts::Contacts,
     seats::Seat,
     solver::{Mass, Problem, accelerations, accelerations_in_contact},
     touching::{MalletPose, find_contacts},
@@ -134,7 +135,10 @@ pub fn touch_apart<T: Lanes, A>(
         (axes, row(&arms.motion.dq, lane))
     };
     let robots = world.arms.len();
-    let Some(contacts) = find_contacts(&mallets[..robots], motion, &world.puck) else {
+    let found = find_contacts(&mallets[..robots], motion, &world.puck);
+    let touching = found.as_ref().map_or(0, Contacts::touching);
+    world.impacts.touch(touching, world.substep, &world.puck);
+    let Some(contacts) = found else {
         return;
     };
     let free = world

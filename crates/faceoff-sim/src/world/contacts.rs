@@ -1,6 +1,9 @@
 //! The contact forces of one substep, solved together through the bodies that they share.
 
-use super::cone::{DIRECTIONS, solve_cone};
+use super::{
+    cone::{DIRECTIONS, solve_cone},
+    impacts::Met,
+};
 use crate::{
     model::DOFS,
     table::{
@@ -55,6 +58,8 @@ pub struct Contacts {
     count: usize,
     rows: [Row; MAX_ROWS],
     friction: [f64; MAX_CONTACTS],
+    /// What touches the puck, as bits.
+    touching: u8,
 }
 
 /// Who moves on the two sides of a contact.
@@ -94,12 +99,18 @@ impl Contacts {
             count: 0,
             rows: [row; MAX_ROWS],
             friction: [0.0; MAX_CONTACTS],
+            touching: 0,
         }
     }
 
     /// Is nothing in contact?
     pub fn is_empty(&self) -> bool {
         self.count == 0
+    }
+
+    /// What touches the puck, as bits of [`Met`].
+    pub fn touching(&self) -> u8 {
+        self.touching
     }
 
     /// Which arms a contact pushes.
@@ -174,6 +185,13 @@ impl Contacts {
             row.target = push - material.damping_per_s * velocity;
             self.rows[DIRECTIONS * self.count + k] = row;
         }
+        self.touching |= match pair {
+            Pair::Rim { .. } if n[1].abs() > n[0].abs() => Met::LongRim.bit(),
+            Pair::Rim { .. } => Met::ShortRim.bit(),
+            Pair::Mallet { robot: 0, .. } => Met::Mallet(0).bit(),
+            Pair::Mallet { .. } => Met::Mallet(1).bit(),
+            Pair::Mallets { .. } => 0,
+        };
         self.friction[self.count] = material.friction;
         self.count += 1;
     }

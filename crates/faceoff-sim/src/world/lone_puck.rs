@@ -12,6 +12,8 @@ impl World {
     pub(super) fn advance_puck_alone(&mut self) {
         let mut contacts = Contacts::none();
         add_rims(&mut contacts, &self.puck);
+        self.impacts
+            .touch(contacts.touching(), self.substep, &self.puck);
         let force = (!contacts.is_empty()).then(|| {
             contacts.solve_puck(&self.puck.free_acceleration(&self.puck_damping, self.air_n))
         });
@@ -41,6 +43,8 @@ impl World {
                 );
             }
         }
+        self.impacts
+            .touch(contacts.touching(), self.substep, &self.puck);
         let force = (!contacts.is_empty()).then(|| {
             contacts.solve_puck(&self.puck.free_acceleration(&self.puck_damping, self.air_n))
         });

@@ -8,6 +8,7 @@ mod cone;
 mod contacts;
 mod divergence;
 mod friction;
+mod impacts;
 mod joints;
 mod lone_puck;
 mod seats;
@@ -29,6 +30,7 @@ use crate::{
 use arm::Arm;
 pub use bounds::{Bounds, Divergence, Runaway};
 use faceoff_types::{Interpolation, Ruleset};
+pub use impacts::{Impact, Impacts, Met};
 
 /// A mallet's striking cylinder: centre x, y, z (m) and velocity vx, vy (m/s), table frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,6 +60,7 @@ pub struct World {
     /// The robots that a contact pushed last.
     pushed: [bool; 2],
     divergence: Option<Divergence>,
+    impacts: Impacts,
 }
 
 impl World {
@@ -79,6 +82,7 @@ impl World {
             runaway: None,
             pushed: [false; 2],
             divergence: None,
+            impacts: Impacts::default(),
         }
     }
 
@@ -141,6 +145,12 @@ impl World {
     #[must_use]
     pub fn puck(&self) -> &Puck {
         &self.puck
+    }
+
+    /// The contacts of the puck that began in the last control step, or in the one under way.
+    #[must_use]
+    pub fn impacts(&self) -> &Impacts {
+        &self.impacts
     }
 
     /// Positions of a robot's driven joints, rad.

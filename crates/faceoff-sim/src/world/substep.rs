@@ -127,6 +127,8 @@ fn meet<T: Lanes, A>(
         let robots = seat.world.arms.len();
         if may_touch(&centres[..robots], &seat.world.puck) {
             touch_apart(arms, seat, prepared, &centres, apart);
+        } else {
+            seat.world.impacts.part();
         }
         let stopped = |arm: &Arm| arm.constraints.any_stop();
         if beyond & seat.lanes() != 0 || seat.world.arms.iter().any(stopped) {

@@ -45,6 +45,7 @@ impl World {
                 world.control_step(air);
                 continue;
             }
+            world.begin_step();
             let arms = world.arms.len();
             seats.push(Seat::new(world, air, first));
             first += arms;
@@ -62,7 +63,15 @@ impl World {
         self.divergence.is_none() && self.imposed.is_none() && !self.arms.is_empty()
     }
 
+    /// Forgets what was noted of the control step before.
+    fn begin_step(&mut self) {
+        if self.substep == 0 {
+            self.impacts.begin_step();
+        }
+    }
+
     fn advance(&mut self, substeps: usize, mut air: impl FnMut(&Puck) -> [f64; 2]) {
+        self.begin_step();
         if self.is_laned() {
             let robots = self.arms.len();
             let mut seats = [Seat::new(self, air, 0)];

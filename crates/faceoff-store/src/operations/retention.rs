@@ -240,7 +240,7 @@ impl Store {
         let archives = bundles::going(&mut connection, before).await?;
         drop(connection);
         for (id, key) in &datasets {
-            self.artifacts().delete(key).await?;
+            self.artifacts().delete_dataset(key).await?;
             self.write(Actor::Server, now, async |tx| {
                 retentions::set_dataset_gone(tx, *id).await
             })

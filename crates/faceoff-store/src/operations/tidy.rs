@@ -62,7 +62,7 @@ impl Store {
         let dropped = drafts::with_dropped_datasets(&mut connection, before).await?;
         drop(connection);
         for (id, key) in &dropped {
-            self.artifacts().delete(key).await?;
+            self.artifacts().delete_dataset(key).await?;
             self.write(Actor::Server, now, async |tx| {
                 drafts::set_dataset_removed(tx, *id, now).await
             })

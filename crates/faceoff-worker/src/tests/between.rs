@@ -80,7 +80,7 @@ impl WorkServer for Between {
         self.server.store_recording(key, folder)
     }
 
-    fn store_dataset(&self, key: &str, archive: &Path) -> anyhow::Result<()> {
-        self.server.store_dataset(key, archive)
+    fn store_dataset(&self, key: &str, archive: &Path, clips: Option<&Path>) -> anyhow::Result<()> {
+        self.server.store_dataset(key, archive, clips)
     }
 }

@@ -195,6 +195,7 @@ impl Evaluator for Scripted {
         meta: &EvaluationMeta,
         recordings: &[PathBuf],
         archive: &Path,
+        clips: &Path,
     ) -> Result<Assembled, PlatformFault> {
         let parts = recordings
             .iter()
@@ -202,6 +203,7 @@ impl Evaluator for Scripted {
             .collect::<Vec<_>>();
         let bytes = parts.join("\n");
         std::fs::write(archive, &bytes).unwrap();
+        std::fs::write(clips, "clips").unwrap();
         *self.assembled.lock().unwrap() = parts;
         Ok(Assembled {
             result: result(meta),
@@ -209,6 +211,7 @@ impl Evaluator for Scripted {
                 bytes: bytes.len() as u64,
                 blake3: blake3::hash(bytes.as_bytes()).to_string(),
             },
+            clips: true,
         })
     }
 }

@@ -108,6 +108,8 @@ fn joined(dir: &Path, task: Task, shards: u32, episodes: u32, steps: u32) -> Vec
                         state: &state,
                         constraints: Default::default(),
                         next_observation: world.observation(),
+                        puck_lost: false,
+                        impacts: &[],
                     });
                 }
                 writer.write(rows.take()).unwrap();

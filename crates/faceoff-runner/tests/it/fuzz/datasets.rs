@@ -99,7 +99,7 @@ fn recorded(dir: &Path) {
         ruleset: spec.ruleset,
         variation: Default::default(),
     };
-    assemble(&meta, &[shard], &dir.join("dataset.zip")).unwrap();
+    assemble(&meta, &[shard], &dir.join("dataset.zip"), None).unwrap();
 }
 
 /// The files of a dataset, or of a game's recording, by name, and the archive.

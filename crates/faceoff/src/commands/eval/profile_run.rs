@@ -88,8 +88,9 @@ pub(super) fn play(setup: &EvalSetup, profile: Profile, out: &Path) -> anyhow::R
         ruleset: Ruleset::CURRENT,
         variation: setup.variation.clone(),
     };
-    let Assembled { result, archive } =
-        assemble(&meta, &dirs, &out.join(ARCHIVE_FILE)).context("joining the recordings")?;
+    let Assembled {
+        result, archive, ..
+    } = assemble(&meta, &dirs, &out.join(ARCHIVE_FILE), None).context("joining the recordings")?;
     // They are in the dataset now; a further profile needs the room.
     for dir in &dirs {
         fs::remove_dir_all(dir).with_context(|| format!("removing {}", dir.display()))?;

@@ -1,0 +1,203 @@
+//! `/evaluations/{id}/episodes/{task}/{episode}`: an episode, drawn; and the same without anything around it, for other sites.
+
+use super::{
+    assets,
+    episode_words::in_words,
+    frame::{Frame, PageProblem, render},
+    table_drawing::{self, Dot, Ground},
+};
+use crate::{
+    app::App,
+    episode_path::EpisodePath,
+    paths,
+    problem::Problem,
+    viewer::Viewer,
+    views::{clips::Clips, season::SeasonHead, sight::Sight},
+};
+use askama::Template;
+use axum::{
+    extract::State,
+    http::{HeaderValue, header},
+    response::Response,
+};
+use faceoff_replay::{
+    Clip, EpisodeLine, Key,
+    model::{CONTROL_STEP_S, PUCK, TOOL},
+};
+use faceoff_types::{EvaluationId, Task};
+use jiff::civil::Date;
+
+/// The episode as a picture that does not move.
+struct Still {
+    ground: Ground,
+    puck_way: String,
+    mallet_way: String,
+    opponent_way: String,
+    /// Where the agent was told that the puck is.
+    seen: String,
+    contacts: String,
+    start: Dot,
+    puck: Dot,
+    mallet: Dot,
+    puck_radius: f64,
+    mallet_radius: f64,
+}
+
+/// What both pages need.
+struct Shown {
+    id: EvaluationId,
+    task: Task,
+    episode: u32,
+    team: String,
+    day: Date,
+    success: bool,
+    why: String,
+    broken: Vec<String>,
+    late: u32,
+    /// On somebody else's page?
+    embedded: bool,
+    steps: u32,
+    duration_s: String,
+    still: Still,
+    /// Where the script finds the clips.
+    motion: String,
+    observed: Option<String>,
+    script: &'static str,
+    styles: [&'static str; 2],
+    before: Option<String>,
+    after: Option<String>,
+}
+
+#[derive(Template)]
+#[template(path = "replay.html")]
+struct Page {
+    frame: Frame,
+    shown: Shown,
+}
+
+#[derive(Template)]
+#[template(path = "replay_embedded.html")]
+struct Embedded {
+    frame: Frame,
+    shown: Shown,
+}
+
+/// An episode's replay.
+pub(super) async fn page(
+    viewer: Result<Viewer, Problem>,
+    State(app): State<App>,
+    path: Result<EpisodePath, Problem>,
+) -> Result<Response, PageProblem> {
+    let shown = Shown::of(&app, viewer?, path?).await?;
+    let season = SeasonHead::now(&app).await?;
+    render(&Page {
+        frame: Frame::of(&app, season.name, ""),
+        shown,
+    })
+}
+
+/// The replay alone, as anybody sees it, whoever is signed in: pages of other sites may hold it.
+pub(super) async fn embedded(
+    State(app): State<App>,
+    path: Result<EpisodePath, Problem>,
+) -> Result<Response, PageProblem> {
+    let shown = Shown::of(&app, Viewer::Anybody, path?).await?;
+    let mut answer = render(&Embedded {
+        frame: Frame::new(String::new(), ""),
+        shown: Shown {
+            observed: None,
+            embedded: true,
+            ..shown
+        },
+    })?;
+    let headers = answer.headers_mut();
+    headers.insert(
+        header::CONTENT_SECURITY_POLICY,
+        HeaderValue::from_static(
+            "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; \
+             base-uri 'none'; form-action 'none'; frame-ancestors *",
+        ),
+    );
+    Ok(answer)
+}
+
+impl Shown {
+    async fn of(app: &App, viewer: Viewer, path: EpisodePath) -> Result<Self, Problem> {
+        let EpisodePath { id, task, episode } = path;
+        let sight = Sight::of(app, viewer).await?;
+        let clips = Clips::of(app, &sight, id).await?;
+        let view = clips.episodes().await?;
+        let at = |episode: u32| {
+            let found = view
+                .episodes
+                .binary_search_by_key(&(task, episode), |line| (line.task, line.episode));
+            found.ok().map(|index| &view.episodes[index])
+        };
+        let line = at(episode).ok_or_else(|| Problem::not_found("episode"))?;
+        let motion = read(&clips, Key::motion(task, episode)).await?;
+        let observed = match clips.sees_observed {
+            true => Some(read(&clips, Key::observed(task, episode)).await?),
+            false => None,
+        };
+        let team = app.store.team(clips.evaluation.team).await?;
+        let api = format!("{}/episodes/{task}/{episode}", paths::evaluation(id));
+        let beside = |other: Option<u32>| {
+            let other = other.and_then(at)?;
+            Some(page_path(id, other))
+        };
+        Ok(Self {
+            id,
+            task,
+            episode,
+            team: team.name.to_string(),
+            day: clips.evaluation.of.date,
+            success: line.success,
+            why: line.why.clone(),
+            broken: line.broken.iter().map(in_words).collect(),
+            embedded: false,
+            late: if clips.sees_observed { line.late } else { 0 },
+            steps: line.steps,
+            duration_s: format!("{:.2}", f64::from(line.steps) * CONTROL_STEP_S),
+            still: Still::of(&motion, observed.as_ref()),
+            observed: observed.map(|_| format!("{api}/observed")),
+            motion: format!("{api}/motion"),
+            script: assets::replay_script_url(),
+            styles: [assets::episodes_style_url(), assets::replay_style_url()],
+            before: beside(episode.checked_sub(1)),
+            after: beside(episode.checked_add(1)),
+        })
+    }
+}
+
+pub(super) fn page_path(id: EvaluationId, line: &EpisodeLine) -> String {
+    format!("/evaluations/{id}/episodes/{}/{}", line.task, line.episode)
+}
+
+async fn read(clips: &Clips, key: Key) -> Result<Clip, Problem> {
+    let bytes = clips.clip(key).await?;
+    Clip::read(&bytes).map_err(Problem::internal)
+}
+
+impl Still {
+    fn of(motion: &Clip, observed: Option<&Clip>) -> Self {
+        let [puck, mallet] = [motion.puck_places(), motion.mallet_places(0)];
+        let contacts = motion.header.contacts.iter();
+        let contacts: Vec<[f64; 2]> = contacts.map(|contact| [contact.x, contact.y]).collect();
+        let millimetres = |m: f64| (m * 1e4).round() / 10.0;
+        let dot = |place: Option<&[f64; 2]>| Dot::at(place.copied().unwrap_or_default());
+        Self {
+            ground: Ground::new(),
+            start: dot(puck.first()),
+            puck: dot(puck.last()),
+            mallet: dot(mallet.last()),
+            puck_way: table_drawing::way(&puck),
+            mallet_way: table_drawing::way(&mallet),
+            opponent_way: table_drawing::way(&motion.mallet_places(1)),
+            seen: observed
+                .map_or_else(String::new, |clip| table_drawing::dots(&clip.seen_places())),
+            contacts: table_drawing::squares(&contacts),
+            puck_radius: millimetres(PUCK.radius_m),
+            mallet_radius: millimetres(TOOL.cylinder_radius_m),
+        }
+    }
+}

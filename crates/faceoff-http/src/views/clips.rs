@@ -1,0 +1,154 @@
+//! What replays of an evaluation's episodes are drawn from. The motion, and how each episode went, are there for everybody once the
+//! day is released; what the agent was told and commanded, its times and its faults for whoever gets the dataset.
+
+use super::sight::Sight;
+use crate::{
+    app::AppState,
+    archived,
+    problem::{Problem, ProblemKind},
+    release::check_released,
+};
+use faceoff_replay::{EpisodeLine, Key, Pack, ReplayError, Sheet};
+use faceoff_store::{Artifacts, Evaluation, EvaluationState};
+use faceoff_types::{EpisodeEnd, EvaluationId, Task};
+use serde::{Deserialize, Serialize};
+use std::{collections::BTreeMap, path::PathBuf};
+use utoipa::ToSchema;
+
+/// The recorded clips of an evaluation, for a viewer.
+#[derive(Debug)]
+pub(crate) struct Clips {
+    pub(crate) evaluation: Evaluation,
+    /// Does the viewer see what was observed, commanded and timed, and the agent's faults?
+    pub(crate) sees_observed: bool,
+    /// The clips' name among the artifacts, which is never another's.
+    pub(crate) key: String,
+    path: PathBuf,
+}
+
+/// How the episodes of an evaluation went, in order of task and number.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct EpisodesView {
+    /// The episodes.
+    pub episodes: Vec<EpisodeLine>,
+    /// By task, for whoever gets the dataset: how many control steps were answered in which time, shortest first.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub computation_times: BTreeMap<Task, Vec<TimeBinView>>,
+}
+
+/// Control steps by the time that the agent took for its answer.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct TimeBinView {
+    /// At least, s.
+    pub from_s: f64,
+    /// Less than, s.
+    pub to_s: f64,
+    /// How many.
+    pub steps: u64,
+}
+
+impl Clips {
+    /// Of an evaluation, if the viewer may see it now.
+    ///
+    /// # Errors
+    /// `NotFound`, `NotYet`, `Blind`; `Gone` once the dataset was removed; `Conflict` for one without a result, or one that an
+    /// older version of the server has played.
+    pub(crate) async fn of(
+        app: &AppState,
+        sight: &Sight,
+        id: EvaluationId,
+    ) -> Result<Self, Problem> {
+        let evaluation = app.store.evaluation(id).await?;
+        sight.check_shown(evaluation.of.stage)?;
+        let EvaluationState::Finished { dataset, .. } = &evaluation.state else {
+            return Err(Problem::new(
+                ProblemKind::Conflict,
+                "the evaluation has no result, and its episodes are shown with it",
+            ));
+        };
+        check_released(app, &evaluation).await?;
+        if !sight.is_own(&evaluation) {
+            sight.check_not_frozen(&evaluation, "shown")?;
+        }
+        if let Some(removed) = &evaluation.dataset_removed {
+            return Err(Problem::removed(
+                "the recording, with the replays that are drawn from it,",
+                removed,
+            ));
+        }
+        archived::check_kept(app, dataset, "recording").await?;
+        let key = Artifacts::clips_of(dataset);
+        let artifacts = app.store.artifacts();
+        if artifacts.bytes_of(&key).await?.is_none() {
+            return Err(Problem::new(
+                ProblemKind::Conflict,
+                "there are no replays of this evaluation: the version of the server that played it made none. Its \
+                 dataset has the episodes, and `faceoff replay` draws them",
+            ));
+        }
+        Ok(Self {
+            sees_observed: sight.is_own(&evaluation) || sight.is_public(&evaluation),
+            path: artifacts.path_of(&key).map_err(Problem::internal)?,
+            key,
+            evaluation,
+        })
+    }
+
+    /// An episode's clip, gzip-compressed.
+    ///
+    /// # Errors
+    /// `NotFound` if there is no such episode.
+    pub(crate) async fn clip(&self, key: Key) -> Result<Vec<u8>, Problem> {
+        self.read(move |pack| pack.clip(key))
+            .await?
+            .ok_or_else(|| Problem::not_found("episode"))
+    }
+
+    /// How the episodes went.
+    ///
+    /// # Errors
+    /// An internal problem, if the file cannot be read.
+    pub(crate) async fn episodes(&self) -> Result<EpisodesView, Problem> {
+        let Sheet {
+            mut episodes,
+            times,
+            ..
+        } = self.read(Pack::sheet).await?;
+        if !self.sees_observed {
+            for line in &mut episodes {
+                if line.end == EpisodeEnd::AgentFault {
+                    line.why = "a fault of the agent ended the episode".to_owned();
+                }
+            }
+        }
+        let bins = |(task, times): (Task, faceoff_replay::TimeBins)| {
+            let bins = times
+                .bins()
+                .map(|(from_s, to_s, steps)| TimeBinView {
+                    from_s,
+                    to_s,
+                    steps,
+                })
+                .collect();
+            (task, bins)
+        };
+        Ok(EpisodesView {
+            episodes,
+            computation_times: match self.sees_observed {
+                true => times.into_iter().map(bins).collect(),
+                false => BTreeMap::new(),
+            },
+        })
+    }
+
+    async fn read<T: Send + 'static>(
+        &self,
+        read: impl FnOnce(&Pack) -> Result<T, ReplayError> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let path = self.path.clone();
+        tokio::task::spawn_blocking(move || read(&Pack::open(&path)?))
+            .await
+            .map_err(Problem::internal)?
+            .map_err(Problem::internal)
+    }
+}

@@ -1,0 +1,96 @@
+//! A clip as bytes.
+
+use crate::{
+    column::Column,
+    error::ReplayError,
+    header::{CLIP_FORMAT, ColumnHeader, Header},
+};
+use flate2::{Compression, read::GzDecoder, write::GzEncoder};
+use std::io::{self, Read, Write};
+
+/// A header and its columns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Clip {
+    /// What it says of itself; [`Clip::compressed`] fills in the columns.
+    pub header: Header,
+    /// The samples.
+    pub columns: Vec<Column>,
+}
+
+/// The largest clip that is read: what claims to be more is no clip.
+const MAX_BYTES: u64 = 64 << 20;
+
+impl Clip {
+    /// A column by its name.
+    #[must_use]
+    pub fn column(&self, name: &str) -> Option<&Column> {
+        self.columns.iter().find(|column| column.name == name)
+    }
+
+    /// The clip's bytes, gzip-compressed, as servers send and packs keep them. The same clip gives the same bytes.
+    ///
+    /// # Errors
+    /// [`ReplayError::Io`], if memory cannot be written; [`ReplayError::Unreadable`] for what is too long.
+    pub fn compressed(&self) -> Result<Vec<u8>, ReplayError> {
+        let too_long = || ReplayError::unreadable("what was recorded", "it is too long");
+        let mut payload = Vec::with_capacity(1 << 14);
+        let mut header = self.header.clone();
+        header.columns.clear();
+        for column in &self.columns {
+            let before = payload.len();
+            column.write(&mut payload);
+            header.columns.push(ColumnHeader {
+                name: column.name.clone(),
+                unit: column.unit.clone(),
+                scale: column.scale,
+                order: column.order,
+                first: column.first,
+                count: u32::try_from(column.counts.len()).map_err(|_| too_long())?,
+                bytes: u32::try_from(payload.len() - before).map_err(|_| too_long())?,
+            });
+        }
+        let header = serde_json::to_vec(&header).map_err(io::Error::other)?;
+        let length = u32::try_from(header.len()).map_err(|_| too_long())?;
+        let mut gzip = GzEncoder::new(Vec::with_capacity(payload.len()), Compression::new(6));
+        gzip.write_all(&length.to_le_bytes())?;
+        gzip.write_all(&header)?;
+        gzip.write_all(&payload)?;
+        Ok(gzip.finish()?)
+    }
+
+    /// Reads what [`Clip::compressed`] has made.
+    ///
+    /// # Errors
+    /// [`ReplayError::Unreadable`].
+    pub fn read(compressed: &[u8]) -> Result<Self, ReplayError> {
+        let wrong = |why: &dyn ToString| ReplayError::unreadable("this", why.to_string());
+        let mut bytes = Vec::new();
+        GzDecoder::new(compressed)
+            .take(MAX_BYTES)
+            .read_to_end(&mut bytes)
+            .map_err(|error| wrong(&error))?;
+        let cut = || wrong(&"it is cut off");
+        let (length, rest) = bytes.split_first_chunk::<4>().ok_or_else(cut)?;
+        let length = usize::try_from(u32::from_le_bytes(*length)).map_err(|error| wrong(&error))?;
+        let (header, mut payload) = rest.split_at_checked(length).ok_or_else(cut)?;
+        let header: Header = serde_json::from_slice(header).map_err(|error| wrong(&error))?;
+        if header.format != CLIP_FORMAT {
+            return Err(wrong(&format!(
+                "its format is {:?}, this version reads {CLIP_FORMAT}",
+                header.format
+            )));
+        }
+        let mut columns = Vec::with_capacity(header.columns.len());
+        for told in &header.columns {
+            let bytes = usize::try_from(told.bytes).map_err(|error| wrong(&error))?;
+            let (of_column, rest) = payload.split_at_checked(bytes).ok_or_else(cut)?;
+            payload = rest;
+            let mut column = Column::new(told.name.as_str(), &told.unit, told.scale, told.order)
+                .from_sample(told.first);
+            let count = usize::try_from(told.count).map_err(|error| wrong(&error))?;
+            column.read(of_column, count)?;
+            columns.push(column);
+        }
+        Ok(Self { header, columns })
+    }
+}

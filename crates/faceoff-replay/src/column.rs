@@ -1,0 +1,172 @@
+//! Columns of numbers as small integers.
+
+use crate::error::ReplayError;
+
+/// A column: its values are multiples of `scale`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// What it holds.
+    pub name: String,
+    /// SI unit of the values.
+    pub unit: String,
+    /// What one counts for, in that unit.
+    pub scale: f64,
+    /// How often differences are taken before the numbers are written: 0 to 2.
+    pub order: u8,
+    /// Samples of the clip before the column's first.
+    pub first: u32,
+    /// In units of `scale`.
+    pub counts: Vec<i64>,
+}
+
+/// Values are cut here: far beyond what is simulated, and exact as a float.
+const LIMIT: f64 = 1e15;
+
+impl Column {
+    /// An empty one.
+    pub(crate) fn new(name: impl Into<String>, unit: &str, scale: f64, order: u8) -> Self {
+        Self {
+            name: name.into(),
+            unit: unit.to_owned(),
+            scale,
+            order,
+            first: 0,
+            counts: Vec::new(),
+        }
+    }
+
+    /// The same, without a value for the clip's first samples.
+    pub(crate) fn from_sample(self, first: u32) -> Self {
+        Self { first, ..self }
+    }
+
+    /// The next value, rounded; what is no number counts as 0.
+    pub(crate) fn push(&mut self, value: f64) {
+        #[expect(clippy::cast_possible_truncation, reason = "cut to ±1e15 before")]
+        let count = (value / self.scale).round().clamp(-LIMIT, LIMIT) as i64;
+        self.counts.push(count);
+    }
+
+    /// The values.
+    #[expect(clippy::cast_precision_loss, reason = "counts are at most 1e15")]
+    pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
+        self.counts.iter().map(|count| *count as f64 * self.scale)
+    }
+
+    /// Appends the differences as varints.
+    pub(crate) fn write(&self, out: &mut Vec<u8>) {
+        let (mut last, mut before) = (0_i64, 0_i64);
+        for count in &self.counts {
+            let difference = match self.order {
+                0 => *count,
+                1 => count - last,
+                _ => count - 2 * last + before,
+            };
+            (before, last) = (last, *count);
+            write_varint(out, difference);
+        }
+    }
+
+    /// Reads `count` numbers that [`Column::write`] has written, and nothing must be left.
+    pub(crate) fn read(&mut self, bytes: &[u8], count: usize) -> Result<(), ReplayError> {
+        let wrong = |why: &str| ReplayError::unreadable(format!("the column {:?}", self.name), why);
+        // A number takes at least a byte: what a header claims costs no memory.
+        if count > bytes.len() {
+            return Err(wrong("it is cut off"));
+        }
+        let mut rest = bytes;
+        let mut counts = Vec::with_capacity(count);
+        let (mut last, mut before) = (0_i64, 0_i64);
+        for _ in 0..count {
+            let difference = read_varint(&mut rest).ok_or_else(|| wrong("it is cut off"))?;
+            let value = match self.order {
+                0 => Some(difference),
+                1 => last.checked_add(difference),
+                _ => last
+                    .checked_mul(2)
+                    .and_then(|twice| twice.checked_sub(before))
+                    .and_then(|expected| expected.checked_add(difference)),
+            };
+            let value = value.ok_or_else(|| wrong("its numbers are too large"))?;
+            (before, last) = (last, value);
+            counts.push(value);
+        }
+        if !rest.is_empty() {
+            return Err(wrong("it is longer than it says"));
+        }
+        self.counts = counts;
+        Ok(())
+    }
+}
+
+/// Zig-zag, then seven bits a byte, the low ones first.
+fn write_varint(out: &mut Vec<u8>, value: i64) {
+    let mut rest = ((value << 1) ^ (value >> 63)).cast_unsigned();
+    loop {
+        let [low, ..] = rest.to_le_bytes();
+        rest >>= 7;
+        if rest == 0 {
+            out.push(low & 0x7f);
+            return;
+        }
+        out.push(low | 0x80);
+    }
+}
+
+fn read_varint(bytes: &mut &[u8]) -> Option<i64> {
+    let mut value = 0_u64;
+    for shift in (0..64).step_by(7) {
+        let (byte, rest) = bytes.split_first()?;
+        *bytes = rest;
+        value |= u64::from(byte & 0x7f).checked_shl(shift)?;
+        if byte & 0x80 == 0 {
+            return Some((value >> 1).cast_signed() ^ -(value & 1).cast_signed());
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read_back(column: &Column) -> Column {
+        let mut bytes = Vec::new();
+        column.write(&mut bytes);
+        let mut read = Column {
+            counts: Vec::new(),
+            ..column.clone()
+        };
+        read.read(&bytes, column.counts.len()).unwrap();
+        read
+    }
+
+    #[test]
+    fn every_order_gives_the_numbers_back() {
+        for order in 0..3 {
+            let mut column = Column::new("q_1", "rad", 1e-4, order);
+            for value in [0.0, 1.0, -3.2, 1e9, -1e9, f64::NAN, f64::INFINITY, 0.00004] {
+                column.push(value);
+            }
+            assert_eq!(read_back(&column), column, "order {order}");
+            assert_eq!(column.counts[7], 0, "rounded to the nearest");
+            assert_eq!(column.values().nth(1), Some(1.0));
+        }
+    }
+
+    #[test]
+    fn what_is_cut_or_too_long_is_refused() {
+        let mut column = Column::new("q_1", "rad", 1e-4, 1);
+        (0..50).for_each(|i| column.push(f64::from(i) * 0.3));
+        let mut bytes = Vec::new();
+        column.write(&mut bytes);
+        let read = |bytes: &[u8], count| {
+            let why = column.clone().read(bytes, count).unwrap_err();
+            why.to_string()
+        };
+        assert!(read(&bytes[..bytes.len() - 1], 50).contains("cut off"));
+        assert!(read(&bytes, 49).contains("longer"));
+        assert!(read(&bytes, usize::MAX).contains("cut off"));
+        assert!(read(&[0xff; 11], 1).contains("cut off"));
+    }
+}

@@ -1,0 +1,110 @@
+//! The columns of what moves.
+
+use crate::{
+    column::Column,
+    header::{Contact, ContactWith},
+};
+use faceoff_sim::{EpisodeState, Impact, JOINTS, Met, model::CONTROL_STEP_S};
+
+/// m: a tenth of a pixel of the largest picture.
+const PLACE: f64 = 1e-4;
+/// rad: with it the end effector is where it was to a few tenths of a millimetre.
+const ANGLE: f64 = 1e-4;
+const PUCK_YAW: f64 = 1e-3;
+/// m/s.
+const PUCK_SPEED: f64 = 1e-3;
+/// rad/s: a quarter of a percent of the slowest joint's limit.
+const JOINT_SPEED: f64 = 4e-3;
+const UNIVERSAL: f64 = 1e-3;
+
+/// A contact that begins sooner after one with the same body is the same bounce.
+const BOUNCE_S: f64 = 0.01;
+
+/// The samples of table and arms.
+#[derive(Debug, Default)]
+pub(crate) struct Motion {
+    columns: Vec<Column>,
+    contacts: Vec<Contact>,
+}
+
+/// `name_1` … `name_7`.
+pub(crate) fn joints(
+    name: &str,
+    unit: &str,
+    scale: f64,
+    order: u8,
+) -> impl Iterator<Item = Column> {
+    (1..=JOINTS).map(move |joint| Column::new(format!("{name}_{joint}"), unit, scale, order))
+}
+
+impl Motion {
+    /// Of a table on which an opponent stands, or none.
+    pub fn new(has_opponent: bool) -> Self {
+        let mut columns = vec![
+            Column::new("puck_x", "m", PLACE, 2),
+            Column::new("puck_y", "m", PLACE, 2),
+            Column::new("puck_yaw", "rad", PUCK_YAW, 2),
+            Column::new("puck_vx", "m/s", PUCK_SPEED, 1),
+            Column::new("puck_vy", "m/s", PUCK_SPEED, 1),
+        ];
+        columns.extend(joints("q", "rad", ANGLE, 2));
+        columns.extend(joints("dq", "rad/s", JOINT_SPEED, 1));
+        columns.extend(
+            [1, 2].map(|axis| Column::new(format!("universal_{axis}"), "rad", UNIVERSAL, 1)),
+        );
+        if has_opponent {
+            columns.extend(joints("opponent_q", "rad", ANGLE, 2));
+        }
+        Self {
+            columns,
+            contacts: Vec::new(),
+        }
+    }
+
+    /// The next sample.
+    pub fn push(&mut self, state: &EpisodeState) {
+        let [x, y, yaw, vx, vy, _] = state.puck;
+        let own = [x, y, yaw, vx, vy]
+            .into_iter()
+            .chain(state.q)
+            .chain(state.dq);
+        let values = own
+            .chain(state.universal)
+            .chain(state.opponent_q.into_iter().flatten());
+        for (column, value) in self.columns.iter_mut().zip(values) {
+            column.push(value);
+        }
+    }
+
+    /// Contacts that began in a control step.
+    pub fn meet(&mut self, step: u32, impacts: &[Impact]) {
+        for impact in impacts {
+            let t = f64::from(step) * CONTROL_STEP_S + impact.after_s();
+            let what = match impact.met {
+                Met::LongRim | Met::ShortRim => ContactWith::Rim,
+                Met::Mallet(0) => ContactWith::Mallet,
+                Met::Mallet(_) => ContactWith::OpponentMallet,
+            };
+            let again = |earlier: &Contact| earlier.what == what && t - earlier.t < BOUNCE_S;
+            if !self.contacts.iter().rev().any(again) {
+                let [x, y] = impact.puck;
+                self.contacts.push(Contact {
+                    t: rounded(t, 1e3),
+                    what,
+                    x: rounded(x, 1e4),
+                    y: rounded(y, 1e4),
+                });
+            }
+        }
+    }
+
+    /// What was recorded.
+    pub fn take(self) -> (Vec<Column>, Vec<Contact>) {
+        (self.columns, self.contacts)
+    }
+}
+
+/// To a whole number of parts, `per_unit` of them in one.
+fn rounded(value: f64, per_unit: f64) -> f64 {
+    (value * per_unit).round() / per_unit
+}

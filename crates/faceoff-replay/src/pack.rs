@@ -1,0 +1,276 @@
+//! A file of clips that is read by its index.
+//!
+//! ```text
+//! 16 bytes   "faceoff-clips/1\n"
+//! clips, each gzip-compressed
+//! index, sorted by its first 8 bytes: 20 bytes a clip
+//!            kind u8 · contest u8 · 0 · 0 · number u32 · offset u64 · length u32 (all little-endian)
+//! 16 bytes   offset of the index u64 · clips u32 · "clip"
+//! ```
+
+use crate::{error::ReplayError, sheet::Sheet};
+use faceoff_types::Task;
+use fs_err::File;
+use std::{
+    io::Write,
+    os::unix::fs::FileExt,
+    path::{Path, PathBuf},
+};
+
+const MAGIC: &[u8; 16] = b"faceoff-clips/1\n";
+const END: &[u8; 4] = b"clip";
+const ENTRY_BYTES: usize = 20;
+const FOOTER_BYTES: u64 = 16;
+/// The most clips of a pack: an index of 20 MB.
+const MAX_CLIPS: u32 = 1 << 20;
+
+/// What a clip of a pack shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Key {
+    kind: u8,
+    contest: u8,
+    number: u32,
+}
+
+impl Key {
+    const SHEET: Self = Self {
+        kind: 0,
+        contest: 0,
+        number: 0,
+    };
+
+    /// The public motion of an episode.
+    #[must_use]
+    pub const fn motion(task: Task, episode: u32) -> Self {
+        Self {
+            kind: 1,
+            contest: contest(task),
+            number: episode,
+        }
+    }
+
+    /// What the agent was told and commanded in an episode.
+    #[must_use]
+    pub const fn observed(task: Task, episode: u32) -> Self {
+        Self {
+            kind: 2,
+            contest: contest(task),
+            number: episode,
+        }
+    }
+}
+
+const fn contest(task: Task) -> u8 {
+    match task {
+        Task::Hit => 0,
+        Task::Defend => 1,
+        Task::Prepare => 2,
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Entry {
+    key: Key,
+    offset: u64,
+    length: u32,
+}
+
+impl Entry {
+    fn bytes(&self) -> [u8; ENTRY_BYTES] {
+        let mut bytes = [0; ENTRY_BYTES];
+        bytes[0] = self.key.kind;
+        bytes[1] = self.key.contest;
+        bytes[4..8].copy_from_slice(&self.key.number.to_le_bytes());
+        bytes[8..16].copy_from_slice(&self.offset.to_le_bytes());
+        bytes[16..].copy_from_slice(&self.length.to_le_bytes());
+        bytes
+    }
+
+    fn of(bytes: &[u8; ENTRY_BYTES]) -> Self {
+        let [kind, contest, _, _, rest @ ..] = bytes;
+        let (number, rest) = rest.split_first_chunk().unwrap_or((&[0; 4], &[]));
+        let (offset, rest) = rest.split_first_chunk().unwrap_or((&[0; 8], &[]));
+        let (length, _) = rest.split_first_chunk().unwrap_or((&[0; 4], &[]));
+        Self {
+            key: Key {
+                kind: *kind,
+                contest: *contest,
+                number: u32::from_le_bytes(*number),
+            },
+            offset: u64::from_le_bytes(*offset),
+            length: u32::from_le_bytes(*length),
+        }
+    }
+}
+
+/// A pack being written.
+#[derive(Debug)]
+pub struct PackWriter<W> {
+    out: W,
+    written: u64,
+    index: Vec<Entry>,
+}
+
+impl<W: Write> PackWriter<W> {
+    /// Begins one.
+    ///
+    /// # Errors
+    /// [`ReplayError::Io`].
+    pub fn new(mut out: W) -> Result<Self, ReplayError> {
+        out.write_all(MAGIC)?;
+        Ok(Self {
+            out,
+            written: MAGIC.len() as u64,
+            index: Vec::new(),
+        })
+    }
+
+    /// Adds a clip's compressed bytes.
+    ///
+    /// # Errors
+    /// [`ReplayError::Io`].
+    pub fn add(&mut self, key: Key, compressed: &[u8]) -> Result<(), ReplayError> {
+        let length = u32::try_from(compressed.len())
+            .map_err(|_| ReplayError::unreadable("a clip", "it is longer than 4 GB"))?;
+        self.out.write_all(compressed)?;
+        self.index.push(Entry {
+            key,
+            offset: self.written,
+            length,
+        });
+        self.written += u64::from(length);
+        Ok(())
+    }
+
+    /// Adds the sheet of the pack's episodes.
+    ///
+    /// # Errors
+    /// [`ReplayError::Io`].
+    pub fn add_sheet(&mut self, sheet: &Sheet) -> Result<(), ReplayError> {
+        self.add(Key::SHEET, &sheet.compressed()?)
+    }
+
+    /// Writes the index.
+    ///
+    /// # Errors
+    /// [`ReplayError::Io`].
+    pub fn finish(mut self) -> Result<W, ReplayError> {
+        self.index.sort_by_key(|entry| entry.key);
+        for entry in &self.index {
+            self.out.write_all(&entry.bytes())?;
+        }
+        let count = u32::try_from(self.index.len())
+            .ok()
+            .filter(|count| *count <= MAX_CLIPS)
+            .ok_or_else(|| ReplayError::unreadable("a pack", "it has too many clips"))?;
+        self.out.write_all(&self.written.to_le_bytes())?;
+        self.out.write_all(&count.to_le_bytes())?;
+        self.out.write_all(END)?;
+        Ok(self.out)
+    }
+}
+
+/// A pack that is read. Opening one reads its index.
+#[derive(Debug)]
+pub struct Pack {
+    path: PathBuf,
+    file: File,
+    index: Vec<Entry>,
+}
+
+impl Pack {
+    /// Opens a file.
+    ///
+    /// # Errors
+    /// [`ReplayError::Io`]; [`ReplayError::Unreadable`] if it is no pack of this version, or cut off.
+    pub fn open(path: &Path) -> Result<Self, ReplayError> {
+        let wrong = |why: &str| ReplayError::unreadable(path.display().to_string(), why);
+        let file = File::open(path)?;
+        let bytes = file.metadata()?.len();
+        let shortest = MAGIC.len() as u64 + FOOTER_BYTES;
+        if bytes < shortest {
+            return Err(wrong("it is cut off"));
+        }
+        let mut magic = [0; MAGIC.len()];
+        file.file().read_exact_at(&mut magic, 0)?;
+        if &magic != MAGIC {
+            return Err(wrong("it does not begin as one"));
+        }
+        let mut offset = [0; 8];
+        let mut count = [0; 4];
+        let mut end = [0; 4];
+        let footer = bytes - FOOTER_BYTES;
+        file.file().read_exact_at(&mut offset, footer)?;
+        file.file().read_exact_at(&mut count, footer + 8)?;
+        file.file().read_exact_at(&mut end, footer + 12)?;
+        let (offset, count) = (u64::from_le_bytes(offset), u32::from_le_bytes(count));
+        let index_bytes = u64::from(count) * ENTRY_BYTES as u64;
+        if &end != END || count > MAX_CLIPS || offset.checked_add(index_bytes) != Some(footer) {
+            return Err(wrong("it is cut off, or its end is damaged"));
+        }
+        let mut index_bytes = vec![0; usize::try_from(index_bytes).unwrap_or_default()];
+        file.file().read_exact_at(&mut index_bytes, offset)?;
+        let (entries, _) = index_bytes.as_chunks::<ENTRY_BYTES>();
+        let index: Vec<Entry> = entries.iter().map(Entry::of).collect();
+        let inside = |entry: &Entry| {
+            let end = entry.offset.checked_add(u64::from(entry.length));
+            entry.offset >= MAGIC.len() as u64 && end.is_some_and(|end| end <= offset)
+        };
+        if !index.iter().all(inside) || !index.is_sorted_by(|a, b| a.key < b.key) {
+            return Err(wrong("its index is damaged"));
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+            index,
+        })
+    }
+
+    /// A clip's compressed bytes; `None` if the pack has no such clip.
+    ///
+    /// # Errors
+    /// [`ReplayError::Io`].
+    pub fn clip(&self, key: Key) -> Result<Option<Vec<u8>>, ReplayError> {
+        let found = self.index.binary_search_by_key(&key, |entry| entry.key);
+        let Some(entry) = found.ok().map(|index| self.index[index]) else {
+            return Ok(None);
+        };
+        let mut bytes = vec![0; usize::try_from(entry.length).unwrap_or_default()];
+        self.file.file().read_exact_at(&mut bytes, entry.offset)?;
+        Ok(Some(bytes))
+    }
+
+    /// The line of each of its episodes.
+    ///
+    /// # Errors
+    /// [`ReplayError`].
+    pub fn sheet(&self) -> Result<Sheet, ReplayError> {
+        match self.clip(Key::SHEET)? {
+            Some(bytes) => Sheet::read(&bytes),
+            None => Err(ReplayError::unreadable(
+                self.path.display().to_string(),
+                "it has no sheet of episodes",
+            )),
+        }
+    }
+}
+
+/// Joins the packs of an evaluation's shards.
+///
+/// # Errors
+/// [`ReplayError`].
+pub fn join<W: Write>(packs: &[PathBuf], out: W) -> Result<W, ReplayError> {
+    let mut writer = PackWriter::new(out)?;
+    let mut sheet = Sheet::default();
+    for path in packs {
+        let pack = Pack::open(path)?;
+        for entry in pack.index.iter().filter(|entry| entry.key != Key::SHEET) {
+            if let Some(bytes) = pack.clip(entry.key)? {
+                writer.add(entry.key, &bytes)?;
+            }
+        }
+        sheet.merge(pack.sheet()?);
+    }
+    writer.add_sheet(&sheet)?;
+    writer.finish()
+}
