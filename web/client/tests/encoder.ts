@@ -28,7 +28,7 @@ function differences(numbers: number[], order: number): number[] {
   return out;
 }
 
-export function encode(header: Record<string, unknown>, columns: TestColumn[]): Uint8Array {
+export function encode(header: Record<string, unknown>, columns: TestColumn[]): Uint8Array<ArrayBuffer> {
   const parts = columns.map((column) => {
     const { scale = 1e-4, order = 1 } = column;
     const whole = column.values.map((value) => Math.round(value / scale));
@@ -58,7 +58,7 @@ export function encode(header: Record<string, unknown>, columns: TestColumn[]): 
   );
 }
 
-export function assemble(header: Uint8Array, payload: number[]): Uint8Array {
+export function assemble(header: Uint8Array, payload: number[]): Uint8Array<ArrayBuffer> {
   const bytes = new Uint8Array(4 + header.length + payload.length);
   new DataView(bytes.buffer).setUint32(0, header.length, true);
   bytes.set(header, 4);

@@ -33,7 +33,7 @@ export class DataTable {
         "div",
         {
           class: "wide",
-          attributes: { tabindex: "0", role: "region", "aria-label": "Samples around the cursor" },
+          attributes: { tabindex: "0", role: "region", "aria-label": `Samples around the cursor: ${title}` },
         },
         h("table", {}, h("thead", {}, this.head), this.body),
       ),

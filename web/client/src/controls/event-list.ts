@@ -40,7 +40,9 @@ export class EventList {
 
   /** Marks the latest event at a position. */
   update(position: number): void {
-    let current = -1;
+    // From where it was: it seldom moves by more than one.
+    let current = this.current;
+    while (current >= 0 && this.events[current].position > position + 1e-6) current--;
     while (current + 1 < this.events.length && this.events[current + 1].position <= position + 1e-6)
       current++;
     if (current === this.current) return;

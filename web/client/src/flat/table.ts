@@ -96,7 +96,7 @@ function axes(context: CanvasRenderingContext2D, at: Projection, palette: Palett
   TICKS_X.forEach((x, i) => {
     if (i % everyX === 0) context.fillText(fixed(x, 1), at.x(x), bottom + 7);
   });
-  context.fillText("x, m", at.x(0.6), bottom + 7);
+  context.fillText("x, m (table frame)", at.x(0), bottom + 22);
   context.textAlign = "right";
   context.textBaseline = "middle";
   TICKS_Y.forEach((y, i) => {

@@ -8,6 +8,7 @@ import type { Shown, View } from "./shown";
 /** The picture, in space or flat, and the few words that stand in it. */
 export class Stage {
   readonly element: HTMLElement;
+  private readonly field: HTMLElement;
   readonly solid: View3D | null;
   /** Why there is no picture in space; null if there is one. */
   unavailable: string | null = null;
@@ -27,21 +28,26 @@ export class Stage {
     private readonly switched: () => void,
   ) {
     this.solid = this.openSolid(still, changed);
-    this.element = h(
+    this.field = h(
       "div",
       { class: "stage", attributes: { tabindex: "0", role: "group", "aria-label": `Picture: ${title}` } },
       this.plane.canvas,
+    );
+    if (this.solid !== null) this.field.prepend(this.solid.canvas);
+    this.element = h(
+      "div",
+      { class: "picture" },
+      this.field,
       this.score,
       this.state,
       this.outcome,
       this.note,
     );
-    if (this.solid !== null) this.element.prepend(this.solid.canvas);
-    for (const canvas of this.element.querySelectorAll("canvas")) canvas.setAttribute("aria-hidden", "true");
+    for (const canvas of this.field.querySelectorAll("canvas")) canvas.setAttribute("aria-hidden", "true");
     new ResizeObserver(() => {
       this.resize();
       changed();
-    }).observe(this.element);
+    }).observe(this.field);
     this.choose();
   }
 
@@ -116,7 +122,7 @@ export class Stage {
   }
 
   private resize(): void {
-    const { clientWidth, clientHeight } = this.element;
+    const { clientWidth, clientHeight } = this.field;
     this.ratio = Math.min(devicePixelRatio, 2);
     this.plane.resize(clientWidth, clientHeight, this.ratio);
     this.solid?.resize(clientWidth, clientHeight, this.ratio);

@@ -168,6 +168,7 @@ export class Viewer {
     const still = section.querySelector(".still");
     if (still === null) section.prepend(this.element);
     else still.replaceWith(this.element);
+    section.dataset.view = this.stage.flat ? "flat" : "3d";
     this.stage.paint(paletteOf(section));
     this.strips.paint(paletteOf(section));
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
@@ -337,7 +338,10 @@ export class Viewer {
       this.show(part);
       this.learn(part);
     }
-    if (clock.playing) source.prefetch(position);
+    if (clock.playing) {
+      source.prefetch(position);
+      if (!this.stage.flat) this.stage.solid?.pace(nowMs);
+    }
 
     this.pose(shown, position, step);
     const orbit = this.stage.solid?.orbit;

@@ -59,13 +59,13 @@ export function seriesOf(part: Part, side: 0 | 1): Series[] {
   });
 
   const all = [
-    margin("End effector: height, to its limit", margins.height, "mm", 1, "ee"),
-    margin("End effector: edge of the table, to its limit", margins.table, "mm", 0, "ee"),
-    margin("Elbow and wrist: height, to the limit", margins.link, "mm", 0, "link"),
-    margin("Joint positions: nearest to a limit", margins.position, "rad", 3, "joint_pos"),
+    margin("End effector height: margin", margins.height, "mm", 1, "ee"),
+    margin("Edge of the table: margin", margins.table, "mm", 0, "ee"),
+    margin("Elbow and wrist height: margin", margins.link, "mm", 0, "link"),
+    margin("Joint positions: least margin", margins.position, "rad", 3, "joint_pos"),
   ];
   if (arm.dq !== null) {
-    all.push(margin("Joint velocities: nearest to a limit", margins.velocity, "rad/s", 2, "joint_vel"));
+    all.push(margin("Joint velocities: least margin", margins.velocity, "rad/s", 2, "joint_vel"));
     all.push(shares(arm.dq, broken("joint_vel")));
   }
   if (observed !== null && observed.side === side && observed.computationTimeS !== null) {
@@ -106,7 +106,7 @@ function shares(dq: readonly Float64Array[], broken: readonly Violation[]): Seri
     colour: `rp-${joint + 1}` as ColourName,
   }));
   return {
-    title: "Joint velocities: share of their limits",
+    title: "Joint speeds, share of limit",
     unit: "%",
     lines,
     limit: 100 * MODEL.constraints.limit_fraction,

@@ -12,6 +12,7 @@ export class Strip {
   private readonly value = h("span", { class: "value" });
   private readonly field: HTMLElement;
   private width = 0;
+  private told = -1;
 
   constructor(
     private readonly series: Series,
@@ -72,6 +73,8 @@ export class Strip {
     const x = Math.min(Math.max(share, 0), 1) * this.width;
     this.cursor.style.transform = `translateX(${x.toFixed(1)}px)`;
     const k = Math.min(Math.max(Math.floor(position + 1e-6) - this.first, 0), this.samples - 1);
+    if (k === this.told) return;
+    this.told = k;
     say(this.value, this.series.words(k));
   }
 }

@@ -32,6 +32,11 @@ export class Strips {
         this.span,
         this.choiceRow,
       ),
+      h(
+        "p",
+        { class: "legend-note" },
+        "Dashed: the limit; tinted: beyond it; bars: recorded as broken. Click or drag to go there.",
+      ),
       this.body,
     );
     new ResizeObserver(() => {

@@ -13,10 +13,10 @@ interface Seat {
 const DEG = Math.PI / 180;
 
 const SEATS: Record<Camera, Seat> = {
-  corner: { x: -0.28, y: 0, z: 0.1, azimuth: -52 * DEG, elevation: 32 * DEG, distance: 3.3 },
-  side: { x: -0.28, y: 0, z: 0.22, azimuth: -90 * DEG, elevation: 12 * DEG, distance: 3.3 },
-  robot: { x: -0.15, y: 0, z: 0, azimuth: 180 * DEG, elevation: 38 * DEG, distance: 2.7 },
-  above: { x: -0.12, y: 0, z: 0, azimuth: -90 * DEG, elevation: 89.5 * DEG, distance: 3.1 },
+  corner: { x: -0.27, y: 0, z: 0.12, azimuth: -58 * DEG, elevation: 30 * DEG, distance: 3.9 },
+  side: { x: -0.3, y: 0, z: 0.2, azimuth: -90 * DEG, elevation: 14 * DEG, distance: 3.6 },
+  robot: { x: -0.16, y: 0, z: 0, azimuth: 180 * DEG, elevation: 62 * DEG, distance: 3.6 },
+  above: { x: -0.34, y: 0, z: 0, azimuth: -90 * DEG, elevation: 89.5 * DEG, distance: 3.6 },
 };
 
 const SMALL_TURN = 15 * DEG;

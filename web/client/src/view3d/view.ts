@@ -11,6 +11,7 @@ import type { Contest } from "../clip/motion";
 import type { Palette } from "../replay/palette";
 import { trail, type Shown, type View } from "../replay/shown";
 import { ArmModel } from "./arm";
+import { Effort } from "./effort";
 import { Orbit } from "./orbit";
 import { followPointer } from "./pointer";
 import { PuckModel } from "./puck";
@@ -36,6 +37,8 @@ export class View3D implements View {
   private table: TableModel | null = null;
   private palette: Palette | null = null;
   private farther = 1;
+  private readonly effort = new Effort();
+  private ratio = 1;
 
   constructor(still: boolean, changed: () => void) {
     this.renderer = new WebGLRenderer({ antialias: true, powerPreference: "low-power" });
@@ -59,7 +62,8 @@ export class View3D implements View {
 
   resize(width: number, height: number, ratio: number): void {
     if (width === 0 || height === 0) return;
-    this.renderer.setPixelRatio(ratio);
+    this.ratio = ratio;
+    this.renderer.setPixelRatio(Math.min(ratio, this.effort.ratio));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
@@ -92,6 +96,17 @@ export class View3D implements View {
     this.renderer.info.reset();
     this.renderer.render(this.scene, this.camera);
     return this.renderer.info.render.calls;
+  }
+
+  /** To be told of each frame while it plays: a machine that cannot keep up gets a plainer picture. */
+  pace(nowMs: number): void {
+    if (!this.effort.tooSlow(nowMs)) return;
+    this.renderer.shadowMap.enabled = this.effort.shadows;
+    // Materials know at their making whether there are shadows.
+    this.scene.traverse((object) => {
+      if (object instanceof DirectionalLight) object.castShadow = this.effort.shadows;
+    });
+    this.renderer.setPixelRatio(Math.min(this.ratio, this.effort.ratio));
   }
 
   /** Table and arms, once it is known what is played. */

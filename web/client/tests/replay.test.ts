@@ -1,0 +1,230 @@
+import { describe, expect, it } from "vitest";
+import { decodeMotion } from "../src/clip/motion";
+import { decodeObserved } from "../src/clip/observed";
+import { fixed, stepWords } from "../src/controls/words";
+import { wishOf, type KeyWishes } from "../src/controls/keys";
+import { Clock } from "../src/replay/clock";
+import { columnName, csvOf } from "../src/replay/csv";
+import { endWords, eventsOf } from "../src/replay/events";
+import { parseFragment, writeFragment } from "../src/replay/fragment";
+import { Score } from "../src/replay/score";
+import { Source } from "../src/replay/source";
+import { encode, still } from "./encoder";
+
+/** Frames that a test gives by hand. */
+class Frames {
+  private waiting: ((nowMs: number) => void)[] = [];
+  request(tick: (nowMs: number) => void): void {
+    this.waiting.push(tick);
+  }
+  at(nowMs: number): void {
+    const now = this.waiting;
+    this.waiting = [];
+    for (const tick of now) tick(nowMs);
+  }
+  get idle(): boolean {
+    return this.waiting.length === 0;
+  }
+}
+
+describe("the clock", () => {
+  it("plays at its speed, stops at the end and starts over from there", () => {
+    const frames = new Frames();
+    const clock = new Clock(0.02, frames);
+    clock.cover(10);
+    clock.setSpeed(0.5);
+    clock.play();
+    frames.at(1000);
+    frames.at(1100);
+    expect(clock.position).toBeCloseTo(2.5, 9);
+    frames.at(1300);
+    frames.at(1500);
+    expect(clock.position).toBe(10);
+    expect(clock.playing).toBe(false);
+    expect(frames.idle).toBe(true);
+    clock.play();
+    expect(clock.position).toBe(0);
+  });
+
+  it("stands still while there is nothing to show", () => {
+    const frames = new Frames();
+    const clock = new Clock(0.02, frames);
+    let open = false;
+    clock.cover(100);
+    clock.gate(() => open);
+    clock.play();
+    frames.at(0);
+    frames.at(200);
+    expect(clock.position).toBe(0);
+    open = true;
+    frames.at(220);
+    expect(clock.position).toBeCloseTo(1, 9);
+  });
+
+  it("does not jump when the page was hidden for long", () => {
+    const frames = new Frames();
+    const clock = new Clock(0.02, frames);
+    clock.cover(10_000);
+    clock.play();
+    frames.at(0);
+    frames.at(60_000);
+    expect(clock.position).toBeLessThan(15);
+  });
+
+  it("steps to whole steps from between them, and not past the ends", () => {
+    const clock = new Clock(0.02, new Frames());
+    clock.cover(10);
+    clock.seek(3.4);
+    clock.step(1);
+    expect(clock.position).toBe(4);
+    clock.seek(3.4);
+    clock.step(-1);
+    expect(clock.position).toBe(3);
+    clock.step(-Infinity);
+    expect(clock.position).toBe(0);
+    clock.step(Infinity);
+    expect(clock.position).toBe(10);
+  });
+});
+
+describe("a link to a place", () => {
+  it("comes back as it was written", () => {
+    const place = { step: 37, camera: "side", flat: false, speed: 0.5 } as const;
+    expect(writeFragment(place)).toBe("#t=37&cam=side&speed=0.5");
+    expect(parseFragment(writeFragment(place))).toEqual({ step: 37, camera: "side", speed: 0.5 });
+    expect(parseFragment("#t=37&flat=1")).toEqual({ step: 37, flat: true });
+  });
+
+  it("passes over what it does not know", () => {
+    expect(parseFragment("#main")).toEqual({});
+    expect(parseFragment("#t=-1&cam=moon&speed=3&x=%")).toEqual({});
+  });
+});
+
+const observed = encode({ kind: "observed", samples: 4, late: [2, 1], lost: [{ from: 1, to: 3 }] }, [
+  { name: "computation_time", unit: "s", values: [0.004, 0.026, 0.001], first: 1, scale: 1e-6 },
+]);
+
+const motion = encode(
+  {
+    samples: 4,
+    contacts: [{ t: 0.05, what: "rim", x: 0.31, y: -0.46 }],
+    violations: [{ side: 0, group: "ee", from: 1, to: 1, worst: 0.0031 }],
+    end: { end: "slow", success: true, why: "at rest behind the line", steps: 3 },
+  },
+  still(4, (k) => k * 0.1, () => 0), // prettier-ignore
+);
+
+describe("events", () => {
+  it("are told in words, in the order of time, neighbouring late answers as one", () => {
+    const events = eventsOf(decodeMotion(motion), decodeObserved(observed));
+    expect(events.map((event) => [event.position, event.text])).toEqual([
+      [1, "end effector out of bounds, step 1, by 3.1 mm"],
+      [1, "camera lost the puck for 3 steps"],
+      [1, "2 answers late, up to 26 ms"],
+      [2.5, "puck meets the rim at (0.31, −0.46) m"],
+      [3, "Success: at rest behind the line"],
+    ]);
+    expect(events.at(-1)?.sign).toBe("✓");
+  });
+
+  it("say how it ended, also where nobody wrote why", () => {
+    const end = { end: "left_table", success: false, why: "", steps: 1 };
+    expect(endWords(decodeMotion(encode({ samples: 2, end }, still(2, () => 0, () => 0))))).toBe(
+      "No success: left table",
+    ); // prettier-ignore
+  });
+});
+
+describe("the score of a game", () => {
+  it("follows from the last rally before now, if no chunk between is missing", () => {
+    const score = new Score();
+    const goal = (sample: number, a: number, b: number) =>
+      ({ sample, what: "goal", by: 0, score: [a, b] }) as const;
+    score.learn(0, [goal(100, 1, 0)]);
+    score.learn(2, [goal(1200, 1, 1)]);
+    expect(score.at(50)).toEqual([0, 0]);
+    expect(score.at(300)).toEqual([1, 0]);
+    expect(score.at(1100)).toBeNull();
+    expect(score.at(1300)).toEqual([1, 1]);
+    score.learn(1, []);
+    expect(score.at(1100)).toEqual([1, 0]);
+    expect(score.at(1500)).toEqual([1, 1]);
+  });
+});
+
+describe("a source", () => {
+  const chunk = (first: number): Uint8Array<ArrayBuffer> =>
+    encode({ contest: "game", first, samples: 501 }, still(501, () => 0, () => 0)); // prettier-ignore
+
+  it("fetches a chunk once, keeps a few, and shows the motion without what may not be seen", async () => {
+    const asked: string[] = [];
+    const source = new Source({ motion: "/m/{chunk}", observed: "/o/{chunk}", samples: 5001 }, (address) => {
+      const path = address as string;
+      asked.push(path);
+      const found = path.startsWith("/m/") ? new Response(chunk(500 * Number(path.slice(3)))) : null;
+      return Promise.resolve(found ?? new Response(null, { status: 403 }));
+    });
+    const [part, same] = await Promise.all([source.at(700), source.at(999.9)]);
+    expect(part).toBe(same);
+    expect(part.motion.first).toBe(500);
+    expect(part.unobserved).toMatch(/may not see it/);
+    expect(asked).toEqual(["/m/1", "/o/1"]);
+    expect(source.indexOf(5000)).toBe(9);
+    for (const position of [1000, 1500, 2000, 2500, 3000, 3500]) await source.at(position);
+    expect(source.here(700)).toBeNull();
+    expect(source.here(3999)?.motion.first).toBe(3500);
+  });
+
+  it("says what the server said, and can be asked again", async () => {
+    let status = 500;
+    const source = new Source({ motion: "/m", observed: null, samples: null }, () =>
+      Promise.resolve(status === 200 ? new Response(motion) : new Response(null, { status })),
+    );
+    await expect(source.at(0)).rejects.toThrow("the server answered with status 500");
+    status = 404;
+    await expect(source.at(0)).rejects.toThrow("no recording of it");
+    status = 200;
+    await expect(source.at(0)).resolves.toMatchObject({ index: 0 });
+  });
+
+  it("gives its data as comma-separated values with units", async () => {
+    const source = new Source({ motion: "/m", observed: "/o", samples: null }, (address) =>
+      Promise.resolve(new Response(address === "/m" ? motion : observed)),
+    );
+    const lines = csvOf(await source.at(0)).split("\n");
+    expect(lines[0]).toBe("sample,time_s,puck_x,puck_y,q_1,q_2,q_3,q_4,q_5,q_6,q_7,computation_time_s");
+    expect(lines[1]).toBe("0,0,0,0,0,0.1,0.2,0.3,0.4,0.5,0.6,");
+    expect(lines[3]).toBe("2,0.04,0.2,0,0,0.1,0.2,0.3,0.4,0.5,0.6,0.026");
+    expect(columnName({ name: "dq_1", unit: "rad/s", values: new Float64Array() })).toBe("dq_1_rad_s");
+  });
+});
+
+describe("keys", () => {
+  const nothing = (): void => undefined;
+  const wishes: KeyWishes = {
+    toggle: nothing,
+    step: nothing,
+    event: nothing,
+    camera: nothing,
+    flat: nothing,
+    help: nothing,
+  };
+
+  it("leave to a control what it needs itself", () => {
+    expect(wishOf(" ", false, "picture", wishes)).toBe(wishes.toggle);
+    expect(wishOf(" ", false, "button", wishes)).toBeNull();
+    expect(wishOf("ArrowLeft", false, "slider", wishes)).toBeNull();
+    expect(wishOf("ArrowLeft", true, "slider", wishes)).not.toBeNull();
+    expect(wishOf("n", false, "other", wishes)).toBeNull();
+    expect(wishOf("Tab", false, "picture", wishes)).toBeNull();
+  });
+});
+
+describe("words", () => {
+  it("have a true minus, and none before nothing", () => {
+    expect(fixed(-0.0004, 2)).toBe("0.00");
+    expect(fixed(-1.5, 1)).toBe("−1.5");
+    expect(stepWords(37, 120, 0.02)).toBe("step 37 of 120, 0.74 s");
+  });
+});
