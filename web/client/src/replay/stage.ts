@@ -117,6 +117,7 @@ export class Stage {
   private choose(): void {
     this.plane.canvas.hidden = !this.flat;
     if (this.solid !== null) this.solid.canvas.hidden = this.flat;
+    this.element.classList.toggle("flat", this.flat);
     write(this.note, this.unavailable ?? "");
     this.switched();
   }

@@ -272,6 +272,7 @@ export class Viewer {
     });
     section.dataset.state = "ready";
     if (part.unobserved !== null) {
+      this.trouble.classList.add("minor");
       this.trouble.replaceChildren(h("p", {}, `What the agent observed is not shown: ${part.unobserved}.`));
       this.trouble.hidden = false;
     } else {
@@ -301,6 +302,7 @@ export class Viewer {
         if (this.loading !== index) return;
         this.setting.clock.pause();
         section.dataset.state = "failed";
+        this.trouble.classList.remove("minor");
         this.trouble.replaceChildren(
           h("p", {}, `This part of the replay could not be loaded: ${wordsOf(error)}.`),
           button("Try again", () => {

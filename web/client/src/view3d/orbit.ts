@@ -13,7 +13,7 @@ interface Seat {
 const DEG = Math.PI / 180;
 
 const SEATS: Record<Camera, Seat> = {
-  corner: { x: -0.27, y: 0, z: 0.12, azimuth: -58 * DEG, elevation: 30 * DEG, distance: 3.9 },
+  corner: { x: -0.27, y: 0, z: 0.08, azimuth: -58 * DEG, elevation: 30 * DEG, distance: 4.0 },
   side: { x: -0.3, y: 0, z: 0.2, azimuth: -90 * DEG, elevation: 14 * DEG, distance: 3.6 },
   robot: { x: -0.16, y: 0, z: 0, azimuth: 180 * DEG, elevation: 62 * DEG, distance: 3.6 },
   above: { x: -0.34, y: 0, z: 0, azimuth: -90 * DEG, elevation: 89.5 * DEG, distance: 3.6 },
