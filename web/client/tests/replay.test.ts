@@ -141,15 +141,17 @@ describe("the score of a game", () => {
     const score = new Score();
     const goal = (sample: number, a: number, b: number) =>
       ({ sample, what: "goal", by: 0, score: [a, b] }) as const;
-    score.learn(0, [goal(100, 1, 0)]);
-    score.learn(2, [goal(1200, 1, 1)]);
+    score.learn(0, [goal(100, 1, 0)], null);
+    score.learn(2, [goal(1200, 1, 1)], null);
     expect(score.at(50)).toEqual([0, 0]);
     expect(score.at(300)).toEqual([1, 0]);
     expect(score.at(1100)).toBeNull();
     expect(score.at(1300)).toEqual([1, 1]);
-    score.learn(1, []);
+    score.learn(1, [], null);
     expect(score.at(1100)).toEqual([1, 0]);
     expect(score.at(1500)).toEqual([1, 1]);
+    score.learn(80, [], [4, 2]);
+    expect(score.at(40_200)).toEqual([4, 2]);
   });
 });
 

@@ -67,6 +67,8 @@ export interface Motion {
   readonly contacts: readonly Contact[];
   readonly violations: readonly Violation[];
   readonly breaks: readonly Break[];
+  /** How a game stood at the clip's first sample, where that was written. */
+  readonly score: readonly [number, number] | null;
   readonly end: End | null;
   /** Everything that was read, in its order, for the data as a table. */
   readonly columns: readonly Column[];
@@ -123,6 +125,7 @@ export function decodeMotion(bytes: Uint8Array): Motion {
       by: b.has("by") ? sideOf(b, "by") : null,
       score: scoreOf(b),
     })),
+    score: scoreOf(header),
     end: header.has("end") ? endOf(header.inside("end")) : null,
     columns: [...container.columns.values()],
   };

@@ -49,6 +49,11 @@ export class Source {
     return Math.min(Math.max(Math.floor(position / CHUNK_STEPS), 0), this.chunks - 1);
   }
 
+  /** The position at which a part starts; null if there is no such part. */
+  startOf(index: number): number | null {
+    return index >= 0 && index < this.chunks ? index * CHUNK_STEPS : null;
+  }
+
   /** The part at a position if it is here. */
   here(position: number): Part | null {
     return this.parts.get(this.indexOf(position)) ?? null;

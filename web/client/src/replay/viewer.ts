@@ -218,19 +218,40 @@ export class Viewer {
 
   private readonly toEvent = (direction: 1 | -1): void => {
     const { clock } = this.setting;
-    const events = this.allEvents();
-    const next =
-      direction === 1
-        ? events.find((event) => event.position > clock.position + 1e-4)
-        : events.findLast((event) => event.position < clock.position - 1e-4);
     clock.pause();
-    if (next === undefined) {
-      this.announce(direction === 1 ? "No event after this" : "No event before this");
-      return;
-    }
-    clock.seek(next.position);
-    this.announce(`${fixed(next.position * clock.stepS, 2)} s: ${next.text}`);
+    const from = clock.position;
+    this.findEvent(from, direction).then(
+      (event) => {
+        // The reader has gone elsewhere while it was looked for.
+        if (clock.position !== from) return;
+        if (event === null) {
+          this.announce(direction === 1 ? "No event after this" : "No event before this");
+        } else {
+          clock.seek(event.position);
+          this.announce(`${fixed(event.position * clock.stepS, 2)} s: ${event.text}`);
+        }
+      },
+      (error: unknown) => {
+        this.announce(`Events could not be loaded: ${wordsOf(error)}`);
+      },
+    );
   };
+
+  /** The nearest event in a direction, in part after part of a game until there is one. */
+  private async findEvent(from: number, direction: 1 | -1): Promise<ReplayEvent | null> {
+    const { source } = this.setting;
+    for (let index = source.indexOf(Math.min(from, this.last)); ; index += direction) {
+      const start = source.startOf(index);
+      if (start === null) return null;
+      if (!this.events.has(index)) this.learn(await source.at(start));
+      const events = this.events.get(index) ?? [];
+      const found =
+        direction === 1
+          ? events.find((event) => event.position > from + 1e-4)
+          : events.findLast((event) => event.position < from - 1e-4);
+      if (found !== undefined) return found;
+    }
+  }
 
   private allEvents(): ReplayEvent[] {
     const chunks = [...this.events.entries()].sort(([a], [b]) => a - b);
@@ -241,7 +262,7 @@ export class Viewer {
   private learn(part: Part): void {
     if (this.events.has(part.index)) return;
     this.events.set(part.index, eventsOf(part.motion, part.observed));
-    this.score.learn(part.index, part.motion.breaks);
+    this.score.learn(part.index, part.motion.breaks, part.motion.score);
     const events = this.allEvents();
     const { stepS } = part.motion;
     const note = this.setting.steps === null ? "" : ", of the parts that were loaded";
@@ -380,6 +401,8 @@ export class Viewer {
       this.figuresMs = nowMs;
       this.data.update(step);
     }
+    // Figures that change sixty times a second are read by nobody.
+    if (step === this.step && this.setting.clock.playing) return;
     const k = step - motion.first;
     const speed = Math.hypot(motion.puck.vx?.[k] ?? NaN, motion.puck.vy?.[k] ?? NaN);
     const seen = shown.lost ? ", the camera has lost it" : "";
@@ -391,7 +414,7 @@ export class Viewer {
     const score = motion.contest === "game" ? this.score.at(shown.position) : null;
     const sign = motion.end?.success === true ? "✓ " : motion.end?.success === false ? "✕ " : "";
     this.stage.tell({
-      state: shown.lost ? "○ Camera lost the puck" : "",
+      state: this.last === 0 ? "No step was played" : shown.lost ? "○ Camera lost the puck" : "",
       outcome: over ? sign + endWords(motion) : "",
       good: motion.end?.success === true,
       score: score === null ? "" : `A ${score[0]} : ${score[1]} B`,

@@ -41,8 +41,15 @@ export class View3D implements View {
   private ratio = 1;
 
   constructor(still: boolean, changed: () => void) {
-    this.renderer = new WebGLRenderer({ antialias: true, powerPreference: "low-power" });
-    this.canvas = this.renderer.domElement;
+    this.canvas = document.createElement("canvas");
+    // Asked for here, as the library reports a browser without it in the console, where it alarms for nothing.
+    const context = this.canvas.getContext("webgl2", {
+      alpha: false,
+      antialias: true,
+      powerPreference: "low-power",
+    });
+    if (context === null) throw new Error("no WebGL 2");
+    this.renderer = new WebGLRenderer({ canvas: this.canvas, context });
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     // What is reported as draw calls is to include those of the shadows.

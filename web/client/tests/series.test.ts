@@ -1,0 +1,84 @@
+import { describe, expect, it } from "vitest";
+import { decodeMotion } from "../src/clip/motion";
+import { MODEL, VELOCITY_LIMITS } from "../src/model/model";
+import { rimOutline } from "../src/model/table";
+import { between, pathsOf } from "../src/motion/paths";
+import { Interpolation } from "../src/motion/pose";
+import type { Part } from "../src/replay/source";
+import { rangeOf } from "../src/strips/plot";
+import { seriesOf } from "../src/strips/series";
+import { encode, type TestColumn } from "./encoder";
+
+/** The arm in its initial pose, its fourth joint at the given share of its speed limit; a puck that slides. */
+function part(share: number, header: Record<string, unknown> = {}): Part {
+  const samples = 3;
+  const row = (name: string, value: (k: number) => number): TestColumn => ({
+    name,
+    scale: 1e-7,
+    values: Array.from({ length: samples }, (_, k) => value(k)),
+  });
+  const motion = decodeMotion(
+    encode({ samples, ...header }, [
+      row("puck_x", (k) => 0.1 * k),
+      row("puck_y", () => 0),
+      ...MODEL.initial_q_rad.map((q, i) => row(`q_${i + 1}`, () => q)),
+      ...MODEL.initial_q_rad.map((_, i) =>
+        row(`dq_${i + 1}`, () => (i === 3 ? -share * VELOCITY_LIMITS[3] : 0)),
+      ),
+    ]),
+  );
+  const interpolation = new Interpolation(motion);
+  return {
+    index: 0,
+    motion,
+    observed: null,
+    unobserved: null,
+    interpolation,
+    paths: pathsOf(motion, interpolation, null),
+  };
+}
+
+describe("strips", () => {
+  it("tell margins and shares as the rules count them", () => {
+    const series = seriesOf(part(0.5), 0);
+    expect(series.map((one) => [one.title, one.words(1)])).toEqual([
+      ["End effector height: margin", "20.0 mm"],
+      ["Edge of the table: margin", "66 mm"],
+      ["Elbow and wrist height: margin", expect.stringMatching(/^\d+ mm$/)],
+      ["Joint positions: least margin", "0.146 rad"],
+      ["Joint velocities: least margin", "0.59 rad/s"],
+      ["Joint speeds, share of limit", "joint 4: 50 %"],
+    ]);
+  });
+
+  it("say so in words where a limit is passed, and show what was recorded as broken", () => {
+    const violations = [{ side: 0, group: "joint_vel", from: 0, to: 2, worst: 0.1 }];
+    const velocity = seriesOf(part(1, { violations }), 0)[4];
+    expect(velocity.words(0)).toBe("−0.07 rad/s ▲ beyond");
+    expect(velocity.broken).toHaveLength(1);
+    const [low, high] = rangeOf(velocity);
+    expect(low).toBeLessThan(0);
+    expect(high).toBe(0);
+  });
+});
+
+describe("paths", () => {
+  it("are found by position", () => {
+    const { puck } = part(0).paths;
+    expect([...puck.at]).toEqual([0, 0.25, 0.5, 0.75, 1, 1.25, 1.5, 1.75, 2]);
+    expect(between(puck, 0.5, 1)).toEqual([2, 4]);
+    expect(between(puck, -Infinity, Infinity)).toEqual([0, 8]);
+  });
+
+  it("are interrupted where a rally was over", () => {
+    const game = part(0, { contest: "game", breaks: [{ sample: 0, what: "goal", by: 0, score: [1, 0] }] });
+    expect([...game.paths.puck.gap]).toEqual([1, 1, 1, 1, 0, 0, 0, 0, 0]);
+  });
+});
+
+it("the rims leave the goal open and are as wide as the model says", () => {
+  const outline = rimOutline();
+  expect(Math.min(...outline.map(([, y]) => y))).toBeCloseTo(0.125, 9);
+  expect(Math.max(...outline.map(([x]) => x))).toBeCloseTo(1.064, 9);
+  expect(outline).toContainEqual([0.974, 0.519]);
+});
