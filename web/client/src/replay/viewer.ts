@@ -137,7 +137,7 @@ export class Viewer {
     section.dataset.state = "loading";
     section.classList.add("replay");
     const waiting = h("p", { class: "waiting", attributes: { role: "status" } }, "Loading the replay …");
-    section.append(waiting);
+    this.beneathStill(waiting);
     const place = parseFragment(location.hash);
     try {
       const part = await source.at(place.step ?? 0);
@@ -159,8 +159,15 @@ export class Viewer {
           void this.open();
         }),
       );
-      section.append(again);
+      this.beneathStill(again);
     }
+  }
+
+  /** Where the reader looks for the replay. */
+  private beneathStill(element: HTMLElement): void {
+    const still = this.setting.section.querySelector(".still");
+    if (still === null) this.setting.section.prepend(element);
+    else still.after(element);
   }
 
   private mount(): void {
@@ -356,6 +363,7 @@ export class Viewer {
     this.timeline.update(step, this.last, stepS);
     this.tellPlaying(step);
     if (!this.ready(position)) return;
+    this.recover();
     const part = source.here(position);
     if (part !== null && part !== shown.part) {
       this.show(part);
@@ -378,6 +386,13 @@ export class Viewer {
     section.dataset.state = "ready";
     if (moving) this.invalidate();
   };
+
+  /** The reader went on from a part that could not be loaded: that one is tried again when it is needed again. */
+  private recover(): void {
+    if (this.trouble.hidden || this.trouble.classList.contains("minor")) return;
+    this.trouble.hidden = true;
+    this.loading = null;
+  }
 
   private pose(shown: Shown, position: number, step: number): void {
     const { interpolation, motion, observed } = shown.part;
