@@ -330,6 +330,7 @@ export class Viewer {
         if (this.loading !== index) return;
         this.setting.clock.pause();
         section.dataset.state = "failed";
+        this.stage.tell({ state: "Not loaded", outcome: "", good: false, score: "" });
         this.trouble.classList.remove("minor");
         this.trouble.replaceChildren(
           h("p", {}, `This part of the replay could not be loaded: ${wordsOf(error)}.`),
