@@ -1,7 +1,10 @@
 //! `make demo` without make: the command it runs.
 
-use crate::browser;
-use faceoff_tests::{bundle, program, repository, server::Server};
+use faceoff_tests::{
+    browser::{Browser, View},
+    bundle, program, repository,
+    server::Server,
+};
 use serde_json::Value;
 use std::{fs::File, process::Command};
 
@@ -81,10 +84,13 @@ fn the_demo_plays_a_day_and_its_board_is_served() {
         page.split_once("<tbody")
             .map_or_else(String::new, |(_, table)| table.to_owned())
     };
-    assert_in_order(
-        &table(&browser::dump(&format!("{}/", server.url), scratch.path())),
-        &teams,
-    );
+    let browser = Browser::start(scratch.path());
+    let url = format!("{}/", server.url);
+    for view in [View::DESK, View::PHONE.dark().without_scripts()] {
+        let page = browser.open_in(view, &url);
+        assert_in_order(&table(&page.html()), &teams);
+        assert_eq!(page.console_errors(), [""; 0]);
+    }
     // What a visitor without JavaScript gets.
     assert_in_order(
         &table(&server.get("/", None).text().expect("a page is text")),

@@ -2,7 +2,6 @@
 
 mod backup;
 mod bad_agents;
-mod browser;
 mod busy_host;
 mod command_line;
 mod commands;

@@ -1,6 +1,7 @@
 //! What the end-to-end tests share: the real `faceoff` program as a child process, bundles on disk
 //! and an HTTP client that knows nothing of the server's types.
 
+pub mod browser;
 pub mod bundle;
 pub mod packages;
 pub mod server;
