@@ -93,17 +93,38 @@ impl Conditions {
         self.is_get
     }
 
-    /// The answer to who has it already.
-    pub(crate) fn not_modified(&self, tag: &ETag) -> Option<Response> {
+    /// Takes from a request what its client has.
+    pub(crate) fn taken_from(headers: &mut HeaderMap) -> Self {
+        let mut taken = HeaderMap::new();
+        if let header::Entry::Occupied(values) = headers.entry(header::IF_NONE_MATCH) {
+            let (name, values) = values.remove_entry_mult();
+            for value in values {
+                taken.append(&name, value);
+            }
+        }
+        Self {
+            is_get: true,
+            headers: taken,
+        }
+    }
+
+    /// Has the client what has this tag, as a header tells it?
+    pub(crate) fn have(&self, tag: &HeaderValue) -> bool {
+        let tag = tag.to_str().unwrap_or_default();
+        let tag = tag.strip_prefix("W/").unwrap_or(tag);
         let known = self.headers.get_all(header::IF_NONE_MATCH).into_iter();
         // A weak comparison, as the header's is; a comma within a tag makes parts that are none of ours.
-        let has_it = known
+        known
             .filter_map(|value| value.to_str().ok())
             .flat_map(|value| value.split(','))
             .map(|known| known.trim())
             .map(|known| known.strip_prefix("W/").unwrap_or(known))
-            .any(|known| known == "*" || known == tag.opaque);
-        has_it.then(|| {
+            .any(|known| known == "*" || known == tag)
+    }
+
+    /// The answer to who has it already.
+    pub(crate) fn not_modified(&self, tag: &ETag) -> Option<Response> {
+        self.have(&tag.header()).then(|| {
             let headers = [(header::ETAG, tag.header())];
             (StatusCode::NOT_MODIFIED, headers).into_response()
         })

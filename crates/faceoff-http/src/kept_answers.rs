@@ -154,6 +154,11 @@ pub(crate) fn asked(request: &Request, store: &Store, second: i64) -> Option<Ask
     (asked.length() <= LONGEST_QUESTION).then_some(asked)
 }
 
+/// Has a path a board's page, whose conditions are looked at before it is asked for?
+pub(crate) fn is_board_page(path: &str) -> bool {
+    path == "/" || path.starts_with("/tasks/")
+}
+
 fn is_everybodys(path: &str) -> bool {
     let is_one_of = |path: &str, exact: &[&str], below: &[&str]| {
         exact.contains(&path) || below.iter().any(|folder| path.starts_with(folder))

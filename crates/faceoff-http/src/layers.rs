@@ -2,6 +2,7 @@
 
 use crate::{
     app::AppState,
+    conditions::Conditions,
     in_flight::{self, InFlight},
     kept_answers, pages,
     peer::Peer,
@@ -10,6 +11,7 @@ use crate::{
 };
 use axum::{
     Router,
+    body::Body,
     extract::{Request, State},
     http::{Extensions, HeaderMap, HeaderName, HeaderValue, StatusCode, Version, header},
     middleware::{self, Next},
@@ -33,6 +35,7 @@ pub(crate) fn around(site: Router, app: &Arc<AppState>) -> Router {
     site.layer(CatchPanicLayer::custom(panicked))
         .layer(CompressionLayer::new().compress_when(texts))
         .layer(middleware::from_fn_with_state(Arc::clone(app), keep))
+        .layer(middleware::from_fn(revalidate))
         .layer(middleware::from_fn_with_state(
             InFlight::new(app),
             in_flight::limit,
@@ -82,6 +85,28 @@ pub(crate) async fn time_out(
             ),
         )
         .into_response(),
+    }
+}
+
+/// Tells who has a board's page already that it still stands. Their condition goes no further, so that the page is made for
+/// them as for everybody, once (`kept_answers.rs`).
+async fn revalidate(mut request: Request, next: Next) -> Response {
+    if !kept_answers::is_board_page(request.uri().path()) {
+        return next.run(request).await;
+    }
+    let conditions = Conditions::taken_from(request.headers_mut());
+    let response = next.run(request).await;
+    let tag = response.headers().get(header::ETAG).cloned();
+    match tag.filter(|_| response.status() == StatusCode::OK) {
+        Some(tag) if conditions.have(&tag) => {
+            let (mut parts, _) = response.into_parts();
+            parts.status = StatusCode::NOT_MODIFIED;
+            for of_body in [header::CONTENT_TYPE, header::CONTENT_LENGTH] {
+                parts.headers.remove(of_body);
+            }
+            Response::from_parts(parts, Body::empty())
+        }
+        _ => response,
     }
 }
 

@@ -1,4 +1,4 @@
-//! Styles and icon, compiled in.
+//! Styles, script and icon, compiled in.
 
 use axum::{
     http::{HeaderValue, header},
@@ -7,6 +7,7 @@ use axum::{
 use std::sync::LazyLock;
 
 pub(super) const STYLE_PATH: &str = "/static/faceoff.css";
+pub(super) const SCRIPT_PATH: &str = "/static/live.js";
 pub(super) const ICON_PATH: &str = "/static/faceoff.svg";
 pub(super) const EPISODES_STYLE_PATH: &str = "/static/episodes.css";
 pub(super) const REPLAY_STYLE_PATH: &str = "/static/replay.css";
@@ -19,6 +20,7 @@ const EPISODES_STYLE: &str = include_str!("../../../../web/static/episodes.css")
 const REPLAY_STYLE: &str = include_str!("../../../../web/static/replay.css");
 /// Made of `web/client` by `make web`.
 const REPLAY_SCRIPT: &str = include_str!("../../../../web/client/dist/replay.js");
+const SCRIPT: &str = include_str!("../../../../web/static/live.js");
 const ICON: &str = include_str!("../../../../web/static/faceoff.svg");
 
 /// Where the pages load the styles from. The hash changes with the content, so that a browser may
@@ -46,6 +48,12 @@ pub(super) fn replay_script_url() -> &'static str {
     &URL
 }
 
+/// Where the pages load their script from.
+pub(super) fn script_url() -> &'static str {
+    static URL: LazyLock<String> = LazyLock::new(|| hashed(SCRIPT_PATH, SCRIPT));
+    &URL
+}
+
 fn hashed(path: &str, content: &str) -> String {
     let hash = blake3::hash(content.as_bytes()).to_hex();
     format!("{path}?{}", &hash[..12])
@@ -64,6 +72,10 @@ fn asset(media_type: &'static str, content: &'static str) -> impl IntoResponse {
 
 pub(super) async fn style() -> impl IntoResponse {
     asset("text/css; charset=utf-8", STYLE)
+}
+
+pub(super) async fn script() -> impl IntoResponse {
+    asset("text/javascript; charset=utf-8", SCRIPT)
 }
 
 pub(super) async fn icon() -> impl IntoResponse {

@@ -2,7 +2,9 @@
 
 use crate::views::task::TaskView;
 use faceoff_scoring::TIER_CHANGE_RESAMPLES;
-use faceoff_types::{Tier, TierBounds};
+use faceoff_types::{Task, TaskWeights, Tier, TierBounds};
+use jiff::Timestamp;
+use std::collections::BTreeMap;
 
 /// A success rate with its interval.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,7 +25,19 @@ impl Rate {
         let [low, high] = result
             .success_ci95
             .map(|bound| 100.0 * bound.clamp(0.0, 1.0));
-        let percent = 100.0 * result.success_rate;
+        Self::of_percent(100.0 * result.success_rate, [low, high])
+    }
+
+    /// The overall score, as a rate.
+    pub(super) fn of_score(
+        score: f64,
+        tasks: &BTreeMap<Task, TaskView>,
+        weights: &TaskWeights,
+    ) -> Self {
+        Self::of_percent(score, score_interval(score, tasks, weights))
+    }
+
+    fn of_percent(percent: f64, [low, high]: [f64; 2]) -> Self {
         Self {
             percent: one(percent),
             low: one(low),
@@ -33,6 +47,33 @@ impl Rate {
             bar_at: one(percent),
         }
     }
+}
+
+/// A 95 % interval of the score in percent. Tasks are independent of each other, so that the distances from the rates
+/// to the ends of their intervals add up as squares, each side by itself (Zou and Donner, Statistics in Medicine 2008).
+pub(super) fn score_interval(
+    score: f64,
+    tasks: &BTreeMap<Task, TaskView>,
+    weights: &TaskWeights,
+) -> [f64; 2] {
+    let distances = tasks.iter().map(|(task, result)| {
+        let weight = weights.of(*task).as_f64();
+        result
+            .success_ci95
+            .map(|end| 100.0 * weight * (end - result.success_rate))
+    });
+    let [below, above] = distances.fold([0.0, 0.0], |sums: [f64; 2], ends| {
+        [sums[0] + ends[0] * ends[0], sums[1] + ends[1] * ends[1]]
+    });
+    [
+        (score - below.sqrt()).max(0.0),
+        (score + above.sqrt()).min(100.0),
+    ]
+}
+
+/// A moment to the minute.
+pub(super) fn minute(at: Timestamp) -> String {
+    at.strftime("%Y-%m-%d %H:%M UTC").to_string()
 }
 
 /// One decimal; never “-0.0”.

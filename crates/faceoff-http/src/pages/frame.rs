@@ -1,7 +1,10 @@
 use super::assets;
-use crate::{app::AppState, problem::Problem};
+use crate::{app::AppState, conditions::ETag, problem::Problem};
 use askama::Template;
-use axum::response::{Html, IntoResponse, Response};
+use axum::{
+    http::{HeaderValue, header},
+    response::{Html, IntoResponse, Response},
+};
 use faceoff_types::RULESET;
 
 /// What surrounds the content of every page.
@@ -17,6 +20,7 @@ pub(super) struct Frame {
     /// Path of the navigation entry that this page is.
     pub(super) current: String,
     pub(super) style: &'static str,
+    pub(super) script: &'static str,
     pub(super) icon: &'static str,
     /// Address of the picture that a preview of a link to the page shows; none where the server does not know its own.
     pub(super) preview: Option<String>,
@@ -55,10 +59,38 @@ impl Frame {
             ruleset: RULESET,
             current: current.into(),
             style: assets::style_url(),
+            script: assets::script_url(),
             icon: assets::ICON_PATH,
             preview: None,
         }
     }
+
+    /// Is the page below this entry of the navigation? The boards of the tasks are below the first one.
+    pub(super) fn is_at(&self, entry: &str) -> bool {
+        let below = if entry == "/" { "/tasks" } else { entry };
+        let rest = self.current.strip_prefix(below);
+        self.current == entry || rest.is_some_and(|rest| rest.starts_with('/'))
+    }
+}
+
+/// Renders a page that has a tag, by which who has it already is told so (`layers.rs`).
+pub(super) fn render_tagged(page: &impl Template) -> Result<Response, PageProblem> {
+    let html = page
+        .render()
+        .map_err(|error| PageProblem(Problem::internal(error)))?;
+    let tag = ETag::of("page", &[&html]);
+    let headers = [
+        (header::ETAG, tag.header()),
+        (
+            header::CACHE_CONTROL,
+            HeaderValue::from_static("private, no-cache"),
+        ),
+        (
+            header::VARY,
+            HeaderValue::from_static("authorization, cookie"),
+        ),
+    ];
+    Ok((headers, Html(html)).into_response())
 }
 
 /// Renders a page.

@@ -75,6 +75,7 @@ pub(crate) fn router(patience: Duration, api: Arc<Value>) -> Router<App> {
         .route("/robots.txt", get(robots::robots))
         .merge(docs::router(api))
         .route(assets::STYLE_PATH, get(assets::style))
+        .route(assets::SCRIPT_PATH, get(assets::script))
         .route(assets::ICON_PATH, get(assets::icon))
         .route(assets::EPISODES_STYLE_PATH, get(assets::episodes_style))
         .route(assets::REPLAY_STYLE_PATH, get(assets::replay_style))

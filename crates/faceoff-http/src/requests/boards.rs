@@ -47,6 +47,14 @@ pub enum BoardBy {
 }
 
 impl BoardBy {
+    /// As a query has it.
+    pub(crate) const fn as_str(self) -> &'static str {
+        match self {
+            Self::Best => "best",
+            Self::Latest => "latest",
+        }
+    }
+
     pub(crate) const fn standings(self) -> Standings {
         match self {
             Self::Best => Standings::Best,
@@ -63,6 +71,115 @@ pub enum BoardFormat {
     Json,
     /// A table for spreadsheets, with a line of names.
     Csv,
+}
+
+/// Which board a page shows, and in which order.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoardPageQuery {
+    /// As of [`BoardQuery`].
+    pub stage: Option<StageId>,
+    /// As of [`BoardQuery`].
+    pub revision: Option<u32>,
+    /// As of [`BoardQuery`].
+    pub division: Option<DivisionName>,
+    /// As of [`BoardQuery`].
+    pub day: Option<Date>,
+    /// As of [`BoardQuery`].
+    pub by: Option<BoardBy>,
+    /// As of [`BoardQuery`].
+    #[serde(default)]
+    pub live: bool,
+    /// By which column; without it in board order, tier by tier.
+    pub sort: Option<BoardSort>,
+}
+
+impl BoardPageQuery {
+    /// The board itself.
+    pub(crate) fn board(&self) -> BoardQuery {
+        BoardQuery {
+            stage: self.stage,
+            revision: self.revision,
+            division: self.division.clone(),
+            day: self.day,
+            by: self.by,
+            live: self.live,
+            format: None,
+        }
+    }
+}
+
+/// A column that a board is sorted by; the better first, or with a `-` before its name the worse.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
+pub struct BoardSort {
+    /// Which.
+    pub column: BoardColumn,
+    /// The other way round.
+    pub is_reversed: bool,
+}
+
+/// A column of a board.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BoardColumn {
+    /// Board order: tiers, and inside of them the score.
+    Place,
+    /// By name.
+    Team,
+    /// The overall score, or on a task's board the success rate.
+    Score,
+    /// A task's success rate.
+    Task(Task),
+    /// Penalty points.
+    Points,
+}
+
+impl BoardColumn {
+    /// As a query names it.
+    pub(crate) const fn as_str(self) -> &'static str {
+        match self {
+            Self::Place => "place",
+            Self::Team => "team",
+            Self::Score => "score",
+            Self::Task(task) => task.as_str(),
+            Self::Points => "points",
+        }
+    }
+
+    /// All of them.
+    pub(crate) const ALL: [Self; 7] = [
+        Self::Place,
+        Self::Team,
+        Self::Score,
+        Self::Task(Task::Hit),
+        Self::Task(Task::Defend),
+        Self::Task(Task::Prepare),
+        Self::Points,
+    ];
+}
+
+impl TryFrom<String> for BoardSort {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        let (name, is_reversed) = match text.strip_prefix('-') {
+            Some(name) => (name, true),
+            None => (text.as_str(), false),
+        };
+        let column = BoardColumn::ALL
+            .into_iter()
+            .find(|column| column.as_str() == name);
+        let unknown = || {
+            let names = BoardColumn::ALL.map(BoardColumn::as_str).join(", ");
+            format!("sort is one of {names}, with a - before it for the other way round")
+        };
+        column
+            .map(|column| Self {
+                column,
+                is_reversed,
+            })
+            .ok_or_else(unknown)
+    }
 }
 
 /// Of which stage a team's page tells.

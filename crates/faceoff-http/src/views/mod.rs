@@ -48,6 +48,7 @@ pub mod team;
 pub mod token;
 pub mod tournament;
 pub(crate) mod tournament_sheet;
+pub(crate) mod trail;
 pub mod violations;
 pub mod webhook;
 

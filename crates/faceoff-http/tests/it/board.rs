@@ -211,7 +211,8 @@ async fn a_tasks_board_ranks_by_the_task_alone() {
         1,
         "no team has points in this task"
     );
-    assert_eq!(texts(&html, "nav [aria-current]"), ["Prepare"]);
+    assert_eq!(texts(&html, ".tabs [aria-current=page]"), ["Prepare"]);
+    assert_eq!(texts(&html, "header [aria-current=true]"), ["Board"]);
 }
 
 #[tokio::test]
@@ -269,8 +270,13 @@ async fn an_empty_board_says_what_comes_next_and_a_running_one_how_far_it_is() {
         .unwrap();
     for day in ["today", "after midnight"] {
         let html = page(&site, "/").await;
-        let rows = texts(&html, "table.plain tbody tr");
+        let rows = texts(&html, ".under-way .runs li");
         assert_eq!(rows, ["Alpha Running 3 of 12"], "{day}");
+        let whole = texts(&html, ".under-way .whole").join(" ");
+        assert!(
+            whole.starts_with("3 of 12 episodes; 0 of 1 evaluations are over."),
+            "{whole}"
+        );
         site.next_day();
     }
     let html = page(&site, &evaluation.replace("/api/v1", "")).await;

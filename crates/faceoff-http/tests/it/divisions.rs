@@ -188,9 +188,9 @@ async fn the_boards_pages_lead_to_the_divisions() {
     site.next_day();
     let started = site.post("/api/v1/days", Some(ADMIN), &json!({})).await;
     started.json(200);
-    let under_way = texts(&page("/?division=open").await, "table.plain tbody th");
+    let under_way = texts(&page("/?division=open").await, ".under-way p > a");
     assert_eq!(under_way, ["B"]);
-    assert_eq!(texts(&page("/").await, "table.plain tbody th").len(), 4);
+    assert_eq!(texts(&page("/").await, ".under-way p > a").len(), 4);
     let empty = page("/?division=pupils").await;
     let empty = texts(&empty, "#empty").join(" ");
     assert_eq!(empty, "No team of the division has a result yet");

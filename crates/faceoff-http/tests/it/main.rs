@@ -12,6 +12,7 @@ mod blind;
 mod board;
 mod board_data;
 mod board_load;
+mod board_page;
 mod capacity;
 mod capacity_log;
 mod clips;

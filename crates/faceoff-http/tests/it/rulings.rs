@@ -180,7 +180,9 @@ async fn a_paused_queue_says_so_and_the_server_is_well() {
     for path in ["/", "/tasks/hit"] {
         let page = site.get(path, None).await.body;
         assert!(
-            page.contains("Paused</strong> since 2026-03-01 10:00 UTC"),
+            page.contains(
+                "Paused</strong> since <time datetime=\"2026-03-01T10:00:00Z\">2026-03-01 10:00 UTC"
+            ),
             "{page}"
         );
     }

@@ -7,9 +7,7 @@ use crate::{
     },
     views::history::HistoryRow,
 };
-use faceoff_types::{
-    EvaluationId, Task, TaskWeights, Tier, TierBounds, Variation, ViolationCounts,
-};
+use faceoff_types::{EvaluationId, Task, Tier, TierBounds, Variation, ViolationCounts};
 use jiff::civil::Date;
 
 /// Where it stands by its newest day.
@@ -58,7 +56,7 @@ pub(super) struct Day {
 
 impl Day {
     pub(super) fn of(row: &HistoryRow, variation: &Variation) -> Self {
-        let [low, high] = score_interval(row, &variation.weights);
+        let [low, high] = figures::score_interval(row.score, &row.tasks, &variation.weights);
         Self {
             day: row.day,
             evaluation: row.evaluation,
@@ -86,24 +84,6 @@ fn points_per_episode(row: &HistoryRow) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// A 95 % interval of the score in percent. Tasks are independent of each other, so that the distances from the rates
-/// to the ends of their intervals add up as squares, each side by itself (Zou and Donner, Statistics in Medicine 2008).
-fn score_interval(row: &HistoryRow, weights: &TaskWeights) -> [f64; 2] {
-    let distances = row.tasks.iter().map(|(task, result)| {
-        let weight = weights.of(*task).as_f64();
-        result
-            .success_ci95
-            .map(|end| 100.0 * weight * (end - result.success_rate))
-    });
-    let [below, above] = distances.fold([0.0, 0.0], |sums: [f64; 2], ends| {
-        [sums[0] + ends[0] * ends[0], sums[1] + ends[1] * ends[1]]
-    });
-    [
-        (row.score - below.sqrt()).max(0.0),
-        (row.score + above.sqrt()).min(100.0),
-    ]
-}
-
 /// Score, points and each task's success, over the same days.
 pub(super) fn panels(rows: &[HistoryRow], variation: &Variation) -> Vec<Panel> {
     let of_row = |row: &HistoryRow, value, interval| Value {
@@ -112,7 +92,7 @@ pub(super) fn panels(rows: &[HistoryRow], variation: &Variation) -> Vec<Panel> {
         interval,
     };
     let score = rows.iter().map(|row| {
-        let interval = score_interval(row, &variation.weights);
+        let interval = figures::score_interval(row.score, &row.tasks, &variation.weights);
         of_row(row, row.score, Some(interval))
     });
     let points = rows
