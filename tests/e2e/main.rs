@@ -16,6 +16,7 @@ mod installed;
 mod kills;
 mod large_uploads;
 mod like_server;
+mod live;
 mod luck;
 mod packages;
 mod people;

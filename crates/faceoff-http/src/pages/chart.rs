@@ -223,6 +223,102 @@ fn trimmed(value: f64, decimals: usize) -> String {
     text.to_owned()
 }
 
+/// The axis of times begins and ends at these powers of ten of a millisecond.
+const FIRST_DECADE: f64 = -2.0;
+const LAST_DECADE: f64 = 3.0;
+/// Words before the rows of a strip are as wide.
+const STRIP_LEFT: f64 = 58.0;
+/// From row to row.
+const ROW: u32 = 24;
+/// What an answer has: a control step, in milliseconds.
+const STEP_MS: f64 = 20.0;
+
+/// Times of one kind, in milliseconds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Span {
+    pub(super) name: &'static str,
+    pub(super) mean: f64,
+    pub(super) p99: f64,
+    pub(super) max: f64,
+}
+
+/// Times on a logarithmic axis, ready to be drawn by `chart.html`.
+#[derive(Debug)]
+pub(super) struct Strip {
+    pub(super) rows: Vec<StripRow>,
+    /// Powers of ten.
+    pub(super) grid: Vec<Tick>,
+    /// Where a control step ends.
+    pub(super) limit: String,
+    /// Where the noise floor begins, and how wide it is.
+    pub(super) floor: Option<[String; 2]>,
+    pub(super) bottom: u32,
+    pub(super) height: u32,
+    /// What it shows in a sentence, for whoever does not see it.
+    pub(super) told: String,
+}
+
+/// Where the times of one kind lie.
+#[derive(Debug)]
+pub(super) struct StripRow {
+    pub(super) name: &'static str,
+    pub(super) y: u32,
+    pub(super) mean: String,
+    pub(super) p99: String,
+    pub(super) max: String,
+}
+
+impl Strip {
+    /// `floor`: median and 99th percentile of what the server itself adds, in milliseconds.
+    pub(super) fn of(spans: &[Span], floor: Option<[f64; 2]>) -> Self {
+        let mut y = 0;
+        let rows = spans.iter().map(|span| {
+            y += ROW;
+            let [mean, p99, max] = [span.mean, span.p99, span.max].map(|ms| figures::one(at(ms)));
+            StripRow {
+                name: span.name,
+                y,
+                mean,
+                p99,
+                max,
+            }
+        });
+        let rows = rows.collect();
+        let bottom = y + ROW / 2;
+        let grid = [0.01, 0.1, 1.0, 10.0, 100.0, 1000.0].map(|ms| Tick {
+            at: figures::one(at(ms)),
+            word: short(ms),
+        });
+        let told = spans.iter().map(|span| {
+            let [mean, p99, max] = [span.mean, span.p99, span.max].map(short);
+            format!(
+                "{}: mean {mean}, 99th percentile {p99}, maximum {max}",
+                span.name
+            )
+        });
+        let told: Vec<String> = told.collect();
+        Self {
+            rows,
+            grid: grid.into(),
+            limit: figures::one(at(STEP_MS)),
+            floor: floor.map(|[from, to]| [at(from), at(to) - at(from)].map(figures::one)),
+            bottom,
+            height: bottom + 20,
+            told: format!(
+                "Answer times in milliseconds, of {STEP_MS} that a control step has; {}",
+                told.join("; ")
+            ),
+        }
+    }
+}
+
+/// Where a time lies.
+fn at(ms: f64) -> f64 {
+    let decade = ms.max(f64::MIN_POSITIVE).log10();
+    let share = (decade - FIRST_DECADE) / (LAST_DECADE - FIRST_DECADE);
+    STRIP_LEFT + share.clamp(0.0, 1.0) * (RIGHT - STRIP_LEFT)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -255,6 +351,30 @@ mod tests {
             panel.told.contains("2026-03-05: 100 (90 – 110)"),
             "{}",
             panel.told
+        );
+    }
+
+    #[test]
+    fn times_stand_by_their_powers_of_ten_and_none_lies_outside() {
+        let span = Span {
+            name: "hit",
+            mean: 0.1,
+            p99: 10.0,
+            max: 5000.0,
+        };
+        let strip = Strip::of(&[span], Some([0.001, 1.0]));
+        let row = &strip.rows[0];
+        assert_eq!(
+            [&row.mean, &row.p99, &row.max],
+            ["115.6", "230.8", "346.0"],
+            "a fifth, three fifths, and the end"
+        );
+        assert_eq!(strip.floor, Some(["58.0", "115.2"].map(str::to_owned)));
+        assert_eq!(strip.limit, "248.1");
+        assert!(
+            strip
+                .told
+                .contains("hit: mean 0.1, 99th percentile 10, maximum 5000")
         );
     }
 

@@ -2,6 +2,7 @@
 //! team's and stay in the API.
 
 use super::{
+    chart::{Span, Strip},
     figures,
     frame::{Frame, PageProblem, render},
 };
@@ -26,9 +27,14 @@ use crate::{
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
-use faceoff_scoring::{EpisodeSummary, TIER_CHANGE_RESAMPLES};
+use faceoff_scoring::{
+    EE_POINTS, EpisodeSummary, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS,
+    TIER_CHANGE_RESAMPLES,
+};
 use faceoff_store::EvaluationState;
-use faceoff_types::{EvaluationId, Profile, RoundTrips, Seed, SlotTiming, StageDay, Task};
+use faceoff_types::{
+    EvaluationId, Profile, RoundTrips, Seed, SlotTiming, StageDay, Task, ViolationCounts,
+};
 use faceoff_wire::dataset::SlowEpisode;
 use figures::Rate;
 use jiff::{Timestamp, civil};
@@ -51,11 +57,8 @@ struct TaskFigures {
 /// What is told of a task once its day is released.
 struct TaskDetails {
     steps: u64,
-    ee: String,
-    link: String,
-    joint_pos: String,
-    joint_vel: String,
-    computation_time: String,
+    /// End effector, elbow and wrist, joint position, joint velocity, answer time.
+    broken: [Broken; 5],
     mean_ms: String,
     p99_ms: String,
     max_ms: String,
@@ -79,17 +82,47 @@ impl TaskFigures {
     }
 }
 
+/// What one kind of violation came to.
+struct Broken {
+    /// Of the episodes.
+    share: String,
+    /// What it cost; `None` of nothing.
+    points: Option<String>,
+}
+
+impl Broken {
+    fn of(result: &TaskView, violations: ViolationCounts) -> [Self; 5] {
+        let of_motion = [
+            (violations.ee, EE_POINTS),
+            (violations.link, LINK_POINTS),
+            (violations.joint_pos, JOINT_POS_POINTS),
+            (violations.joint_vel, JOINT_VEL_POINTS),
+        ];
+        let of_motion = of_motion.map(|(count, each)| (count, f64::from(count) * each));
+        // How much a slow answer costs depends on how slow it was: it is what remains.
+        let rest: f64 = of_motion.iter().map(|(_, points)| points).sum();
+        let slow = (result.penalty_points - rest).max(0.0);
+        let [ee, link, joint_pos, joint_vel] = of_motion;
+        [
+            ee,
+            link,
+            joint_pos,
+            joint_vel,
+            (violations.computation_time, slow),
+        ]
+        .map(|(count, points)| Self {
+            share: figures::share(count, result.episodes),
+            points: (count > 0).then(|| figures::one(points)),
+        })
+    }
+}
+
 impl TaskDetails {
     fn of(result: &TaskView) -> Option<Self> {
-        let count = |violations| figures::share(violations, result.episodes);
         let (violations, time) = (result.violations?, result.computation_time_s?);
         Some(Self {
             steps: result.steps?,
-            ee: count(violations.ee),
-            link: count(violations.link),
-            joint_pos: count(violations.joint_pos),
-            joint_vel: count(violations.joint_vel),
-            computation_time: count(violations.computation_time),
+            broken: Broken::of(result, violations),
             mean_ms: figures::milliseconds(time.mean),
             p99_ms: figures::milliseconds(time.p99),
             max_ms: figures::milliseconds(time.max),
@@ -111,11 +144,13 @@ struct Finished {
     seed: Option<String>,
     /// Of the dataset's archive.
     dataset_blake3: Option<String>,
-    finished_at: String,
+    finished_at: Timestamp,
     tasks: Vec<TaskFigures>,
     /// Evaluations that met the same episodes.
     others: Vec<Other>,
     timing: Option<TimingFigures>,
+    /// How long answers took; once the day is released.
+    times: Option<Strip>,
     slow: SlowAnswers,
 }
 
@@ -292,22 +327,23 @@ struct Page {
     /// When and why it was removed, if it was.
     dataset_removed: Option<RulingView>,
     progress: Option<Progress>,
-    /// Where it stands in the queue, in words.
-    place: Option<String>,
+    /// Where it stands in the queue.
+    queue: Option<QueueView>,
     next: String,
     finished: Option<Finished>,
 }
 
-/// Where an evaluation that is under way stands.
-fn place(queue: &QueueView) -> String {
-    let expected = match queue.expected_at {
-        Some(at) => format!("expected to be over {}", at.strftime("%Y-%m-%d %H:%M UTC")),
-        None => "nobody can tell yet when it will be over".to_owned(),
-    };
-    format!(
-        "Number {} of {} to be over; {expected}.",
-        queue.place, queue.of
-    )
+impl Page {
+    /// What has changed when the page has, in a sentence.
+    fn told(&self) -> String {
+        match &self.finished {
+            Some(done) => format!(
+                "The evaluation of {} is finished: score {} percent, {} penalty points.",
+                self.team, done.score, done.penalty_points
+            ),
+            None => self.state.clone(),
+        }
+    }
 }
 
 /// One evaluation.
@@ -369,7 +405,7 @@ pub(super) async fn page(
         public: view.public,
         dataset_removed: view.dataset_removed.clone(),
         progress: (!view.status.is_final()).then_some(view.progress),
-        place: view.queue.as_ref().map(place),
+        queue: view.queue,
         next: view.next.clone(),
         finished,
     })
@@ -450,6 +486,27 @@ async fn others(
         .collect())
 }
 
+/// Answer times of all tasks, if they are told.
+fn times(result: &ResultView) -> Option<Strip> {
+    let tasks = result.tasks.iter();
+    let spans: Vec<Span> = tasks
+        .filter_map(|(task, of_task)| {
+            let time = of_task.computation_time_s?;
+            Some(Span {
+                name: task.as_str(),
+                mean: 1e3 * time.mean,
+                p99: 1e3 * time.p99,
+                max: 1e3 * time.max,
+            })
+        })
+        .collect();
+    let floor = result.timing.as_ref().map(|timing| {
+        let trips = timing.during_s;
+        [1e3 * trips.p50, 1e3 * trips.p99]
+    });
+    (!spans.is_empty()).then(|| Strip::of(&spans, floor))
+}
+
 impl Finished {
     fn of(result: &ResultView, finished_at: Timestamp, summary: &EpisodeSummary) -> Self {
         Self {
@@ -463,7 +520,7 @@ impl Finished {
             resamples: TIER_CHANGE_RESAMPLES,
             ruleset: result.ruleset.clone(),
             seed: result.seed.map(|seed| seed.to_string()),
-            finished_at: finished_at.strftime("%Y-%m-%d %H:%M UTC").to_string(),
+            finished_at,
             tasks: result
                 .tasks
                 .iter()
@@ -473,6 +530,7 @@ impl Finished {
             others: Vec::new(),
             slow: SlowAnswers::default(),
             timing: result.timing.as_ref().map(TimingFigures::of),
+            times: times(result),
         }
     }
 }

@@ -230,7 +230,7 @@ async fn what_waits_tells_its_place_its_time_and_what_comes_next() {
     assert_eq!(listed.unwrap()["queue"], view["queue"]);
     let page = site.get(page, None).await.body;
     assert!(
-        page.contains("Number 1 of 1 to be over; expected to be over 2026-03-01"),
+        page.contains("Number 1 of 1 to be over; expected to be over <time datetime=\"2026-03-01"),
         "{page}"
     );
     assert!(page.contains("What happens next"), "{page}");
