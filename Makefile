@@ -11,13 +11,14 @@ CARGO      ?= cargo
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
 
-.PHONY: demo test wheel test-api test-python test-learning fuzz busy load soak steady lint format fidelity setup setup-test agents dist clean-demo help
+.PHONY: demo test web wheel test-api test-python test-learning fuzz busy load soak steady lint format fidelity setup setup-test agents dist clean-demo help
 
 help:
 	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
 	@echo "make agents   bundle striker and baseline: $(TARGET_DIR)/bundles"
 	@echo "make dist   pack the program for other Linux machines: $(TARGET_DIR)/dist"
 	@echo "make test   run everything that proves that it works"
+	@echo "make web    the script of the replay pages: web/client/dist"
 	@echo "make wheel  the Python package: $(TARGET_DIR)/wheels"
 	@echo "make test-api   validate the API's document, try every operation, make two clients of it"
 	@echo "make test-python   make it, install it where nothing else is, test it"
@@ -67,6 +68,7 @@ test: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
 	docker/runtime.sh $(TARGET_DIR)/runtimes/python3-ml
 	python3 agents/test_agents.py
+	web/client/build.sh test
 	TARGET_DIR=$(TARGET_DIR) tests/api/test.sh
 	TARGET_DIR=$(TARGET_DIR) crates/faceoff-py/test.sh test
 	if $(CARGO) nextest --version >/dev/null 2>&1; \
@@ -74,6 +76,10 @@ test: setup-test
 	    else $(CARGO) test --locked --workspace --no-fail-fast -- --test-threads 2; fi
 	@# The golden hashes again, as the released program computes them: the same bits.
 	$(CARGO) test --release --locked --package faceoff-sim --test it golden
+
+# The script of the replay pages, from its sources; what it makes is committed.
+web:
+	web/client/build.sh build
 
 # The Python package, for every CPython from 3.11 on: one wheel.
 wheel: setup

@@ -3,11 +3,12 @@
 use crate::{
     clip::Clip,
     error::ReplayError,
+    group::Group,
     header::{CLIP_FORMAT, ClipKind, EndTold, Header},
     motion::Motion,
     observed::Observed,
     sheet::{Broken, EpisodeLine, TimeBins},
-    violations::{Group, Watch},
+    violations::Watch,
 };
 use faceoff_episode::{EpisodeStart, StepRow, why_it_ended};
 use faceoff_sim::{
@@ -159,6 +160,7 @@ impl Recording {
             contacts,
             violations: self.watch.take(),
             breaks: Vec::new(),
+            score: None,
             late: Vec::new(),
             lost: Vec::new(),
             end: Some(end(told)),

@@ -1,6 +1,6 @@
 //! What a clip says of itself, beside its columns.
 
-use crate::violations::Group;
+use crate::group::Group;
 use faceoff_types::EpisodeEnd;
 use serde::{Deserialize, Serialize};
 
@@ -49,6 +49,9 @@ pub struct Header {
     /// Ends of a game's rallies.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub breaks: Vec<Break>,
+    /// Of games: the count at the first sample.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub score: Option<[u32; 2]>,
     /// Samples whose answer took more than a control step.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub late: Vec<u32>,

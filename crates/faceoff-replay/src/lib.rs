@@ -9,6 +9,8 @@ mod clip;
 mod column;
 mod episode;
 mod error;
+mod game;
+mod group;
 mod header;
 mod motion;
 mod observed;
@@ -23,6 +25,8 @@ mod violations;
 pub use clip::Clip;
 pub use column::Column;
 pub use error::ReplayError;
+pub use game::{CHUNK_STEPS, GameClipRecorder};
+pub use group::Group;
 pub use header::{
     Break, BreakKind, ClipKind, ColumnHeader, Contact, ContactWith, EndTold, Header, Lost,
     ViolationTold,
@@ -30,7 +34,6 @@ pub use header::{
 pub use pack::{Key, Pack, PackWriter, join};
 pub use recorder::ClipRecorder;
 pub use sheet::{Broken, EpisodeLine, Sheet, TimeBins};
-pub use violations::Group;
 
 /// The numbers of the model that a drawing of a clip needs.
 pub mod model {

@@ -4,7 +4,7 @@ use crate::{
     column::Column,
     header::{Contact, ContactWith},
 };
-use faceoff_sim::{EpisodeState, Impact, JOINTS, Met, model::CONTROL_STEP_S};
+use faceoff_sim::{EpisodeState, GameState, Impact, JOINTS, Met, model::CONTROL_STEP_S};
 
 /// m: a tenth of a pixel of the largest picture.
 const PLACE: f64 = 1e-4;
@@ -58,6 +58,37 @@ impl Motion {
         Self {
             columns,
             contacts: Vec::new(),
+        }
+    }
+
+    /// Of a game, in which both robots are recorded alike.
+    pub fn of_game() -> Self {
+        let mut motion = Self::new(true);
+        motion
+            .columns
+            .extend(joints("opponent_dq", "rad/s", JOINT_SPEED, 1));
+        motion
+            .columns
+            .extend([1, 2].map(|axis| {
+                Column::new(format!("opponent_universal_{axis}"), "rad", UNIVERSAL, 1)
+            }));
+        motion
+    }
+
+    /// The next sample of a game.
+    pub fn push_game(&mut self, state: &GameState) {
+        let [x, y, yaw, vx, vy, _] = state.puck;
+        let [q, opponent_q] = state.q;
+        let [dq, opponent_dq] = state.dq;
+        let [universal, opponent_universal] = state.universal;
+        let own = [x, y, yaw, vx, vy].into_iter().chain(q).chain(dq);
+        let values = own
+            .chain(universal)
+            .chain(opponent_q)
+            .chain(opponent_dq)
+            .chain(opponent_universal);
+        for (column, value) in self.columns.iter_mut().zip(values) {
+            column.push(value);
         }
     }
 

@@ -9,7 +9,7 @@
 //! ```
 
 use crate::{error::ReplayError, sheet::Sheet};
-use faceoff_types::Task;
+use faceoff_types::{Side, Task};
 use fs_err::File;
 use std::{
     io::Write,
@@ -58,7 +58,32 @@ impl Key {
             number: episode,
         }
     }
+
+    /// The public motion of a game: 500 control steps from `500 × chunk` on.
+    #[must_use]
+    pub const fn game_motion(chunk: u32) -> Self {
+        Self {
+            kind: 1,
+            contest: GAME,
+            number: chunk,
+        }
+    }
+
+    /// What a side was told and commanded in such a part of a game.
+    #[must_use]
+    pub const fn game_observed(side: Side, chunk: u32) -> Self {
+        Self {
+            kind: match side {
+                Side::First => 2,
+                Side::Second => 3,
+            },
+            contest: GAME,
+            number: chunk,
+        }
+    }
 }
+
+const GAME: u8 = 3;
 
 const fn contest(task: Task) -> u8 {
     match task {

@@ -1,6 +1,6 @@
 //! A line for each episode of an evaluation.
 
-use crate::{error::ReplayError, violations::Group};
+use crate::{error::ReplayError, group::Group};
 use faceoff_types::{EpisodeEnd, Task};
 use flate2::{Compression, read::GzDecoder, write::GzEncoder};
 use serde::{Deserialize, Serialize};

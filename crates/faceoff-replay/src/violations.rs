@@ -1,39 +1,7 @@
 //! When constraints were broken.
 
-use crate::header::ViolationTold;
+use crate::{group::Group, header::ViolationTold};
 use faceoff_sim::ConstraintValues;
-use serde::{Deserialize, Serialize};
-
-/// A group of constraints.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
-pub enum Group {
-    /// The end effector's place, m.
-    Ee,
-    /// Height of elbow and wrist, m.
-    Link,
-    /// Joint positions, rad.
-    JointPos,
-    /// Joint velocities, rad/s.
-    JointVel,
-}
-
-impl Group {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::Ee, Self::Link, Self::JointPos, Self::JointVel];
-
-    /// Its value, above 0 if broken.
-    #[must_use]
-    pub const fn of(self, values: &ConstraintValues) -> f64 {
-        match self {
-            Self::Ee => values.ee,
-            Self::Link => values.link,
-            Self::JointPos => values.joint_pos,
-            Self::JointVel => values.joint_vel,
-        }
-    }
-}
 
 /// The violations of a side, as they come.
 #[derive(Debug, Clone, Default)]

@@ -2,8 +2,8 @@
 
 use super::{
     files::{
-        GAME_FILE, MOTION_FILE, OUTCOME_FILE, RALLIES_FILE, SIDE_OUTCOME_FILE, entries_file,
-        log_file, side_file, steps_file,
+        CLIPS_FILE, GAME_FILE, MOTION_FILE, OUTCOME_FILE, RALLIES_FILE, SIDE_OUTCOME_FILE,
+        entries_file, log_file, side_file, steps_file,
     },
     recorder::{GameRecorder, Tables},
 };
@@ -105,6 +105,7 @@ impl RecordedGame<'_> {
             archives.push((name, digest::of_file(&partial(name, out))?));
         }
         let game = digest::of_file(&game)?;
+        fs::rename(tables.path(CLIPS_FILE), out.join(CLIPS_FILE))?;
         fs::remove_dir_all(tables.path(""))?;
         // All are there, so all get their names; the game last, for who finds it finds all of them.
         for name in Side::BOTH.map(side_file).into_iter().chain([GAME_FILE]) {
@@ -131,7 +132,8 @@ fn partial(name: &str, out: &Path) -> PathBuf {
 /// # Errors
 /// Why one of them is still there.
 pub fn clear_game(out: &Path) -> std::io::Result<()> {
-    for name in [GAME_FILE].into_iter().chain(Side::BOTH.map(side_file)) {
+    let files = [GAME_FILE, CLIPS_FILE].into_iter();
+    for name in files.chain(Side::BOTH.map(side_file)) {
         for path in [out.join(name), partial(name, out)] {
             match fs::remove_file(path) {
                 Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),

@@ -4,6 +4,8 @@ use faceoff_types::Side;
 
 /// The whole recording in the folder that `faceoff play` writes.
 pub const GAME_FILE: &str = "game.zip";
+/// What replays of the game are drawn from.
+pub(super) const CLIPS_FILE: &str = "clips";
 /// The true motion.
 pub(super) const MOTION_FILE: &str = "motion.parquet";
 /// The rallies.

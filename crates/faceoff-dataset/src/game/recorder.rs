@@ -1,13 +1,17 @@
 use super::{
-    files::{MOTION_FILE, RALLIES_FILE, entries_file, steps_file},
+    files::{CLIPS_FILE, MOTION_FILE, RALLIES_FILE, entries_file, steps_file},
     rows::{GameRows, not_recorded},
 };
 use crate::{error::RecordingError, table::TableWriter};
 use faceoff_episode::{GameSink, GameStepRow, RallyRow, RallyStart, RecordError};
+use faceoff_replay::GameClipRecorder;
 use faceoff_types::Side;
 use faceoff_wire::game::GAME_SCHEMA;
-use fs_err as fs;
-use std::path::{Path, PathBuf};
+use fs_err::{self as fs, File};
+use std::{
+    io::BufWriter,
+    path::{Path, PathBuf},
+};
 
 /// Rows that are held before they go to the files.
 const HELD_ROWS: usize = 1000;
@@ -20,6 +24,7 @@ pub struct GameRecorder {
     sides: [TableWriter; 2],
     rallies: TableWriter,
     entries: [TableWriter; 2],
+    clips: GameClipRecorder<BufWriter<File>>,
 }
 
 impl std::fmt::Debug for GameRecorder {
@@ -69,6 +74,7 @@ impl GameRecorder {
                 open(entries_file(first), rows.entries[0].schema())?,
                 open(entries_file(second), rows.entries[1].schema())?,
             ],
+            clips: GameClipRecorder::new(BufWriter::new(File::create(dir.join(CLIPS_FILE))?))?,
             rows,
         })
     }
@@ -93,20 +99,28 @@ impl GameRecorder {
         for table in self.sides.into_iter().chain(self.entries) {
             table.finish()?;
         }
+        let clips = self.clips.finish()?;
+        let clips = clips
+            .into_inner()
+            .map_err(std::io::IntoInnerError::into_error)?;
+        clips.sync_all()?;
         Ok(Tables { dir: self.dir })
     }
 }
 
 impl GameSink for GameRecorder {
     fn begin_rally(&mut self, start: &RallyStart<'_>) -> Result<(), RecordError> {
+        self.clips.begin_rally(start)?;
         self.rows.begin_rally(start)
     }
 
     fn observe(&mut self, observations: [&[f64]; 2]) {
+        self.clips.observe(observations);
         self.rows.observe(observations);
     }
 
     fn step(&mut self, row: &GameStepRow<'_>) -> Result<(), RecordError> {
+        self.clips.step(row)?;
         self.rows.step(row)?;
         if self.rows.motion.len() >= HELD_ROWS {
             self.write_steps().map_err(not_recorded)?;
@@ -115,6 +129,7 @@ impl GameSink for GameRecorder {
     }
 
     fn end_rally(&mut self, row: &RallyRow<'_>) -> Result<(), RecordError> {
+        self.clips.end_rally(row)?;
         self.rows.end_rally(row)
     }
 }

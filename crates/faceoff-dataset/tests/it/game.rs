@@ -1,12 +1,16 @@
 //! Recordings of games: verified, forged, damaged.
 
-use crate::forgery::{Forgery, flipped};
-use arrow_array::{Array, RecordBatch};
+use crate::{
+    forgery::{Forgery, flipped},
+    played::table,
+};
+use arrow_array::{Array, RecordBatch, cast::AsArray, types::Float64Type};
 use faceoff_dataset::{
     DatasetError,
     game::{GAME_FILE, GameRecorder, GameRecording, RecordedGame, side_file, verify_game},
 };
 use faceoff_episode::{Answered, Arena, Entry, GameCourse, Response, SideFault};
+use faceoff_replay::{CHUNK_STEPS, Clip, Key, Pack};
 use faceoff_types::{
     AgentFaultKind, GameLimits, Interpolation, Profile, Ruleset, Seed, Side, SlotTiming,
 };
@@ -273,4 +277,63 @@ fn what_is_damaged_is_told_apart_from_what_is_foreign() {
         .unwrap_err()
         .to_string();
     assert!(both.contains("name one of them"), "{both}");
+}
+
+#[test]
+fn clips_of_a_game_are_its_motion_part_by_part() {
+    let (out, unpacked) = recorded();
+    let pack = Pack::open(&out.path().join("clips")).unwrap();
+    let motion = table(&unpacked.path().join("motion.parquet"));
+    let float = |name: &str| motion[name].as_primitive::<Float64Type>().values().to_vec();
+    let mut score = [0, 0];
+    let mut last_of_before: Option<f64> = None;
+    let mut rallies = 0;
+    for chunk in 0..STEPS.div_ceil(CHUNK_STEPS) {
+        let clip = pack.clip(Key::game_motion(chunk)).unwrap().unwrap();
+        let clip = Clip::read(&clip).unwrap();
+        let first = chunk * CHUNK_STEPS;
+        let samples = (STEPS - first).min(CHUNK_STEPS) + 1;
+        assert_eq!((clip.header.first, clip.header.samples), (first, samples));
+        assert_eq!(clip.header.score, Some(score));
+        for (column, recorded) in [
+            ("puck_x", "puck_x"),
+            ("q_4", "robot_1_q_4"),
+            ("opponent_q_4", "robot_2_q_4"),
+            ("opponent_dq_2", "robot_2_dq_2"),
+            ("universal_1", "robot_1_universal_1"),
+        ] {
+            let column = clip.column(column).unwrap();
+            let recorded = &float(recorded)[first as usize..(first + samples - 1) as usize];
+            // Behind the sample that the part begins with.
+            for (found, expected) in column.values().skip(1).zip(recorded) {
+                let difference = (found - expected).abs();
+                assert!(difference <= 0.5001 * column.scale, "{}", column.name);
+            }
+        }
+        let places: Vec<f64> = clip.column("puck_x").unwrap().values().collect();
+        if let Some(last) = last_of_before {
+            assert_eq!(places[0], last, "a part begins where the one before ends");
+        }
+        last_of_before = places.last().copied();
+        for one in &clip.header.breaks {
+            assert!((first + 1..=first + samples).contains(&one.sample));
+            score = one.score;
+            rallies += 1;
+        }
+        for side in Side::BOTH {
+            let observed = pack.clip(Key::game_observed(side, chunk)).unwrap().unwrap();
+            let observed = Clip::read(&observed).unwrap();
+            let times = observed.column("computation_time").unwrap();
+            assert_eq!(times.counts.len(), samples as usize - 1);
+            // Each side's observation is of the table that both stand at.
+            let seen = observed.column("seen_x").unwrap();
+            for (seen, place) in seen.values().zip(&places) {
+                assert!(seen.abs() < 1.2, "{seen} where the puck is at {place}");
+            }
+        }
+    }
+    let after = Key::game_motion(STEPS.div_ceil(CHUNK_STEPS));
+    assert!(pack.clip(after).unwrap().is_none());
+    let recorded = table(&unpacked.path().join("rallies.parquet"));
+    assert_eq!(rallies, recorded.num_rows(), "each rally has its end");
 }

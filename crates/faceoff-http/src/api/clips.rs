@@ -1,6 +1,7 @@
 //! How an evaluation's episodes went, and the clips that their replays are drawn from.
 
 use super::{
+    clip_answer::send,
     document::{Binary, TagHeader},
     downloads::stays_its_callers,
 };
@@ -18,15 +19,12 @@ use crate::{
 };
 use axum::{
     Json,
-    body::Body,
     extract::State,
-    http::{HeaderMap, HeaderValue, header},
+    http::{HeaderMap, header},
     response::{IntoResponse, Response},
 };
 use faceoff_replay::Key;
 use faceoff_types::EvaluationId;
-use flate2::read::GzDecoder;
-use std::io::Read;
 
 /// How the episodes of an evaluation went, once its day is released: where each began and ended and why, and what it broke.
 ///
@@ -87,7 +85,7 @@ pub(crate) async fn motion(
     let sight = Sight::of(&app, viewer).await?;
     let clips = Clips::of(&app, &sight, path.id).await?;
     let key = Key::motion(path.task, path.episode);
-    send(&clips, key, "motion", path, &conditions, &headers).await
+    send_episode(&clips, key, "motion", path, &conditions, &headers).await
 }
 
 /// What the agent was told and commanded in an episode, and how long its answers took, as a clip; for whoever gets the
@@ -124,10 +122,10 @@ pub(crate) async fn observed(
         ));
     }
     let key = Key::observed(path.task, path.episode);
-    send(&clips, key, "observed", path, &conditions, &headers).await
+    send_episode(&clips, key, "observed", path, &conditions, &headers).await
 }
 
-async fn send(
+async fn send_episode(
     clips: &Clips,
     key: Key,
     what: &str,
@@ -137,63 +135,5 @@ async fn send(
 ) -> Result<Response, Problem> {
     let EpisodePath { task, episode, .. } = path;
     let tag = ETag::of(what, &[&clips.key, task.as_str(), &episode.to_string()]);
-    if let Some(mut answer) = conditions.not_modified(&tag) {
-        stays_its_callers(answer.headers_mut());
-        return Ok(answer);
-    }
-    let compressed = clips.clip(key).await?;
-    let mut answer = if accepts_gzip(headers) {
-        let encoding = (header::CONTENT_ENCODING, "gzip");
-        ([encoding], Body::from(compressed)).into_response()
-    } else {
-        let mut bytes = Vec::new();
-        GzDecoder::new(compressed.as_slice())
-            .read_to_end(&mut bytes)
-            .map_err(Problem::internal)?;
-        Body::from(bytes).into_response()
-    };
-    let sent = answer.headers_mut();
-    sent.insert(header::ETAG, tag.header());
-    sent.insert(
-        header::CONTENT_TYPE,
-        HeaderValue::from_static("application/octet-stream"),
-    );
-    stays_its_callers(sent);
-    let by = HeaderValue::from_static("authorization, cookie, accept-encoding");
-    sent.insert(header::VARY, by);
-    Ok(answer)
-}
-
-/// Does the client take gzip? By the encodings that it names, whichever it likes best.
-fn accepts_gzip(headers: &HeaderMap) -> bool {
-    let named = headers.get_all(header::ACCEPT_ENCODING).iter();
-    named
-        .filter_map(|value| value.to_str().ok())
-        .flat_map(|value| value.split(','))
-        .any(|one| {
-            let (name, weight) = one.split_once(';').unwrap_or((one, ""));
-            let refused = weight
-                .trim()
-                .strip_prefix("q=")
-                .is_some_and(|weight| weight.trim().parse() == Ok(0.0));
-            matches!(name.trim(), "gzip" | "x-gzip" | "*") && !refused
-        })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn gzip_is_sent_to_who_takes_it() {
-        let accepts = |text: &'static str| {
-            let value = HeaderValue::from_static(text);
-            accepts_gzip(&HeaderMap::from_iter([(header::ACCEPT_ENCODING, value)]))
-        };
-        assert!(accepts("deflate, gzip;q=0.5"));
-        assert!(accepts("br,*"));
-        assert!(!accepts("br, gzip;q=0"));
-        assert!(!accepts("identity"));
-        assert!(!accepts_gzip(&HeaderMap::new()));
-    }
+    send(&tag, conditions, headers, clips.clip(key)).await
 }

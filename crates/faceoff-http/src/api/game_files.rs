@@ -160,7 +160,7 @@ pub(crate) async fn side_log(
     Ok((media_type, faceoff_types::harmless(&log).into_owned()).into_response())
 }
 
-fn side_of([id, side]: &[String; 2]) -> Result<(GameId, Side), Problem> {
+pub(super) fn side_of([id, side]: &[String; 2]) -> Result<(GameId, Side), Problem> {
     let id = id.parse().map_err(|error: faceoff_types::ParseIdError| {
         Problem::new(ProblemKind::NotFound, error.to_string())
     })?;

@@ -6,6 +6,7 @@ mod announcements;
 mod board;
 mod bundle_stream;
 mod capacity;
+mod clip_answer;
 mod clips;
 mod comparisons;
 mod datasets;
@@ -19,6 +20,7 @@ mod event_stream;
 mod events;
 mod free_games;
 mod freezes;
+mod game_clips;
 mod game_files;
 mod games;
 mod health;
@@ -162,6 +164,8 @@ pub(crate) fn router(patience: Duration) -> (Router<App>, Arc<Value>) {
         .routes(routes!(clips::episodes))
         .routes(routes!(clips::motion))
         .routes(routes!(clips::observed))
+        .routes(routes!(game_clips::game_motion))
+        .routes(routes!(game_clips::game_observed))
         .routes(routes!(datasets::publish_evaluation))
         .routes(routes!(comparisons::compare))
         .routes(routes!(

@@ -24,7 +24,7 @@ use crate::{
     },
 };
 use faceoff_archive::Edition;
-use faceoff_store::{EvaluationState, Stage};
+use faceoff_store::{Artifacts, EvaluationState, Stage};
 use faceoff_types::StageDay;
 use std::collections::BTreeMap;
 
@@ -279,6 +279,16 @@ pub(super) async fn add_artifacts(
             bytes.to_string(),
             blake3.clone(),
         ]);
+        // What replays are drawn from goes along, where there is any.
+        let beside = match artifact.key.strip_suffix("/game.zip") {
+            Some(folder) => format!("{folder}/clips"),
+            None => Artifacts::clips_of(&artifact.key),
+        };
+        if app.store.artifacts().bytes_of(&beside).await?.is_some() {
+            let place = app.store.artifacts().path_of(&beside)?;
+            let (bytes, blake3) = files::hash(place.clone()).await?;
+            kept.insert(format!("artifacts/{beside}"), (place, bytes, blake3));
+        }
         kept.insert(path, (place, bytes, blake3));
     }
     files.put("datasets.csv", table.into_bytes()).await?;

@@ -17,6 +17,7 @@ mod evaluation;
 mod feed;
 mod figures;
 mod frame;
+mod game;
 mod help;
 mod join;
 mod log;
@@ -60,6 +61,7 @@ pub(crate) fn router(patience: Duration, api: Arc<Value>) -> Router<App> {
             "/evaluations/{id}/episodes/{task}/{episode}/embed",
             get(replay::embedded),
         )
+        .route("/games/{id}", get(game::page))
         .route("/season", get(season::page))
         .route("/submissions/{id}/ablation", get(ablation::page))
         .route("/help", get(help::page))

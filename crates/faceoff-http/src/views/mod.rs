@@ -23,6 +23,7 @@ pub mod event;
 pub(crate) mod feed;
 pub mod finalised;
 pub mod game;
+pub(crate) mod game_clips;
 pub mod health;
 pub mod history;
 pub mod invitation;

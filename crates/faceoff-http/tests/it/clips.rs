@@ -65,7 +65,10 @@ fn pack(folder: &std::path::Path) -> PathBuf {
 
 /// Two teams of one day; the first has an evaluation with clips, the second's is under way unless the day is over.
 async fn recorded(is_over: bool) -> Recorded {
-    let site = Site::start().await;
+    recorded_at(Site::start().await, is_over).await
+}
+
+async fn recorded_at(site: Site, is_over: bool) -> Recorded {
     let [alpha, beta] = [site.team("Alpha").await, site.team("Beta").await];
     let of_alpha = site.valid_submission(&alpha, "striker").await;
     site.valid_submission(&beta, "striker").await;
@@ -185,16 +188,16 @@ async fn everybody_sees_the_motion_and_who_gets_the_dataset_the_rest() {
 
 #[tokio::test]
 async fn a_blind_stage_shows_no_episode() {
-    let recorded = recorded(true).await;
-    let stage = recorded.site.stage().await;
-    let path = format!("/api/v1/stages/{stage}");
-    let request = recorded.site.request(Method::PATCH, &path, Some(ADMIN));
+    let site = Site::start().await;
+    let path = format!("/api/v1/stages/{}", site.stage().await);
+    let request = site.request(Method::PATCH, &path, Some(ADMIN));
     let changed = request
         .json(&json!({ "blind": true }))
         .send()
         .await
         .unwrap();
     assert_eq!(changed.status(), 200);
+    let recorded = recorded_at(site, true).await;
     for path in ["episodes", "episodes/prepare/0/motion"] {
         for token in [None, Some(recorded.alpha.token.as_str())] {
             let refused = recorded.get(path, token).await;

@@ -140,11 +140,13 @@ const TABLE: &[(&str, &str)] = &[
     ("GET /games/{id}", "000++++"),
     ("GET /games/{id}/attempts", "?----++"),
     ("GET /games/{id}/live", "000++++"),
+    ("GET /games/{id}/motion/{chunk}", "000++++"),
     ("GET /games/{id}/recording", "000--++"),
     ("POST /games/{id}/recording/link", "?00--++"),
     ("GET /games/{id}/sides/{side}", "000++++"),
     ("POST /games/{id}/sides/{side}/link", "?00++++"),
     ("GET /games/{id}/sides/{side}/log", "?00++++"),
+    ("GET /games/{id}/sides/{side}/observed/{chunk}", "000++++"),
     ("GET /tournaments", "+++++++"),
     ("GET /tournaments/{id}", "+++++++"),
     ("GET /tournaments/{id}/certainty", "+++++++"),
@@ -354,6 +356,7 @@ impl Cast {
             .replace("{day}", "2020-01-01")
             .replace("{side}", "1")
             .replace("{episode}", "0")
+            .replace("{chunk}", "0")
             .replace("{version}", "7");
         format!("/api/v1{path}")
     }

@@ -98,6 +98,9 @@ async fn a_killed_evaluation_ends_as_an_undisturbed_one() {
     let survived = without_times(server.store.outcomes(troubled.run).await.unwrap());
     assert_eq!(survived, undisturbed);
     let published = server.path().join("data/artifacts").join(dataset);
-    let datasets = std::fs::read_dir(published.parent().unwrap()).unwrap();
-    assert_eq!(datasets.count(), 1, "no unpublished dataset is left");
+    let kept = std::fs::read_dir(published.parent().unwrap()).unwrap();
+    let mut kept: Vec<_> = kept.map(|entry| entry.unwrap().path()).collect();
+    kept.sort();
+    let clips = published.with_extension("zip.clips");
+    assert_eq!(kept, [published, clips], "no unpublished dataset is left");
 }

@@ -27,7 +27,7 @@ const DATASET: &str = "dataset.zip";
 
 /// Plays one game between two agents, each in a sandbox of its own, prints the result and writes
 /// `results.json`, `game.zip` (which `faceoff verify` simulates again), `side-1.zip` and `side-2.zip` (what each
-/// side may have of it) to a folder. Exit status 0 only if there is a result; a forfeit is one.
+/// side may have of it) and `clips` (what replays are drawn from) to a folder. Exit status 0 only if there is a result; a forfeit is one.
 #[derive(Debug, Args)]
 pub struct PlayCommand {
     #[command(flatten)]

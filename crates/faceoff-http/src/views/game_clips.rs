@@ -1,0 +1,79 @@
+//! What the replay of a game is drawn from: the motion for everybody who knows the game, what a side was told and commanded for whoever
+//! gets its file.
+
+use super::{game, sight::GameSight};
+use crate::{
+    app::App,
+    problem::{Problem, ProblemKind},
+    viewer::Viewer,
+};
+use faceoff_replay::{CHUNK_STEPS, Key, Pack};
+use faceoff_store::{Game, GameState};
+use faceoff_types::{GameId, Side};
+use std::path::PathBuf;
+
+/// The recorded clips of a game.
+#[derive(Debug)]
+pub(crate) struct GameClips {
+    /// Their name among the artifacts, which is never another's.
+    pub(crate) key: String,
+    path: PathBuf,
+    /// Of each side: does the viewer see what it was told and commanded?
+    pub(crate) sees: [bool; 2],
+}
+
+impl GameClips {
+    /// Of a game that the viewer knows of.
+    ///
+    /// # Errors
+    /// `NotFound`; `Conflict` without a result, or for one whose clips are not kept.
+    pub(crate) async fn of(app: &App, viewer: Viewer, id: GameId) -> Result<Self, Problem> {
+        let (sheet, game) = game::known(app, viewer, id).await?;
+        Self::of_known(app, sheet.sight(viewer), &game).await
+    }
+
+    async fn of_known(app: &App, sight: GameSight<'_>, game: &Game) -> Result<Self, Problem> {
+        let recording = match &game.state {
+            GameState::Played(row) => row.recording.as_ref(),
+            _ => None,
+        };
+        let conflict = |why: &str| Problem::new(ProblemKind::Conflict, why);
+        let Some(recording) = recording else {
+            return Err(conflict(
+                "the game has no result with a recording, and its replay is drawn from that",
+            ));
+        };
+        let key = format!("{}/clips", recording.key);
+        let artifacts = app.store.artifacts();
+        if artifacts.bytes_of(&key).await?.is_none() {
+            return Err(conflict(
+                "there is no replay of this game: the version of the server that played it made none, or the archive that \
+                 is shown was made without it",
+            ));
+        }
+        Ok(Self {
+            path: artifacts.path_of(&key).map_err(Problem::internal)?,
+            key,
+            sees: Side::BOTH.map(|side| sight.is_own(game, side) || sight.sees_both_sides(game)),
+        })
+    }
+
+    /// A clip's compressed bytes.
+    ///
+    /// # Errors
+    /// `NotFound` if the game was over before.
+    pub(crate) async fn clip(&self, key: Key) -> Result<Vec<u8>, Problem> {
+        let path = self.path.clone();
+        let read = move || Pack::open(&path)?.clip(key);
+        tokio::task::spawn_blocking(read)
+            .await
+            .map_err(Problem::internal)?
+            .map_err(Problem::internal)?
+            .ok_or_else(|| {
+                let detail = format!(
+                    "the game has no such part; each is {CHUNK_STEPS} control steps, the first is 0"
+                );
+                Problem::new(ProblemKind::NotFound, detail)
+            })
+    }
+}
