@@ -74,6 +74,17 @@ fn a_board_and_an_evaluation_follow_a_day_without_being_loaded_again() {
         assert_eq!(page.console_errors(), [""; 0]);
     }
 
+    // A moment is told by the server's clock, and by that of who reads it.
+    let far_away = View {
+        time_zone: "Asia/Kolkata",
+        ..View::PHONE
+    };
+    let page = browser.open_in(far_away, &format!("{}{of_team}", server.url));
+    page.wait_for("time .local");
+    assert!(page.text("time:has(.local)").contains(" UTC ("));
+    assert!(page.text("time .local").contains("GMT+5:30"));
+    assert_eq!(page.overflow(), 0);
+
     // Without scripts the same is there, for who loads it; and nothing is cut on a phone.
     for path in ["/", "/?sort=team", "/tasks/hit", &of_team] {
         for view in [View::PHONE, View::PHONE.dark().without_scripts()] {

@@ -43,6 +43,8 @@ pub struct View {
     pub dark: bool,
     /// Scripts run.
     pub scripts: bool,
+    /// Where the visitor's clock is.
+    pub time_zone: &'static str,
 }
 
 impl View {
@@ -52,6 +54,7 @@ impl View {
         height: 900,
         dark: false,
         scripts: true,
+        time_zone: "UTC",
     };
     /// The narrowest that pages are made for.
     pub const PHONE: Self = Self {
@@ -188,6 +191,10 @@ impl Page<'_> {
         self.ask(
             "Emulation.setEmulatedMedia",
             &json!({ "features": [{ "name": "prefers-color-scheme", "value": scheme }] }),
+        );
+        self.ask(
+            "Emulation.setTimezoneOverride",
+            &json!({ "timezoneId": view.time_zone }),
         );
         self.ask(
             "Emulation.setScriptExecutionDisabled",

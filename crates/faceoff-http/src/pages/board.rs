@@ -53,15 +53,18 @@ struct OverallPage {
 impl OverallPage {
     /// What has changed when the board has, in a sentence.
     fn told(&self) -> String {
-        let Some(first) = self.groups.iter().flat_map(|group| &group.rows).next() else {
-            return String::new();
-        };
-        let teams: usize = self.groups.iter().map(|group| group.rows.len()).sum();
-        format!(
-            "The board has changed: {teams} teams, {} first in the list with {} percent.",
-            first.who.team, first.score.percent
-        )
+        let rows = self.groups.iter().flat_map(|group| &group.rows);
+        told(rows.map(|row| (row.who.team.as_str(), row.score.percent.as_str())))
     }
+}
+
+/// Of teams and their scores, as they stand in the list.
+fn told<'a>(mut rows: impl Iterator<Item = (&'a str, &'a str)>) -> String {
+    let Some((first, percent)) = rows.next() else {
+        return String::new();
+    };
+    let teams = 1 + rows.count();
+    format!("The board has changed. Teams: {teams}. First in the list: {first}, {percent} percent.")
 }
 
 /// The overall board.
@@ -112,6 +115,14 @@ struct TaskPage {
     has_groups: bool,
     groups: Vec<Group<TaskRow>>,
     baselines: Vec<Baseline>,
+}
+
+impl TaskPage {
+    /// What has changed when the board has, in a sentence.
+    fn told(&self) -> String {
+        let rows = self.groups.iter().flat_map(|group| &group.rows);
+        told(rows.map(|row| (row.who.team.as_str(), row.rate.percent.as_str())))
+    }
 }
 
 /// The board of one task.

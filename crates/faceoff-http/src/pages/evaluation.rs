@@ -1,6 +1,8 @@
 //! `/evaluations/{id}`: what everybody may know of an evaluation. Log, faults and dataset are its
 //! team's and stay in the API.
 
+mod slow;
+
 use super::{
     chart::{Span, Strip},
     figures,
@@ -8,7 +10,6 @@ use super::{
 };
 use crate::{
     app::App,
-    archived,
     extract::PathParam,
     problem::Problem,
     viewer::Viewer,
@@ -22,7 +23,6 @@ use crate::{
         sight::Sight,
         submission::SubmissionView,
         task::TaskView,
-        violations::ViolationsView,
     },
 };
 use askama::Template;
@@ -31,13 +31,12 @@ use faceoff_scoring::{
     EE_POINTS, EpisodeSummary, JOINT_POS_POINTS, JOINT_VEL_POINTS, LINK_POINTS,
     TIER_CHANGE_RESAMPLES,
 };
-use faceoff_store::EvaluationState;
 use faceoff_types::{
     EvaluationId, Profile, RoundTrips, Seed, SlotTiming, StageDay, Task, ViolationCounts,
 };
-use faceoff_wire::dataset::SlowEpisode;
 use figures::Rate;
 use jiff::{Timestamp, civil};
+use slow::SlowAnswers;
 
 /// A task's results, in words.
 struct TaskFigures {
@@ -132,7 +131,7 @@ impl TaskDetails {
 
 /// A finished evaluation.
 struct Finished {
-    score: String,
+    score: Rate,
     penalty_points: String,
     tier_name: &'static str,
     tier_title: &'static str,
@@ -152,113 +151,6 @@ struct Finished {
     /// How long answers took; once the day is released.
     times: Option<Strip>,
     slow: SlowAnswers,
-}
-
-/// The answers that cost points, those that cost most first; once the day is released.
-#[derive(Default)]
-struct SlowAnswers {
-    shown: Vec<SlowAnswer>,
-    /// Of how many episodes, those that are not shown included.
-    episodes: usize,
-    /// They are in the dataset, which cannot be read.
-    lost: bool,
-    /// They were in the dataset, which was removed.
-    removed: bool,
-}
-
-/// The slowest answer of an episode that lost points by slow answers; times in milliseconds.
-struct SlowAnswer {
-    task: Task,
-    episode: u32,
-    points: String,
-    mean_ms: String,
-    max_ms: String,
-    /// What is known of the slowest answer; nothing in datasets of older versions.
-    step: Option<SlowStepFigures>,
-}
-
-struct SlowStepFigures {
-    step: u32,
-    wall_ms: String,
-    host_ms: String,
-    /// `None` where the host did not tell.
-    cpu_ms: Option<String>,
-}
-
-impl SlowAnswers {
-    /// A page is no list; the API tells of all.
-    const SHOWN: usize = 20;
-
-    async fn of(app: &App, view: &EvaluationView, result: &ResultView) -> Result<Self, Problem> {
-        let of_task = |task: &TaskView| task.violations.is_some_and(|v| v.computation_time > 0);
-        if !result.tasks.values().any(of_task) {
-            return Ok(Self::default());
-        }
-        if view.dataset_removed.is_some() {
-            return Ok(Self {
-                removed: true,
-                ..Self::default()
-            });
-        }
-        let evaluation = app.store.evaluation(view.id).await?;
-        let EvaluationState::Finished { dataset, .. } = &evaluation.state else {
-            return Ok(Self::default());
-        };
-        if archived::is_left_out(app, dataset).await? {
-            return Ok(Self::default());
-        }
-        Ok(match ViolationsView::read(app, dataset).await {
-            Ok(violations) => Self::worst(violations),
-            // It is logged; the rest of the page is not worse for it.
-            Err(_) => Self {
-                lost: true,
-                ..Self::default()
-            },
-        })
-    }
-
-    fn worst(violations: ViolationsView) -> Self {
-        let mut slow: Vec<(Task, SlowEpisode)> = violations
-            .tasks
-            .into_iter()
-            .flat_map(|(task, of_task)| {
-                let episodes = of_task.computation_time.into_iter();
-                episodes.map(move |episode| (task, episode))
-            })
-            .collect();
-        slow.sort_by(|(_, a), (_, b)| {
-            let by_points = b.points.total_cmp(&a.points);
-            by_points.then_with(|| b.max_s.total_cmp(&a.max_s))
-        });
-        Self {
-            episodes: slow.len(),
-            shown: slow
-                .into_iter()
-                .take(Self::SHOWN)
-                .map(|(task, episode)| SlowAnswer::of(task, &episode))
-                .collect(),
-            lost: false,
-            removed: false,
-        }
-    }
-}
-
-impl SlowAnswer {
-    fn of(task: Task, episode: &SlowEpisode) -> Self {
-        Self {
-            task,
-            episode: episode.episode,
-            points: figures::one(episode.points),
-            mean_ms: figures::milliseconds(episode.mean_s),
-            max_ms: figures::milliseconds(episode.max_s),
-            step: episode.slowest.map(|slowest| SlowStepFigures {
-                step: slowest.step,
-                wall_ms: figures::milliseconds(slowest.wall_s),
-                host_ms: figures::milliseconds(slowest.host_s),
-                cpu_ms: slowest.cpu_s.map(figures::milliseconds),
-            }),
-        }
-    }
 }
 
 /// Another team's evaluation of the same episodes.
@@ -339,7 +231,7 @@ impl Page {
         match &self.finished {
             Some(done) => format!(
                 "The evaluation of {} is finished: score {} percent, {} penalty points.",
-                self.team, done.score, done.penalty_points
+                self.team, done.score.percent, done.penalty_points
             ),
             None => self.state.clone(),
         }
@@ -508,9 +400,16 @@ fn times(result: &ResultView) -> Option<Strip> {
 }
 
 impl Finished {
+    /// Had any episode a violation?
+    fn has_violations(&self) -> bool {
+        let details = self.tasks.iter().filter_map(|task| task.details.as_ref());
+        let mut kinds = details.flat_map(|details| &details.broken);
+        kinds.any(|kind| kind.points.is_some())
+    }
+
     fn of(result: &ResultView, finished_at: Timestamp, summary: &EpisodeSummary) -> Self {
         Self {
-            score: figures::one(result.score),
+            score: Rate::of_score(result.score, &result.tasks, &result.variation.weights),
             penalty_points: figures::one(result.penalty_points),
             tier_name: result.tier.as_str(),
             tier_title: result.tier.title(),

@@ -101,7 +101,11 @@ async fn a_retention_is_confirmed_applied_and_told() {
     let page = played[1].replace("/api/v1", "");
     let page = site.get(&page, None).await;
     assert_eq!(page.status, 200);
-    assert!(page.body.contains("removed on 2026-03-04"), "{}", page.body);
+    assert!(
+        page.body.contains("removed on <time datetime=\"2026-03-04"),
+        "{}",
+        page.body
+    );
     assert!(!page.body.contains("/dataset\""), "no link to nothing");
 
     // Nothing goes by keeping more: nothing is to be confirmed.

@@ -50,6 +50,7 @@ pub(super) struct Heading {
     pub(super) is_hidden: bool,
     /// May it change?
     pub(super) result: String,
+    pub(super) is_provisional: bool,
     /// The overall board and those of the tasks.
     pub(super) tabs: Vec<Tab>,
 }
@@ -129,6 +130,7 @@ impl Heading {
                     blind: standing::blind(board, is_hidden),
                     is_hidden,
                     result: standing::result(board),
+                    is_provisional: board.provisional,
                     tabs: tabs(board.task, address),
                 });
             }
