@@ -86,7 +86,7 @@ impl Clip {
             let (of_column, rest) = payload.split_at_checked(bytes).ok_or_else(cut)?;
             payload = rest;
             let mut column = Column::new(told.name.as_str(), &told.unit, told.scale, told.order)
-                .from_sample(told.first);
+                .beginning_at(told.first);
             let count = usize::try_from(told.count).map_err(|error| wrong(&error))?;
             column.read(of_column, count)?;
             columns.push(column);

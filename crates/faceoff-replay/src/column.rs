@@ -36,7 +36,7 @@ impl Column {
     }
 
     /// The same, without a value for the clip's first samples.
-    pub(crate) fn from_sample(self, first: u32) -> Self {
+    pub(crate) fn beginning_at(self, first: u32) -> Self {
         Self { first, ..self }
     }
 

@@ -37,10 +37,10 @@ impl Observed {
             Column::new("seen_y", "m", PLACE, 1),
             Column::new("seen_yaw", "rad", ANGLE, 1),
         ];
-        columns.extend(joints("command", "rad", COMMAND, 2).map(|column| column.from_sample(1)));
+        columns.extend(joints("command", "rad", COMMAND, 2).map(|column| column.beginning_at(1)));
         columns.extend(
             ["computation_time", "host_time"]
-                .map(|name| Column::new(name, "s", TIME, 0).from_sample(1)),
+                .map(|name| Column::new(name, "s", TIME, 0).beginning_at(1)),
         );
         Self {
             side,
