@@ -1,15 +1,19 @@
 //! Registering a team.
 
-use super::joining::{link, profile};
+use super::{
+    deciding::checked_reason,
+    joining::{good_until, link, profile},
+};
 use crate::{
     app::AppState,
     problem::Problem,
     requests::Register,
     text,
     token::{Secret, SecretKind},
-    views::invitation::NewRegistrationView,
+    views::invitation::{NewRegistrationView, RegistrationView},
 };
-use faceoff_store::NewRegistration;
+use faceoff_store::{Actor, NewRegistration};
+use faceoff_types::RegistrationId;
 
 const CONTACT_CHARS: usize = 120;
 
@@ -36,4 +40,36 @@ pub(crate) async fn registered(
         join_link: link(app, secret.as_str()),
         code: secret.as_str().to_owned(),
     })
+}
+
+/// Lets a registered team take part.
+pub(crate) async fn approve_registration(
+    app: &AppState,
+    actor: Actor,
+    id: RegistrationId,
+) -> Result<RegistrationView, Problem> {
+    let now = app.config.clock.now();
+    let (registration, team) = app
+        .store
+        .approve_registration(actor, id, good_until(now), now)
+        .await?;
+    tracing::info!(registration = %id, team = %team.name, "registration approved");
+    Ok(registration.into())
+}
+
+/// Refuses a registration, with a reason that its team reads.
+pub(crate) async fn refuse_registration(
+    app: &AppState,
+    actor: Actor,
+    id: RegistrationId,
+    reason: &str,
+) -> Result<RegistrationView, Problem> {
+    let reason = checked_reason(reason)?;
+    let now = app.config.clock.now();
+    let registration = app
+        .store
+        .refuse_registration(actor, id, reason, now)
+        .await?;
+    tracing::info!(registration = %id, reason, "registration refused");
+    Ok(registration.into())
 }

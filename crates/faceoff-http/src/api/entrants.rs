@@ -1,8 +1,7 @@
 //! Who is in a tournament, and who leaves it.
 
-use super::rulings::checked_reason;
 use crate::{
-    acts::entering,
+    acts::{deciding::checked_reason, entering},
     app::App,
     auth::{Caller, Organiser},
     extract::{Json as Body, PathParam},

@@ -1,7 +1,7 @@
 //! Evaluations: following them, stopping them, and playing them again.
 
-use super::rulings::checked_reason;
 use crate::{
+    acts::turns,
     app::App,
     auth::{Caller, Organiser},
     extract::{Json as Body, PathParam},
@@ -100,14 +100,8 @@ pub(crate) async fn cancel_evaluation(
     PathParam(id): PathParam<EvaluationId>,
     Body(Cancellation { reason }): Body<Cancellation>,
 ) -> Result<Json<EvaluationView>, Problem> {
-    let reason = checked_reason(&reason)?;
-    let now = app.config.clock.now();
-    app.store
-        .cancel_evaluation(organiser.actor(), id, reason, now)
-        .await?;
-    tracing::info!(evaluation = %id, reason, "evaluation cancelled");
-    let sight = Sight::of_organiser(&app).await?;
-    EvaluationView::find(&app, &sight, id).await.map(Json)
+    let cancelled = turns::cancel_evaluation(&app, organiser.actor(), id, &reason);
+    cancelled.await.map(Json)
 }
 
 /// Plays an evaluation again that was cancelled or voided, or failed by our fault: the submission that was active at
@@ -126,14 +120,7 @@ pub(crate) async fn rerun_evaluation(
     State(app): State<App>,
     PathParam(id): PathParam<EvaluationId>,
 ) -> Result<impl IntoResponse, Problem> {
-    let now = app.config.clock.now();
-    let rerun = app
-        .store
-        .rerun_evaluation(organiser.actor(), id, now)
-        .await?;
-    tracing::info!(evaluation = %id, rerun = %rerun.id, "an evaluation is played again");
-    let sight = Sight::of_organiser(&app).await?;
-    let view = EvaluationView::of(&app, &sight, rerun).await?;
+    let view = turns::rerun_evaluation(&app, organiser.actor(), id).await?;
     let location = [(header::LOCATION, paths::evaluation(view.id))];
     Ok((StatusCode::CREATED, AppendHeaders(location), Json(view)))
 }

@@ -1,7 +1,7 @@
 //! Boards that stand still, by the organiser.
 
-use super::rulings::checked_reason;
 use crate::{
+    acts::settling,
     app::App,
     auth::Organiser,
     extract::{Json as Body, PathParam},
@@ -30,13 +30,8 @@ pub(crate) async fn freeze_boards(
     PathParam(id): PathParam<StageId>,
     Body(Reason { reason }): Body<Reason>,
 ) -> Result<Json<StageView>, Problem> {
-    let reason = checked_reason(&reason)?;
-    let now = app.config.clock.now();
-    app.store
-        .freeze_boards(organiser.actor(), id, reason, now)
-        .await?;
-    tracing::info!(stage = %id, reason, "boards frozen");
-    StageView::find(&app, id).await.map(Json)
+    let frozen = settling::freeze_boards(&app, organiser.actor(), id, &reason);
+    frozen.await.map(Json)
 }
 
 /// Has the boards of a stage show everything again, at once.
@@ -54,10 +49,6 @@ pub(crate) async fn unfreeze_boards(
     State(app): State<App>,
     PathParam(id): PathParam<StageId>,
 ) -> Result<Json<StageView>, Problem> {
-    let now = app.config.clock.now();
-    app.store
-        .unfreeze_boards(organiser.actor(), id, now)
-        .await?;
-    tracing::info!(stage = %id, "boards unfrozen");
-    StageView::find(&app, id).await.map(Json)
+    let open = settling::unfreeze_boards(&app, organiser.actor(), id);
+    open.await.map(Json)
 }

@@ -1,7 +1,7 @@
 //! Games: listed, read, called off, voided and played again.
 
-use super::rulings::checked_reason;
 use crate::{
+    acts::deciding::checked_reason,
     app::App,
     auth::{Caller, Organiser},
     extract::{Json as Body, PathParam},

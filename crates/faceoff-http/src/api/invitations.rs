@@ -1,76 +1,21 @@
 //! Links by which people join, and joining.
 
 use crate::{
-    acts::joining::{good_until, join, link},
+    acts::{inviting, joining::join},
     app::App,
     auth::Caller,
     extract::{Json as Body, PathParam},
     paging::{Page, PageQuery, Paged},
-    problem::{Problem, ProblemKind},
-    requests::{self, InvitedRole, Join},
-    text,
-    token::{Secret, SecretKind},
+    problem::Problem,
+    requests::{self, Join},
     views::{
         invitation::{InvitationView, NewInvitationView},
         person::{JoinedView, WhoView},
     },
 };
 use axum::{Json, extract::State, http::StatusCode};
-use faceoff_store::{Invitation, InvitedAs, NewInvitation, TokenKind, Who};
+use faceoff_store::{TokenKind, Who};
 use faceoff_types::InvitationId;
-use jiff::SignedDuration;
-
-/// The longest time for which an invitation is good.
-const LONGEST: SignedDuration = SignedDuration::from_hours(90 * 24);
-const NOTE_CHARS: usize = 80;
-
-fn may_manage(caller: &Caller, invitation: &Invitation) -> bool {
-    match (&caller.who, invitation.invited_as) {
-        (Who::Host | Who::Organiser(_), _) => true,
-        (Who::Member(_, own), InvitedAs::Member(team)) => own.id == team,
-        (Who::Member(..) | Who::Team(_), _) => false,
-    }
-}
-
-/// What a caller invites to.
-fn invited_as(caller: &Caller, new: &requests::NewInvitation) -> Result<InvitedAs, Problem> {
-    let unless = |field: &str, is_given: bool| match is_given {
-        true => Err(Problem::invalid(
-            field,
-            "it does not belong to this role; leave it out",
-        )),
-        false => Ok(()),
-    };
-    if new.role != InvitedRole::Member {
-        unless("team", new.team.is_some())?;
-    }
-    if new.role != InvitedRole::Return {
-        unless("person", new.person.is_some())?;
-    }
-    let forbidden = |detail: &str| Err(Problem::new(ProblemKind::Forbidden, detail));
-    match (&caller.who, new.role) {
-        (Who::Team(_), _) => {
-            forbidden("a team's own token invites nobody; a member does, or an organiser")
-        }
-        (Who::Member(_, own), InvitedRole::Member) => match new.team {
-            Some(team) if team != own.id => Err(Problem::not_found("team")),
-            _ => Ok(InvitedAs::Member(own.id)),
-        },
-        (Who::Member(..), _) => forbidden("a member invites members of their team alone"),
-        (_, InvitedRole::Organiser) => Ok(InvitedAs::Organiser),
-        (_, InvitedRole::Founder) => Ok(InvitedAs::Founder),
-        (_, InvitedRole::Member) => new.team.map(InvitedAs::Member).ok_or_else(|| {
-            Problem::invalid(
-                "team",
-                "expected the id of the team whose member they become",
-            )
-        }),
-        (_, InvitedRole::Return) => new
-            .person
-            .map(InvitedAs::Return)
-            .ok_or_else(|| Problem::invalid("person", "expected the id of who is to return")),
-    }
-}
 
 /// Makes an invitation and returns its link, once. Organisers invite whomever they want, members into their team.
 #[utoipa::path(
@@ -88,31 +33,7 @@ pub(crate) async fn create_invitation(
     State(app): State<App>,
     Body(new): Body<requests::NewInvitation>,
 ) -> Result<(StatusCode, Json<NewInvitationView>), Problem> {
-    let invited_as = invited_as(&caller, &new)?;
-    let note = text::line("note", &new.note, NOTE_CHARS)?;
-    let now = app.config.clock.now();
-    let expires_at = new.expires_at.unwrap_or_else(|| good_until(now));
-    if now.duration_until(expires_at) > LONGEST {
-        let detail = format!(
-            "expected a time within {} days, got {expires_at}",
-            LONGEST.as_hours() / 24
-        );
-        return Err(Problem::invalid("expires_at", detail));
-    }
-    let secret = Secret::generate(SecretKind::Invitation).map_err(Problem::internal)?;
-    let new = NewInvitation {
-        code_hash: secret.hash(),
-        invited_as,
-        note,
-        expires_at,
-    };
-    let invitation = app.store.invite(caller.actor(), new, now).await?;
-    tracing::info!(invitation = %invitation.id, actor = %caller.actor(), "invited");
-    let view = NewInvitationView {
-        invitation: InvitationView::of(invitation, now),
-        link: link(&app, secret.as_str()),
-        code: secret.as_str().to_owned(),
-    };
+    let view = inviting::create_invitation(&app, &caller, new).await?;
     Ok((StatusCode::CREATED, Json(view)))
 }
 
@@ -128,8 +49,7 @@ pub(crate) async fn list_invitations(
     State(app): State<App>,
 ) -> Result<Paged<InvitationView>, Problem> {
     let now = app.config.clock.now();
-    let mut invitations = app.store.invitations().await?;
-    invitations.retain(|invitation| may_manage(&caller, invitation));
+    let invitations = inviting::invitations(&app, &caller).await?;
     let page = page.cut(invitations, |invitation| invitation.id)?;
     Ok(page.map(|invitation| InvitationView::of(invitation, now)))
 }
@@ -149,16 +69,8 @@ pub(crate) async fn revoke_invitation(
     State(app): State<App>,
     PathParam(id): PathParam<InvitationId>,
 ) -> Result<Json<InvitationView>, Problem> {
-    let invitations = app.store.invitations().await?;
-    let is_theirs = invitations
-        .iter()
-        .any(|invitation| invitation.id == id && may_manage(&caller, invitation));
-    if !is_theirs {
-        return Err(Problem::not_found("invitation"));
-    }
-    let now = app.config.clock.now();
-    let invitation = app.store.revoke_invitation(caller.actor(), id, now).await?;
-    Ok(Json(InvitationView::of(invitation, now)))
+    let revoked = inviting::revoke_invitation(&app, &caller, id);
+    revoked.await.map(Json)
 }
 
 /// Follows an invitation, once: the caller becomes a person with a role and gets a token, which is shown this once.

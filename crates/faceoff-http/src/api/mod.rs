@@ -4,7 +4,6 @@
 mod ablations;
 mod announcements;
 mod board;
-mod bundle_stream;
 mod capacity;
 mod clip_answer;
 mod clips;

@@ -1,7 +1,8 @@
 //! Trials and re-evaluations: made, looked at, applied or dropped by the organiser, and seen by nobody else.
 
-use super::{recorded::Recorded, rulings::checked_reason};
+use super::recorded::Recorded;
 use crate::{
+    acts::deciding::checked_reason,
     app::App,
     auth::Organiser,
     extract::{Json as Body, OptionalJson, PathParam},

@@ -1,8 +1,7 @@
 //! Teams that want to take part.
 
-use super::rulings::checked_reason;
 use crate::{
-    acts::{joining::good_until, registering::registered},
+    acts::registering,
     app::App,
     auth::Organiser,
     extract::{Json as Body, PathParam},
@@ -27,7 +26,7 @@ pub(crate) async fn register(
     State(app): State<App>,
     Body(body): Body<Register>,
 ) -> Result<(StatusCode, Json<NewRegistrationView>), Problem> {
-    let view = registered(&app, body).await?;
+    let view = registering::registered(&app, body).await?;
     Ok((StatusCode::CREATED, Json(view)))
 }
 
@@ -62,13 +61,8 @@ pub(crate) async fn approve_registration(
     State(app): State<App>,
     PathParam(id): PathParam<RegistrationId>,
 ) -> Result<Json<RegistrationView>, Problem> {
-    let now = app.config.clock.now();
-    let (registration, team) = app
-        .store
-        .approve_registration(organiser.actor(), id, good_until(now), now)
-        .await?;
-    tracing::info!(registration = %id, team = %team.name, "registration approved");
-    Ok(Json(registration.into()))
+    let approved = registering::approve_registration(&app, organiser.actor(), id);
+    approved.await.map(Json)
 }
 
 /// Refuses a registration.
@@ -86,12 +80,6 @@ pub(crate) async fn refuse_registration(
     PathParam(id): PathParam<RegistrationId>,
     Body(Reason { reason }): Body<Reason>,
 ) -> Result<Json<RegistrationView>, Problem> {
-    let reason = checked_reason(&reason)?;
-    let now = app.config.clock.now();
-    let registration = app
-        .store
-        .refuse_registration(organiser.actor(), id, reason, now)
-        .await?;
-    tracing::info!(registration = %id, reason, "registration refused");
-    Ok(Json(registration.into()))
+    let refused = registering::refuse_registration(&app, organiser.actor(), id, &reason);
+    refused.await.map(Json)
 }

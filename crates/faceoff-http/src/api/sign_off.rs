@@ -1,15 +1,15 @@
 //! What follows a stage's close: its final day, where it has one, and the signing off of its result.
 
 use crate::{
+    acts::settling,
     app::App,
     auth::Organiser,
     extract::{OptionalJson, PathParam},
-    problem::{Problem, ProblemKind},
+    problem::Problem,
     requests::Confirmation,
     views::{day::DayView, stage::StageView},
 };
 use axum::{Json, extract::State};
-use faceoff_store::StoreError;
 use faceoff_types::StageId;
 
 /// Starts a stage's final day, once, after its close: what each team has active now plays it, on episodes of its own.
@@ -28,25 +28,8 @@ pub(crate) async fn start_final_day(
     State(app): State<App>,
     PathParam(id): PathParam<StageId>,
 ) -> Result<Json<DayView>, Problem> {
-    let now = app.config.clock.now();
-    let stage = app.store.stage(id).await?;
-    let started = app.store.start_final_day(organiser.actor(), id, now).await;
-    let created = started.map_err(|error| match error {
-        StoreError::DayHasCut { day, cut_at } => Problem::new(
-            ProblemKind::DayHasCut,
-            format!(
-                "{day} had its cut at {}, and a date has one; nothing was started. The final day needs a date of its \
-                 own: start it when the next one has begun in {}",
-                cut_at.strftime("%Y-%m-%d %H:%M:%S UTC"),
-                stage.zone
-            ),
-        )
-        .with("day", day.to_string())
-        .with("cut_at", cut_at.to_string()),
-        error => error.into(),
-    })?;
-    tracing::info!(stage = %stage.name, evaluations = created.len(), "the final day was started");
-    DayView::of(&app, stage.day(now)).await.map(Json)
+    let started = settling::start_final_day(&app, organiser.actor(), id);
+    started.await.map(Json)
 }
 
 /// Signs a closed stage's result off: it was provisional, and nothing of the stage changes any more.
@@ -67,16 +50,6 @@ pub(crate) async fn finalise_stage(
     PathParam(id): PathParam<StageId>,
     OptionalJson(Confirmation { confirm }): OptionalJson<Confirmation>,
 ) -> Result<Json<StageView>, Problem> {
-    let now = app.config.clock.now();
-    let stage = app.store.check_stage_settled(id, now).await?;
-    let name = stage.name.as_str();
-    let what = format!(
-        "the result of the stage {name:?} would be signed off for good. None of its evaluations could be voided or \
-         played again, none of its settings changed, and who is disqualified or reinstated later would not change its \
-         boards"
-    );
-    Problem::check_confirmed(confirm.as_deref(), name, &what)?;
-    let done = app.store.finalise_stage(organiser.actor(), id, now).await?;
-    tracing::info!(stage = %done.name, %id, "stage signed off");
-    StageView::of(&app, done).await.map(Json)
+    let signed = settling::finalise_stage(&app, organiser.actor(), id, confirm.as_deref());
+    signed.await.map(Json)
 }

@@ -3,9 +3,9 @@
 use super::{
     document::{Binary, FileHeaders},
     downloads::{Download, download},
-    rulings::checked_reason,
 };
 use crate::{
+    acts::deciding::checked_reason,
     app::App,
     archived,
     auth::Caller,

@@ -1,6 +1,7 @@
 //! Submissions: following an agent's smoke run, choosing what plays.
 
 use crate::{
+    acts::entering_days,
     app::App,
     auth::{Caller, TeamCaller},
     extract::{Json as Body, PathParam},
@@ -10,14 +11,7 @@ use crate::{
     views::submission::SubmissionView,
 };
 use axum::{Json, extract::State};
-use faceoff_store::SubmissionWords;
 use faceoff_types::SubmissionId;
-
-/// Longest name that a team has for a submission.
-const MAX_LABEL_CHARS: usize = 80;
-
-/// Longest note of a team on a submission.
-const MAX_NOTE_CHARS: usize = 2000;
 
 /// The calling team's submissions, newest first.
 #[utoipa::path(
@@ -73,13 +67,8 @@ pub(crate) async fn activate_submission(
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,
 ) -> Result<Json<SubmissionView>, Problem> {
-    let (actor, name) = (caller.actor(), &caller.team.name);
-    let found = app.store.submission(id).await;
-    caller.visible("submission", found, |submission| submission.team)?;
-    let now = app.config.clock.now();
-    let submission = app.store.activate_submission(actor, id, now).await?;
-    tracing::info!(team = %name, submission = %id, "submission activated");
-    SubmissionView::of(&app, submission).await.map(Json)
+    let active = entering_days::activate_submission(&app, &caller, id);
+    active.await.map(Json)
 }
 
 /// Takes a submission back: it enters no further day, unless it is chosen again.
@@ -99,13 +88,8 @@ pub(crate) async fn withdraw_submission(
     State(app): State<App>,
     PathParam(id): PathParam<SubmissionId>,
 ) -> Result<Json<SubmissionView>, Problem> {
-    let (actor, name) = (caller.actor(), &caller.team.name);
-    let found = app.store.submission(id).await;
-    caller.visible("submission", found, |submission| submission.team)?;
-    let now = app.config.clock.now();
-    let submission = app.store.withdraw_submission(actor, id, now).await?;
-    tracing::info!(team = %name, submission = %id, "submission withdrawn");
-    SubmissionView::of(&app, submission).await.map(Json)
+    let withdrawn = entering_days::withdraw_submission(&app, &caller, id);
+    withdrawn.await.map(Json)
 }
 
 /// Changes what a team says of a submission: a name for it, and a note. Only the team and the organiser read them.
@@ -120,35 +104,8 @@ pub(crate) async fn describe_submission(
     PathParam(id): PathParam<SubmissionId>,
     Body(change): Body<SubmissionChange>,
 ) -> Result<Json<SubmissionView>, Problem> {
-    let found = app.store.submission(id).await;
-    caller.visible("submission", found, |submission| submission.team)?;
-    let words = SubmissionWords {
-        label: said("label", &change.label, MAX_LABEL_CHARS)?,
-        note: said("note", &change.note, MAX_NOTE_CHARS)?,
-    };
-    if words.label.is_none() && words.note.is_none() {
-        let detail = "expected label, note, or both; there is nothing to change";
-        return Err(Problem::new(ProblemKind::InvalidContent, detail));
-    }
-    let (actor, now) = (caller.actor(), app.config.clock.now());
-    let submission = app.store.describe_submission(actor, id, words, now).await?;
-    SubmissionView::of(&app, submission).await.map(Json)
-}
-
-/// Words without the space around them, if they are given and not too many.
-#[expect(clippy::option_option, reason = "null and left out are told apart")]
-fn said<'w>(
-    field: &str,
-    words: &'w Option<Option<String>>,
-    most_chars: usize,
-) -> Result<Option<Option<&'w str>>, Problem> {
-    let words = words.as_ref().map(|words| words.as_deref().map(str::trim));
-    let chars = words.flatten().map_or(1, |words| words.chars().count());
-    if !(1..=most_chars).contains(&chars) {
-        let detail = format!("expected 1 to {most_chars} characters, or null, got {chars}");
-        return Err(Problem::invalid(field, detail));
-    }
-    Ok(words)
+    let described = entering_days::describe_submission(&app, &caller, id, &change);
+    described.await.map(Json)
 }
 
 /// Gone: nobody starts the evaluation of a single submission.

@@ -1,11 +1,11 @@
 //! The season's tournaments: opened, changed, held, closed by the organiser, seen by everybody.
 
-use super::{
-    rulings::checked_reason,
-    stages::{check_offered, check_robot},
-};
 use crate::{
-    acts::entering,
+    acts::{
+        deciding::checked_reason,
+        entering,
+        staging::{check_offered, check_robot},
+    },
     app::App,
     auth::Organiser,
     extract::{Json as Body, PathParam, objects_only},

@@ -6,10 +6,7 @@ use crate::{
     problem::{Problem, ProblemKind},
     room,
 };
-use axum::{
-    body::{Body, BodyDataStream},
-    http::HeaderValue,
-};
+use axum::body::{Body, BodyDataStream};
 use faceoff_types::ArchiveFormat;
 use futures::StreamExt;
 use std::path::Path;
@@ -51,13 +48,12 @@ struct Incoming {
 /// when the body is empty or breaks off; `StorageFull` when the disk is, `Internal` when it fails.
 pub(crate) async fn receive(
     body: Body,
-    announced: Option<&HeaderValue>,
+    announced: Option<u64>,
     dir: &Path,
     allowance: &Allowance,
     rate: LeastRate,
 ) -> Result<Uploaded, Problem> {
     let max_bytes = allowance.max_bytes;
-    let announced: Option<u64> = announced.and_then(|value| value.to_str().ok()?.parse().ok());
     let mut incoming = Incoming::new(body, rate);
     if let Some(bytes) = announced.filter(|bytes| *bytes > max_bytes) {
         incoming.drain(bytes).await;
