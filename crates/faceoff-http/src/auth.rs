@@ -91,6 +91,21 @@ impl Caller {
 pub(crate) struct Organiser(Caller);
 
 impl Organiser {
+    /// # Errors
+    /// `Forbidden`.
+    pub(crate) fn of(caller: Caller) -> Result<Self, Problem> {
+        if caller.is_organiser() {
+            return Ok(Self(caller));
+        }
+        Err(Problem::new(
+            ProblemKind::Forbidden,
+            format!(
+                "this request needs the organiser's token; yours is {}",
+                caller.named()
+            ),
+        ))
+    }
+
     /// As the log has them.
     pub(crate) const fn actor(&self) -> Actor {
         self.0.actor()
@@ -105,6 +120,25 @@ pub(crate) struct TeamCaller {
 }
 
 impl TeamCaller {
+    /// # Errors
+    /// `Forbidden`.
+    pub(crate) fn of(caller: Caller) -> Result<Self, Problem> {
+        match caller.team() {
+            Some(team) => Ok(Self {
+                team: team.clone(),
+                caller,
+            }),
+            None => Err(Problem::new(
+                ProblemKind::Forbidden,
+                format!(
+                    "this request needs a team's token; yours is {}. Use the token that POST /api/v1/teams \
+                     returned, or a member's",
+                    caller.named()
+                ),
+            )),
+        }
+    }
+
     /// As the log has them.
     pub(crate) const fn actor(&self) -> Actor {
         self.caller.actor()
@@ -247,17 +281,7 @@ impl FromRequestParts<App> for Organiser {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
-        let caller = Caller::from_request_parts(parts, app).await?;
-        if caller.is_organiser() {
-            return Ok(Self(caller));
-        }
-        Err(Problem::new(
-            ProblemKind::Forbidden,
-            format!(
-                "this request needs the organiser's token; yours is {}",
-                caller.named()
-            ),
-        ))
+        Self::of(Caller::from_request_parts(parts, app).await?)
     }
 }
 
@@ -265,20 +289,6 @@ impl FromRequestParts<App> for TeamCaller {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
-        let caller = Caller::from_request_parts(parts, app).await?;
-        match caller.team() {
-            Some(team) => Ok(Self {
-                team: team.clone(),
-                caller,
-            }),
-            None => Err(Problem::new(
-                ProblemKind::Forbidden,
-                format!(
-                    "this request needs a team's token; yours is {}. Use the token that POST /api/v1/teams \
-                     returned, or a member's",
-                    caller.named()
-                ),
-            )),
-        }
+        Self::of(Caller::from_request_parts(parts, app).await?)
     }
 }

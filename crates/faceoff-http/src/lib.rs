@@ -21,6 +21,7 @@ mod ending;
 mod episode_path;
 mod event_reader;
 mod extract;
+mod form_file;
 mod in_flight;
 mod kept;
 mod kept_answers;

@@ -19,7 +19,7 @@ pub(crate) async fn at_stake_of_evaluation(
     let sight = Sight::of_organiser(app).await?;
     let view = EvaluationView::find(app, &sight, id).await?;
     let what = format!(
-        "the evaluation of {} by {} would leave the boards for good, {}; `rerun` can play it again",
+        "the evaluation of {} by {} would leave the boards for good, {}; it can be played again (rerun)",
         view.day,
         view.team_name,
         published(reason)

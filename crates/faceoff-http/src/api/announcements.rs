@@ -1,21 +1,17 @@
 //! What is told to everybody, and what teams ask.
 
 use crate::{
+    acts::telling,
     app::App,
     auth::{Anybody, Organiser, TeamCaller},
     extract::{Json as Body, PathParam},
     paging::{Page, PageQuery, Paged},
     problem::Problem,
     requests::{NewAnnouncement, NewAnswer, NewQuestion},
-    text,
     views::announcement::{AnnouncementView, QuestionView},
 };
 use axum::{Json, extract::State, http::StatusCode};
 use faceoff_types::{AnnouncementId, QuestionId};
-
-const TITLE_CHARS: usize = 120;
-const TEXT_CHARS: usize = 5000;
-const QUESTION_CHARS: usize = 2000;
 
 /// What the organisers have told everybody, the newest first.
 #[utoipa::path(
@@ -42,15 +38,8 @@ pub(crate) async fn announce(
     State(app): State<App>,
     Body(new): Body<NewAnnouncement>,
 ) -> Result<(StatusCode, Json<AnnouncementView>), Problem> {
-    let title = text::line("title", &new.title, TITLE_CHARS)?;
-    let body = text::lines("text", &new.text, TEXT_CHARS)?;
-    let now = app.config.clock.now();
-    let announced = app
-        .store
-        .announce(organiser.actor(), &title, &body, now)
-        .await?;
-    tracing::info!(announcement = %announced.id, "announced");
-    Ok((StatusCode::CREATED, Json(announced.into())))
+    let view = telling::announce(&app, organiser.actor(), &new).await?;
+    Ok((StatusCode::CREATED, Json(view)))
 }
 
 /// Questions, the newest first: for everybody those with a public answer, for a team also its own, for organisers all.
@@ -64,19 +53,7 @@ pub(crate) async fn list_questions(
     page: Page<QuestionId>,
     State(app): State<App>,
 ) -> Result<Paged<QuestionView>, Problem> {
-    let questions = app.store.questions().await?.into_iter();
-    let shown = questions.filter_map(|question| {
-        let is_theirs = caller
-            .0
-            .as_ref()
-            .zip(question.team)
-            .is_some_and(|(caller, team)| caller.may_see(team));
-        let is_public = question
-            .answer
-            .as_ref()
-            .is_some_and(|answer| answer.is_public);
-        (is_theirs || is_public).then(|| QuestionView::of(question, is_theirs))
-    });
+    let shown = telling::questions(&app, caller.0.as_ref()).await?;
     page.cut(shown, |question| question.id)
 }
 
@@ -94,14 +71,8 @@ pub(crate) async fn ask(
     State(app): State<App>,
     Body(new): Body<NewQuestion>,
 ) -> Result<(StatusCode, Json<QuestionView>), Problem> {
-    let text = text::lines("text", &new.text, QUESTION_CHARS)?;
-    let now = app.config.clock.now();
-    let question = app
-        .store
-        .ask(caller.actor(), caller.team.id, &text, now)
-        .await?;
-    tracing::info!(question = %question.id, team = %caller.team.name, "asked");
-    Ok((StatusCode::CREATED, Json(QuestionView::of(question, true))))
+    let view = telling::ask(&app, &caller, &new).await?;
+    Ok((StatusCode::CREATED, Json(view)))
 }
 
 /// Answers a question, or answers it anew.
@@ -116,12 +87,6 @@ pub(crate) async fn answer(
     PathParam(id): PathParam<QuestionId>,
     Body(new): Body<NewAnswer>,
 ) -> Result<Json<QuestionView>, Problem> {
-    let text = text::lines("text", &new.text, TEXT_CHARS)?;
-    let now = app.config.clock.now();
-    let question = app
-        .store
-        .answer(organiser.actor(), id, &text, new.public, now)
-        .await?;
-    tracing::info!(question = %id, public = new.public, "answered");
-    Ok(Json(QuestionView::of(question, true)))
+    let answered = telling::answer(&app, organiser.actor(), id, &new);
+    answered.await.map(Json)
 }

@@ -1,6 +1,7 @@
 //! People: who they are, their passwords, and how they leave.
 
 use crate::{
+    acts::people,
     app::App,
     auth::Caller,
     extract::{Json as Body, PathParam},
@@ -10,7 +11,6 @@ use crate::{
     views::person::PersonView,
 };
 use axum::{Json, extract::State};
-use faceoff_store::{Person, StoreError, Who};
 use faceoff_types::PersonId;
 
 /// The people whom the caller may see: an organiser everybody, a team its members.
@@ -24,32 +24,9 @@ pub(crate) async fn list_people(
     page: Page<PersonId>,
     State(app): State<App>,
 ) -> Result<Paged<PersonView>, Problem> {
-    let people = match caller.team() {
-        Some(team) => app.store.members_of(team.id).await?,
-        None => app.store.people().await?,
-    };
+    let people = people::people(&app, &caller).await?;
     let page = page.cut(people, |person| person.id)?;
     Ok(page.map(PersonView::from))
-}
-
-/// The person, if the caller is an organiser or that person; a teammate is seen, and not acted for.
-async fn find(app: &App, caller: &Caller, id: PersonId) -> Result<Person, Problem> {
-    let person = match app.store.person(id).await {
-        Ok(person) => person,
-        Err(StoreError::NotFound(_)) => return Err(Problem::not_found("person")),
-        Err(error) => return Err(error.into()),
-    };
-    let is_self = caller.person().is_some_and(|own| own.id == id);
-    if caller.is_organiser() || is_self {
-        return Ok(person);
-    }
-    match (&caller.who, person.team) {
-        (Who::Member(_, own) | Who::Team(own), Some(team)) if own.id == team => Err(Problem::new(
-            ProblemKind::Forbidden,
-            "only that person may do this, or an organiser",
-        )),
-        _ => Err(Problem::not_found("person")),
-    }
 }
 
 /// Lets a person do nothing any more, at once: their tokens and sessions are revoked. By an organiser, or by
@@ -69,17 +46,8 @@ pub(crate) async fn remove_person(
     PathParam(id): PathParam<PersonId>,
     Body(Confirmation { confirm }): Body<Confirmation>,
 ) -> Result<Json<PersonView>, Problem> {
-    let person = find(&app, &caller, id).await?;
-    let what = format!(
-        "{} could do nothing any more, at once and for good: all tokens and sessions would be revoked; the name stays \
-         with what was done",
-        person.name
-    );
-    Problem::check_confirmed(confirm.as_deref(), person.name.as_str(), &what)?;
-    let now = app.config.clock.now();
-    let person = app.store.remove_person(caller.actor(), id, now).await?;
-    tracing::info!(person = %id, actor = %caller.actor(), "person removed");
-    Ok(Json(person.into()))
+    let removed = people::remove_person(&app, &caller, id, confirm.as_deref()).await?;
+    Ok(Json(removed.into()))
 }
 
 /// Sets the caller's password. All their other tokens and sessions are revoked.
@@ -98,7 +66,7 @@ pub(crate) async fn set_password(
     PathParam(id): PathParam<PersonId>,
     Body(new): Body<NewPassword>,
 ) -> Result<Json<PersonView>, Problem> {
-    let person = find(&app, &caller, id).await?;
+    let person = people::find(&app, &caller, id).await?;
     if caller.person().is_none_or(|own| own.id != id) {
         return Err(Problem::new(
             ProblemKind::Forbidden,

@@ -1,6 +1,7 @@
 //! The season: its name, rules, the commitment to its secret, and its end.
 
 use crate::{
+    acts::teams,
     app::App,
     auth::Organiser,
     extract::Json as Body,
@@ -37,15 +38,7 @@ pub(crate) async fn change_season(
     State(app): State<App>,
     Body(change): Body<SeasonChange>,
 ) -> Result<Json<SeasonView>, Problem> {
-    let now = app.config.clock.now();
-    app.store
-        .change_season(
-            organiser.actor(),
-            change.takes_registrations,
-            change.divisions.as_deref(),
-            now,
-        )
-        .await?;
+    teams::change_season(&app, organiser.actor(), &change).await?;
     SeasonView::now(&app, Viewer::Organiser).await.map(Json)
 }
 

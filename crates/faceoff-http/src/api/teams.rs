@@ -1,18 +1,17 @@
 //! Teams: invited, described, renamed, retired.
 
 use crate::{
-    acts::joining::profile,
+    acts::teams,
     app::App,
     auth::{Caller, Organiser},
     extract::{Json as Body, PathParam},
     paging::{Page, PageQuery, Paged},
-    problem::{Problem, ProblemKind},
+    problem::Problem,
     requests::{self, Confirmation, NewTeam},
     token::{Secret, SecretKind},
     views::team::{TeamView, TeamWithToken},
 };
 use axum::{Json, extract::State, http::StatusCode};
-use faceoff_store::{Team, TeamChange, TeamProfile};
 use faceoff_types::{TeamId, TeamName};
 
 /// Creates a team and returns its token, once.
@@ -85,20 +84,6 @@ pub(crate) async fn replace_token(
     }))
 }
 
-/// The caller's own team, or any for an organiser.
-async fn own(app: &App, caller: &Caller, id: TeamId) -> Result<Team, Problem> {
-    let team = app.store.team(id).await;
-    let team = caller.visible("team", team, |team| team.id)?;
-    // Whoever finds a team's token must not rename it, or take it out of the season.
-    if caller.person().is_none() && !caller.is_organiser() {
-        return Err(Problem::new(
-            ProblemKind::Forbidden,
-            "a team's own token changes nothing of the team; a member does, or an organiser",
-        ));
-    }
-    Ok(team)
-}
-
 /// Changes a team's name, or what it tells of itself. By an organiser or a member; the division, and whether it is a baseline, by an organiser alone.
 #[utoipa::path(
     patch, path = "/teams/{id}", tag = "people", security(("team" = []), ("organiser" = [])),
@@ -116,44 +101,8 @@ pub(crate) async fn change_team(
     PathParam(id): PathParam<TeamId>,
     Body(change): Body<requests::TeamChange>,
 ) -> Result<Json<TeamView>, Problem> {
-    let team = own(&app, &caller, id).await?;
-    if change.division.is_some() && !caller.is_organiser() {
-        return Err(Problem::new(
-            ProblemKind::Forbidden,
-            "division: only an organiser puts a team into another division",
-        ));
-    }
-    if change.baseline.is_some() && !caller.is_organiser() {
-        return Err(Problem::new(
-            ProblemKind::Forbidden,
-            "baseline: only an organiser says which team is a baseline",
-        ));
-    }
-    let described = requests::FoundedTeam {
-        name: change.name.clone().unwrap_or_else(|| team.name.clone()),
-        affiliation: change.affiliation.unwrap_or(team.profile.affiliation),
-        link: change.link.unwrap_or(team.profile.link),
-        division: change.division.unwrap_or(team.profile.division),
-    };
-    let declines = change.declines_friendly_games;
-    let (_, profile): (_, TeamProfile) = profile(described)?;
-    let change = TeamChange {
-        name: change.name,
-        profile: Some(profile),
-        baseline: change.baseline,
-    };
-    let now = app.config.clock.now();
-    let team = app
-        .store
-        .change_team(caller.actor(), id, change, now)
-        .await?;
-    if let Some(declines) = declines {
-        app.store
-            .set_declines_friendly_games(caller.actor(), id, declines, now)
-            .await?;
-    }
-    tracing::info!(team = %team.name, %id, actor = %caller.actor(), "team changed");
-    TeamView::find(&app, id).await.map(Json)
+    let changed = teams::change_team(&app, &caller, id, change);
+    changed.await.map(Json)
 }
 
 /// Takes a team out of all days to come, by its own wish: it neither uploads nor plays; its results stay.
@@ -172,7 +121,7 @@ pub(crate) async fn retire_team(
     PathParam(id): PathParam<TeamId>,
     Body(Confirmation { confirm }): Body<Confirmation>,
 ) -> Result<Json<TeamView>, Problem> {
-    let team = own(&app, &caller, id).await?;
+    let team = teams::own(&app, &caller, id).await?;
     let what = format!(
         "{} would neither upload nor enter a day from now on; what had its cut goes on, and its results stay",
         team.name
@@ -199,7 +148,7 @@ pub(crate) async fn return_team(
     State(app): State<App>,
     PathParam(id): PathParam<TeamId>,
 ) -> Result<Json<TeamView>, Problem> {
-    own(&app, &caller, id).await?;
+    teams::own(&app, &caller, id).await?;
     let now = app.config.clock.now();
     let team = app.store.return_team(caller.actor(), id, now).await?;
     tracing::info!(team = %team.name, %id, actor = %caller.actor(), "team returned");

@@ -1,17 +1,15 @@
 //! The terms of taking part.
 
 use crate::{
+    acts::{people, telling},
     app::App,
     auth::{Caller, Organiser},
     extract::{Json as Body, PathParam},
-    problem::{Problem, ProblemKind},
+    problem::Problem,
     requests::NewTerms,
-    text,
     views::{announcement::TermsView, person::PersonView},
 };
 use axum::{Json, extract::State, http::StatusCode};
-
-const TEXT_CHARS: usize = 20_000;
 
 /// All versions of the terms, the newest first; none if taking part needs no consent.
 #[utoipa::path(get, path = "/terms", tag = "public", responses((status = 200, body = Vec<TermsView>)))]
@@ -30,14 +28,8 @@ pub(crate) async fn publish_terms(
     State(app): State<App>,
     Body(new): Body<NewTerms>,
 ) -> Result<(StatusCode, Json<TermsView>), Problem> {
-    let text = text::lines("text", &new.text, TEXT_CHARS)?;
-    let now = app.config.clock.now();
-    let terms = app
-        .store
-        .publish_terms(organiser.actor(), &text, now)
-        .await?;
-    tracing::info!(version = terms.version, "terms published");
-    Ok((StatusCode::CREATED, Json(terms.into())))
+    let terms = telling::publish_terms(&app, organiser.actor(), &new).await?;
+    Ok((StatusCode::CREATED, Json(terms)))
 }
 
 /// The calling person accepts the terms.
@@ -55,16 +47,6 @@ pub(crate) async fn accept_terms(
     State(app): State<App>,
     PathParam(version): PathParam<u32>,
 ) -> Result<Json<PersonView>, Problem> {
-    let Some(person) = caller.person() else {
-        return Err(Problem::new(
-            ProblemKind::Forbidden,
-            "people accept terms; this token is no person's. A member of the team does so with their own token",
-        ));
-    };
-    let now = app.config.clock.now();
-    let person = app
-        .store
-        .accept_terms(caller.actor(), person.id, version, now)
-        .await?;
+    let person = people::accept_terms(&app, &caller, version).await?;
     Ok(Json(person.into()))
 }

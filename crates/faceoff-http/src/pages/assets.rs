@@ -15,6 +15,9 @@ pub(super) const REPLAY_SCRIPT_PATH: &str = "/static/replay.js";
 /// The board, as previews of links show it: one of the documentation's pictures.
 pub(super) const PREVIEW_PATH: &str = "/docs/images/board.png";
 
+pub(super) const DESK_STYLE_PATH: &str = "/static/desk.css";
+pub(super) const DESK_SCRIPT_PATH: &str = "/static/desk.js";
+
 const STYLE: &str = include_str!("../../../../web/static/faceoff.css");
 const EPISODES_STYLE: &str = include_str!("../../../../web/static/episodes.css");
 const REPLAY_STYLE: &str = include_str!("../../../../web/static/replay.css");
@@ -22,6 +25,35 @@ const REPLAY_STYLE: &str = include_str!("../../../../web/static/replay.css");
 const REPLAY_SCRIPT: &str = include_str!("../../../../web/client/dist/replay.js");
 const SCRIPT: &str = include_str!("../../../../web/static/live.js");
 const ICON: &str = include_str!("../../../../web/static/faceoff.svg");
+
+const DESK_STYLE: &str = include_str!("../../../../web/static/desk.css");
+const DESK_SCRIPT: &str = include_str!("../../../../web/static/desk.js");
+
+/// A path with a part that changes with what is there.
+fn hashed(path: &str, content: &str) -> String {
+    let hash = blake3::hash(content.as_bytes()).to_hex();
+    format!("{path}?{}", &hash[..12])
+}
+
+/// The styles that only the desks have.
+pub(super) fn desk_style_url() -> &'static str {
+    static URL: LazyLock<String> = LazyLock::new(|| hashed(DESK_STYLE_PATH, DESK_STYLE));
+    &URL
+}
+
+/// The one script: the desks'.
+pub(super) fn desk_script_url() -> &'static str {
+    static URL: LazyLock<String> = LazyLock::new(|| hashed(DESK_SCRIPT_PATH, DESK_SCRIPT));
+    &URL
+}
+
+pub(super) async fn desk_style() -> impl IntoResponse {
+    asset("text/css; charset=utf-8", DESK_STYLE)
+}
+
+pub(super) async fn desk_script() -> impl IntoResponse {
+    asset("text/javascript; charset=utf-8", DESK_SCRIPT)
+}
 
 /// Where the pages load the styles from. The hash changes with the content, so that a browser may
 /// keep them for good and still never shows a new page with old styles.

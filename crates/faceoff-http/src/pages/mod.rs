@@ -10,6 +10,8 @@ mod baselines;
 mod board;
 mod chart;
 mod comparison;
+mod desk;
+mod desk_frame;
 mod docs;
 mod episode_words;
 mod episodes;
@@ -20,13 +22,14 @@ mod frame;
 mod game;
 mod help;
 mod join;
-mod log;
+mod organiser;
 mod problems;
 mod register;
 mod replay;
 mod robots;
 mod season;
 mod sign_in;
+mod signed_in;
 mod standing;
 mod table_drawing;
 mod team;
@@ -72,7 +75,8 @@ pub(crate) fn router(patience: Duration, api: Arc<Value>) -> Router<App> {
         .route("/account", get(account::page))
         .route("/join/{code}", get(join::page).post(join::submit))
         .route("/register", get(register::page).post(register::submit))
-        .route("/log", get(log::page))
+        .merge(desk::router())
+        .merge(organiser::router())
         .route(feed::FEED_PATH, get(feed::feed))
         .route("/robots.txt", get(robots::robots))
         .merge(docs::router(api))
@@ -82,6 +86,10 @@ pub(crate) fn router(patience: Duration, api: Arc<Value>) -> Router<App> {
         .route(assets::EPISODES_STYLE_PATH, get(assets::episodes_style))
         .route(assets::REPLAY_STYLE_PATH, get(assets::replay_style))
         .route(assets::REPLAY_SCRIPT_PATH, get(assets::replay_script))
+        .route(assets::DESK_STYLE_PATH, get(assets::desk_style))
+        .route(assets::DESK_SCRIPT_PATH, get(assets::desk_script))
         .layer(middleware::from_fn_with_state(patience, layers::time_out))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES))
+        // It may take long as long as it moves, and is watched by what receives it.
+        .merge(desk::uploads())
 }

@@ -9,7 +9,8 @@ Disallow: /api/
 Disallow: /account
 Disallow: /docs/search
 Disallow: /join
-Disallow: /log
+Disallow: /desk
+Disallow: /organiser
 Disallow: /sign-in
 Allow: /
 ";

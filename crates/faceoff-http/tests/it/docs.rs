@@ -299,7 +299,14 @@ async fn robots_read_pages_and_documentation_alone() {
         .lines()
         .filter_map(|line| line.strip_prefix("Disallow: "))
         .collect();
-    for path in ["/api/", "/account", "/sign-in", "/join", "/log"] {
+    for path in [
+        "/api/",
+        "/account",
+        "/sign-in",
+        "/join",
+        "/organiser",
+        "/desk",
+    ] {
         assert!(refused.contains(path), "{path}: {}", answer.body);
     }
     for path in [

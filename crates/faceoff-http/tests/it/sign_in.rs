@@ -1,76 +1,12 @@
 //! The pages on which people join, register and sign in, as a browser uses them.
 
-use crate::site::{ADMIN, Answer, Site, http, text};
-use reqwest::{Method, redirect::Policy};
+use crate::{
+    browser::{Browser, PASSWORD, first, invited},
+    site::{ADMIN, Site, text},
+};
+use reqwest::Method;
 use scraper::{Html, Selector};
 use serde_json::json;
-
-/// A browser: it follows nothing by itself, keeps one cookie, and says where its forms come from.
-struct Browser<'a> {
-    site: &'a Site,
-    http: reqwest::Client,
-    cookie: Option<String>,
-}
-
-impl<'a> Browser<'a> {
-    fn new(site: &'a Site) -> Self {
-        let http = http().redirect(Policy::none());
-        Self {
-            site,
-            http: http.build().unwrap(),
-            cookie: None,
-        }
-    }
-
-    async fn send(&mut self, request: reqwest::RequestBuilder) -> Answer {
-        let request = match &self.cookie {
-            Some(cookie) => request.header("cookie", cookie),
-            None => request,
-        };
-        let answer = Answer::of(request.send().await.unwrap()).await;
-        if let Some(set) = answer.headers.get("set-cookie") {
-            let pair = set.to_str().unwrap().split(';').next().unwrap();
-            self.cookie = (!pair.ends_with('=')).then(|| pair.to_owned());
-        }
-        answer
-    }
-
-    async fn open(&mut self, path: &str) -> Answer {
-        let request = self.http.get(format!("{}{path}", self.site.url));
-        self.send(request.header("accept", "text/html")).await
-    }
-
-    async fn submit(&mut self, path: &str, fields: &[(&str, &str)]) -> Answer {
-        let body: Vec<String> = fields
-            .iter()
-            .map(|(name, value)| format!("{name}={}", value.replace(' ', "+")))
-            .collect();
-        let request = self
-            .http
-            .post(format!("{}{path}", self.site.url))
-            .header("accept", "text/html")
-            .header("origin", &self.site.url)
-            .header("content-type", "application/x-www-form-urlencoded")
-            .body(body.join("&"));
-        self.send(request).await
-    }
-}
-
-/// The text of the first element that the selector finds.
-fn first(answer: &Answer, selector: &str) -> String {
-    let page = Html::parse_document(&answer.body);
-    let found = page.select(&Selector::parse(selector).unwrap()).next();
-    let found = found.unwrap_or_else(|| panic!("no {selector} in {}", answer.body));
-    found.text().collect::<String>().trim().to_owned()
-}
-
-/// The path of a new invitation's page.
-async fn invited(site: &Site, body: serde_json::Value) -> String {
-    let invited = site.post("/api/v1/invitations", Some(ADMIN), &body).await;
-    text(&invited.json(201)["link"])
-}
-
-const PASSWORD: &str = "correct horse battery";
 
 #[tokio::test]
 async fn somebody_follows_a_link_signs_out_and_signs_in_again() {
@@ -109,7 +45,10 @@ async fn somebody_follows_a_link_signs_out_and_signs_in_again() {
     let account = browser.open("/account").await;
     assert_eq!(first(&account, "h1"), "Ada");
     assert!(account.body.contains("Alpha"));
-    assert!(!account.body.contains("/log"), "that is for organisers");
+    assert!(
+        !account.body.contains("/organiser"),
+        "that is for organisers"
+    );
     let spent = browser.submit(&link, &fields).await;
     assert_eq!(spent.status, 409);
     assert!(spent.body.contains("was accepted"), "{}", spent.body);
@@ -130,7 +69,7 @@ async fn somebody_follows_a_link_signs_out_and_signs_in_again() {
         .submit("/sign-in", &[("name", "ada"), ("password", PASSWORD)])
         .await;
     assert_eq!(in_again.header("location"), "/account");
-    assert_eq!(browser.open("/log").await.status, 403);
+    assert_eq!(browser.open("/organiser/log").await.status, 403);
 }
 
 #[tokio::test]
@@ -138,28 +77,37 @@ async fn an_organiser_reads_the_log_on_its_page() {
     let site = Site::start().await;
     let link = invited(&site, json!({ "role": "organiser", "note": "Grace" })).await;
     let mut browser = Browser::new(&site);
-    assert_eq!(browser.open("/log").await.header("location"), "/sign-in");
+    assert_eq!(
+        browser.open("/log").await.header("location"),
+        "/organiser/log"
+    );
+    assert_eq!(
+        browser.open("/organiser/log").await.header("location"),
+        "/sign-in?next=%2Forganiser%2Flog"
+    );
     browser
         .submit(&link, &[("name", "Grace"), ("password", PASSWORD)])
         .await;
     for name in ["Alpha", "Beta"] {
         site.team(name).await;
     }
-    let log = browser.open("/log?actor=&subject=&kind=team_created").await;
+    let log = browser
+        .open("/organiser/log?actor=&subject=&kind=team_created")
+        .await;
     assert_eq!(log.status, 200);
     let rows = Html::parse_document(&log.body);
     assert_eq!(
         rows.select(&Selector::parse("tbody tr").unwrap()).count(),
         2
     );
-    let page = browser.open("/log?limit=1").await;
+    let page = browser.open("/organiser/log?limit=1").await;
     let older = Html::parse_document(&page.body);
     let older = older
-        .select(&Selector::parse("a[href^='/log?before=']").unwrap())
+        .select(&Selector::parse("a[href^='/organiser/log?before=']").unwrap())
         .next();
     let older = older.unwrap().attr("href").unwrap().to_owned();
     assert_eq!(browser.open(&older).await.status, 200);
-    let nonsense = browser.open("/log?actor=nobody").await;
+    let nonsense = browser.open("/organiser/log?actor=nobody").await;
     assert_eq!(nonsense.status, 422);
     assert!(
         nonsense.body.contains("expected organiser"),

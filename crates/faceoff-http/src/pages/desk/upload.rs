@@ -1,0 +1,61 @@
+//! `/desk/upload`: an agent from a form, streamed to disk as the API's are.
+
+use super::agents;
+use crate::{
+    acts::uploading::{Incoming, upload},
+    app::App,
+    form_file::FormFile,
+    pages::{
+        desk_frame::{Done, done},
+        frame::PageProblem,
+        signed_in::{Member, Refused},
+    },
+    problem::{Problem, ProblemKind},
+    session,
+};
+use axum::{
+    body::Body,
+    extract::State,
+    http::HeaderMap,
+    response::{IntoResponse, Response},
+};
+use faceoff_store::Submission;
+
+async fn taken(
+    app: &App,
+    member: &Member,
+    headers: &HeaderMap,
+    body: Body,
+) -> Result<Submission, Problem> {
+    let file = FormFile::of(headers, body, app.config.limits.upload_rate).await?;
+    if file.name.is_empty() {
+        return Err(Problem::new(
+            ProblemKind::InvalidRequest,
+            "no file was chosen; choose the agent's archive (.tar.gz, .tar.zst or .zip)",
+        ));
+    }
+    let incoming = Incoming {
+        bytes: file.bytes,
+        claimed_name: file.name,
+        body: file.body,
+    };
+    upload(app, &member.team, incoming).await
+}
+
+/// Takes the agent in and leads to the desk, or says there what was wrong with it.
+pub(super) async fn submit(
+    member: Result<Member, Refused>,
+    State(app): State<App>,
+    headers: HeaderMap,
+    body: Body,
+) -> Result<Response, PageProblem> {
+    let member = match member {
+        Ok(member) => member,
+        Err(refused) => return Ok(refused.into_response()),
+    };
+    session::check_own_page(&headers)?;
+    match taken(&app, &member, &headers, body).await {
+        Ok(_) => Ok(done("/desk", "uploaded")),
+        Err(problem) => agents::page_with(&app, &member, &Done::default(), Some(&problem)).await,
+    }
+}

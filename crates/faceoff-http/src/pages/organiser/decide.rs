@@ -1,0 +1,93 @@
+//! `/organiser/decide/…`: a decision's page says what it would do; its form does it.
+
+use super::order::{Order, Sheet};
+use crate::{
+    app::App,
+    extract::{PageForm, PathParam},
+    pages::{
+        desk_frame::{Done, Head, done, render_desk},
+        frame::{Frame, PageProblem},
+        signed_in::{Organising, Refused},
+    },
+    problem::Problem,
+    requests::Decision,
+    views::season::SeasonHead,
+};
+use askama::Template;
+use axum::{
+    extract::State,
+    response::{IntoResponse, Response},
+};
+use serde::Deserialize;
+
+#[derive(Template)]
+#[template(path = "organiser_decide.html")]
+struct Page {
+    frame: Frame,
+    head: Head,
+    sheet: Sheet,
+    reason: String,
+}
+
+async fn page_with(
+    app: &App,
+    organising: &Organising,
+    order: Order,
+    reason: String,
+    refused: Option<&Problem>,
+) -> Result<Response, PageProblem> {
+    let sheet = order.sheet(app).await?;
+    let season = SeasonHead::now(app).await?.name;
+    let page = Page {
+        frame: Frame::of(app, season, ""),
+        head: Head::of(&organising.caller, "", &Done::default()).refusing(refused),
+        sheet,
+        reason,
+    };
+    render_desk(&page, refused)
+}
+
+/// What it would do.
+pub(super) async fn page(
+    organising: Result<Organising, Refused>,
+    State(app): State<App>,
+    order: Result<PathParam<Order>, Problem>,
+) -> Result<Response, PageProblem> {
+    match organising {
+        Ok(organising) => page_with(&app, &organising, order?.0, String::new(), None).await,
+        Err(refused) => Ok(refused.into_response()),
+    }
+}
+
+#[derive(Deserialize)]
+pub(super) struct Form {
+    #[serde(default)]
+    reason: String,
+    #[serde(default)]
+    confirm: String,
+}
+
+/// Does it, and leads back; or says on the same page why not.
+pub(super) async fn submit(
+    organising: Result<Organising, Refused>,
+    State(app): State<App>,
+    order: Result<PathParam<Order>, Problem>,
+    form: Result<PageForm<Form>, Problem>,
+) -> Result<Response, PageProblem> {
+    let organising = match organising {
+        Ok(organising) => organising,
+        Err(refused) => return Ok(refused.into_response()),
+    };
+    let (PathParam(order), PageForm(form)) = (order?, form?);
+    // Asked before it is done, since it leads back to where it stood.
+    let back = order.sheet(&app).await?.back;
+    let decision = Decision {
+        reason: form.reason.clone(),
+        confirm: Some(form.confirm).filter(|confirm| !confirm.is_empty()),
+    };
+    let actor = organising.organiser.actor();
+    match order.carry_out(&app, actor, decision).await {
+        Ok(key) => Ok(done(&back, key)),
+        Err(problem) => page_with(&app, &organising, order, form.reason, Some(&problem)).await,
+    }
+}

@@ -1,0 +1,179 @@
+//! `/organiser/teams`: who takes part, who wants to, in which division, and who asks for it.
+
+use crate::{
+    acts::teams,
+    app::App,
+    extract::{PageForm, PathParam},
+    pages::{
+        desk_frame::{self, Done, Head, done, render_desk},
+        frame::{Frame, PageProblem},
+        signed_in::{Organising, Refused},
+    },
+    problem::Problem,
+    requests::{SeasonChange, TeamChange},
+    views::{invitation::RegistrationView, season::SeasonHead, team::TeamView},
+};
+use askama::Template;
+use axum::{
+    extract::{Query, State},
+    response::{IntoResponse, Response},
+};
+use faceoff_types::{DivisionName, TeamId};
+use serde::Deserialize;
+
+#[derive(Template)]
+#[template(path = "organiser_teams.html")]
+struct Page {
+    frame: Frame,
+    head: Head,
+    teams: Vec<TeamView>,
+    waiting: Vec<RegistrationView>,
+    decided: Vec<RegistrationView>,
+    divisions: Vec<DivisionName>,
+    season: SeasonForm,
+}
+
+impl Page {
+    fn at(&self, at: &jiff::Timestamp) -> String {
+        desk_frame::at(*at)
+    }
+}
+
+const PATH: &str = "/organiser/teams";
+
+async fn page_with(
+    app: &App,
+    organising: &Organising,
+    said: &Done,
+    filled: Option<SeasonForm>,
+    refused: Option<&Problem>,
+) -> Result<Response, PageProblem> {
+    let registrations = app.store.registrations().await.map_err(Problem::from)?;
+    let registrations = registrations.into_iter().map(RegistrationView::from);
+    let (waiting, decided) = registrations.partition(|one| one.state == "waiting");
+    let divisions = app.store.divisions().await.map_err(Problem::from)?;
+    let season = app.store.season().await.map_err(Problem::from)?;
+    let form = filled.unwrap_or_else(|| SeasonForm {
+        takes_registrations: match season.takes_registrations {
+            true => "on".to_owned(),
+            false => String::new(),
+        },
+        divisions: divisions
+            .iter()
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+            .join("\n"),
+    });
+    let name = SeasonHead::now(app).await?.name;
+    let page = Page {
+        frame: Frame::of(app, name, PATH),
+        head: Head::of(&organising.caller, PATH, said).refusing(refused),
+        teams: TeamView::all(app).await?,
+        waiting,
+        decided,
+        divisions,
+        season: form,
+    };
+    render_desk(&page, refused)
+}
+
+pub(super) async fn page(
+    organising: Result<Organising, Refused>,
+    State(app): State<App>,
+    Query(said): Query<Done>,
+) -> Result<Response, PageProblem> {
+    match organising {
+        Ok(organising) => page_with(&app, &organising, &said, None, None).await,
+        Err(refused) => Ok(refused.into_response()),
+    }
+}
+
+/// What of a team only organisers change.
+#[derive(Deserialize)]
+pub(super) struct TeamForm {
+    #[serde(default)]
+    division: String,
+    /// Ticked, or not sent.
+    #[serde(default)]
+    baseline: String,
+}
+
+fn team_change(form: &TeamForm) -> Result<TeamChange, Problem> {
+    let division = Some(form.division.trim()).filter(|name| !name.is_empty());
+    let division = division.map(str::parse).transpose();
+    Ok(TeamChange {
+        division: Some(division.map_err(|error| Problem::invalid("division", error))?),
+        baseline: Some(!form.baseline.is_empty()),
+        ..TeamChange::default()
+    })
+}
+
+/// Puts a team into a division, or makes it a reference agent.
+pub(super) async fn change(
+    organising: Result<Organising, Refused>,
+    State(app): State<App>,
+    id: Result<PathParam<TeamId>, Problem>,
+    form: Result<PageForm<TeamForm>, Problem>,
+) -> Result<Response, PageProblem> {
+    let organising = match organising {
+        Ok(organising) => organising,
+        Err(refused) => return Ok(refused.into_response()),
+    };
+    let (PathParam(id), PageForm(form)) = (id?, form?);
+    let changed = match team_change(&form) {
+        Ok(change) => teams::change_team(&app, &organising.caller, id, change).await,
+        Err(problem) => Err(problem),
+    };
+    match changed {
+        Ok(_) => Ok(done(PATH, "team-changed")),
+        Err(problem) => {
+            let said = Done::default();
+            page_with(&app, &organising, &said, None, Some(&problem)).await
+        }
+    }
+}
+
+/// Who may come.
+#[derive(Deserialize)]
+pub(super) struct SeasonForm {
+    #[serde(default)]
+    pub(super) takes_registrations: String,
+    /// A name a line.
+    #[serde(default)]
+    pub(super) divisions: String,
+}
+
+fn season_change(form: &SeasonForm) -> Result<SeasonChange, Problem> {
+    let names = form.divisions.lines().map(str::trim);
+    let names = names.filter(|name| !name.is_empty()).map(str::parse);
+    let divisions: Result<Vec<DivisionName>, _> = names.collect();
+    Ok(SeasonChange {
+        takes_registrations: Some(!form.takes_registrations.is_empty()),
+        divisions: Some(divisions.map_err(|error| Problem::invalid("divisions", error))?),
+    })
+}
+
+/// Changes whether teams may register, and the divisions.
+pub(super) async fn change_season(
+    organising: Result<Organising, Refused>,
+    State(app): State<App>,
+    form: Result<PageForm<SeasonForm>, Problem>,
+) -> Result<Response, PageProblem> {
+    let organising = match organising {
+        Ok(organising) => organising,
+        Err(refused) => return Ok(refused.into_response()),
+    };
+    let PageForm(form) = form?;
+    let actor = organising.organiser.actor();
+    let changed = match season_change(&form) {
+        Ok(change) => teams::change_season(&app, actor, &change).await,
+        Err(problem) => Err(problem),
+    };
+    match changed {
+        Ok(()) => Ok(done(PATH, "season-changed")),
+        Err(problem) => {
+            let said = Done::default();
+            page_with(&app, &organising, &said, Some(form), Some(&problem)).await
+        }
+    }
+}

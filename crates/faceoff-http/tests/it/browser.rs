@@ -1,0 +1,193 @@
+//! A browser without scripts: it opens pages, sends forms, and keeps one cookie.
+
+use crate::site::{ADMIN, Answer, Site, http, text};
+use reqwest::redirect::Policy;
+use scraper::{Html, Selector};
+
+/// A browser: it follows nothing by itself, keeps one cookie, and says where its forms come from.
+pub struct Browser<'a> {
+    pub site: &'a Site,
+    pub http: reqwest::Client,
+    pub cookie: Option<String>,
+}
+
+impl<'a> Browser<'a> {
+    pub fn new(site: &'a Site) -> Self {
+        let http = http().redirect(Policy::none());
+        Self {
+            site,
+            http: http.build().unwrap(),
+            cookie: None,
+        }
+    }
+
+    pub async fn send(&mut self, request: reqwest::RequestBuilder) -> Answer {
+        let request = match &self.cookie {
+            Some(cookie) => request.header("cookie", cookie),
+            None => request,
+        };
+        let answer = Answer::of(request.send().await.unwrap()).await;
+        if let Some(set) = answer.headers.get("set-cookie") {
+            let pair = set.to_str().unwrap().split(';').next().unwrap();
+            self.cookie = (!pair.ends_with('=')).then(|| pair.to_owned());
+        }
+        answer
+    }
+
+    pub async fn open(&mut self, path: &str) -> Answer {
+        let request = self.http.get(format!("{}{path}", self.site.url));
+        self.send(request.header("accept", "text/html")).await
+    }
+
+    pub async fn submit(&mut self, path: &str, fields: &[(&str, &str)]) -> Answer {
+        let body: Vec<String> = fields
+            .iter()
+            .map(|(name, value)| format!("{name}={}", encoded(value)))
+            .collect();
+        let request = self
+            .http
+            .post(format!("{}{path}", self.site.url))
+            .header("accept", "text/html")
+            .header("origin", &self.site.url)
+            .header("content-type", "application/x-www-form-urlencoded")
+            .body(body.join("&"));
+        self.send(request).await
+    }
+
+    /// Sends an archive as the upload's form does.
+    pub async fn upload(&mut self, path: &str, name: &str, archive: &[u8]) -> Answer {
+        let head = format!(
+            "--X\r\nContent-Disposition: form-data; name=\"bundle\"; filename=\"{name}\"\r\n\
+             Content-Type: application/octet-stream\r\n\r\n"
+        );
+        let body = [head.as_bytes(), archive, b"\r\n--X--\r\n"].concat();
+        let request = self
+            .http
+            .post(format!("{}{path}", self.site.url))
+            .header("accept", "text/html")
+            .header("origin", &self.site.url)
+            .header("content-type", "multipart/form-data; boundary=X")
+            .body(body);
+        self.send(request).await
+    }
+
+    /// What a foreign page has the browser send: with the cookie, as an old or a careless one would.
+    pub async fn lured(&mut self, form: &Form) -> Vec<Answer> {
+        let mut answers = Vec::new();
+        for (name, value) in [
+            ("origin", "https://evil.example"),
+            ("origin", "null"),
+            ("sec-fetch-site", "cross-site"),
+            ("sec-fetch-site", "same-site"),
+            ("accept", "text/html"),
+        ] {
+            let fields: Vec<String> = form
+                .fields
+                .iter()
+                .map(|(name, value)| format!("{name}={}", encoded(value)))
+                .collect();
+            let media_type = match form.is_multipart {
+                true => "multipart/form-data; boundary=X",
+                false => "application/x-www-form-urlencoded",
+            };
+            let request = self
+                .http
+                .post(format!("{}{}", self.site.url, form.action))
+                .header(name, value)
+                .header("content-type", media_type)
+                .body(fields.join("&"));
+            answers.push(self.send(request).await);
+        }
+        answers
+    }
+
+    /// Of somebody who has followed an invitation to be this.
+    pub async fn joined(site: &'a Site, name: &str, role: serde_json::Value) -> Self {
+        let link = invited(site, role).await;
+        let mut browser = Self::new(site);
+        let fields = [("name", name), ("password", PASSWORD)];
+        assert_eq!(browser.submit(&link, &fields).await.status, 303);
+        browser
+    }
+}
+
+fn encoded(text: &str) -> String {
+    let encoded = text.bytes().map(|byte| match byte {
+        b' ' => "+".to_owned(),
+        byte if byte.is_ascii_alphanumeric() || b"-._".contains(&byte) => {
+            char::from(byte).to_string()
+        }
+        byte => format!("%{byte:02X}"),
+    });
+    encoded.collect()
+}
+
+/// A form of a page, with what its fields hold.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Form {
+    pub action: String,
+    pub is_post: bool,
+    pub is_multipart: bool,
+    pub fields: Vec<(String, String)>,
+}
+
+/// The forms of the page at a path.
+pub fn forms(path: &str, answer: &Answer) -> Vec<Form> {
+    let page = Html::parse_document(&answer.body);
+    let select = |words: &str| Selector::parse(words).unwrap();
+    let (forms, inputs) = (
+        select("form"),
+        select("input[name], textarea[name], select[name]"),
+    );
+    let options = select("option[selected], option:first-child");
+    page.select(&forms)
+        .map(|form| {
+            let attr = |name| form.value().attr(name);
+            let fields = form.select(&inputs).filter_map(|field| {
+                let name = field.value().attr("name").unwrap().to_owned();
+                let value = |of: scraper::ElementRef<'_>| {
+                    let value = of.value().attr("value").map(str::to_owned);
+                    value.unwrap_or_else(|| of.text().collect())
+                };
+                let is_box = field.value().attr("type") == Some("checkbox");
+                match field.value().name() {
+                    "select" => {
+                        let options: Vec<_> = field.select(&options).collect();
+                        let chosen = options
+                            .iter()
+                            .find(|option| option.value().attr("selected").is_some())
+                            .or(options.first());
+                        chosen.map(|option| (name, value(*option)))
+                    }
+                    _ if is_box => field
+                        .value()
+                        .attr("checked")
+                        .map(|_| (name, field.value().attr("value").unwrap_or("on").to_owned())),
+                    _ => Some((name, value(field))),
+                }
+            });
+            Form {
+                action: attr("action").unwrap_or(path).to_owned(),
+                is_post: attr("method") == Some("post"),
+                is_multipart: attr("enctype") == Some("multipart/form-data"),
+                fields: fields.collect(),
+            }
+        })
+        .collect()
+}
+
+/// The text of the first element that the selector finds.
+pub fn first(answer: &Answer, selector: &str) -> String {
+    let page = Html::parse_document(&answer.body);
+    let found = page.select(&Selector::parse(selector).unwrap()).next();
+    let found = found.unwrap_or_else(|| panic!("no {selector} in {}", answer.body));
+    found.text().collect::<String>().trim().to_owned()
+}
+
+/// The path of a new invitation's page.
+pub async fn invited(site: &Site, body: serde_json::Value) -> String {
+    let invited = site.post("/api/v1/invitations", Some(ADMIN), &body).await;
+    text(&invited.json(201)["link"])
+}
+
+pub const PASSWORD: &str = "correct horse battery";
