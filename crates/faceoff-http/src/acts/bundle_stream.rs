@@ -93,7 +93,7 @@ pub(crate) async fn receive(
     if bytes == 0 {
         return Err(Problem::new(
             ProblemKind::InvalidRequest,
-            "the body is empty; send the archive (.tar.gz, .tar.zst or .zip) as the request's body",
+            "what came is empty; send the archive itself (.tar.gz, .tar.zst or .zip)",
         ));
     }
     let format = format.ok_or_else(|| not_an_archive(&head))?;
@@ -180,8 +180,8 @@ fn not_an_archive(head: &[u8]) -> Problem {
     Problem::new(
         ProblemKind::UnsupportedMediaType,
         format!(
-            "expected a .tar.gz, .tar.zst or .zip archive as the body; it begins with the bytes {}. \
-             Send the archive itself, not a form and not text",
+            "expected a .tar.gz, .tar.zst or .zip archive; what came begins with the bytes {}. Send the archive itself, \
+             and nothing around it",
             hex::encode(head)
         ),
     )

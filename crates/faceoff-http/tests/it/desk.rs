@@ -158,7 +158,7 @@ async fn what_is_no_agent_is_refused_on_the_page_as_the_api_refuses_it() {
             415,
             "expected a .tar.gz",
         ),
-        ("empty.zip", b"".as_slice(), 400, "the body is empty"),
+        ("empty.zip", b"".as_slice(), 400, "what came is empty"),
         ("", b"".as_slice(), 400, "no file was chosen"),
     ] {
         let refused = ada.upload("/desk/upload", name, archive).await;
