@@ -62,6 +62,9 @@ pub(super) async fn page(
                 .unwrap_or(100)
                 .min(100),
     });
+    let mut disks: Vec<Disk> = disks.collect();
+    // Folders that are watched may be on the same disk.
+    disks.dedup_by(|one, other| (&one.free, &one.size) == (&other.free, &other.size));
     let mut stages = Vec::new();
     for stage in app.store.stages().await.map_err(Problem::from)? {
         let kept = app
@@ -78,7 +81,7 @@ pub(super) async fn page(
     let page = Page {
         frame: Frame::of(&app, season, path),
         head: Head::of(&organising.caller, path, &Done::default()),
-        disks: disks.collect(),
+        disks,
         kept_free: desk_frame::bytes(room.min_free_bytes()),
         is_short: room.is_short(),
         teams,
