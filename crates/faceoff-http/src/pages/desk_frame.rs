@@ -152,8 +152,8 @@ impl Head {
         let said = done.done.as_deref();
         let said = DONE.iter().find(|(key, _)| Some(*key) == said);
         Self {
-            style: assets::desk_style_url(),
-            script: assets::desk_script_url(),
+            style: assets::DESK_STYLE.url(),
+            script: assets::DESK_SCRIPT.url(),
             desk,
             who: caller.person().map_or_else(
                 || match caller.team() {

@@ -147,7 +147,7 @@ pub(super) async fn page(
     ];
     render(&Page {
         frame: Frame::of(&app, season.name, ""),
-        style: assets::episodes_style_url(),
+        style: assets::EPISODES_STYLE.url(),
         id,
         team: team.name.to_string(),
         day: clips.evaluation.of.date,

@@ -58,9 +58,9 @@ impl Frame {
             archived: None,
             ruleset: RULESET,
             current: current.into(),
-            style: assets::style_url(),
-            script: assets::script_url(),
-            icon: assets::ICON_PATH,
+            style: assets::STYLE.url(),
+            script: assets::SCRIPT.url(),
+            icon: assets::ICON.url(),
             preview: None,
         }
     }

@@ -87,8 +87,8 @@ pub(super) async fn page(
         state: state(&view.status),
         next: view.next,
         played,
-        styles: [assets::episodes_style_url(), assets::replay_style_url()],
-        script: assets::replay_script_url(),
+        styles: [assets::EPISODES_STYLE.url(), assets::REPLAY_STYLE.url()],
+        script: assets::REPLAY_SCRIPT.url(),
     })
 }
 

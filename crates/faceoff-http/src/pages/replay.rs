@@ -161,8 +161,8 @@ impl Shown {
             still: Still::of(&motion, observed.as_ref()),
             observed: observed.map(|_| format!("{api}/observed")),
             motion: format!("{api}/motion"),
-            script: assets::replay_script_url(),
-            styles: [assets::episodes_style_url(), assets::replay_style_url()],
+            script: assets::REPLAY_SCRIPT.url(),
+            styles: [assets::EPISODES_STYLE.url(), assets::REPLAY_STYLE.url()],
             before: beside(episode.checked_sub(1)),
             after: beside(episode.checked_add(1)),
         })
