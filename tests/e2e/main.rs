@@ -1,5 +1,6 @@
 //! End to end: what an organiser, a team and a visitor get from the real program.
 
+mod accessible;
 mod backup;
 mod bad_agents;
 mod busy_host;
@@ -22,6 +23,7 @@ mod packages;
 mod people;
 mod privacy;
 mod real_time;
+mod replay;
 mod retention;
 mod runtimes;
 mod soak;

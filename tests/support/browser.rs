@@ -100,6 +100,8 @@ impl Browser {
                 "--remote-debugging-pipe",
                 "--no-sandbox",
                 "--disable-gpu",
+                // The replay draws in space, here without a graphics card.
+                "--enable-unsafe-swiftshader",
                 "--disable-quic",
                 "--disable-dev-shm-usage",
                 "--hide-scrollbars",

@@ -9,7 +9,7 @@ use faceoff_types::{SmokeOutcome, SmokeTiming, Task};
 use scraper::{Html, Selector};
 use serde_json::json;
 
-/// A page of a desk: valid, with the one script that there is, and with nothing that runs within it.
+/// A page of a desk: valid, with its script and that of all pages, and with nothing that runs within it.
 #[track_caller]
 pub fn shown(answer: &Answer, status: u16) -> Html {
     assert_eq!(answer.status.as_u16(), status, "{}", answer.body);
@@ -17,15 +17,15 @@ pub fn shown(answer: &Answer, status: u16) -> Html {
     assert!(html.errors.is_empty(), "{:?}\n{}", html.errors, answer.body);
     let scripts = Selector::parse("script").unwrap();
     let scripts: Vec<_> = html.select(&scripts).collect();
-    assert_eq!(scripts.len(), 1);
-    assert!(
-        scripts[0]
-            .value()
-            .attr("src")
-            .unwrap()
-            .starts_with("/static/desk.js?")
-    );
-    assert_eq!(scripts[0].text().collect::<String>(), "");
+    let sources: Vec<_> = scripts
+        .iter()
+        .map(|script| {
+            assert_eq!(script.text().collect::<String>(), "");
+            let source = script.attr("src").unwrap();
+            source.split('?').next().unwrap()
+        })
+        .collect();
+    assert_eq!(sources, ["/static/desk.js", "/static/live.js"]);
     let policy = answer.header("content-security-policy");
     assert!(policy.contains("script-src 'self';") && !policy.contains("unsafe"));
     assert!(!answer.body.contains("style=") && !answer.body.contains("onclick"));

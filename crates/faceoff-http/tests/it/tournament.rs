@@ -6,6 +6,7 @@ pub mod cup;
 mod files;
 mod formats;
 mod free_games;
+mod game_page;
 mod live;
 mod paper;
 mod replays;

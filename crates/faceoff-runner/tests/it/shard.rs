@@ -235,6 +235,7 @@ fn a_cancelled_shard_leaves_no_recording() {
         names,
         [
             "agent.log",
+            "clips",
             "episodes.parquet",
             "report.json",
             "shard.json",

@@ -55,7 +55,13 @@ fn a_game_leaves_results_and_a_recording_that_verifies() {
     left.sort();
     assert_eq!(
         left,
-        ["game.zip", "results.json", "side-1.zip", "side-2.zip"]
+        [
+            "clips",
+            "game.zip",
+            "results.json",
+            "side-1.zip",
+            "side-2.zip"
+        ]
     );
     let results: serde_json::Value =
         serde_json::from_slice(&fs::read(out.join("results.json")).unwrap()).unwrap();
