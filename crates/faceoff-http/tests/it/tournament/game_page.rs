@@ -80,8 +80,8 @@ async fn page(cup: &Cup, game: &Game) -> Html {
 #[tokio::test]
 async fn a_games_page_says_what_it_came_to_and_why() {
     let (cup, game) = played("at_release").await;
-    let view = cup.site.get(&format!("/api/v1/games/{}", game.id), None);
-    let view = view.await.json(200);
+    let path = format!("/api/v1/games/{}", game.id);
+    let view = cup.site.get(&path, None).await.json(200);
     let html = page(&cup, &game).await;
     let verdict = texts(&html, ".verdict").remove(0);
     let [home, away] = [0, 1].map(|side| view["result"]["score"][side].to_string());
