@@ -96,6 +96,7 @@ pub(crate) async fn motion(
     params(("id" = EvaluationId, Path), ("task" = faceoff_types::Task, Path), ("episode" = u32, Path), TagHeader),
     responses(
         (status = 200, body = inline(Binary), content_type = "application/octet-stream"),
+        (status = 403, description = "another team's, and not public"),
         (status = 404),
         (status = 409, description = "as for the episodes"),
         (status = 410, description = "the recording was removed"),

@@ -60,6 +60,7 @@ pub(crate) async fn game_motion(
     ),
     responses(
         (status = 200, body = inline(Binary), content_type = "application/octet-stream"),
+        (status = 403, description = "another team's, and not public"),
         (status = 404),
         (status = 409, description = "as for the motion"),
     )
