@@ -3,15 +3,16 @@
 use crate::{
     column::Column,
     error::ReplayError,
+    gzip::Gzip,
     header::{CLIP_FORMAT, ColumnHeader, Header},
 };
-use flate2::{Compression, read::GzDecoder, write::GzEncoder};
-use std::io::{self, Read, Write};
+use flate2::read::GzDecoder;
+use std::io::{self, Read};
 
 /// A header and its columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clip {
-    /// What it says of itself; [`Clip::compressed`] fills in the columns.
+    /// What it says of itself; the columns are filled in when it is written.
     pub header: Header,
     /// The samples.
     pub columns: Vec<Column>,
@@ -31,7 +32,7 @@ impl Clip {
     ///
     /// # Errors
     /// [`ReplayError::Io`], if memory cannot be written; [`ReplayError::Unreadable`] for what is too long.
-    pub fn compressed(&self) -> Result<Vec<u8>, ReplayError> {
+    pub(crate) fn compressed(&self, gzip: &mut Gzip) -> Result<Vec<u8>, ReplayError> {
         let too_long = || ReplayError::unreadable("what was recorded", "it is too long");
         let values: usize = self.columns.iter().map(|column| column.counts.len()).sum();
         let mut payload = Vec::with_capacity(2 * values);
@@ -52,15 +53,10 @@ impl Clip {
         }
         let header = serde_json::to_vec(&header).map_err(io::Error::other)?;
         let length = u32::try_from(header.len()).map_err(|_| too_long())?;
-        // The fastest: what is left after the differences gains little from more, and it is made while agents play.
-        let mut gzip = GzEncoder::new(Vec::with_capacity(payload.len()), Compression::fast());
-        gzip.write_all(&length.to_le_bytes())?;
-        gzip.write_all(&header)?;
-        gzip.write_all(&payload)?;
-        Ok(gzip.finish()?)
+        Ok(gzip.member(&[&length.to_le_bytes(), &header, &payload])?)
     }
 
-    /// Reads what [`Clip::compressed`] has made.
+    /// Reads a clip as packs have it.
     ///
     /// # Errors
     /// [`ReplayError::Unreadable`].

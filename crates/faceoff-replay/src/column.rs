@@ -33,7 +33,8 @@ impl Column {
             scale,
             order,
             first: 0,
-            counts: Vec::new(),
+            // Of most episodes: a column that grows is copied.
+            counts: Vec::with_capacity(256),
             per_unit: 1.0 / scale,
         }
     }

@@ -4,6 +4,7 @@ use crate::{
     clip::Clip,
     error::ReplayError,
     group::Group,
+    gzip::Gzip,
     header::{CLIP_FORMAT, ClipKind, EndTold, Header},
     motion::Motion,
     observed::Observed,
@@ -190,8 +191,11 @@ impl Recording {
 
 impl Recorded {
     /// Both clips' bytes.
-    pub fn compressed(&self) -> Result<[Vec<u8>; 2], ReplayError> {
-        Ok([self.motion.compressed()?, self.observed.compressed()?])
+    pub fn compressed(&self, gzip: &mut Gzip) -> Result<[Vec<u8>; 2], ReplayError> {
+        Ok([
+            self.motion.compressed(gzip)?,
+            self.observed.compressed(gzip)?,
+        ])
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::{
     clip::Clip,
     error::ReplayError,
+    gzip::Gzip,
     header::{Break, BreakKind, CLIP_FORMAT, ClipKind, Header},
     motion::Motion,
     observed::Observed,
@@ -23,6 +24,7 @@ pub const CHUNK_STEPS: u32 = WINDOW_STEPS;
 pub struct GameClipRecorder<W> {
     pack: PackWriter<W>,
     chunk: Option<Chunk>,
+    gzip: Gzip,
 }
 
 /// Clips under way.
@@ -160,6 +162,7 @@ impl<W: Write> GameClipRecorder<W> {
         Ok(Self {
             pack: PackWriter::new(out)?,
             chunk: None,
+            gzip: Gzip::default(),
         })
     }
 
@@ -177,11 +180,15 @@ impl<W: Write> GameClipRecorder<W> {
             return Ok(());
         };
         let (number, [motion, home, away]) = chunk.end();
-        self.pack
-            .add(Key::game_motion(number), &motion.compressed()?)?;
+        self.pack.add(
+            Key::game_motion(number),
+            &motion.compressed(&mut self.gzip)?,
+        )?;
         for (side, clip) in Side::BOTH.into_iter().zip([home, away]) {
-            self.pack
-                .add(Key::game_observed(side, number), &clip.compressed()?)?;
+            self.pack.add(
+                Key::game_observed(side, number),
+                &clip.compressed(&mut self.gzip)?,
+            )?;
         }
         Ok(())
     }

@@ -11,6 +11,7 @@ mod episode;
 mod error;
 mod game;
 mod group;
+mod gzip;
 mod header;
 mod motion;
 mod observed;

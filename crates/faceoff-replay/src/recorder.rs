@@ -3,6 +3,7 @@
 use crate::{
     episode::Recording,
     error::ReplayError,
+    gzip::Gzip,
     pack::{Key, PackWriter},
     sheet::Sheet,
 };
@@ -16,6 +17,7 @@ pub struct ClipRecorder<W> {
     pack: PackWriter<W>,
     sheet: Sheet,
     under_way: Option<Recording>,
+    gzip: Gzip,
 }
 
 impl<W> std::fmt::Debug for ClipRecorder<W> {
@@ -38,6 +40,7 @@ impl<W: Write> ClipRecorder<W> {
             pack: PackWriter::new(out)?,
             sheet: Sheet::default(),
             under_way: None,
+            gzip: Gzip::default(),
         })
     }
 
@@ -56,7 +59,7 @@ impl<W: Write> ClipRecorder<W> {
         };
         let times = self.sheet.times.entry(self.task).or_default();
         let recorded = recording.end(outcome, times);
-        let [motion, observed] = recorded.compressed()?;
+        let [motion, observed] = recorded.compressed(&mut self.gzip)?;
         let episode = outcome.episode;
         self.pack.add(Key::motion(self.task, episode), &motion)?;
         self.pack
