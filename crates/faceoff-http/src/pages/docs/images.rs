@@ -34,8 +34,9 @@ macro_rules! image {
     };
 }
 
-static IMAGES: [Image; 6] = [
+static IMAGES: [Image; 7] = [
     image!("board.png", "image/png"),
+    image!("replay-page.png", "image/png"),
     image!("robot.svg", "image/svg+xml"),
     image!("fidelity/arm.svg", "image/svg+xml"),
     image!("fidelity/contacts.svg", "image/svg+xml"),

@@ -100,6 +100,10 @@ const SOURCES: [(&str, &[Source]); 4] = [
                 "What is recorded of an evaluation or a game, file by file and column by column."
             ),
             source!(
+                "replay",
+                "What the pages of episodes and games show, who sees it, and the clips that it is drawn from."
+            ),
+            source!(
                 "verifying",
                 "How anybody computes a score again from its dataset."
             ),
