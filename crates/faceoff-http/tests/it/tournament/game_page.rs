@@ -93,7 +93,8 @@ async fn a_games_page_says_what_it_came_to_and_why() {
         verdict.contains(&text(&view["result"]["because"])),
         "{verdict}"
     );
-    assert!(verdict.contains("A wins"), "{verdict}");
+    let winner = text(&view["result"]["winner"]);
+    assert!(verdict.contains(&format!("{winner} wins")), "{verdict}");
     let rows = texts(&html, "tbody tr");
     assert!(
         rows.iter().any(|row| row.starts_with("Penalty points")),
