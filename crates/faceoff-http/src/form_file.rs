@@ -1,5 +1,6 @@
 //! The file of a form as a browser sends it (`multipart/form-data`, RFC 7578): the form's only part, streamed. Nothing of
-//! the file is kept in memory, and what surrounds it is bounded.
+//! the file is kept in memory, and what surrounds it is bounded. (The reader that comes with axum, `multer` 3, takes in all
+//! that the connection has ready before it hands on the first byte.)
 
 use crate::{
     pace::LeastRate,

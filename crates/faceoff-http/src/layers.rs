@@ -141,16 +141,35 @@ async fn drop_foreign_request_id(mut request: Request) -> Request {
     request
 }
 
+/// Marks an answer that pages of other sites may hold.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Embeddable;
+
+/// What a page may load and do, and who may hold it.
+macro_rules! policy {
+    ($ancestors:literal) => {
+        concat!(
+            "default-src 'none'; style-src 'self'; script-src 'self'; connect-src 'self'; img-src 'self'; \
+             base-uri 'none'; form-action 'self'; frame-ancestors ",
+            $ancestors
+        )
+    };
+}
+
 async fn security_headers(mut response: Response) -> Response {
+    let is_embeddable = response.extensions().get::<Embeddable>().is_some();
     let headers = response.headers_mut();
-    if !headers.contains_key(header::CONTENT_SECURITY_POLICY) {
+    if !is_embeddable {
         headers.insert(header::X_FRAME_OPTIONS, HeaderValue::from_static("DENY"));
     }
     for (name, value) in [
         (
             header::CONTENT_SECURITY_POLICY,
-            "default-src 'none'; style-src 'self'; script-src 'self'; connect-src 'self'; img-src 'self'; \
-             base-uri 'none'; form-action 'self'; frame-ancestors 'none'",
+            if is_embeddable {
+                policy!("*")
+            } else {
+                policy!("'none'")
+            },
         ),
         (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
         (header::REFERRER_POLICY, "no-referrer"),
@@ -163,10 +182,7 @@ async fn security_headers(mut response: Response) -> Response {
             "same-origin",
         ),
     ] {
-        // A replay that others may show says so itself.
-        headers
-            .entry(name)
-            .or_insert(HeaderValue::from_static(value));
+        headers.insert(name, HeaderValue::from_static(value));
     }
     // Scores change and API answers belong to their caller; only the hashed assets say otherwise.
     headers

@@ -39,6 +39,7 @@ mod paths;
 mod peer;
 mod probes;
 pub mod problem;
+mod query;
 mod rates;
 mod release;
 pub mod requests;

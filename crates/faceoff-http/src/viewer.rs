@@ -25,18 +25,24 @@ impl Viewer {
         }
     }
 
+    /// What it is to ask for something of others: whoever has not said who they are is asked that first.
+    pub(crate) const fn refusal(self) -> ProblemKind {
+        match self {
+            Self::Anybody => ProblemKind::Unauthenticated,
+            Self::Team(_) | Self::Organiser => ProblemKind::Forbidden,
+        }
+    }
+
     /// Refuses everybody but organisers, of whom `what` is.
     ///
     /// # Errors
     /// `Unauthenticated` or `Forbidden`.
     pub(crate) fn check_organiser(self, what: &str) -> Result<(), Problem> {
-        let kind = match self {
-            Self::Organiser => return Ok(()),
-            Self::Team(_) => ProblemKind::Forbidden,
-            Self::Anybody => ProblemKind::Unauthenticated,
-        };
+        if self == Self::Organiser {
+            return Ok(());
+        }
         Err(Problem::new(
-            kind,
+            self.refusal(),
             format!("{what} is for the organiser: it needs the organiser's token"),
         ))
     }

@@ -1,6 +1,7 @@
 //! A line for each episode of an evaluation.
 
 use crate::{error::ReplayError, group::Group};
+use faceoff_episode::why_it_ended;
 use faceoff_types::{EpisodeEnd, Task};
 use flate2::{Compression, read::GzDecoder, write::GzEncoder};
 use serde::{Deserialize, Serialize};
@@ -60,6 +61,15 @@ pub struct EpisodeLine {
     /// Answers that took more than a control step.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub late: u32,
+}
+
+impl EpisodeLine {
+    /// As everybody sees it: what exactly an agent did wrong is its team's to know.
+    pub fn forget_fault(&mut self) {
+        if self.end == EpisodeEnd::AgentFault {
+            self.why = why_it_ended(self.task, self.end, &[0.0; 6], self.steps, None);
+        }
+    }
 }
 
 #[expect(

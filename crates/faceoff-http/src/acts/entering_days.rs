@@ -16,6 +16,12 @@ const MAX_LABEL_CHARS: usize = 80;
 /// Longest note of a team on a submission.
 const MAX_NOTE_CHARS: usize = 2000;
 
+async fn check_own(app: &AppState, caller: &TeamCaller, id: SubmissionId) -> Result<(), Problem> {
+    let found = app.store.submission(id).await;
+    caller.visible("submission", found, |submission| submission.team)?;
+    Ok(())
+}
+
 /// Chooses what the team enters at the next cut.
 pub(crate) async fn activate_submission(
     app: &AppState,
@@ -23,8 +29,7 @@ pub(crate) async fn activate_submission(
     id: SubmissionId,
 ) -> Result<SubmissionView, Problem> {
     let (actor, name) = (caller.actor(), &caller.team.name);
-    let found = app.store.submission(id).await;
-    caller.visible("submission", found, |submission| submission.team)?;
+    check_own(app, caller, id).await?;
     let now = app.config.clock.now();
     let submission = app.store.activate_submission(actor, id, now).await?;
     tracing::info!(team = %name, submission = %id, "submission activated");
@@ -38,8 +43,7 @@ pub(crate) async fn withdraw_submission(
     id: SubmissionId,
 ) -> Result<SubmissionView, Problem> {
     let (actor, name) = (caller.actor(), &caller.team.name);
-    let found = app.store.submission(id).await;
-    caller.visible("submission", found, |submission| submission.team)?;
+    check_own(app, caller, id).await?;
     let now = app.config.clock.now();
     let submission = app.store.withdraw_submission(actor, id, now).await?;
     tracing::info!(team = %name, submission = %id, "submission withdrawn");
@@ -53,8 +57,7 @@ pub(crate) async fn describe_submission(
     id: SubmissionId,
     change: &SubmissionChange,
 ) -> Result<SubmissionView, Problem> {
-    let found = app.store.submission(id).await;
-    caller.visible("submission", found, |submission| submission.team)?;
+    check_own(app, caller, id).await?;
     let words = SubmissionWords {
         label: said("label", &change.label, MAX_LABEL_CHARS)?,
         note: said("note", &change.note, MAX_NOTE_CHARS)?,

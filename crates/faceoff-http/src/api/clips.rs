@@ -10,7 +10,7 @@ use crate::{
     conditions::{Conditions, ETag},
     episode_path::EpisodePath,
     extract::PathParam,
-    problem::{Problem, ProblemKind},
+    problem::Problem,
     viewer::Viewer,
     views::{
         clips::{Clips, EpisodesView},
@@ -49,7 +49,10 @@ pub(crate) async fn episodes(
     let sight = Sight::of(&app, viewer).await?;
     let clips = Clips::of(&app, &sight, id).await?;
     let seen = if clips.sees_observed { "all" } else { "some" };
-    let tag = ETag::of("episodes", &[&clips.key, seen, env!("CARGO_PKG_VERSION")]);
+    let tag = ETag::of(
+        "episodes",
+        &[&clips.file.key, seen, env!("CARGO_PKG_VERSION")],
+    );
     let mut answer = match conditions.not_modified(&tag) {
         Some(answer) => answer,
         None => {
@@ -112,12 +115,8 @@ pub(crate) async fn observed(
     let sight = Sight::of(&app, viewer).await?;
     let clips = Clips::of(&app, &sight, path.id).await?;
     if !clips.sees_observed {
-        let kind = match viewer {
-            Viewer::Anybody => ProblemKind::Unauthenticated,
-            Viewer::Team(_) | Viewer::Organiser => ProblemKind::Forbidden,
-        };
         return Err(Problem::new(
-            kind,
+            viewer.refusal(),
             "what an agent was told and commanded is its team's, until the dataset is public; the motion is there for \
              everybody",
         ));
@@ -135,6 +134,9 @@ async fn send_episode(
     headers: &HeaderMap,
 ) -> Result<Response, Problem> {
     let EpisodePath { task, episode, .. } = path;
-    let tag = ETag::of(what, &[&clips.key, task.as_str(), &episode.to_string()]);
+    let tag = ETag::of(
+        what,
+        &[&clips.file.key, task.as_str(), &episode.to_string()],
+    );
     send(&tag, conditions, headers, clips.clip(key)).await
 }

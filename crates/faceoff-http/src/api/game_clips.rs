@@ -3,7 +3,7 @@
 use super::{
     clip_answer::send,
     document::{Binary, TagHeader},
-    game_files::side_of,
+    game_files::{game_of, side_of},
 };
 use crate::{
     app::App,
@@ -37,10 +37,9 @@ pub(crate) async fn game_motion(
     PathParams(path): PathParams<String, 2>,
 ) -> Result<Response, Problem> {
     let [id, chunk] = path;
-    let (id, _) = side_of(&[id, "1".to_owned()])?;
-    let chunk = number(&chunk)?;
+    let (id, chunk) = (game_of(&id)?, number(&chunk)?);
     let clips = GameClips::of(&app, viewer, id).await?;
-    let tag = ETag::of("motion", &[&clips.key, &chunk.to_string()]);
+    let tag = ETag::of("motion", &[&clips.file.key, &chunk.to_string()]);
     send(
         &tag,
         &conditions,
@@ -77,18 +76,14 @@ pub(crate) async fn game_observed(
     let chunk = number(&chunk)?;
     let clips = GameClips::of(&app, viewer, id).await?;
     if !clips.sees[side.index()] {
-        let kind = match viewer {
-            Viewer::Anybody => ProblemKind::Unauthenticated,
-            Viewer::Team(_) | Viewer::Organiser => ProblemKind::Forbidden,
-        };
         return Err(Problem::new(
-            kind,
+            viewer.refusal(),
             "what a side was told and commanded is its team's, until the recording is public; the motion is there for \
              everybody",
         ));
     }
     let of = [
-        clips.key.as_str(),
+        clips.file.key.as_str(),
         &side.number().to_string(),
         &chunk.to_string(),
     ];

@@ -160,10 +160,14 @@ pub(crate) async fn side_log(
     Ok((media_type, faceoff_types::harmless(&log).into_owned()).into_response())
 }
 
-pub(super) fn side_of([id, side]: &[String; 2]) -> Result<(GameId, Side), Problem> {
-    let id = id.parse().map_err(|error: faceoff_types::ParseIdError| {
+pub(super) fn game_of(id: &str) -> Result<GameId, Problem> {
+    id.parse().map_err(|error: faceoff_types::ParseIdError| {
         Problem::new(ProblemKind::NotFound, error.to_string())
-    })?;
+    })
+}
+
+pub(super) fn side_of([id, side]: &[String; 2]) -> Result<(GameId, Side), Problem> {
+    let id = game_of(id)?;
     let side = side
         .parse::<u32>()
         .ok()

@@ -1,6 +1,9 @@
 //! `/account`: who has signed in, and the tokens and sessions that are theirs.
 
-use super::frame::{Frame, PageProblem, render};
+use super::{
+    figures::minute,
+    frame::{Frame, PageProblem, render},
+};
 use crate::{
     app::App,
     auth::Anybody,
@@ -31,7 +34,7 @@ struct Page {
 
 impl Page {
     fn shown(&self, at: &Timestamp) -> String {
-        at.strftime("%Y-%m-%d %H:%M UTC").to_string()
+        minute(*at)
     }
 
     fn state(&self, token: &TokenView) -> String {

@@ -1,6 +1,9 @@
 //! `/announcements`: what the organisers have told everybody, and what they have answered for everybody to read.
 
-use super::frame::{Frame, PageProblem, render};
+use super::{
+    figures::minute,
+    frame::{Frame, PageProblem, render},
+};
 use crate::{
     app::App,
     problem::Problem,
@@ -27,7 +30,7 @@ struct Page {
 
 impl Page {
     fn shown(&self, at: &Timestamp) -> String {
-        at.strftime("%Y-%m-%d %H:%M UTC").to_string()
+        minute(*at)
     }
 }
 

@@ -44,8 +44,14 @@ pub(super) struct Head {
     /// Who has signed in.
     pub(super) who: String,
     pub(super) tabs: Vec<Tab>,
-    pub(super) done: Option<&'static str>,
-    pub(super) refused: Option<Refusal>,
+    pub(super) said: Words,
+}
+
+/// [`Said`], in words.
+pub(super) enum Words {
+    Nothing,
+    Done(&'static str),
+    Refused(Refusal),
 }
 
 /// Why something was not done.
@@ -71,6 +77,16 @@ impl From<&Problem> for Refusal {
 #[serde(default)]
 pub(super) struct Done {
     pub(super) done: Option<String>,
+}
+
+/// What a page says above its content.
+#[derive(Clone, Copy)]
+pub(super) enum Said<'a> {
+    Nothing,
+    /// What the page before it has done, if anything.
+    Done(&'a Done),
+    /// Why what was sent to it was not done.
+    Refused(&'a Problem),
 }
 
 /// What was done, in words: a page says none that come from outside.
@@ -139,7 +155,7 @@ const DONE: &[(&str, &str)] = &[
 
 impl Head {
     /// Of the page at `current`.
-    pub(super) fn of(caller: &Caller, current: &str, done: &Done) -> Self {
+    pub(super) fn of(caller: &Caller, current: &str, said: Said<'_>) -> Self {
         let (tabs, desk): (&[(&str, &str)], _) = match caller.is_organiser() {
             true => (&ORGANISER, "Organiser’s desk"),
             false => (&TEAM, "Team’s desk"),
@@ -149,8 +165,6 @@ impl Head {
             name,
             is_current: *path == current,
         };
-        let said = done.done.as_deref();
-        let said = DONE.iter().find(|(key, _)| Some(*key) == said);
         Self {
             style: assets::DESK_STYLE.url(),
             script: assets::DESK_SCRIPT.url(),
@@ -163,25 +177,27 @@ impl Head {
                 |person| person.name.to_string(),
             ),
             tabs: tabs.iter().map(tab).collect(),
-            done: said.map(|(_, words)| *words),
-            refused: None,
+            said: Words::from(said),
         }
-    }
-
-    /// After something was refused.
-    pub(super) fn refusing(mut self, refused: Option<&Problem>) -> Self {
-        self.refused = refused.map(Refusal::from);
-        self
     }
 }
 
-/// Renders a page of a desk, with the status of what was `refused`.
-pub(super) fn render_desk(
-    page: &impl Template,
-    refused: Option<&Problem>,
-) -> Result<Response, PageProblem> {
+impl From<Said<'_>> for Words {
+    fn from(said: Said<'_>) -> Self {
+        let done = match said {
+            Said::Nothing => None,
+            Said::Done(done) => done.done.as_deref(),
+            Said::Refused(problem) => return Self::Refused(problem.into()),
+        };
+        let words = DONE.iter().find(|(key, _)| Some(*key) == done);
+        words.map_or(Self::Nothing, |(_, words)| Self::Done(words))
+    }
+}
+
+/// Renders a page of a desk, with the status of what was refused.
+pub(super) fn render_desk(page: &impl Template, said: Said<'_>) -> Result<Response, PageProblem> {
     let mut response = render(page)?;
-    if let Some(problem) = refused {
+    if let Said::Refused(problem) = said {
         response
             .headers_mut()
             .extend(problem.headers().iter().cloned());
@@ -194,11 +210,6 @@ pub(super) fn render_desk(
 pub(super) fn done(path: &str, key: &'static str) -> Response {
     let sign = if path.contains('?') { '&' } else { '?' };
     Redirect::to(&format!("{path}{sign}done={key}")).into_response()
-}
-
-/// As the desks write a time.
-pub(super) fn at(at: jiff::Timestamp) -> String {
-    at.strftime("%Y-%m-%d %H:%M UTC").to_string()
 }
 
 /// As the desks write a number of bytes.

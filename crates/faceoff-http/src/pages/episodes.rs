@@ -13,6 +13,7 @@ use crate::{
     app::App,
     extract::{PathParam, QueryParams},
     problem::{Problem, ProblemKind},
+    query::asking,
     requests::EpisodesQuery,
     viewer::Viewer,
     views::{clips::Clips, season::SeasonHead, sight::Sight},
@@ -109,18 +110,12 @@ pub(super) async fn page(
         .map(|line| Row::of(id, line, clips.sees_observed))
         .collect();
     let other_page = |number: usize| {
-        // Each is a word of a list.
-        let chosen = [
-            ("task", &query.task),
-            ("went", &query.went),
-            ("broke", &query.broke),
-            ("end", &query.end),
-        ];
-        let words = chosen.into_iter().filter(|(_, word)| !word.is_empty());
-        let words: String = words
-            .map(|(name, word)| format!("{name}={word}&"))
-            .collect();
-        format!("/evaluations/{id}/episodes?{words}page={number}#table")
+        let query = EpisodesQuery {
+            page: u32::try_from(number).ok(),
+            ..query.clone()
+        };
+        let address = asking(&format!("/evaluations/{id}/episodes"), &query);
+        format!("{address}#table")
     };
     let choice = |given: &str, value: &'static str, word: &'static str| Choice {
         value,

@@ -34,7 +34,7 @@ use faceoff_scoring::{
 use faceoff_types::{
     EvaluationId, Profile, RoundTrips, Seed, SlotTiming, StageDay, Task, ViolationCounts,
 };
-use figures::Rate;
+use figures::{Rate, minute};
 use jiff::{Timestamp, civil};
 use slow::SlowAnswers;
 
@@ -289,7 +289,7 @@ pub(super) async fn page(
             Some(frozen) => format!(
                 "It is finished. The boards of its stage are frozen since {} ({}): its result is shown once they are \
                  unfrozen.",
-                frozen.at.strftime("%Y-%m-%d %H:%M UTC"),
+                minute(frozen.at),
                 frozen.reason
             ),
             None => in_words(&view).to_owned(),

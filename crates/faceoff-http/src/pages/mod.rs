@@ -13,6 +13,7 @@ mod comparison;
 mod desk;
 mod desk_frame;
 mod docs;
+mod entry;
 mod episode_words;
 mod episodes;
 mod evaluation;

@@ -9,19 +9,16 @@ use super::{
 use crate::{
     app::App,
     episode_path::EpisodePath,
+    layers::Embeddable,
     paths,
     problem::Problem,
     viewer::Viewer,
     views::{clips::Clips, season::SeasonHead, sight::Sight},
 };
 use askama::Template;
-use axum::{
-    extract::State,
-    http::{HeaderValue, header},
-    response::Response,
-};
+use axum::{extract::State, response::Response};
 use faceoff_replay::{
-    Clip, EpisodeLine, Key,
+    Clip,
     model::{CONTROL_STEP_S, PUCK, TOOL},
 };
 use faceoff_types::{EvaluationId, Task};
@@ -110,14 +107,7 @@ pub(super) async fn embedded(
             ..shown
         },
     })?;
-    let headers = answer.headers_mut();
-    headers.insert(
-        header::CONTENT_SECURITY_POLICY,
-        HeaderValue::from_static(
-            "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; \
-             base-uri 'none'; form-action 'none'; frame-ancestors *",
-        ),
-    );
+    answer.extensions_mut().insert(Embeddable);
     Ok(answer)
 }
 
@@ -126,25 +116,10 @@ impl Shown {
         let EpisodePath { id, task, episode } = path;
         let sight = Sight::of(app, viewer).await?;
         let clips = Clips::of(app, &sight, id).await?;
-        let view = clips.episodes().await?;
-        let at = |episode: u32| {
-            let found = view
-                .episodes
-                .binary_search_by_key(&(task, episode), |line| (line.task, line.episode));
-            found.ok().map(|index| &view.episodes[index])
-        };
-        let line = at(episode).ok_or_else(|| Problem::not_found("episode"))?;
-        let motion = read(&clips, Key::motion(task, episode)).await?;
-        let observed = match clips.sees_observed {
-            true => Some(read(&clips, Key::observed(task, episode)).await?),
-            false => None,
-        };
+        let shown = clips.episode(task, episode).await?;
+        let (line, observed) = (&shown.line, shown.observed.as_ref());
         let team = app.store.team(clips.evaluation.team).await?;
         let api = format!("{}/episodes/{task}/{episode}", paths::evaluation(id));
-        let beside = |other: Option<u32>| {
-            let other = other.and_then(at)?;
-            Some(page_path(id, other))
-        };
         Ok(Self {
             id,
             task,
@@ -158,24 +133,19 @@ impl Shown {
             late: if clips.sees_observed { line.late } else { 0 },
             steps: line.steps,
             duration_s: format!("{:.2}", f64::from(line.steps) * CONTROL_STEP_S),
-            still: Still::of(&motion, observed.as_ref()),
+            still: Still::of(&shown.motion, observed),
             observed: observed.map(|_| format!("{api}/observed")),
             motion: format!("{api}/motion"),
             script: assets::REPLAY_SCRIPT.url(),
             styles: [assets::EPISODES_STYLE.url(), assets::REPLAY_STYLE.url()],
-            before: beside(episode.checked_sub(1)),
-            after: beside(episode.checked_add(1)),
+            before: shown.has_before.then(|| page_path(id, task, episode - 1)),
+            after: shown.has_after.then(|| page_path(id, task, episode + 1)),
         })
     }
 }
 
-pub(super) fn page_path(id: EvaluationId, line: &EpisodeLine) -> String {
-    format!("/evaluations/{id}/episodes/{}/{}", line.task, line.episode)
-}
-
-async fn read(clips: &Clips, key: Key) -> Result<Clip, Problem> {
-    let bytes = clips.clip(key).await?;
-    Clip::read(&bytes).map_err(Problem::internal)
+pub(super) fn page_path(id: EvaluationId, task: Task, episode: u32) -> String {
+    format!("/evaluations/{id}/episodes/{task}/{episode}")
 }
 
 impl Still {

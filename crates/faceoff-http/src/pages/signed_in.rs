@@ -5,13 +5,13 @@ use crate::{
     app::App,
     auth::{Anybody, Caller, Organiser, TeamCaller},
     problem::{Problem, ProblemKind},
+    query::asking,
 };
 use axum::{
     extract::FromRequestParts,
     http::request::Parts,
     response::{IntoResponse, Redirect, Response},
 };
-use std::fmt::Write;
 
 /// Somebody who has signed in.
 pub(super) struct SignedIn(pub(super) Caller);
@@ -39,25 +39,11 @@ impl IntoResponse for Refused {
     fn into_response(self) -> Response {
         match self {
             Self::SignIn(next) => {
-                Redirect::to(&format!("/sign-in?next={}", encoded(&next))).into_response()
+                Redirect::to(&asking("/sign-in", &[("next", next)])).into_response()
             }
             Self::Problem(problem) => PageProblem::from(problem).into_response(),
         }
     }
-}
-
-/// As a value of a query.
-pub(super) fn encoded(text: &str) -> String {
-    let mut encoded = String::with_capacity(text.len());
-    for byte in text.bytes() {
-        if byte.is_ascii_alphanumeric() || b"-._~".contains(&byte) {
-            encoded.push(char::from(byte));
-        } else {
-            // Writing to a string does not fail.
-            let _ = write!(encoded, "%{byte:02X}");
-        }
-    }
-    encoded
 }
 
 /// The places that one is led back to.
@@ -151,6 +137,5 @@ mod tests {
         ] {
             assert_eq!(own_place(foreign), None, "{foreign:?}");
         }
-        assert_eq!(encoded("/desk?a=b&c"), "%2Fdesk%3Fa%3Db%26c");
     }
 }

@@ -1,7 +1,18 @@
 //! How a board stands, in words: what its rows are made of, who sees them, and whether they may still change.
 
-use crate::views::board::BoardView;
+use super::figures::minute;
+use crate::views::{board::BoardView, stage::PhaseView};
 use faceoff_types::Standings;
+
+/// How far a stage is.
+pub(super) const fn phase(phase: PhaseView, is_signed_off: bool) -> &'static str {
+    match phase {
+        PhaseView::Upcoming => "upcoming",
+        PhaseView::Open => "open",
+        PhaseView::Closed if is_signed_off => "signed off",
+        PhaseView::Closed => "closed, provisional",
+    }
+}
 
 /// What a row is, as the table's caption says it.
 pub(super) fn rows(board: &BoardView) -> String {
@@ -52,7 +63,7 @@ pub(super) fn result(board: &BoardView) -> String {
             .to_owned(),
         Some(done) => format!(
             "The result was signed off on {} by {}: nothing of it changes any more.",
-            done.at.strftime("%Y-%m-%d %H:%M UTC"),
+            minute(done.at),
             done.by
         ),
     }

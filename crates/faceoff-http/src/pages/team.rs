@@ -1,10 +1,10 @@
 //! `/teams/{id}`: what a team came to, day by day, and what it has entered.
 
 mod days;
-mod entered;
 
 use super::{
     chart::Panel,
+    entry::Entry,
     frame::{Frame, PageProblem, render},
 };
 use crate::{
@@ -21,7 +21,6 @@ use crate::{
 use askama::Template;
 use axum::{extract::State, response::Response};
 use days::{Broken, Day, Now};
-use entered::Entered;
 use faceoff_types::{StageDay, TeamId};
 
 #[derive(Template)]
@@ -43,7 +42,7 @@ struct Page {
     /// Of today, without a result.
     under_way: Vec<EvaluationView>,
     /// For the team itself and for organisers; nobody else sees what was not played.
-    entered: Option<Vec<Entered>>,
+    entered: Option<Vec<Entry>>,
     /// The query that asks the API for the same days.
     of_days: String,
 }
@@ -90,7 +89,7 @@ pub(super) async fn page(
         Viewer::Anybody => false,
     };
     let entered = match entered {
-        true => Some(entered::of(SubmissionView::of_team(&app, id).await?)),
+        true => Some(SubmissionView::of_team(&app, id).await?),
         false => None,
     };
     let others = StageView::all(&app).await?;
@@ -117,7 +116,7 @@ pub(super) async fn page(
         of_days: format!("?stage={}&revision={}", stage.id, history.revision),
         frozen: history.frozen,
         under_way,
-        entered,
+        entered: entered.map(|all| all.iter().map(Entry::from).collect()),
         team,
     })
 }

@@ -47,14 +47,6 @@ pub enum BoardBy {
 }
 
 impl BoardBy {
-    /// As a query has it.
-    pub(crate) const fn as_str(self) -> &'static str {
-        match self {
-            Self::Best => "best",
-            Self::Latest => "latest",
-        }
-    }
-
     pub(crate) const fn standings(self) -> Standings {
         match self {
             Self::Best => Standings::Best,
@@ -74,7 +66,7 @@ pub enum BoardFormat {
 }
 
 /// Which board a page shows, and in which order.
-#[derive(Debug, Clone, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BoardPageQuery {
     /// As of [`BoardQuery`].
@@ -88,7 +80,7 @@ pub struct BoardPageQuery {
     /// As of [`BoardQuery`].
     pub by: Option<BoardBy>,
     /// As of [`BoardQuery`].
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub live: bool,
     /// By which column; without it in board order, tier by tier.
     pub sort: Option<BoardSort>,
@@ -110,8 +102,8 @@ impl BoardPageQuery {
 }
 
 /// A column that a board is sorted by; the better first, or with a `-` before its name the worse.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(try_from = "String")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
 pub struct BoardSort {
     /// Which.
     pub column: BoardColumn,
@@ -156,6 +148,13 @@ impl BoardColumn {
         Self::Task(Task::Prepare),
         Self::Points,
     ];
+}
+
+impl From<BoardSort> for String {
+    fn from(sort: BoardSort) -> Self {
+        let sign = if sort.is_reversed { "-" } else { "" };
+        format!("{sign}{}", sort.column.as_str())
+    }
 }
 
 impl TryFrom<String> for BoardSort {

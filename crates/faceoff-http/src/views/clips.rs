@@ -1,18 +1,18 @@
 //! What replays of an evaluation's episodes are drawn from. The motion, and how each episode went, are there for everybody once the
 //! day is released; what the agent was told and commanded, its times and its faults for whoever gets the dataset.
 
-use super::sight::Sight;
+use super::{clip_file::ClipFile, sight::Sight};
 use crate::{
     app::AppState,
     archived,
     problem::{Problem, ProblemKind},
     release::check_released,
 };
-use faceoff_replay::{EpisodeLine, Key, Pack, ReplayError, Sheet};
+use faceoff_replay::{Clip, EpisodeLine, Key, Pack, ReplayError, Sheet};
 use faceoff_store::{Artifacts, Evaluation, EvaluationState};
-use faceoff_types::{EpisodeEnd, EvaluationId, Task};
+use faceoff_types::{EvaluationId, Task};
 use serde::{Deserialize, Serialize};
-use std::{collections::BTreeMap, path::PathBuf};
+use std::collections::BTreeMap;
 use utoipa::ToSchema;
 
 /// The recorded clips of an evaluation, for a viewer.
@@ -21,9 +21,18 @@ pub(crate) struct Clips {
     pub(crate) evaluation: Evaluation,
     /// Does the viewer see what was observed, commanded and timed, and the agent's faults?
     pub(crate) sees_observed: bool,
-    /// The clips' name among the artifacts, which is never another's.
-    pub(crate) key: String,
-    path: PathBuf,
+    pub(crate) file: ClipFile,
+}
+
+/// All that is shown of an episode.
+pub(crate) struct Episode {
+    pub(crate) line: EpisodeLine,
+    /// Are there the episodes of the task before and after it?
+    pub(crate) has_before: bool,
+    pub(crate) has_after: bool,
+    pub(crate) motion: Clip,
+    /// For whoever gets the dataset.
+    pub(crate) observed: Option<Clip>,
 }
 
 /// How the episodes of an evaluation went, in order of task and number.
@@ -78,18 +87,16 @@ impl Clips {
         }
         archived::check_kept(app, dataset, "recording").await?;
         let key = Artifacts::clips_of(dataset);
-        let artifacts = app.store.artifacts();
-        if artifacts.bytes_of(&key).await?.is_none() {
-            return Err(Problem::new(
+        let file = ClipFile::find(app, key).await?.ok_or_else(|| {
+            Problem::new(
                 ProblemKind::Conflict,
                 "there are no replays of this evaluation: the version of the server that played it made none. Its \
                  dataset has the episodes, and `faceoff replay` draws them",
-            ));
-        }
+            )
+        })?;
         Ok(Self {
             sees_observed: sight.is_own(&evaluation) || sight.is_public(&evaluation),
-            path: artifacts.path_of(&key).map_err(Problem::internal)?,
-            key,
+            file,
             evaluation,
         })
     }
@@ -99,9 +106,45 @@ impl Clips {
     /// # Errors
     /// `NotFound` if there is no such episode.
     pub(crate) async fn clip(&self, key: Key) -> Result<Vec<u8>, Problem> {
-        self.read(move |pack| pack.clip(key))
-            .await?
-            .ok_or_else(|| Problem::not_found("episode"))
+        let clip = self.file.read(move |pack| pack.clip(key)).await?;
+        clip.ok_or_else(|| Problem::not_found("episode"))
+    }
+
+    /// An episode, read.
+    ///
+    /// # Errors
+    /// `NotFound` if there is no such episode.
+    pub(crate) async fn episode(&self, task: Task, episode: u32) -> Result<Episode, Problem> {
+        let sees_observed = self.sees_observed;
+        let read = move |pack: &Pack| {
+            let sheet = pack.sheet()?;
+            let clip = |key| -> Result<Option<Clip>, ReplayError> {
+                let bytes = pack.clip(key)?;
+                bytes.map(|bytes| Clip::read(&bytes)).transpose()
+            };
+            let line = sheet.line(task, episode);
+            let Some((line, motion)) = line.zip(clip(Key::motion(task, episode))?) else {
+                return Ok(None);
+            };
+            let has =
+                |other: Option<u32>| other.is_some_and(|other| sheet.line(task, other).is_some());
+            let mut line = line.clone();
+            if !sees_observed {
+                line.forget_fault();
+            }
+            Ok(Some(Episode {
+                line,
+                has_before: has(episode.checked_sub(1)),
+                has_after: has(episode.checked_add(1)),
+                motion,
+                observed: match sees_observed {
+                    true => clip(Key::observed(task, episode))?,
+                    false => None,
+                },
+            }))
+        };
+        let found = self.file.read(read).await?;
+        found.ok_or_else(|| Problem::not_found("episode"))
     }
 
     /// How the episodes went.
@@ -113,13 +156,9 @@ impl Clips {
             mut episodes,
             times,
             ..
-        } = self.read(Pack::sheet).await?;
+        } = self.file.read(Pack::sheet).await?;
         if !self.sees_observed {
-            for line in &mut episodes {
-                if line.end == EpisodeEnd::AgentFault {
-                    line.why = "a fault of the agent ended the episode".to_owned();
-                }
-            }
+            episodes.iter_mut().for_each(EpisodeLine::forget_fault);
         }
         let bins = |(task, times): (Task, faceoff_replay::TimeBins)| {
             let bins = times
@@ -139,16 +178,5 @@ impl Clips {
                 false => BTreeMap::new(),
             },
         })
-    }
-
-    async fn read<T: Send + 'static>(
-        &self,
-        read: impl FnOnce(&Pack) -> Result<T, ReplayError> + Send + 'static,
-    ) -> Result<T, Problem> {
-        let path = self.path.clone();
-        tokio::task::spawn_blocking(move || read(&Pack::open(&path)?))
-            .await
-            .map_err(Problem::internal)?
-            .map_err(Problem::internal)
     }
 }

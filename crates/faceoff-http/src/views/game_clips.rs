@@ -1,23 +1,20 @@
 //! What the replay of a game is drawn from: the motion for everybody who knows the game, what a side was told and commanded for whoever
 //! gets its file.
 
-use super::{game, sight::GameSight};
+use super::{clip_file::ClipFile, game, sight::GameSight};
 use crate::{
     app::App,
     problem::{Problem, ProblemKind},
     viewer::Viewer,
 };
-use faceoff_replay::{CHUNK_STEPS, Key, Pack};
+use faceoff_replay::{CHUNK_STEPS, Key};
 use faceoff_store::{Game, GameState};
 use faceoff_types::{GameId, Side};
-use std::path::PathBuf;
 
 /// The recorded clips of a game.
 #[derive(Debug)]
 pub(crate) struct GameClips {
-    /// Their name among the artifacts, which is never another's.
-    pub(crate) key: String,
-    path: PathBuf,
+    pub(crate) file: ClipFile,
     /// Of each side: does the viewer see what it was told and commanded?
     pub(crate) sees: [bool; 2],
 }
@@ -44,16 +41,14 @@ impl GameClips {
             ));
         };
         let key = format!("{}/clips", recording.key);
-        let artifacts = app.store.artifacts();
-        if artifacts.bytes_of(&key).await?.is_none() {
-            return Err(conflict(
+        let file = ClipFile::find(app, key).await?.ok_or_else(|| {
+            conflict(
                 "there is no replay of this game: the version of the server that played it made none, or the archive that \
                  is shown was made without it",
-            ));
-        }
+            )
+        })?;
         Ok(Self {
-            path: artifacts.path_of(&key).map_err(Problem::internal)?,
-            key,
+            file,
             sees: Side::BOTH.map(|side| sight.is_own(game, side) || sight.sees_both_sides(game)),
         })
     }
@@ -63,17 +58,12 @@ impl GameClips {
     /// # Errors
     /// `NotFound` if the game was over before.
     pub(crate) async fn clip(&self, key: Key) -> Result<Vec<u8>, Problem> {
-        let path = self.path.clone();
-        let read = move || Pack::open(&path)?.clip(key);
-        tokio::task::spawn_blocking(read)
-            .await
-            .map_err(Problem::internal)?
-            .map_err(Problem::internal)?
-            .ok_or_else(|| {
-                let detail = format!(
-                    "the game has no such part; each is {CHUNK_STEPS} control steps, the first is 0"
-                );
-                Problem::new(ProblemKind::NotFound, detail)
-            })
+        let clip = self.file.read(move |pack| pack.clip(key)).await?;
+        clip.ok_or_else(|| {
+            let detail = format!(
+                "the game has no such part; each is {CHUNK_STEPS} control steps, the first is 0"
+            );
+            Problem::new(ProblemKind::NotFound, detail)
+        })
     }
 }

@@ -13,6 +13,7 @@ pub mod board;
 mod board_csv;
 pub mod capacity;
 pub mod certainty;
+pub(crate) mod clip_file;
 pub(crate) mod clips;
 pub mod comparison;
 pub mod day;

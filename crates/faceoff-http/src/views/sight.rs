@@ -275,12 +275,8 @@ impl<'a> GameSight<'a> {
             }
             _ => "it is never there for everybody",
         };
-        let kind = match self.viewer {
-            Viewer::Anybody => ProblemKind::Unauthenticated,
-            Viewer::Organiser | Viewer::Team(_) => ProblemKind::Forbidden,
-        };
         Problem::new(
-            kind,
+            self.viewer.refusal(),
             format!("{what} is not yours to see: {when}; a team gets its own side's at once"),
         )
     }

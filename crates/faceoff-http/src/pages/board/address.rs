@@ -1,8 +1,10 @@
 //! Where the other boards of a page are: by the query that asked for this one, with a part of it changed.
 
-use crate::requests::{BoardColumn, BoardPageQuery, BoardSort};
+use crate::{
+    query::asking,
+    requests::{BoardColumn, BoardPageQuery, BoardSort},
+};
 use jiff::civil::Date;
-use std::fmt::Write;
 
 /// Path and query of a board's page.
 pub(super) struct Address<'a> {
@@ -42,56 +44,12 @@ fn written(
     day: Option<Date>,
     sort: Option<BoardSort>,
 ) -> String {
-    let parts = [
-        ("stage", query.stage.map(|stage| stage.to_string())),
-        (
-            "revision",
-            query.revision.map(|revision| revision.to_string()),
-        ),
-        (
-            "division",
-            query.division.as_ref().map(|name| encoded(name.as_str())),
-        ),
-        ("day", day.map(|day| day.to_string())),
-        ("by", query.by.map(|by| by.as_str().to_owned())),
-        ("live", query.live.then(|| "true".to_owned())),
-        (
-            "sort",
-            sort.map(|sort| {
-                let sign = if sort.is_reversed { "-" } else { "" };
-                format!("{sign}{}", sort.column.as_str())
-            }),
-        ),
-    ];
-    let mut address = path.to_owned();
-    let mut sign = '?';
-    for (name, value) in parts {
-        if let Some(value) = value {
-            address.push(sign);
-            address.push_str(name);
-            address.push('=');
-            address.push_str(&value);
-            sign = '&';
-        }
-    }
-    address
-}
-
-/// As a query has it.
-fn encoded(text: &str) -> String {
-    let mut encoded = String::new();
-    for byte in text.bytes() {
-        match byte {
-            b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'-' | b'.' | b'_' | b'~' => {
-                encoded.push(char::from(byte));
-            }
-            _ => {
-                // A string takes all that is written to it.
-                let _ = write!(encoded, "%{byte:02X}");
-            }
-        }
-    }
-    encoded
+    let query = BoardPageQuery {
+        day,
+        sort,
+        ..query.clone()
+    };
+    asking(path, &query)
 }
 
 #[cfg(test)]
@@ -113,11 +71,11 @@ mod tests {
         let address = Address::of("/tasks/hit", &query);
         assert_eq!(
             address.of_day(None),
-            "/tasks/hit?division=Bachelor%20students&sort=-points"
+            "/tasks/hit?division=Bachelor+students&sort=-points"
         );
         assert_eq!(
             address.at("/"),
-            "/?division=Bachelor%20students&day=2026-03-02"
+            "/?division=Bachelor+students&day=2026-03-02"
         );
         let usual = BoardSort {
             column: BoardColumn::Place,
@@ -125,7 +83,7 @@ mod tests {
         };
         assert_eq!(
             address.sorted(usual),
-            "/tasks/hit?division=Bachelor%20students&day=2026-03-02"
+            "/tasks/hit?division=Bachelor+students&day=2026-03-02"
         );
         let plain = BoardPageQuery::default();
         assert_eq!(Address::of("/", &plain).of_day(None), "/");

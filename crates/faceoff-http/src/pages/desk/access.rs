@@ -7,9 +7,10 @@ use crate::{
     auth::Caller,
     extract::{PageForm, PathParam},
     pages::{
-        desk_frame::{self, Done, Head, done, render_desk},
+        desk_frame::{Done, Head, Said, done, render_desk},
+        figures::minute,
         frame::{Frame, PageProblem},
-        signed_in::{Refused, SignedIn},
+        signed_in::SignedIn,
     },
     problem::Problem,
     requests::{InvitedRole, NewInvitation, NewToken},
@@ -128,12 +129,12 @@ fn key(token: TokenView, names: &BTreeMap<String, String>, caller: &Caller, now:
         (None, None) => "the host".to_owned(),
     };
     let state = match (token.revoked_at, token.expires_at) {
-        (Some(at), _) => format!("revoked {}", desk_frame::at(at)),
-        (None, Some(at)) if at <= now => format!("expired {}", desk_frame::at(at)),
-        (None, Some(at)) => format!("good until {}", desk_frame::at(at)),
+        (Some(at), _) => format!("revoked {}", minute(at)),
+        (None, Some(at)) if at <= now => format!("expired {}", minute(at)),
+        (None, Some(at)) => format!("good until {}", minute(at)),
         (None, None) => "good, without an end".to_owned(),
     };
-    let last = token.last_used_at.map(desk_frame::at);
+    let last = token.last_used_at.map(minute);
     Key {
         id: token.id,
         whose,
@@ -141,7 +142,7 @@ fn key(token: TokenView, names: &BTreeMap<String, String>, caller: &Caller, now:
             "session" => "session of a browser".to_owned(),
             _ => "token".to_owned(),
         },
-        created_at: desk_frame::at(token.created_at),
+        created_at: minute(token.created_at),
         last_used: last.unwrap_or_else(|| "never".to_owned()),
         state,
         is_this: token.id == caller.token.id,
@@ -168,16 +169,15 @@ fn invited(view: InvitationView, names: &BTreeMap<String, String>) -> Invited {
         note: view.note,
         role,
         state: view.state,
-        until: desk_frame::at(view.expires_at),
+        until: minute(view.expires_at),
     }
 }
 
 async fn page_with(
     app: &App,
     caller: &Caller,
-    said: &Done,
+    said: Said<'_>,
     told: Told,
-    refused: Option<&Problem>,
 ) -> Result<Response, PageProblem> {
     let now = app.config.clock.now();
     let names = event::names(app).await?;
@@ -216,8 +216,8 @@ async fn page_with(
                 ),
                 None => "organiser".to_owned(),
             },
-            joined_at: desk_frame::at(view.joined_at),
-            left_at: view.left_at.map(desk_frame::at),
+            joined_at: minute(view.joined_at),
+            left_at: view.left_at.map(minute),
             is_self,
             can_remove: view.left_at.is_none() && (is_organiser || is_self),
         }
@@ -229,7 +229,7 @@ async fn page_with(
     let season = SeasonHead::now(app).await?.name;
     let page = Page {
         frame: Frame::of(app, season, base),
-        head: Head::of(caller, base, said).refusing(refused),
+        head: Head::of(caller, base, said),
         base,
         is_organiser,
         people: everybody.collect(),
@@ -242,18 +242,15 @@ async fn page_with(
         token_name: told.token_name,
         note: told.note,
     };
-    render_desk(&page, refused)
+    render_desk(&page, said)
 }
 
 async fn page(
-    signed_in: Result<SignedIn, Refused>,
+    SignedIn(caller): SignedIn,
     State(app): State<App>,
     Query(said): Query<Done>,
 ) -> Result<Response, PageProblem> {
-    match signed_in {
-        Ok(SignedIn(caller)) => page_with(&app, &caller, &said, Told::default(), None).await,
-        Err(refused) => Ok(refused.into_response()),
-    }
+    page_with(&app, &caller, Said::Done(&said), Told::default()).await
 }
 
 /// The page, with what was made: it is shown this once, so nothing leads on.
@@ -266,7 +263,7 @@ async fn made(
         secret: Some(secret),
         ..Told::default()
     };
-    let page = page_with(app, caller, &Done::default(), told, None).await?;
+    let page = page_with(app, caller, Said::Nothing, told).await?;
     Ok((StatusCode::CREATED, page).into_response())
 }
 
@@ -300,14 +297,10 @@ fn wanted_token(app: &App, caller: &Caller, form: &TokenForm) -> Result<NewToken
 }
 
 async fn make_token(
-    signed_in: Result<SignedIn, Refused>,
+    SignedIn(caller): SignedIn,
     State(app): State<App>,
     form: Result<PageForm<TokenForm>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let SignedIn(caller) = match signed_in {
-        Ok(signed_in) => signed_in,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let PageForm(form) = form?;
     let made_token = match wanted_token(&app, &caller, &form) {
         Ok(wanted) => keys::create_token(&app, &caller, wanted).await,
@@ -323,7 +316,7 @@ async fn make_token(
                 token_name: form.name,
                 ..Told::default()
             };
-            page_with(&app, &caller, &Done::default(), told, Some(&problem)).await
+            page_with(&app, &caller, Said::Refused(&problem), told).await
         }
     }
 }
@@ -332,21 +325,17 @@ async fn make_token(
 struct Nothing {}
 
 async fn revoke_token(
-    signed_in: Result<SignedIn, Refused>,
+    SignedIn(caller): SignedIn,
     State(app): State<App>,
     id: Result<PathParam<TokenId>, Problem>,
     form: Result<PageForm<Nothing>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let SignedIn(caller) = match signed_in {
-        Ok(signed_in) => signed_in,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let (PathParam(id), PageForm(Nothing {})) = (id?, form?);
     match keys::revoke_token(&app, &caller, id).await {
         Ok(_) => Ok(done(base(&caller), "revoked")),
         Err(problem) => {
             let told = Told::default();
-            page_with(&app, &caller, &Done::default(), told, Some(&problem)).await
+            page_with(&app, &caller, Said::Refused(&problem), told).await
         }
     }
 }
@@ -400,14 +389,10 @@ fn wanted_invitation(caller: &Caller, form: &InvitationForm) -> Result<NewInvita
 }
 
 async fn invite(
-    signed_in: Result<SignedIn, Refused>,
+    SignedIn(caller): SignedIn,
     State(app): State<App>,
     form: Result<PageForm<InvitationForm>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let SignedIn(caller) = match signed_in {
-        Ok(signed_in) => signed_in,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let PageForm(form) = form?;
     let invitation = match wanted_invitation(&caller, &form) {
         Ok(wanted) => inviting::create_invitation(&app, &caller, wanted).await,
@@ -423,27 +408,23 @@ async fn invite(
                 note: form.note,
                 ..Told::default()
             };
-            page_with(&app, &caller, &Done::default(), told, Some(&problem)).await
+            page_with(&app, &caller, Said::Refused(&problem), told).await
         }
     }
 }
 
 async fn revoke_invitation(
-    signed_in: Result<SignedIn, Refused>,
+    SignedIn(caller): SignedIn,
     State(app): State<App>,
     id: Result<PathParam<InvitationId>, Problem>,
     form: Result<PageForm<Nothing>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let SignedIn(caller) = match signed_in {
-        Ok(signed_in) => signed_in,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let (PathParam(id), PageForm(Nothing {})) = (id?, form?);
     match inviting::revoke_invitation(&app, &caller, id).await {
         Ok(_) => Ok(done(base(&caller), "uninvited")),
         Err(problem) => {
             let told = Told::default();
-            page_with(&app, &caller, &Done::default(), told, Some(&problem)).await
+            page_with(&app, &caller, Said::Refused(&problem), told).await
         }
     }
 }
@@ -455,22 +436,18 @@ struct RemovalForm {
 }
 
 async fn remove_person(
-    signed_in: Result<SignedIn, Refused>,
+    SignedIn(caller): SignedIn,
     State(app): State<App>,
     id: Result<PathParam<PersonId>, Problem>,
     form: Result<PageForm<RemovalForm>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let SignedIn(caller) = match signed_in {
-        Ok(signed_in) => signed_in,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let (PathParam(id), PageForm(form)) = (id?, form?);
     let confirm = Some(form.confirm.trim());
     match people::remove_person(&app, &caller, id, confirm).await {
         Ok(_) => Ok(done(base(&caller), "removed")),
         Err(problem) => {
             let told = Told::default();
-            page_with(&app, &caller, &Done::default(), told, Some(&problem)).await
+            page_with(&app, &caller, Said::Refused(&problem), told).await
         }
     }
 }

@@ -6,23 +6,20 @@ use crate::{
     app::App,
     extract::PageForm,
     pages::{
-        desk_frame::{self, Done, Head, done, render_desk},
+        desk_frame::{self, Done, Head, Said, done, render_desk},
+        entry::Entry,
         frame::{Frame, PageProblem},
-        signed_in::{Member, Refused, SignedIn},
+        signed_in::{Member, SignedIn},
     },
     problem::Problem,
-    views::{
-        me::MeView,
-        season::SeasonHead,
-        submission::{SubmissionStatus, SubmissionView},
-    },
+    views::{me::MeView, season::SeasonHead, submission::SubmissionView},
 };
 use askama::Template;
 use axum::{
     extract::{Query, State},
     response::{IntoResponse, Redirect, Response},
 };
-use faceoff_types::{EvaluationId, SubmissionId};
+use faceoff_types::EvaluationId;
 use serde::Deserialize;
 
 /// Submissions and evaluations that are listed at once; the rest is behind a fold.
@@ -47,91 +44,24 @@ struct Page {
     is_validating: bool,
 }
 
-/// A submission in a list.
-pub(super) struct Entry {
-    pub(super) id: SubmissionId,
-    pub(super) name: String,
-    pub(super) file: String,
-    pub(super) uploaded_at: String,
-    /// In a word.
-    pub(super) state: &'static str,
-    /// How that is coloured, beside its word.
-    pub(super) class: &'static str,
-    pub(super) reason: Option<String>,
-    pub(super) place: Option<String>,
-    pub(super) next: String,
-    pub(super) is_active: bool,
-    pub(super) can_activate: bool,
-    pub(super) can_withdraw: bool,
-    pub(super) has_archive: bool,
-}
-
-impl From<&SubmissionView> for Entry {
-    fn from(view: &SubmissionView) -> Self {
-        let is_gone = view.archive_removed.is_some();
-        let is_valid = matches!(view.status, SubmissionStatus::Valid { .. });
-        let is_withdrawn = view.withdrawn_at.is_some();
-        let (state, class, reason) = match &view.status {
-            _ if view.deleted.is_some() => ("deleted", "plain", None),
-            _ if is_withdrawn => ("withdrawn", "plain", None),
-            SubmissionStatus::Validating => ("in its smoke run", "waiting", None),
-            SubmissionStatus::Valid { .. } => ("valid", "good", None),
-            SubmissionStatus::Invalid { reason, .. } => ("invalid", "bad", Some(reason.clone())),
-            SubmissionStatus::ValidationError { reason } => (
-                "not checked, by the server’s fault",
-                "bad",
-                Some(reason.clone()),
-            ),
-        };
-        let place = view.queue.map(|queue| {
-            let when = match queue.expected_at {
-                Some(at) => format!("verdict expected {}", desk_frame::at(at)),
-                None => "nobody can tell yet when its verdict comes".to_owned(),
-            };
-            format!("Number {} of {} smoke runs; {when}", queue.place, queue.of)
-        });
-        let named = view.label.clone().or_else(|| view.agent_name.clone());
-        Self {
-            id: view.id,
-            name: named.unwrap_or_else(|| view.file_name.clone()),
-            file: format!("{}, {}", view.file_name, desk_frame::bytes(view.bytes)),
-            uploaded_at: desk_frame::at(view.created_at),
-            state,
-            class,
-            reason,
-            place,
-            next: view.next.clone(),
-            is_active: view.active,
-            can_activate: is_valid && !is_gone && !view.active,
-            can_withdraw: is_valid && !is_gone && !is_withdrawn,
-            has_archive: !is_gone && !matches!(view.status, SubmissionStatus::Invalid { .. }),
-        }
-    }
-}
-
 /// The desk; of an organiser, theirs.
 pub(super) async fn page(
-    signed_in: Result<SignedIn, Refused>,
+    SignedIn(caller): SignedIn,
     State(app): State<App>,
     Query(said): Query<Done>,
 ) -> Result<Response, PageProblem> {
-    let caller = match signed_in {
-        Ok(SignedIn(caller)) if caller.is_organiser() => {
-            return Ok(Redirect::to("/organiser").into_response());
-        }
-        Ok(SignedIn(caller)) => caller,
-        Err(refused) => return Ok(refused.into_response()),
-    };
+    if caller.is_organiser() {
+        return Ok(Redirect::to("/organiser").into_response());
+    }
     let team = crate::auth::TeamCaller::of(caller.clone())?;
-    page_with(&app, &Member { caller, team }, &said, None).await
+    page_with(&app, &Member { caller, team }, Said::Done(&said)).await
 }
 
-/// The desk, with what was done or `refused`.
+/// The desk, with what was done or refused.
 pub(super) async fn page_with(
     app: &App,
     member: &Member,
-    said: &Done,
-    refused: Option<&Problem>,
+    said: Said<'_>,
 ) -> Result<Response, PageProblem> {
     let team = &member.team.team;
     let season = SeasonHead::now(app).await?.name;
@@ -146,7 +76,7 @@ pub(super) async fn page_with(
     let today = me.turn.evaluation.zip(me.turn.next.clone());
     let page = Page {
         frame: Frame::of(app, season, "/desk"),
-        head: Head::of(&member.caller, "/desk", said).refusing(refused),
+        head: Head::of(&member.caller, "/desk", said),
         next_cut: me.next_cut.as_ref().map(ToString::to_string),
         active: active.map(Entry::from),
         today,
@@ -159,7 +89,7 @@ pub(super) async fn page_with(
         is_validating: !me.validating.is_empty(),
         me,
     };
-    render_desk(&page, refused)
+    render_desk(&page, said)
 }
 
 #[derive(Deserialize)]
@@ -169,17 +99,13 @@ pub(super) struct TermsForm {
 
 /// The person accepts the terms.
 pub(super) async fn accept_terms(
-    member: Result<Member, Refused>,
+    member: Member,
     State(app): State<App>,
     form: Result<PageForm<TermsForm>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let member = match member {
-        Ok(member) => member,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let PageForm(TermsForm { version }) = form?;
     match people::accept_terms(&app, &member.caller, version).await {
         Ok(_) => Ok(done("/desk", "terms")),
-        Err(problem) => page_with(&app, &member, &Done::default(), Some(&problem)).await,
+        Err(problem) => page_with(&app, &member, Said::Refused(&problem)).await,
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::{
     app::AppState,
-    pages::{desk_frame, figures},
+    pages::figures::{self, minute},
     problem::Problem,
     viewer::Viewer,
     views::{
@@ -103,7 +103,7 @@ fn of_view(sight: &Sight, view: EvaluationView) -> Played {
             finished_at,
             reason,
         } => {
-            format!("cancelled {}: {reason}", desk_frame::at(finished_at))
+            format!("cancelled {}: {reason}", minute(finished_at))
         }
     };
     if let Some(ruling) = view.voided {

@@ -5,9 +5,10 @@ use crate::{
     app::App,
     extract::PageForm,
     pages::{
-        desk_frame::{self, Done, Head, done, render_desk},
+        desk_frame::{Done, Head, Said, done, render_desk},
+        figures::minute,
         frame::{Frame, PageProblem},
-        signed_in::{Member, Refused},
+        signed_in::Member,
     },
     problem::Problem,
     requests::NewQuestion,
@@ -16,7 +17,7 @@ use crate::{
 use askama::Template;
 use axum::{
     extract::{Query, State},
-    response::{IntoResponse, Response},
+    response::Response,
 };
 
 const PATH: &str = "/desk/questions";
@@ -32,54 +33,43 @@ struct Page {
 
 impl Page {
     fn at(&self, at: &jiff::Timestamp) -> String {
-        desk_frame::at(*at)
+        minute(*at)
     }
 }
 
 async fn page_with(
     app: &App,
     member: &Member,
-    said: &Done,
+    said: Said<'_>,
     text: String,
-    refused: Option<&Problem>,
 ) -> Result<Response, PageProblem> {
     let season = SeasonHead::now(app).await?.name;
     let page = Page {
         frame: Frame::of(app, season, PATH),
-        head: Head::of(&member.caller, PATH, said).refusing(refused),
+        head: Head::of(&member.caller, PATH, said),
         questions: telling::questions(app, Some(&member.caller)).await?,
         text,
     };
-    render_desk(&page, refused)
+    render_desk(&page, said)
 }
 
 pub(super) async fn page(
-    member: Result<Member, Refused>,
+    member: Member,
     State(app): State<App>,
     Query(said): Query<Done>,
 ) -> Result<Response, PageProblem> {
-    match member {
-        Ok(member) => page_with(&app, &member, &said, String::new(), None).await,
-        Err(refused) => Ok(refused.into_response()),
-    }
+    page_with(&app, &member, Said::Done(&said), String::new()).await
 }
 
 /// Asks.
 pub(super) async fn ask(
-    member: Result<Member, Refused>,
+    member: Member,
     State(app): State<App>,
     form: Result<PageForm<NewQuestion>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let member = match member {
-        Ok(member) => member,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let PageForm(form) = form?;
     match telling::ask(&app, &member.team, &form).await {
         Ok(_) => Ok(done(PATH, "asked")),
-        Err(problem) => {
-            let said = Done::default();
-            page_with(&app, &member, &said, form.text, Some(&problem)).await
-        }
+        Err(problem) => page_with(&app, &member, Said::Refused(&problem), form.text).await,
     }
 }

@@ -1,14 +1,14 @@
 //! `/desk/submissions/{id}`: a submission's verdict, its log, and what becomes of it.
 
-use super::agents::Entry;
 use crate::{
     acts::entering_days,
     app::App,
     extract::{PageForm, PathParam},
     pages::{
-        desk_frame::{Done, Head, done, render_desk},
+        desk_frame::{Done, Head, Said, done, render_desk},
+        entry::Entry,
         frame::{Frame, PageProblem},
-        signed_in::{Member, Refused},
+        signed_in::Member,
     },
     problem::Problem,
     requests::SubmissionChange,
@@ -20,7 +20,7 @@ use crate::{
 use askama::Template;
 use axum::{
     extract::{Query, State},
-    response::{IntoResponse, Response},
+    response::Response,
 };
 use faceoff_types::{SmokeTiming, SubmissionId};
 use serde::Deserialize;
@@ -71,9 +71,8 @@ async fn page_with(
     app: &App,
     member: &Member,
     id: SubmissionId,
-    said: &Done,
+    said: Said<'_>,
     filled: Option<Words>,
-    refused: Option<&Problem>,
 ) -> Result<Response, PageProblem> {
     let found = app.store.submission(id).await;
     let submission = member
@@ -91,7 +90,7 @@ async fn page_with(
     });
     let page = Page {
         frame: Frame::of(app, season, ""),
-        head: Head::of(&member.caller, "", said).refusing(refused),
+        head: Head::of(&member.caller, "", said),
         entry: Entry::from(&view),
         log: log.filter(|log| !log.trim().is_empty()),
         timing: view.timing.iter().map(Timing::from).collect(),
@@ -100,20 +99,17 @@ async fn page_with(
         is_validating: view.status == SubmissionStatus::Validating,
         view,
     };
-    render_desk(&page, refused)
+    render_desk(&page, said)
 }
 
 /// A submission of the team's.
 pub(super) async fn page(
-    member: Result<Member, Refused>,
+    member: Member,
     State(app): State<App>,
     id: Result<PathParam<SubmissionId>, Problem>,
     Query(said): Query<Done>,
 ) -> Result<Response, PageProblem> {
-    match member {
-        Ok(member) => page_with(&app, &member, id?.0, &said, None, None).await,
-        Err(refused) => Ok(refused.into_response()),
-    }
+    page_with(&app, &member, id?.0, Said::Done(&said), None).await
 }
 
 #[derive(Deserialize)]
@@ -121,37 +117,29 @@ pub(super) struct Nothing {}
 
 /// Has it play at the next cut.
 pub(super) async fn activate(
-    member: Result<Member, Refused>,
+    member: Member,
     State(app): State<App>,
     id: Result<PathParam<SubmissionId>, Problem>,
     form: Result<PageForm<Nothing>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let member = match member {
-        Ok(member) => member,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let (PathParam(id), PageForm(Nothing {})) = (id?, form?);
     match entering_days::activate_submission(&app, &member.team, id).await {
         Ok(_) => Ok(done("/desk", "activated")),
-        Err(problem) => page_with(&app, &member, id, &Done::default(), None, Some(&problem)).await,
+        Err(problem) => page_with(&app, &member, id, Said::Refused(&problem), None).await,
     }
 }
 
 /// Takes it back.
 pub(super) async fn withdraw(
-    member: Result<Member, Refused>,
+    member: Member,
     State(app): State<App>,
     id: Result<PathParam<SubmissionId>, Problem>,
     form: Result<PageForm<Nothing>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let member = match member {
-        Ok(member) => member,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let (PathParam(id), PageForm(Nothing {})) = (id?, form?);
     match entering_days::withdraw_submission(&app, &member.team, id).await {
         Ok(_) => Ok(done("/desk", "withdrawn")),
-        Err(problem) => page_with(&app, &member, id, &Done::default(), None, Some(&problem)).await,
+        Err(problem) => page_with(&app, &member, id, Said::Refused(&problem), None).await,
     }
 }
 
@@ -164,15 +152,11 @@ pub(super) struct Words {
 
 /// Changes that.
 pub(super) async fn describe(
-    member: Result<Member, Refused>,
+    member: Member,
     State(app): State<App>,
     id: Result<PathParam<SubmissionId>, Problem>,
     form: Result<PageForm<Words>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let member = match member {
-        Ok(member) => member,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let (PathParam(id), PageForm(words)) = (id?, form?);
     let said = |text: &str| Some(Some(text.trim().to_owned()).filter(|text| !text.is_empty()));
     let change = SubmissionChange {
@@ -183,7 +167,7 @@ pub(super) async fn describe(
         Ok(_) => Ok(done(&path(id), "described")),
         Err(problem) => {
             let filled = Some(words);
-            page_with(&app, &member, id, &Done::default(), filled, Some(&problem)).await
+            page_with(&app, &member, id, Said::Refused(&problem), filled).await
         }
     }
 }

@@ -6,19 +6,14 @@ use crate::{
     app::App,
     form_file::FormFile,
     pages::{
-        desk_frame::{Done, done},
+        desk_frame::{Said, done},
         frame::PageProblem,
-        signed_in::{Member, Refused},
+        signed_in::Member,
     },
     problem::{Problem, ProblemKind},
     session,
 };
-use axum::{
-    body::Body,
-    extract::State,
-    http::HeaderMap,
-    response::{IntoResponse, Response},
-};
+use axum::{body::Body, extract::State, http::HeaderMap, response::Response};
 use faceoff_store::Submission;
 
 async fn taken(
@@ -44,18 +39,14 @@ async fn taken(
 
 /// Takes the agent in and leads to the desk, or says there what was wrong with it.
 pub(super) async fn submit(
-    member: Result<Member, Refused>,
+    member: Member,
     State(app): State<App>,
     headers: HeaderMap,
     body: Body,
 ) -> Result<Response, PageProblem> {
-    let member = match member {
-        Ok(member) => member,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     session::check_own_page(&headers)?;
     match taken(&app, &member, &headers, body).await {
         Ok(_) => Ok(done("/desk", "uploaded")),
-        Err(problem) => agents::page_with(&app, &member, &Done::default(), Some(&problem)).await,
+        Err(problem) => agents::page_with(&app, &member, Said::Refused(&problem)).await,
     }
 }

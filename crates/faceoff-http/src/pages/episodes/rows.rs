@@ -1,6 +1,6 @@
 //! An episode as a row of the table.
 
-use crate::pages::{episode_words::in_words, figures};
+use crate::pages::{episode_words::in_words, figures, replay::page_path};
 use faceoff_replay::{EpisodeLine, model::CONTROL_STEP_S};
 use faceoff_types::{EvaluationId, Task};
 
@@ -22,7 +22,7 @@ impl Row {
         Self {
             task: *task,
             episode: *episode,
-            path: format!("/evaluations/{id}/episodes/{task}/{episode}"),
+            path: page_path(id, *task, *episode),
             success: line.success,
             why: line.why.clone(),
             broken: line.broken.iter().map(in_words).collect(),

@@ -3,9 +3,11 @@
 use crate::{
     app::App,
     pages::{
-        desk_frame::{self, Done, Head, render_desk},
-        frame::{Frame, PageProblem},
-        signed_in::{Organising, Refused},
+        desk_frame::{self, Done, Head, Said},
+        figures::minute,
+        frame::{Frame, PageProblem, render},
+        signed_in::Organising,
+        standing,
     },
     problem::Problem,
     views::{
@@ -21,7 +23,7 @@ use crate::{
 use askama::Template;
 use axum::{
     extract::{Query, State},
-    response::{IntoResponse, Response},
+    response::Response,
 };
 use faceoff_store::{RegistrationState, Stage, StagePhase};
 use faceoff_types::{StageDay, StageId, StageName};
@@ -75,7 +77,7 @@ async fn of_server(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Problem
                     title: "The queue is paused".to_owned(),
                     detail: format!(
                         "Since {} ({}). Nothing new is begun; units of work that wait: {}.",
-                        desk_frame::at(ruling.at),
+                        minute(ruling.at),
                         ruling.reason,
                         health.waiting
                     ),
@@ -117,11 +119,7 @@ async fn of_people(app: &App) -> Result<Vec<Item>, Problem> {
         items.push(Item {
             class: "waiting",
             title: format!("{} wants to take part", one.team_name),
-            detail: format!(
-                "Registered {}. {}",
-                desk_frame::at(one.created_at),
-                one.contact
-            ),
+            detail: format!("Registered {}. {}", minute(one.created_at), one.contact),
             links: vec![
                 (
                     format!("/organiser/decide/approve/{}", one.id),
@@ -233,12 +231,7 @@ async fn of_stage(app: &App, stage: Stage) -> Result<(Vec<Item>, Standing), Prob
     let next_cut = NextCut::of(app, &stage).await?.map(|next| next.to_string());
     let standing = Standing {
         id: stage.id,
-        phase: match phase {
-            StagePhase::Upcoming => "upcoming",
-            StagePhase::Open => "open",
-            StagePhase::Closed if is_provisional => "closed, provisional",
-            StagePhase::Closed => "signed off",
-        },
+        phase: standing::phase(phase.into(), stage.finalised.is_some()),
         name: stage.name,
         newest: newest_day,
         next_cut,
@@ -247,14 +240,10 @@ async fn of_stage(app: &App, stage: Stage) -> Result<(Vec<Item>, Standing), Prob
 }
 
 pub(super) async fn page(
-    organising: Result<Organising, Refused>,
+    organising: Organising,
     State(app): State<App>,
     Query(said): Query<Done>,
 ) -> Result<Response, PageProblem> {
-    let organising = match organising {
-        Ok(organising) => organising,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let (mut items, queue) = of_server(&app).await?;
     let mut stages = Vec::new();
     for stage in app.store.stages().await.map_err(Problem::from)? {
@@ -269,7 +258,7 @@ pub(super) async fn page(
     let path = "/organiser";
     let page = Page {
         frame: Frame::of(&app, season.clone(), path),
-        head: Head::of(&organising.caller, path, &said),
+        head: Head::of(&organising.caller, path, Said::Done(&said)),
         season,
         items,
         queue,
@@ -277,5 +266,5 @@ pub(super) async fn page(
         teams: app.store.teams().await.map_err(Problem::from)?.len(),
         stages,
     };
-    render_desk(&page, None)
+    render(&page)
 }

@@ -4,10 +4,10 @@ use crate::{
     app::App,
     extract::QueryParams,
     pages::{
-        desk_frame::{self, Done, Head, render_desk},
-        figures,
-        frame::{Frame, PageProblem},
-        signed_in::{Organising, Refused},
+        desk_frame::{Done, Head, Said},
+        figures::{self, minute},
+        frame::{Frame, PageProblem, render},
+        signed_in::Organising,
     },
     problem::Problem,
     views::{
@@ -21,10 +21,7 @@ use crate::{
     },
 };
 use askama::Template;
-use axum::{
-    extract::State,
-    response::{IntoResponse, Response},
-};
+use axum::{extract::State, response::Response};
 use faceoff_store::StagePhase;
 use faceoff_types::{EvaluationId, StageDay, StageId, StageName, TeamId, TeamName};
 use jiff::civil::Date;
@@ -124,7 +121,7 @@ fn row(view: EvaluationView, replaced: &BTreeSet<EvaluationId>) -> Row {
         detail,
         progress: (!is_final)
             .then_some((view.progress.episodes_done, view.progress.episodes_total)),
-        expected: expected.map(desk_frame::at),
+        expected: expected.map(minute),
         score,
         can_cancel: !is_final,
         can_void: counts,
@@ -142,14 +139,10 @@ pub(super) struct Query {
 
 /// A day; without a query the newest of the stage that is open.
 pub(super) async fn page(
-    organising: Result<Organising, Refused>,
+    organising: Organising,
     State(app): State<App>,
     query: Result<QueryParams<Query>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let organising = match organising {
-        Ok(organising) => organising,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let QueryParams(query) = query?;
     let store = &app.store;
     let now = app.config.clock.now();
@@ -202,15 +195,15 @@ pub(super) async fn page(
     let said = Done { done: query.done };
     let page = Page {
         frame: Frame::of(&app, season.name, "/organiser/day"),
-        head: Head::of(&organising.caller, "/organiser/day", &said),
+        head: Head::of(&organising.caller, "/organiser/day", Said::Done(&said)),
         stages: stages
             .into_iter()
             .filter(|other| other.id != stage.id)
             .map(|other| (other.id, other.name))
             .collect(),
-        cut_at: day.map(|day| desk_frame::at(day.cut_at)),
-        deadline_at: day.and_then(|day| day.deadline_at).map(desk_frame::at),
-        released_at: day.and_then(|day| day.released_at).map(desk_frame::at),
+        cut_at: day.map(|day| minute(day.cut_at)),
+        deadline_at: day.and_then(|day| day.deadline_at).map(minute),
+        released_at: day.and_then(|day| day.released_at).map(minute),
         missed: missed
             .into_iter()
             .find_map(|(day, reason)| (day == of).then_some(reason)),
@@ -232,5 +225,5 @@ pub(super) async fn page(
         stage_name: stage.name,
         of,
     };
-    render_desk(&page, None)
+    render(&page)
 }

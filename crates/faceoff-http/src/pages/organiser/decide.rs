@@ -5,19 +5,16 @@ use crate::{
     app::App,
     extract::{PageForm, PathParam},
     pages::{
-        desk_frame::{Done, Head, done, render_desk},
+        desk_frame::{Head, Said, done, render_desk},
         frame::{Frame, PageProblem},
-        signed_in::{Organising, Refused},
+        signed_in::Organising,
     },
     problem::Problem,
     requests::Decision,
     views::season::SeasonHead,
 };
 use askama::Template;
-use axum::{
-    extract::State,
-    response::{IntoResponse, Response},
-};
+use axum::{extract::State, response::Response};
 use serde::Deserialize;
 
 #[derive(Template)]
@@ -34,29 +31,26 @@ async fn page_with(
     organising: &Organising,
     order: Order,
     reason: String,
-    refused: Option<&Problem>,
+    said: Said<'_>,
 ) -> Result<Response, PageProblem> {
     let sheet = order.sheet(app).await?;
     let season = SeasonHead::now(app).await?.name;
     let page = Page {
         frame: Frame::of(app, season, ""),
-        head: Head::of(&organising.caller, "", &Done::default()).refusing(refused),
+        head: Head::of(&organising.caller, "", said),
         sheet,
         reason,
     };
-    render_desk(&page, refused)
+    render_desk(&page, said)
 }
 
 /// What it would do.
 pub(super) async fn page(
-    organising: Result<Organising, Refused>,
+    organising: Organising,
     State(app): State<App>,
     order: Result<PathParam<Order>, Problem>,
 ) -> Result<Response, PageProblem> {
-    match organising {
-        Ok(organising) => page_with(&app, &organising, order?.0, String::new(), None).await,
-        Err(refused) => Ok(refused.into_response()),
-    }
+    page_with(&app, &organising, order?.0, String::new(), Said::Nothing).await
 }
 
 #[derive(Deserialize)]
@@ -69,15 +63,11 @@ pub(super) struct Form {
 
 /// Does it, and leads back; or says on the same page why not.
 pub(super) async fn submit(
-    organising: Result<Organising, Refused>,
+    organising: Organising,
     State(app): State<App>,
     order: Result<PathParam<Order>, Problem>,
     form: Result<PageForm<Form>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let organising = match organising {
-        Ok(organising) => organising,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let (PathParam(order), PageForm(form)) = (order?, form?);
     // Asked before it is done, since it leads back to where it stood.
     let back = order.sheet(&app).await?.back;
@@ -88,6 +78,15 @@ pub(super) async fn submit(
     let actor = organising.organiser.actor();
     match order.carry_out(&app, actor, decision).await {
         Ok(key) => Ok(done(&back, key)),
-        Err(problem) => page_with(&app, &organising, order, form.reason, Some(&problem)).await,
+        Err(problem) => {
+            page_with(
+                &app,
+                &organising,
+                order,
+                form.reason,
+                Said::Refused(&problem),
+            )
+            .await
+        }
     }
 }

@@ -4,11 +4,12 @@ use crate::{
     app::App,
     extract::QueryParams,
     pages::{
-        desk_frame::{Done, Head, render_desk},
+        desk_frame::{Head, Said, render_desk},
         frame::{Frame, PageProblem},
-        signed_in::{Organising, Refused, encoded},
+        signed_in::Organising,
     },
     problem::Problem,
+    query::asking,
     requests::EventsQuery,
     views::{
         event::{EventView, EventsView},
@@ -18,7 +19,7 @@ use crate::{
 use askama::Template;
 use axum::{
     extract::{RawQuery, State},
-    response::{IntoResponse, Redirect, Response},
+    response::{Redirect, Response},
 };
 
 const PATH: &str = "/organiser/log";
@@ -29,10 +30,7 @@ struct Page {
     frame: Frame,
     head: Head,
     events: EventsView,
-    actor: String,
-    subject: String,
-    kind: String,
-    limit: Option<u32>,
+    query: EventsQuery,
 }
 
 impl Page {
@@ -49,24 +47,15 @@ impl Page {
 
     /// The log of one value of a field.
     fn only(&self, field: &str, value: &str) -> String {
-        format!("{PATH}?{field}={}", encoded(value))
+        asking(PATH, &[(field, value)])
     }
 
     fn older(&self) -> Option<String> {
-        let mut link = format!("{PATH}?before={}", self.events.next_before?);
-        for (name, value) in [
-            ("actor", &self.actor),
-            ("subject", &self.subject),
-            ("kind", &self.kind),
-        ] {
-            if !value.is_empty() {
-                link.push_str(&format!("&{name}={}", encoded(value)));
-            }
-        }
-        if let Some(limit) = self.limit {
-            link.push_str(&format!("&limit={limit}"));
-        }
-        Some(link)
+        let older = EventsQuery {
+            before: Some(self.events.next_before?),
+            ..self.query.clone()
+        };
+        Some(asking(PATH, &older))
     }
 }
 
@@ -79,28 +68,17 @@ pub(super) async fn moved(RawQuery(query): RawQuery) -> Redirect {
 }
 
 pub(super) async fn page(
-    organising: Result<Organising, Refused>,
+    organising: Organising,
     State(app): State<App>,
     query: Result<QueryParams<EventsQuery>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let organising = match organising {
-        Ok(organising) => organising,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let QueryParams(mut query) = query?;
     // A form sends what was left empty, too.
     for field in [&mut query.actor, &mut query.subject, &mut query.kind] {
         field.take_if(|text| text.trim().is_empty());
     }
-    let filled = |field: &Option<String>| field.clone().unwrap_or_default();
-    let (actor, subject, kind) = (
-        filled(&query.actor),
-        filled(&query.subject),
-        filled(&query.kind),
-    );
-    let limit = query.limit;
     let season = SeasonHead::now(&app).await?.name;
-    let (events, refused) = match EventsView::page(&app, query).await {
+    let (events, refused) = match EventsView::page(&app, query.clone()).await {
         Ok(events) => (events, None),
         Err(problem) => {
             let none = EventsView {
@@ -110,14 +88,12 @@ pub(super) async fn page(
             (none, Some(problem))
         }
     };
+    let said = refused.as_ref().map_or(Said::Nothing, Said::Refused);
     let page = Page {
         frame: Frame::of(&app, season, PATH),
-        head: Head::of(&organising.caller, PATH, &Done::default()).refusing(refused.as_ref()),
+        head: Head::of(&organising.caller, PATH, said),
         events,
-        actor,
-        subject,
-        kind,
-        limit,
+        query,
     };
-    render_desk(&page, refused.as_ref())
+    render_desk(&page, said)
 }

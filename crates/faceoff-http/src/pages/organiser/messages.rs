@@ -5,9 +5,10 @@ use crate::{
     app::App,
     extract::{PageForm, PathParam},
     pages::{
-        desk_frame::{self, Done, Head, done, render_desk},
+        desk_frame::{Done, Head, Said, done, render_desk},
+        figures::minute,
         frame::{Frame, PageProblem},
-        signed_in::{Organising, Refused},
+        signed_in::Organising,
     },
     problem::Problem,
     requests::{NewAnnouncement, NewAnswer, NewTerms},
@@ -20,7 +21,7 @@ use crate::{
 use askama::Template;
 use axum::{
     extract::{Query, State},
-    response::{IntoResponse, Response},
+    response::Response,
 };
 use faceoff_types::QuestionId;
 use serde::Deserialize;
@@ -54,7 +55,7 @@ struct Typed {
 
 impl Page {
     fn at(&self, at: &jiff::Timestamp) -> String {
-        desk_frame::at(*at)
+        minute(*at)
     }
 
     fn team(&self, question: &QuestionView) -> &str {
@@ -74,9 +75,8 @@ impl Page {
 async fn page_with(
     app: &App,
     organising: &Organising,
-    said: &Done,
+    said: Said<'_>,
     typed: Typed,
-    refused: Option<&Problem>,
 ) -> Result<Response, PageProblem> {
     let all = telling::questions(app, Some(&organising.caller)).await?;
     let (open, answered) = all.into_iter().partition(|one| one.answer.is_none());
@@ -86,7 +86,7 @@ async fn page_with(
     let season = SeasonHead::now(app).await?.name;
     let page = Page {
         frame: Frame::of(app, season, PATH),
-        head: Head::of(&organising.caller, PATH, said).refusing(refused),
+        head: Head::of(&organising.caller, PATH, said),
         open,
         answered,
         announcements: announcements.map(AnnouncementView::from).collect(),
@@ -94,30 +94,23 @@ async fn page_with(
         names: event::names(app).await?,
         typed,
     };
-    render_desk(&page, refused)
+    render_desk(&page, said)
 }
 
 pub(super) async fn page(
-    organising: Result<Organising, Refused>,
+    organising: Organising,
     State(app): State<App>,
     Query(said): Query<Done>,
 ) -> Result<Response, PageProblem> {
-    match organising {
-        Ok(organising) => page_with(&app, &organising, &said, Typed::default(), None).await,
-        Err(refused) => Ok(refused.into_response()),
-    }
+    page_with(&app, &organising, Said::Done(&said), Typed::default()).await
 }
 
 /// Tells everybody.
 pub(super) async fn announce(
-    organising: Result<Organising, Refused>,
+    organising: Organising,
     State(app): State<App>,
     form: Result<PageForm<NewAnnouncement>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let organising = match organising {
-        Ok(organising) => organising,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let PageForm(form) = form?;
     match telling::announce(&app, organising.organiser.actor(), &form).await {
         Ok(_) => Ok(done(PATH, "announced")),
@@ -127,8 +120,7 @@ pub(super) async fn announce(
                 text: form.text,
                 ..Typed::default()
             };
-            let said = Done::default();
-            page_with(&app, &organising, &said, typed, Some(&problem)).await
+            page_with(&app, &organising, Said::Refused(&problem), typed).await
         }
     }
 }
@@ -143,15 +135,11 @@ pub(super) struct AnswerForm {
 
 /// Answers a question.
 pub(super) async fn answer(
-    organising: Result<Organising, Refused>,
+    organising: Organising,
     State(app): State<App>,
     id: Result<PathParam<QuestionId>, Problem>,
     form: Result<PageForm<AnswerForm>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let organising = match organising {
-        Ok(organising) => organising,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let (PathParam(id), PageForm(form)) = (id?, form?);
     let new = NewAnswer {
         text: form.text,
@@ -164,22 +152,17 @@ pub(super) async fn answer(
                 answer: Some((id, new.text)),
                 ..Typed::default()
             };
-            let said = Done::default();
-            page_with(&app, &organising, &said, typed, Some(&problem)).await
+            page_with(&app, &organising, Said::Refused(&problem), typed).await
         }
     }
 }
 
 /// Publishes other terms.
 pub(super) async fn publish_terms(
-    organising: Result<Organising, Refused>,
+    organising: Organising,
     State(app): State<App>,
     form: Result<PageForm<NewTerms>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let organising = match organising {
-        Ok(organising) => organising,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let PageForm(form) = form?;
     match telling::publish_terms(&app, organising.organiser.actor(), &form).await {
         Ok(_) => Ok(done(PATH, "published")),
@@ -188,8 +171,7 @@ pub(super) async fn publish_terms(
                 terms: form.text,
                 ..Typed::default()
             };
-            let said = Done::default();
-            page_with(&app, &organising, &said, typed, Some(&problem)).await
+            page_with(&app, &organising, Said::Refused(&problem), typed).await
         }
     }
 }

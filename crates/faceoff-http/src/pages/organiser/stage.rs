@@ -6,9 +6,10 @@ use crate::{
     app::App,
     extract::{PageForm, PathParam},
     pages::{
-        desk_frame::{self, Done, Head, done, render_desk},
+        desk_frame::{Done, Head, Said, done, render_desk},
+        figures::minute,
         frame::{Frame, PageProblem},
-        signed_in::{Organising, Refused},
+        signed_in::Organising,
     },
     problem::{Problem, ProblemKind},
     viewer::Viewer,
@@ -20,7 +21,7 @@ use crate::{
 use askama::Template;
 use axum::{
     extract::{Query, State},
-    response::{IntoResponse, Response},
+    response::Response,
 };
 use faceoff_types::{Profile, StageId, Standings};
 
@@ -40,7 +41,7 @@ struct Page {
 
 impl Page {
     fn at(&self, at: &jiff::Timestamp) -> String {
-        desk_frame::at(*at)
+        minute(*at)
     }
 }
 
@@ -48,19 +49,19 @@ async fn page_with(
     app: &App,
     organising: &Organising,
     id: StageId,
-    said: &Done,
+    said: Said<'_>,
     form: Option<StageForm>,
-    refused: Option<&Problem>,
 ) -> Result<Response, PageProblem> {
     let stage = app.store.stage(id).await.map_err(Problem::from)?;
     let form = form.unwrap_or_else(|| StageForm::of(&stage));
     let season = SeasonHead::now(app).await?.name;
     let view = StageView::of(app, stage).await?;
     let view = view.seen_by(app, Viewer::Organiser).await?;
-    let is_asked = refused.is_some_and(|problem| problem.kind() == ProblemKind::NotConfirmed);
+    let is_asked =
+        matches!(said, Said::Refused(problem) if problem.kind() == ProblemKind::NotConfirmed);
     let page = Page {
         frame: Frame::of(app, season, ""),
-        head: Head::of(&organising.caller, "/organiser/stages", said).refusing(refused),
+        head: Head::of(&organising.caller, "/organiser/stages", said),
         form,
         profiles: Profile::ALL,
         confirm: is_asked.then(|| view.name.to_string()),
@@ -68,32 +69,25 @@ async fn page_with(
         has_final_day: view.settings.standings == Standings::Final,
         stage: view,
     };
-    render_desk(&page, refused)
+    render_desk(&page, said)
 }
 
 pub(super) async fn page(
-    organising: Result<Organising, Refused>,
+    organising: Organising,
     State(app): State<App>,
     id: Result<PathParam<StageId>, Problem>,
     Query(said): Query<Done>,
 ) -> Result<Response, PageProblem> {
-    match organising {
-        Ok(organising) => page_with(&app, &organising, id?.0, &said, None, None).await,
-        Err(refused) => Ok(refused.into_response()),
-    }
+    page_with(&app, &organising, id?.0, Said::Done(&said), None).await
 }
 
 /// Changes the stage, or says on the same page why not, or what is to be confirmed.
 pub(super) async fn change(
-    organising: Result<Organising, Refused>,
+    organising: Organising,
     State(app): State<App>,
     id: Result<PathParam<StageId>, Problem>,
     form: Result<PageForm<StageForm>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let organising = match organising {
-        Ok(organising) => organising,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let (PathParam(id), PageForm(form)) = (id?, form?);
     let stage = app.store.stage(id).await.map_err(Problem::from)?;
     let actor = organising.organiser.actor();
@@ -103,9 +97,6 @@ pub(super) async fn change(
     };
     match changed {
         Ok(_) => Ok(done(&format!("/organiser/stages/{id}"), "stage-changed")),
-        Err(problem) => {
-            let said = Done::default();
-            page_with(&app, &organising, id, &said, Some(form), Some(&problem)).await
-        }
+        Err(problem) => page_with(&app, &organising, id, Said::Refused(&problem), Some(form)).await,
     }
 }

@@ -6,20 +6,22 @@ use crate::{
     app::App,
     extract::PageForm,
     pages::{
-        desk_frame::{self, Done, Head, done, render_desk},
+        desk_frame::{Done, Head, Said, done, render_desk},
+        figures::minute,
         frame::{Frame, PageProblem},
-        signed_in::{Organising, Refused},
+        signed_in::Organising,
+        standing,
     },
     problem::Problem,
     views::{
         season::SeasonHead,
-        stage::{self, PhaseView, StageView},
+        stage::{self, StageView},
     },
 };
 use askama::Template;
 use axum::{
     extract::{Query, State},
-    response::{IntoResponse, Response},
+    response::Response,
 };
 use faceoff_types::Profile;
 
@@ -38,25 +40,19 @@ struct Page {
 
 impl Page {
     fn phase(&self, stage: &StageView) -> &'static str {
-        match stage.phase {
-            PhaseView::Upcoming => "upcoming",
-            PhaseView::Open => "open",
-            PhaseView::Closed if stage.finalised.is_some() => "signed off",
-            PhaseView::Closed => "closed, provisional",
-        }
+        standing::phase(stage.phase, stage.finalised.is_some())
     }
 
     fn at(&self, at: &jiff::Timestamp) -> String {
-        desk_frame::at(*at)
+        minute(*at)
     }
 }
 
 async fn page_with(
     app: &App,
     organising: &Organising,
-    said: &Done,
+    said: Said<'_>,
     form: Option<StageForm>,
-    refused: Option<&Problem>,
 ) -> Result<Response, PageProblem> {
     let season = SeasonHead::now(app).await?.name;
     let path = "/organiser/stages";
@@ -66,37 +62,30 @@ async fn page_with(
     };
     let page = Page {
         frame: Frame::of(app, season, path),
-        head: Head::of(&organising.caller, path, said).refusing(refused),
+        head: Head::of(&organising.caller, path, said),
         stages: StageView::all(app).await?,
         form,
         profiles: Profile::ALL,
         confirm: None,
-        is_refused: refused.is_some(),
+        is_refused: matches!(said, Said::Refused(_)),
     };
-    render_desk(&page, refused)
+    render_desk(&page, said)
 }
 
 pub(super) async fn page(
-    organising: Result<Organising, Refused>,
+    organising: Organising,
     State(app): State<App>,
     Query(said): Query<Done>,
 ) -> Result<Response, PageProblem> {
-    match organising {
-        Ok(organising) => page_with(&app, &organising, &said, None, None).await,
-        Err(refused) => Ok(refused.into_response()),
-    }
+    page_with(&app, &organising, Said::Done(&said), None).await
 }
 
 /// Makes a stage.
 pub(super) async fn create(
-    organising: Result<Organising, Refused>,
+    organising: Organising,
     State(app): State<App>,
     form: Result<PageForm<StageForm>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let organising = match organising {
-        Ok(organising) => organising,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let PageForm(form) = form?;
     let actor = organising.organiser.actor();
     let made = match form.new_stage() {
@@ -105,9 +94,6 @@ pub(super) async fn create(
     };
     match made {
         Ok(_) => Ok(done("/organiser/stages", "stage-made")),
-        Err(problem) => {
-            let said = Done::default();
-            page_with(&app, &organising, &said, Some(form), Some(&problem)).await
-        }
+        Err(problem) => page_with(&app, &organising, Said::Refused(&problem), Some(form)).await,
     }
 }

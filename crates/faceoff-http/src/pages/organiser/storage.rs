@@ -3,18 +3,15 @@
 use crate::{
     app::App,
     pages::{
-        desk_frame::{self, Done, Head, render_desk},
-        frame::{Frame, PageProblem},
-        signed_in::{Organising, Refused},
+        desk_frame::{self, Head, Said},
+        frame::{Frame, PageProblem, render},
+        signed_in::Organising,
     },
     problem::Problem,
     views::{season::SeasonHead, storage::StorageView},
 };
 use askama::Template;
-use axum::{
-    extract::State,
-    response::{IntoResponse, Response},
-};
+use axum::{extract::State, response::Response};
 use faceoff_types::{StageId, StageName};
 
 #[derive(Template)]
@@ -45,13 +42,9 @@ impl Page {
 }
 
 pub(super) async fn page(
-    organising: Result<Organising, Refused>,
+    organising: Organising,
     State(app): State<App>,
 ) -> Result<Response, PageProblem> {
-    let organising = match organising {
-        Ok(organising) => organising,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let room = app.store.room();
     let disks = room.disks().into_iter().flatten().map(|disk| Disk {
         free: desk_frame::bytes(disk.free_bytes),
@@ -80,12 +73,12 @@ pub(super) async fn page(
     let path = "/organiser/storage";
     let page = Page {
         frame: Frame::of(&app, season, path),
-        head: Head::of(&organising.caller, path, &Done::default()),
+        head: Head::of(&organising.caller, path, Said::Nothing),
         disks,
         kept_free: desk_frame::bytes(room.min_free_bytes()),
         is_short: room.is_short(),
         teams,
         stages,
     };
-    render_desk(&page, None)
+    render(&page)
 }

@@ -5,9 +5,10 @@ use crate::{
     app::App,
     extract::{PageForm, PathParam},
     pages::{
-        desk_frame::{self, Done, Head, done, render_desk},
+        desk_frame::{Done, Head, Said, done, render_desk},
+        figures::minute,
         frame::{Frame, PageProblem},
-        signed_in::{Organising, Refused},
+        signed_in::Organising,
     },
     problem::Problem,
     requests::{SeasonChange, TeamChange},
@@ -16,7 +17,7 @@ use crate::{
 use askama::Template;
 use axum::{
     extract::{Query, State},
-    response::{IntoResponse, Response},
+    response::Response,
 };
 use faceoff_types::{DivisionName, TeamId};
 use serde::Deserialize;
@@ -35,7 +36,7 @@ struct Page {
 
 impl Page {
     fn at(&self, at: &jiff::Timestamp) -> String {
-        desk_frame::at(*at)
+        minute(*at)
     }
 }
 
@@ -44,9 +45,8 @@ const PATH: &str = "/organiser/teams";
 async fn page_with(
     app: &App,
     organising: &Organising,
-    said: &Done,
+    said: Said<'_>,
     filled: Option<SeasonForm>,
-    refused: Option<&Problem>,
 ) -> Result<Response, PageProblem> {
     let registrations = app.store.registrations().await.map_err(Problem::from)?;
     let registrations = registrations.into_iter().map(RegistrationView::from);
@@ -67,25 +67,22 @@ async fn page_with(
     let name = SeasonHead::now(app).await?.name;
     let page = Page {
         frame: Frame::of(app, name, PATH),
-        head: Head::of(&organising.caller, PATH, said).refusing(refused),
+        head: Head::of(&organising.caller, PATH, said),
         teams: TeamView::all(app).await?,
         waiting,
         decided,
         divisions,
         season: form,
     };
-    render_desk(&page, refused)
+    render_desk(&page, said)
 }
 
 pub(super) async fn page(
-    organising: Result<Organising, Refused>,
+    organising: Organising,
     State(app): State<App>,
     Query(said): Query<Done>,
 ) -> Result<Response, PageProblem> {
-    match organising {
-        Ok(organising) => page_with(&app, &organising, &said, None, None).await,
-        Err(refused) => Ok(refused.into_response()),
-    }
+    page_with(&app, &organising, Said::Done(&said), None).await
 }
 
 /// What of a team only organisers change.
@@ -110,15 +107,11 @@ fn team_change(form: &TeamForm) -> Result<TeamChange, Problem> {
 
 /// Puts a team into a division, or makes it a reference agent.
 pub(super) async fn change(
-    organising: Result<Organising, Refused>,
+    organising: Organising,
     State(app): State<App>,
     id: Result<PathParam<TeamId>, Problem>,
     form: Result<PageForm<TeamForm>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let organising = match organising {
-        Ok(organising) => organising,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let (PathParam(id), PageForm(form)) = (id?, form?);
     let changed = match team_change(&form) {
         Ok(change) => teams::change_team(&app, &organising.caller, id, change).await,
@@ -126,10 +119,7 @@ pub(super) async fn change(
     };
     match changed {
         Ok(_) => Ok(done(PATH, "team-changed")),
-        Err(problem) => {
-            let said = Done::default();
-            page_with(&app, &organising, &said, None, Some(&problem)).await
-        }
+        Err(problem) => page_with(&app, &organising, Said::Refused(&problem), None).await,
     }
 }
 
@@ -155,14 +145,10 @@ fn season_change(form: &SeasonForm) -> Result<SeasonChange, Problem> {
 
 /// Changes whether teams may register, and the divisions.
 pub(super) async fn change_season(
-    organising: Result<Organising, Refused>,
+    organising: Organising,
     State(app): State<App>,
     form: Result<PageForm<SeasonForm>, Problem>,
 ) -> Result<Response, PageProblem> {
-    let organising = match organising {
-        Ok(organising) => organising,
-        Err(refused) => return Ok(refused.into_response()),
-    };
     let PageForm(form) = form?;
     let actor = organising.organiser.actor();
     let changed = match season_change(&form) {
@@ -171,9 +157,6 @@ pub(super) async fn change_season(
     };
     match changed {
         Ok(()) => Ok(done(PATH, "season-changed")),
-        Err(problem) => {
-            let said = Done::default();
-            page_with(&app, &organising, &said, Some(form), Some(&problem)).await
-        }
+        Err(problem) => page_with(&app, &organising, Said::Refused(&problem), Some(form)).await,
     }
 }
