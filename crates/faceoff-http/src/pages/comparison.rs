@@ -1,5 +1,7 @@
 //! `/evaluations/{a}/compare/{b}`: two evaluations on the same episodes.
 
+pub(super) mod pair;
+
 use super::{
     figures,
     frame::{Frame, PageProblem, render},
@@ -10,11 +12,12 @@ use crate::{
     problem::Problem,
     requests::ComparisonQuery,
     viewer::Viewer,
-    views::{comparison::ComparisonView, season::SeasonHead, sight::Sight},
+    views::{clips::Clips, comparison::ComparisonView, season::SeasonHead, sight::Sight},
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
-use faceoff_types::EvaluationId;
+use faceoff_scoring::WhoSolved;
+use faceoff_types::{EvaluationId, Task};
 
 /// A difference with its interval and its test.
 struct Difference {
@@ -54,6 +57,28 @@ struct Row {
     difference: Difference,
 }
 
+/// The episodes of a task that one of the two alone solved.
+struct Differing {
+    task: Task,
+    sides: [(String, Vec<u32>); 2],
+}
+
+impl Differing {
+    /// Tasks without any are left out.
+    fn of(view: &ComparisonView) -> Vec<Self> {
+        let of_task = |(task, who): (&Task, &WhoSolved)| Self {
+            task: *task,
+            sides: [
+                (view.a.team.to_string(), who.only_a.clone()),
+                (view.b.team.to_string(), who.only_b.clone()),
+            ],
+        };
+        let all = view.episodes.iter().flatten().map(of_task);
+        all.filter(|of| of.sides.iter().any(|(_, episodes)| !episodes.is_empty()))
+            .collect()
+    }
+}
+
 #[derive(Template)]
 #[template(path = "comparison.html")]
 struct Page {
@@ -63,6 +88,9 @@ struct Page {
     score_a: String,
     score_b: String,
     overall: Difference,
+    differing: Vec<Differing>,
+    /// Can episodes be looked at side by side?
+    has_replays: bool,
 }
 
 /// The comparison of two evaluations.
@@ -73,7 +101,11 @@ pub(super) async fn page(
 ) -> Result<Response, PageProblem> {
     let PathParams(ids) = ids?;
     let sight = Sight::of(&app, viewer?).await?;
-    let view = ComparisonView::of(&app, &sight, ids, ComparisonQuery::default()).await?;
+    let view = ComparisonView::of(&app, &sight, ids, ComparisonQuery { episodes: true }).await?;
+    let mut has_replays = true;
+    for id in ids {
+        has_replays &= Clips::of(&app, &sight, id).await.is_ok();
+    }
     let season = SeasonHead::now(&app).await?;
     let names = [view.a.team.as_str(), view.b.team.as_str()];
     let rows = view
@@ -109,6 +141,8 @@ pub(super) async fn page(
             of.told_apart,
             names,
         ),
+        differing: Differing::of(&view),
+        has_replays,
         view,
     })
 }

@@ -27,6 +27,7 @@ mod organiser;
 mod problems;
 mod register;
 mod replay;
+mod replay_section;
 mod robots;
 mod season;
 mod sign_in;
@@ -56,6 +57,10 @@ pub(crate) fn router(patience: Duration, api: Arc<Value>) -> Router<App> {
         .route("/teams/{id}", get(team::page))
         .route("/evaluations/{id}", get(evaluation::page))
         .route("/evaluations/{id}/compare/{other}", get(comparison::page))
+        .route(
+            "/evaluations/{id}/compare/{other}/{task}/{episode}",
+            get(comparison::pair::page),
+        )
         .route("/evaluations/{id}/episodes", get(episodes::page))
         .route(
             "/evaluations/{id}/episodes/{task}/{episode}",

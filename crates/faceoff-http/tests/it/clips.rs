@@ -28,7 +28,7 @@ struct Recorded {
 }
 
 /// The pack of a real, if short, evaluation.
-fn pack(folder: &std::path::Path) -> PathBuf {
+pub(crate) fn pack(folder: &std::path::Path) -> PathBuf {
     let seed = Seed::from_number(3);
     let arena = Arena::new(Profile::Evaluation, seed, seed.model_mismatch());
     let part = folder.join("part");

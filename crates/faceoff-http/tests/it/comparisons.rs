@@ -1,4 +1,9 @@
-use crate::site::{Played, Site, outcome};
+use crate::{
+    clips,
+    html::texts,
+    site::{Played, Site, outcome},
+};
+use faceoff_store::{Artifacts, EvaluationState};
 use faceoff_types::{EpisodeOutcome, EvaluationId, Task, Violations};
 use serde_json::json;
 
@@ -67,9 +72,64 @@ async fn two_evaluations_of_a_day_are_compared_episode_by_episode() {
     ] {
         assert!(page.body.contains(part), "{part:?} is not in {}", page.body);
     }
+    let differing = texts(&html, ".differing dd");
+    assert!(differing[0].starts_with("40 41 42"), "{differing:?}");
+    assert_eq!(differing[1], "none");
     let evaluation = site.get(&format!("/evaluations/{a}"), None).await;
     let link = format!("/evaluations/{a}/compare/{b}");
     assert!(evaluation.body.contains(&link), "{}", evaluation.body);
+}
+
+#[tokio::test]
+async fn an_episode_of_both_is_shown_side_by_side_and_in_step() {
+    let site = Site::start().await;
+    let alpha = |task, e| played(task, e, e < 60, false);
+    let beta = |task, e| played(task, e, e >= 1, false);
+    let [a, b] = site
+        .played_day(100, [("Alpha", &alpha), ("Beta", &beta)])
+        .await;
+    let pair = |episode: u32| format!("/evaluations/{a}/compare/{b}/prepare/{episode}");
+    let without = site.get(&pair(0), None).await;
+    assert_eq!(without.status, 409, "{}", without.body);
+    assert!(without.body.contains("no replays"), "{}", without.body);
+
+    let folder = tempfile::tempdir().unwrap();
+    let pack = clips::pack(folder.path());
+    for id in [a, b] {
+        let EvaluationState::Finished { dataset, .. } =
+            site.store.evaluation(id).await.unwrap().state
+        else {
+            panic!("not finished");
+        };
+        let key = Artifacts::clips_of(&dataset);
+        site.store.artifacts().put_file(&key, &pack).await.unwrap();
+    }
+    let page = site.get(&pair(0), None).await;
+    assert_eq!(page.status, 200, "{}", page.body);
+    let html = scraper::Html::parse_document(&page.body);
+    assert!(html.errors.is_empty(), "{:?}", html.errors);
+    let replays = scraper::Selector::parse("section.replay").unwrap();
+    let replays: Vec<_> = html.select(&replays).map(|found| found.value()).collect();
+    assert_eq!(replays.len(), 2);
+    for (replay, id) in replays.iter().zip([a, b]) {
+        let motion = format!("/api/v1/evaluations/{id}/episodes/prepare/0/motion");
+        assert_eq!(replay.attr("data-motion"), Some(motion.as_str()));
+        assert_eq!(
+            replay.attr("data-together"),
+            Some("both"),
+            "they run in step"
+        );
+        assert_eq!(replay.attr("data-observed"), None, "that is their teams'");
+    }
+    assert_ne!(replays[0].id(), replays[1].id());
+    assert!(page.body.contains(&pair(60)), "the next that differs");
+    let list = site
+        .get(&format!("/evaluations/{a}/compare/{b}"), None)
+        .await;
+    assert!(list.body.contains(&pair(0)), "{}", list.body);
+    for nothing in [pair(1000), format!("/evaluations/{a}/compare/{b}/swim/0")] {
+        assert_eq!(site.get(&nothing, None).await.status, 404, "{nothing}");
+    }
 }
 
 #[tokio::test]

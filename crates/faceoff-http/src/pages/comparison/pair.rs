@@ -1,0 +1,147 @@
+//! `/evaluations/{a}/compare/{b}/{task}/{episode}`: one episode as both played it, side by side and in step.
+
+use crate::{
+    app::App,
+    extract::PathParams,
+    pages::{
+        assets,
+        episode_words::in_words,
+        frame::{Frame, PageProblem, render},
+        replay::page_path,
+        replay_section::ReplaySection,
+    },
+    paths,
+    problem::{Problem, ProblemKind},
+    requests::ComparisonQuery,
+    viewer::Viewer,
+    views::{
+        clips::Clips,
+        comparison::{ComparedView, ComparisonView},
+        season::SeasonHead,
+        sight::Sight,
+    },
+};
+use askama::Template;
+use axum::{extract::State, response::Response};
+use faceoff_replay::model::CONTROL_STEP_S;
+use faceoff_scoring::WhoSolved;
+use faceoff_types::{EvaluationId, Task};
+use jiff::civil::Date;
+
+/// How one of the two went.
+struct Side {
+    team: String,
+    path: String,
+    success: bool,
+    duration_s: String,
+    broken: Vec<String>,
+    replay: ReplaySection,
+}
+
+#[derive(Template)]
+#[template(path = "comparison_pair.html")]
+struct Page {
+    frame: Frame,
+    ids: [EvaluationId; 2],
+    task: Task,
+    episode: u32,
+    day: Date,
+    sides: Vec<Side>,
+    /// The nearest episodes of the task that one alone solved.
+    before: Option<u32>,
+    after: Option<u32>,
+    styles: [&'static str; 2],
+    script: &'static str,
+}
+
+/// An episode of two evaluations.
+pub(in crate::pages) async fn page(
+    viewer: Result<Viewer, Problem>,
+    State(app): State<App>,
+    path: Result<PathParams<String, 4>, Problem>,
+) -> Result<Response, PageProblem> {
+    let PathParams([a, b, task, episode]) = path?;
+    let nothing = || Problem::new(ProblemKind::NotFound, "there is no such episode of both");
+    let id = |text: &str| text.parse::<EvaluationId>().map_err(|_| nothing());
+    let ids = [id(&a)?, id(&b)?];
+    let task: Task = task.parse().map_err(|_| nothing())?;
+    let episode: u32 = episode.parse().map_err(|_| nothing())?;
+    let sight = Sight::of(&app, viewer?).await?;
+    let query = ComparisonQuery { episodes: true };
+    let view = ComparisonView::of(&app, &sight, ids, query).await?;
+    let sides = [
+        side(&app, &sight, &view.a, "replay-a", (task, episode)).await?,
+        side(&app, &sight, &view.b, "replay-b", (task, episode)).await?,
+    ];
+    let who = view.episodes.as_ref().and_then(|all| all.get(&task));
+    let [before, after] = who.map_or([None; 2], |who| beside(who, episode));
+    let season = SeasonHead::now(&app).await?;
+    render(&Page {
+        frame: Frame::of(&app, season.name, ""),
+        ids,
+        task,
+        episode,
+        day: view.day,
+        sides: sides.into(),
+        before,
+        after,
+        styles: [assets::EPISODES_STYLE.url(), assets::REPLAY_STYLE.url()],
+        script: assets::REPLAY_SCRIPT.url(),
+    })
+}
+
+async fn side(
+    app: &App,
+    sight: &Sight,
+    of: &ComparedView,
+    id: &'static str,
+    (task, episode): (Task, u32),
+) -> Result<Side, Problem> {
+    let clips = Clips::of(app, sight, of.evaluation).await?;
+    let found = clips.episode(task, episode).await?;
+    let api = format!(
+        "{}/episodes/{task}/{episode}",
+        paths::evaluation(of.evaluation)
+    );
+    let name = format!("{task}, episode {episode}, {}", of.team);
+    let title = format!("{}, {task} {episode}", of.team);
+    Ok(Side {
+        team: of.team.to_string(),
+        path: page_path(of.evaluation, task, episode),
+        success: found.line.success,
+        duration_s: format!("{:.2}", f64::from(found.line.steps) * CONTROL_STEP_S),
+        broken: found.line.broken.iter().map(in_words).collect(),
+        replay: ReplaySection {
+            id,
+            together: Some("both"),
+            ..ReplaySection::of(&found, &api, name, title)
+        },
+    })
+}
+
+/// The nearest episodes before and after this one that one of the two alone solved.
+fn beside(who: &WhoSolved, episode: u32) -> [Option<u32>; 2] {
+    let differing = || who.only_a.iter().chain(&who.only_b).copied();
+    [
+        differing().filter(|other| *other < episode).max(),
+        differing().filter(|other| *other > episode).min(),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_that_differ_are_found_whoever_solved_them() {
+        let who = WhoSolved {
+            both: vec![2],
+            only_a: vec![0, 7],
+            only_b: vec![3, 9],
+            neither: vec![5],
+        };
+        assert_eq!(beside(&who, 5), [Some(3), Some(7)]);
+        assert_eq!(beside(&who, 0), [None, Some(3)]);
+        assert_eq!(beside(&who, 9), [Some(7), None]);
+    }
+}
