@@ -15,6 +15,6 @@ pub(crate) const CALIBRATION_FILE: &str = "calibration.json";
 /// What a dataset is, and the hashes of its other files.
 pub(crate) const MANIFEST_FILE: &str = "manifest.json";
 /// What replays are drawn from, in a shard's folder; beside the dataset, not in it.
-pub(crate) const CLIPS_FILE: &str = "clips";
+pub const CLIPS_FILE: &str = "clips";
 /// The end of the agent's standard error.
 pub(crate) const LOG_FILE: &str = "agent.log";

@@ -25,7 +25,7 @@ pub mod verify;
 pub use assemble::{Assembled, assemble};
 pub use dataset::{Dataset, EpisodeRecord, Layout, StepBatches, StepTable};
 pub use error::{DatasetError, RecordingError};
-pub use files::ARCHIVE_FILE;
+pub use files::{ARCHIVE_FILE, CLIPS_FILE};
 pub use recorder::Recorder;
 pub use shard::ShardReport;
 pub use shard_folder::ShardFolder;

@@ -1,5 +1,13 @@
 //! Tables for spreadsheets.
 
+use axum::{
+    http::header,
+    response::{IntoResponse, Response},
+};
+
+/// RFC 7111, with the line of names.
+pub(crate) const MEDIA_TYPE: &str = "text/csv; charset=utf-8; header=present";
+
 /// Lines of fields; quoted where they must be.
 pub(crate) struct Table(String);
 
@@ -24,6 +32,18 @@ impl Table {
             }
         }
         self.0.push_str("\r\n");
+    }
+
+    /// As a file of this name.
+    pub(crate) fn into_download(self, name: &'static str) -> Response {
+        let headers = [
+            (header::CONTENT_TYPE, MEDIA_TYPE.to_owned()),
+            (
+                header::CONTENT_DISPOSITION,
+                format!("attachment; filename=\"{name}\""),
+            ),
+        ];
+        (headers, self.into_bytes()).into_response()
     }
 
     pub(crate) fn into_bytes(self) -> Vec<u8> {

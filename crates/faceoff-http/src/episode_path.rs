@@ -5,7 +5,7 @@ use crate::{
     problem::{Problem, ProblemKind},
 };
 use axum::{extract::FromRequestParts, http::request::Parts};
-use faceoff_types::{EvaluationId, Task};
+use faceoff_types::{EvaluationId, Profile, SubmissionId, Task};
 use std::{fmt::Display, str::FromStr};
 
 /// An episode of an evaluation: the parameters `{id}`, `{task}` and `{episode}` of the path.
@@ -24,6 +24,30 @@ impl<S: Send + Sync> FromRequestParts<S> for EpisodePath {
             PathParams::<String, 3>::from_request_parts(parts, state).await?;
         Ok(Self {
             id: parsed(&id, "evaluation")?,
+            task: parsed(&task, "task")?,
+            episode: parsed(&episode, "episode")?,
+        })
+    }
+}
+
+/// An episode of a submission's ablation: the parameters `{id}`, `{profile}`, `{task}` and `{episode}` of the path.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct AblationPath {
+    pub(crate) submission: SubmissionId,
+    pub(crate) profile: Profile,
+    pub(crate) task: Task,
+    pub(crate) episode: u32,
+}
+
+impl<S: Send + Sync> FromRequestParts<S> for AblationPath {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        let PathParams([id, profile, task, episode]) =
+            PathParams::<String, 4>::from_request_parts(parts, state).await?;
+        Ok(Self {
+            submission: parsed(&id, "submission")?,
+            profile: parsed(&profile, "profile")?,
             task: parsed(&task, "task")?,
             episode: parsed(&episode, "episode")?,
         })

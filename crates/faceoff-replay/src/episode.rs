@@ -141,7 +141,7 @@ impl Recording {
             start: place_and_velocity(&self.start),
             last: place_and_velocity(&self.last),
             broken: self.broken,
-            longest_s: self.times.iter().copied().fold(0.0, f64::max),
+            longest_s: Some(self.times.iter().copied().fold(0.0, f64::max)),
             late: u32::try_from(late.len()).unwrap_or(u32::MAX),
         };
         let (motion_columns, contacts) = self.motion.take();

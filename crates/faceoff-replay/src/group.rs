@@ -22,6 +22,17 @@ impl Group {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Ee, Self::Link, Self::JointPos, Self::JointVel];
 
+    /// Its name in files.
+    #[must_use]
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Ee => "ee",
+            Self::Link => "link",
+            Self::JointPos => "joint_pos",
+            Self::JointVel => "joint_vel",
+        }
+    }
+
     /// Its value, above 0 if broken.
     #[must_use]
     pub const fn of(self, values: &ConstraintValues) -> f64 {

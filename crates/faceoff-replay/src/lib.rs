@@ -32,7 +32,7 @@ pub use header::{
     Break, BreakKind, ClipKind, ColumnHeader, Contact, ContactWith, EndTold, Header, Lost,
     ViolationTold,
 };
-pub use pack::{Key, Pack, PackWriter, join};
+pub use pack::{Key, Pack, PackWriter, join, select, sheet_of};
 pub use recorder::ClipRecorder;
 pub use sheet::{Broken, EpisodeLine, Sheet, TimeBins};
 

@@ -12,6 +12,7 @@ use crate::{error::ReplayError, sheet::Sheet};
 use faceoff_types::{Side, Task};
 use fs_err::File;
 use std::{
+    collections::BTreeSet,
     io::Write,
     os::unix::fs::FileExt,
     path::{Path, PathBuf},
@@ -167,6 +168,16 @@ impl<W: Write> PackWriter<W> {
         Ok(())
     }
 
+    /// Adds clips of another pack.
+    fn copy(&mut self, pack: &Pack, is_wanted: impl Fn(Key) -> bool) -> Result<(), ReplayError> {
+        for entry in pack.index.iter().filter(|entry| is_wanted(entry.key)) {
+            if let Some(bytes) = pack.clip(entry.key)? {
+                self.add(entry.key, &bytes)?;
+            }
+        }
+        Ok(())
+    }
+
     /// Adds the sheet of the pack's episodes.
     ///
     /// # Errors
@@ -285,17 +296,50 @@ impl Pack {
 /// # Errors
 /// [`ReplayError`].
 pub fn join<W: Write>(packs: &[PathBuf], out: W) -> Result<W, ReplayError> {
-    let mut writer = PackWriter::new(out)?;
-    let mut sheet = Sheet::default();
+    let (mut writer, mut sheet) = (PackWriter::new(out)?, Sheet::default());
     for path in packs {
         let pack = Pack::open(path)?;
-        for entry in pack.index.iter().filter(|entry| entry.key != Key::SHEET) {
-            if let Some(bytes) = pack.clip(entry.key)? {
-                writer.add(entry.key, &bytes)?;
-            }
-        }
+        writer.copy(&pack, |key| key != Key::SHEET)?;
         sheet.merge(pack.sheet()?);
     }
     writer.add_sheet(&sheet)?;
     writer.finish()
+}
+
+/// Joins the packs of an evaluation's shards, and keeps some of its episodes alone; computation times are not counted then.
+///
+/// # Errors
+/// [`ReplayError`].
+pub fn select<W: Write>(
+    packs: &[PathBuf],
+    kept: &BTreeSet<(Task, u32)>,
+    out: W,
+) -> Result<W, ReplayError> {
+    let of_episode = |(task, episode): &(Task, u32)| {
+        [Key::motion(*task, *episode), Key::observed(*task, *episode)]
+    };
+    let keys: BTreeSet<Key> = kept.iter().flat_map(of_episode).collect();
+    let mut writer = PackWriter::new(out)?;
+    for path in packs {
+        writer.copy(&Pack::open(path)?, |key| keys.contains(&key))?;
+    }
+    let mut sheet = sheet_of(packs)?;
+    sheet
+        .episodes
+        .retain(|line| kept.contains(&(line.task, line.episode)));
+    sheet.times.clear();
+    writer.add_sheet(&sheet)?;
+    writer.finish()
+}
+
+/// The lines of all shards of an evaluation.
+///
+/// # Errors
+/// [`ReplayError`].
+pub fn sheet_of(packs: &[PathBuf]) -> Result<Sheet, ReplayError> {
+    let mut sheet = Sheet::default();
+    for path in packs {
+        sheet.merge(Pack::open(path)?.sheet()?);
+    }
+    Ok(sheet)
 }

@@ -6,7 +6,7 @@ use faceoff_types::{EpisodeEnd, Task};
 use flate2::{Compression, read::GzDecoder, write::GzEncoder};
 use serde::{Deserialize, Serialize};
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     io::{self, Read},
 };
 
@@ -56,19 +56,22 @@ pub struct EpisodeLine {
     /// The constraints that were broken, each group once.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub broken: Vec<Broken>,
-    /// The longest computation time, s.
-    pub longest_s: f64,
-    /// Answers that took more than a control step.
+    /// The longest computation time, s; for whoever gets the dataset.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub longest_s: Option<f64>,
+    /// Answers that took more than a control step, if any did; for whoever gets the dataset.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub late: u32,
 }
 
 impl EpisodeLine {
-    /// As everybody sees it: what exactly an agent did wrong is its team's to know.
-    pub fn forget_fault(&mut self) {
+    /// Leaves what everybody may know: what exactly an agent did wrong, and how long it took, are for whoever gets the dataset.
+    pub fn make_public(&mut self) {
         if self.end == EpisodeEnd::AgentFault {
             self.why = why_it_ended(self.task, self.end, &[0.0; 6], self.steps, None);
         }
+        self.longest_s = None;
+        self.late = 0;
     }
 }
 
@@ -151,6 +154,17 @@ impl Sheet {
             .episodes
             .binary_search_by_key(&(task, episode), |line| (line.task, line.episode));
         found.ok().map(|index| &self.episodes[index])
+    }
+
+    /// The episodes of both that another evaluation of the same ones ended otherwise.
+    #[must_use]
+    pub fn ended_otherwise(&self, other: &Self) -> BTreeSet<(Task, u32)> {
+        let of_both = self.episodes.iter().filter_map(|line| {
+            let others = other.line(line.task, line.episode)?;
+            let is_same = (line.success, line.end) == (others.success, others.end);
+            (!is_same).then_some((line.task, line.episode))
+        });
+        of_both.collect()
     }
 
     /// Adds another shard's lines.

@@ -27,7 +27,7 @@ mod waited;
 mod wire_env;
 
 pub use config::AgentEnvironment;
-pub use faceoff_dataset::{Assembled, ShardReport, assemble, game::GameArchives};
+pub use faceoff_dataset::{Assembled, CLIPS_FILE, ShardReport, assemble, game::GameArchives};
 pub use faceoff_types::TimeLimits;
 pub use faceoff_wire::game::{GameCalibration, GameSpec};
 pub use faceoff_wire::work::{EvaluationMeta, ShardSpec, SmokeSpec};

@@ -1,5 +1,6 @@
 use crate::error::{Result, StoreError};
 use bytes::Bytes;
+use faceoff_types::{AblationId, Profile, Task};
 use futures::{StreamExt, TryStreamExt, stream::BoxStream};
 use jiff::Timestamp;
 use object_store::{
@@ -19,6 +20,9 @@ pub type ArtifactStream = BoxStream<'static, Result<Bytes>>;
 
 /// What follows a dataset's key in that of its clips: they come and go with it.
 const CLIPS: &str = ".clips";
+
+/// Where clips of ablations are that are not over.
+const ABLATION_PARTS: &str = "ablation-parts";
 
 /// Bytes in memory per piece of a copy.
 const PIECE_BYTES: usize = 1 << 20;
@@ -77,6 +81,14 @@ impl Artifacts {
         Ok(())
     }
 
+    /// Stores bytes under `key`, replacing what was there; they appear whole or not at all.
+    pub async fn put_bytes(&self, key: &str, bytes: Vec<u8>) -> Result<()> {
+        let key = parse(key)?;
+        let put = self.objects.put(&key, bytes.into());
+        put.await.map_err(artifact_error)?;
+        Ok(())
+    }
+
     /// Stores a dataset, and first what its replays are drawn from: whoever finds the dataset finds them.
     pub async fn put_dataset(&self, key: &str, archive: &Path, clips: Option<&Path>) -> Result<()> {
         if let Some(clips) = clips {
@@ -95,6 +107,55 @@ impl Artifacts {
     pub async fn delete_dataset(&self, key: &str) -> Result<()> {
         self.delete(&Self::clips_of(key)).await?;
         self.delete(key).await
+    }
+
+    /// The key of the clips of a shard of an ablation, until all are played.
+    #[must_use]
+    pub fn ablation_part(
+        id: AblationId,
+        profile: Profile,
+        task: Task,
+        first_episode: u32,
+    ) -> String {
+        format!(
+            "{}/{profile}.{task}.{first_episode}",
+            Self::ablation_parts(id)
+        )
+    }
+
+    /// What the keys of all such parts of an ablation begin with.
+    #[must_use]
+    pub fn ablation_parts(id: AblationId) -> String {
+        format!("{ABLATION_PARTS}/{id}")
+    }
+
+    /// The key of the clips that are kept of an ablation's episodes in a profile.
+    #[must_use]
+    pub fn ablation_clips(id: AblationId, profile: Profile) -> String {
+        format!("ablations/{id}/{profile}{CLIPS}")
+    }
+
+    /// The ablations of which parts are there.
+    pub async fn ablations_in_parts(&self) -> Result<Vec<AblationId>> {
+        let folder = parse(ABLATION_PARTS)?;
+        let listed = self.objects.list_with_delimiter(Some(&folder));
+        let folders = listed.await.map_err(artifact_error)?.common_prefixes;
+        let ids = folders
+            .iter()
+            .filter_map(|folder| folder.filename()?.parse().ok());
+        Ok(ids.collect())
+    }
+
+    /// The parts of an ablation: each profile with a key.
+    pub async fn parts_of_ablation(&self, id: AblationId) -> Result<Vec<(Profile, String)>> {
+        let folder = parse(&Self::ablation_parts(id))?;
+        let listed = self.objects.list_with_delimiter(Some(&folder));
+        let parts = listed.await.map_err(artifact_error)?.objects;
+        let named = parts.iter().filter_map(|part| {
+            let (profile, _) = part.location.filename()?.split_once('.')?;
+            Some((profile.parse().ok()?, part.location.to_string()))
+        });
+        Ok(named.collect())
     }
 
     /// Copies an artifact to a new file and flushes it to disk.

@@ -24,6 +24,18 @@ pub struct WorkOrder {
     pub assignment: Assignment,
 }
 
+/// What is kept of played episodes beside their outcomes.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Keeps {
+    /// Nothing.
+    Nothing,
+    /// What replays are drawn from, below this key.
+    Clips(String),
+    /// All of the recording, below this key prefix.
+    Recording(String),
+}
+
 /// Proof that a unit of work is a slot's.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Lease {
@@ -64,8 +76,8 @@ pub enum Assignment {
         agent: AgentOrder,
         /// Which episodes.
         spec: ShardSpec,
-        /// Key prefix for the recording; `None`: the outcomes alone are kept.
-        recording: Option<String>,
+        /// What is kept beside the outcomes.
+        keeps: Keeps,
     },
     /// Play a game.
     Game {

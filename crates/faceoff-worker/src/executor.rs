@@ -9,12 +9,12 @@ use crate::{
     shown::Shown,
 };
 use anyhow::Context as _;
-use faceoff_runner::{AgentEnvironment, GameSpec, bundle::Bundle};
+use faceoff_runner::{AgentEnvironment, CLIPS_FILE, GameSpec, bundle::Bundle};
 use faceoff_sandbox::{Isolation, Runtime};
 use faceoff_types::{AgentLimits, GameId, SlotTiming, SmokeOutcome, StageRuntimes};
 use faceoff_wire::work::{
-    AgentOrder, Assignment, EvaluationMeta, Lease, ShardSpec, SmokeSpec, StoredGame, WorkOrder,
-    WorkReport,
+    AgentOrder, Assignment, EvaluationMeta, Keeps, Lease, ShardSpec, SmokeSpec, StoredGame,
+    WorkOrder, WorkReport,
 };
 use std::{
     collections::BTreeMap,
@@ -76,11 +76,8 @@ impl Executor {
                 .smoke(agent, spec, runtimes, progress)
                 .map(WorkReport::Smoke),
             Assignment::Play {
-                agent,
-                spec,
-                recording,
-                ..
-            } => self.play(agent, spec, recording.as_deref(), progress.clone()),
+                agent, spec, keeps, ..
+            } => self.play(agent, spec, keeps, progress.clone()),
             Assignment::Game {
                 game,
                 attempt,
@@ -183,12 +180,12 @@ impl Executor {
         })
     }
 
-    /// Plays a shard and stores its recording, if that is kept.
+    /// Plays a shard and stores what is kept of it.
     fn play(
         &mut self,
         agent: &AgentOrder,
         spec: &ShardSpec,
-        recording: Option<&str>,
+        keeps: &Keeps,
         mut progress: Progress,
     ) -> anyhow::Result<WorkReport> {
         let bundle = self.valid_bundle(agent, None, &progress)?;
@@ -197,17 +194,27 @@ impl Executor {
         let played = self
             .evaluator
             .play(spec, &bundle, &environment, out.path(), &mut progress)?;
-        if let Some(key) = recording {
-            self.server
-                .store_recording(key, out.path())
-                .context("storing the recording")?;
-        }
+        let recording = match keeps {
+            Keeps::Nothing => None,
+            Keeps::Clips(key) => {
+                self.server
+                    .store_clips(key, &out.path().join(CLIPS_FILE))
+                    .context("storing the clips")?;
+                None
+            }
+            Keeps::Recording(key) => {
+                self.server
+                    .store_recording(key, out.path())
+                    .context("storing the recording")?;
+                Some(key.clone())
+            }
+        };
         self.timing = Some(played.timing);
         Ok(WorkReport::Play {
             outcomes: played.outcomes,
             log: played.log,
             stopped_by_faults: played.stopped_by_faults,
-            recording: recording.map(str::to_owned),
+            recording,
         })
     }
 

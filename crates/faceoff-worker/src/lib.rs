@@ -10,6 +10,7 @@
 //! This crate decides nothing about physics, protocol or scores, and holds no state that a kill would
 //! lose: everything is in the store.
 
+mod ablation_clips;
 mod bundle_cache;
 mod cpus;
 mod evaluator;

@@ -7,15 +7,15 @@ use crate::{
     tidying,
 };
 use faceoff_store::{
-    Claim, Claimed as Leased, Committed, GameCommit, GameRecording, RunOwner, ShardCommit, Store,
-    StoreError, Work,
+    Artifacts, Claim, Claimed as Leased, Committed, GameCommit, GameRecording, RunOwner,
+    ShardCommit, Store, StoreError, Work,
 };
 use faceoff_types::{AgentLimits, BundleRef, Clock, EvaluationResult, GameId, StageLimits};
 use faceoff_wire::{
     game::GameSpec,
     work::{
-        AgentOrder, Assignment, EvaluationMeta, Lease, ShardSpec, SmokeSpec, StoredGame, WorkOrder,
-        WorkReport,
+        AgentOrder, Assignment, EvaluationMeta, Keeps, Lease, ShardSpec, SmokeSpec, StoredGame,
+        WorkOrder, WorkReport,
     },
 };
 use std::{path::Path, time::Duration};
@@ -82,7 +82,16 @@ impl LocalServer {
                     max_faults: run.plan.max_faults,
                     perturbations: run.plan.variation.perturbations.clone(),
                 },
-                recording: run.keeps_recordings.then(|| claim.recording_key(run.id)),
+                keeps: match owner {
+                    _ if run.keeps_recordings => Keeps::Recording(claim.recording_key(run.id)),
+                    RunOwner::Ablation(id) => Keeps::Clips(Artifacts::ablation_part(
+                        id,
+                        run.plan.profile,
+                        shard.task,
+                        shard.first_episode,
+                    )),
+                    RunOwner::Evaluation(_) | RunOwner::Draft { .. } => Keeps::Nothing,
+                },
             },
             Work::Game {
                 game,
@@ -362,6 +371,11 @@ impl WorkServer for LocalServer {
             }
             Ok(stored?)
         })
+    }
+
+    fn store_clips(&self, key: &str, clips: &Path) -> anyhow::Result<()> {
+        let stored = self.store.artifacts().put_file(key, clips);
+        Ok(self.runtime.block_on(stored)?)
     }
 
     fn store_dataset(&self, key: &str, archive: &Path, clips: Option<&Path>) -> anyhow::Result<()> {

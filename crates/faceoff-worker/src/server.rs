@@ -42,6 +42,9 @@ pub(crate) trait WorkServer: Send + Sync {
     /// Stores the files of a folder as a recording.
     fn store_recording(&self, key: &str, folder: &Path) -> anyhow::Result<()>;
 
+    /// Stores what replays of a shard's episodes are drawn from, in the place of what was there.
+    fn store_clips(&self, key: &str, clips: &Path) -> anyhow::Result<()>;
+
     /// Stores a dataset, with what replays are drawn from; nobody sees it before the commit that names it.
     fn store_dataset(&self, key: &str, archive: &Path, clips: Option<&Path>) -> anyhow::Result<()>;
 }

@@ -1,5 +1,6 @@
 //! What is done now and then, so that the data folder holds what is asked for and little else.
 
+use crate::ablation_clips;
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::{Clearable, Store};
 use jiff::{SignedDuration, Timestamp};
@@ -25,6 +26,7 @@ pub async fn tidy(store: &Store, now: Timestamp) {
     if let Err(error) = store.forget_deliveries(now).await {
         tracing::warn!(%error, "what webhooks were told long ago could not be removed");
     }
+    ablation_clips::join_parts(store).await;
     keep_as_said(store, now).await;
     if let Err(error) = store.checkpoint().await {
         tracing::warn!(%error, "the database's log could not be copied");

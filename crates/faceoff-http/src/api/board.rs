@@ -4,6 +4,7 @@ use super::document::TagHeader;
 use crate::{
     app::App,
     conditions::{Conditions, ETag},
+    csv::MEDIA_TYPE,
     extract::{PathParam, QueryParams},
     problem::Problem,
     requests::{BoardFormat, BoardQuery, HistoryQuery},
@@ -159,10 +160,7 @@ fn sent<T: Serialize>(
     let mut answer = match format {
         BoardFormat::Json => Json(of).into_response(),
         BoardFormat::Csv => {
-            let media_type = [(
-                header::CONTENT_TYPE,
-                "text/csv; charset=utf-8; header=present",
-            )];
+            let media_type = [(header::CONTENT_TYPE, MEDIA_TYPE)];
             (media_type, csv(of)).into_response()
         }
     };

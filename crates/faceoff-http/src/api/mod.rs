@@ -147,6 +147,8 @@ pub(crate) fn router(patience: Duration) -> (Router<App>, Arc<Value>) {
         .routes(routes!(submissions::activate_submission))
         .routes(routes!(submissions::evaluate_submission))
         .routes(routes!(ablations::ablation, ablations::order_ablation))
+        .routes(routes!(ablations::ablation_motion))
+        .routes(routes!(ablations::ablation_observed))
         .routes(routes!(evaluations::list_evaluations))
         .routes(routes!(evaluations::evaluation))
         .routes(routes!(evaluations::cancel_evaluation))

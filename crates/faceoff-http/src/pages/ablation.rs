@@ -1,15 +1,20 @@
-//! `/submissions/{id}/ablation`: what each perturbation costs an agent, as a chart and as a table.
+//! `/submissions/{id}/ablation`: what each perturbation costs an agent, as a chart and as a table, and the episodes that it
+//! changes.
+
+pub(super) mod pair;
 
 use super::{
-    figures,
+    assets, figures,
     frame::{Frame, PageProblem, render},
 };
 use crate::{
     app::App,
     extract::PathParam,
     problem::{Problem, ProblemKind},
+    viewer::Viewer,
     views::{
         ablation::{AblationStatus, AblationView},
+        ablation_clips::{AblationClips, Differing},
         season::SeasonHead,
         submission::SubmissionView,
         team::TeamView,
@@ -77,10 +82,20 @@ struct Page {
     episodes_per_task: u32,
     status: AblationStatus,
     groups: Vec<Group>,
+    style: &'static str,
+    id: SubmissionId,
+    changed: Vec<Changed>,
+}
+
+/// The episodes of a profile that do not end as in the ideal simulator.
+struct Changed {
+    profile: Profile,
+    pairs: Vec<Differing>,
 }
 
 /// The newest ablation of a submission.
 pub(super) async fn page(
+    viewer: Result<Viewer, Problem>,
     State(app): State<App>,
     id: Result<PathParam<SubmissionId>, Problem>,
 ) -> Result<Response, PageProblem> {
@@ -101,8 +116,15 @@ pub(super) async fn page(
         }
         AblationStatus::Open { .. } | AblationStatus::Failed { .. } => Vec::new(),
     };
+    let clips = AblationClips::of(&app, viewer?, id).await?;
+    let changed = clips.differing().await?.into_iter();
     render(&Page {
         frame: Frame::of(&app, season.name, ""),
+        style: assets::EPISODES_STYLE.url(),
+        id,
+        changed: changed
+            .map(|(profile, pairs)| Changed { profile, pairs })
+            .collect(),
         team: team.name.to_string(),
         agent: submission.agent_name,
         episodes_per_task: view.episodes_per_task,

@@ -228,18 +228,32 @@ const FIRST_DECADE: f64 = -2.0;
 const LAST_DECADE: f64 = 3.0;
 /// Words before the rows of a strip are as wide.
 const STRIP_LEFT: f64 = 58.0;
-/// From row to row.
+/// From row to row, and where the rows have distributions above them.
 const ROW: u32 = 24;
+const TALL_ROW: u32 = 48;
+/// The height of a distribution, and how far above its row it stands.
+const SHAPE: f64 = 26.0;
+const SHAPE_GAP: u32 = 8;
 /// What an answer has: a control step, in milliseconds.
 const STEP_MS: f64 = 20.0;
 
 /// Times of one kind, in milliseconds.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Span {
     pub(super) name: &'static str,
     pub(super) mean: f64,
     pub(super) p99: f64,
     pub(super) max: f64,
+    /// How many of them lie where, the shorter first; empty where that is not told.
+    pub(super) counted: Vec<Counted>,
+}
+
+/// So many times lie between two, in milliseconds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Counted {
+    pub(super) from: f64,
+    pub(super) to: f64,
+    pub(super) count: u64,
 }
 
 /// Times on a logarithmic axis, ready to be drawn by `chart.html`.
@@ -248,14 +262,27 @@ pub(super) struct Strip {
     pub(super) rows: Vec<StripRow>,
     /// Powers of ten.
     pub(super) grid: Vec<Tick>,
+    /// Are there distributions above the rows?
+    pub(super) has_shapes: bool,
     /// Where a control step ends.
     pub(super) limit: String,
     /// Where the noise floor begins, and how wide it is.
     pub(super) floor: Option<[String; 2]>,
     pub(super) bottom: u32,
     pub(super) height: u32,
+    /// The distributions in numbers, a row for each of their columns.
+    pub(super) counts: Vec<CountRow>,
     /// What it shows in a sentence, for whoever does not see it.
     pub(super) told: String,
+}
+
+/// How many times of each kind lie between two, in milliseconds.
+#[derive(Debug)]
+pub(super) struct CountRow {
+    pub(super) from: String,
+    pub(super) to: String,
+    /// In the order of the strip's rows.
+    pub(super) counts: Vec<u64>,
 }
 
 /// Where the times of one kind lie.
@@ -266,14 +293,17 @@ pub(super) struct StripRow {
     pub(super) mean: String,
     pub(super) p99: String,
     pub(super) max: String,
+    /// The distribution, an SVG path.
+    pub(super) shape: String,
 }
 
 impl Strip {
     /// `floor`: median and 99th percentile of what the server itself adds, in milliseconds.
     pub(super) fn of(spans: &[Span], floor: Option<[f64; 2]>) -> Self {
+        let has_shapes = spans.iter().any(|span| !span.counted.is_empty());
         let mut y = 0;
         let rows = spans.iter().map(|span| {
-            y += ROW;
+            y += if has_shapes { TALL_ROW } else { ROW };
             let [mean, p99, max] = [span.mean, span.p99, span.max].map(|ms| figures::one(at(ms)));
             StripRow {
                 name: span.name,
@@ -281,6 +311,7 @@ impl Strip {
                 mean,
                 p99,
                 max,
+                shape: shape(&span.counted, y - SHAPE_GAP),
             }
         });
         let rows = rows.collect();
@@ -300,16 +331,55 @@ impl Strip {
         Self {
             rows,
             grid: grid.into(),
+            has_shapes,
             limit: figures::one(at(STEP_MS)),
             floor: floor.map(|[from, to]| [at(from), at(to) - at(from)].map(figures::one)),
             bottom,
             height: bottom + 20,
+            counts: counts(spans),
             told: format!(
                 "Answer times in milliseconds, of {STEP_MS} that a control step has; {}",
                 told.join("; ")
             ),
         }
     }
+}
+
+/// Columns without any time are left out.
+fn counts(spans: &[Span]) -> Vec<CountRow> {
+    // All kinds have the same columns; some have fewer.
+    let longest = spans
+        .iter()
+        .map(|span| &span.counted)
+        .max_by_key(|all| all.len());
+    let columns = longest.into_iter().flatten().enumerate();
+    let rows = columns.map(|(column, of)| CountRow {
+        from: figures::significant(of.from),
+        to: figures::significant(of.to),
+        counts: spans
+            .iter()
+            .map(|span| span.counted.get(column).map_or(0, |one| one.count))
+            .collect(),
+    });
+    rows.filter(|row| row.counts.iter().any(|count| *count > 0))
+        .collect()
+}
+
+/// Columns above `bottom`. Their heights are by the logarithm of the counts: few slow answers among thousands are what one
+/// looks for.
+fn shape(counted: &[Counted], bottom: u32) -> String {
+    let height = |count: u64| (1.0 + count as f64).ln();
+    let most = counted
+        .iter()
+        .map(|one| one.count)
+        .max()
+        .map_or(1.0, height);
+    let columns = counted.iter().filter(|one| one.count > 0).map(|one| {
+        let top = f64::from(bottom) - SHAPE * height(one.count) / most;
+        let [left, right, top] = [at(one.from), at(one.to), top].map(figures::one);
+        format!("M{left} {bottom}V{top}H{right}V{bottom}z")
+    });
+    columns.collect()
 }
 
 /// Where a time lies.
@@ -361,8 +431,31 @@ mod tests {
             mean: 0.1,
             p99: 10.0,
             max: 5000.0,
+            counted: Vec::new(),
         };
-        let strip = Strip::of(&[span], Some([0.001, 1.0]));
+        let strip = Strip::of(std::slice::from_ref(&span), Some([0.001, 1.0]));
+        assert!(!strip.has_shapes && strip.height == 56, "{strip:?}");
+        let counted = |from, to, count| Counted { from, to, count };
+        let told = Span {
+            counted: vec![
+                counted(0.1, 1.0, 99),
+                counted(1.0, 10.0, 0),
+                counted(10.0, 100.0, 9),
+            ],
+            ..span
+        };
+        let tall = Strip::of(&[told], None);
+        assert!(tall.has_shapes);
+        assert_eq!(
+            tall.rows[0].shape, "M115.6 40V14.0H173.2V40zM230.8 40V27.0H288.4V40z",
+            "a tenth of the times is half as high; none is nothing"
+        );
+        let rows: Vec<_> = tall
+            .counts
+            .iter()
+            .map(|row| (&*row.from, &*row.counts))
+            .collect();
+        assert_eq!(rows, [("0.10", &[99][..]), ("10", &[9])]);
         let row = &strip.rows[0];
         assert_eq!(
             [&row.mean, &row.p99, &row.max],

@@ -107,7 +107,7 @@ pub(super) async fn page(
         .iter()
         .skip(first)
         .take(PER_PAGE)
-        .map(|line| Row::of(id, line, clips.sees_observed))
+        .map(|line| Row::of(id, line))
         .collect();
     let other_page = |number: usize| {
         let query = EpisodesQuery {

@@ -4,7 +4,7 @@
 mod slow;
 
 use super::{
-    chart::{Span, Strip},
+    chart::{Counted, Span, Strip},
     figures,
     frame::{Frame, PageProblem, render},
 };
@@ -15,7 +15,7 @@ use crate::{
     viewer::Viewer,
     views::{
         ablation,
-        clips::Clips,
+        clips::{Clips, TimeBinView},
         evaluation::{EvaluationStatus, EvaluationView, Progress, ResultView},
         queue::QueueView,
         ruling::RulingView,
@@ -37,6 +37,7 @@ use faceoff_types::{
 use figures::{Rate, minute};
 use jiff::{Timestamp, civil};
 use slow::SlowAnswers;
+use std::collections::BTreeMap;
 
 /// A task's results, in words.
 struct TaskFigures {
@@ -252,6 +253,11 @@ pub(super) async fn page(
     let season = SeasonHead::now(&app).await?;
     let scored_at = view.status.finished_at();
     let frozen = scored_at.and_then(|at| sight.freeze_hiding(view.stage, at));
+    let clips = Clips::of(&app, &sight, id).await.ok();
+    let distributions = match &clips {
+        Some(clips) => clips.computation_times().await?,
+        None => BTreeMap::new(),
+    };
     let finished = match &view.status {
         _ if frozen.is_some() => None,
         EvaluationStatus::Finished {
@@ -269,6 +275,7 @@ pub(super) async fn page(
                 dataset_blake3: dataset_blake3.clone(),
                 others,
                 slow: SlowAnswers::of(&app, &view, result).await?,
+                times: times(result, &distributions),
                 ..Finished::of(result, *finished_at, &summary)
             })
         }
@@ -283,7 +290,7 @@ pub(super) async fn page(
         extra_turn: view.extra_turn.clone(),
         day: view.day,
         profile: view.profile,
-        has_episodes: finished.is_some() && Clips::of(&app, &sight, id).await.is_ok(),
+        has_episodes: clips.is_some(),
         ablation: ablation.then(|| format!("/submissions/{}/ablation", submission.id)),
         state: match frozen {
             Some(frozen) => format!(
@@ -378,8 +385,11 @@ async fn others(
         .collect())
 }
 
+/// How many control steps were answered in which time.
+type Distributions = BTreeMap<Task, Vec<TimeBinView>>;
+
 /// Answer times of all tasks, if they are told.
-fn times(result: &ResultView) -> Option<Strip> {
+fn times(result: &ResultView, distributions: &Distributions) -> Option<Strip> {
     let tasks = result.tasks.iter();
     let spans: Vec<Span> = tasks
         .filter_map(|(task, of_task)| {
@@ -389,6 +399,10 @@ fn times(result: &ResultView) -> Option<Strip> {
                 mean: 1e3 * time.mean,
                 p99: 1e3 * time.p99,
                 max: 1e3 * time.max,
+                counted: distributions
+                    .get(task)
+                    .map(|bins| counted(bins))
+                    .unwrap_or_default(),
             })
         })
         .collect();
@@ -397,6 +411,15 @@ fn times(result: &ResultView) -> Option<Strip> {
         [1e3 * trips.p50, 1e3 * trips.p99]
     });
     (!spans.is_empty()).then(|| Strip::of(&spans, floor))
+}
+
+fn counted(bins: &[TimeBinView]) -> Vec<Counted> {
+    let bins = bins.iter().map(|bin| Counted {
+        from: 1e3 * bin.from_s,
+        to: 1e3 * bin.to_s,
+        count: bin.steps,
+    });
+    bins.collect()
 }
 
 impl Finished {
@@ -429,7 +452,7 @@ impl Finished {
             others: Vec::new(),
             slow: SlowAnswers::default(),
             timing: result.timing.as_ref().map(TimingFigures::of),
-            times: times(result),
+            times: None,
         }
     }
 }

@@ -76,6 +76,17 @@ pub(super) fn minute(at: Timestamp) -> String {
     at.strftime("%Y-%m-%d %H:%M UTC").to_string()
 }
 
+/// Two significant digits of what is not negative.
+pub(super) fn significant(value: f64) -> String {
+    let decimals = match value {
+        _ if value >= 10.0 => 0,
+        _ if value >= 1.0 => 1,
+        _ if value >= 0.1 => 2,
+        _ => 3,
+    };
+    format!("{value:.decimals$}")
+}
+
 /// One decimal; never “-0.0”.
 pub(super) fn one(value: f64) -> String {
     format!("{:.1}", value + 0.0)

@@ -30,10 +30,12 @@ mod replay;
 mod replay_section;
 mod robots;
 mod season;
+mod side_by_side;
 mod sign_in;
 mod signed_in;
 mod standing;
 mod table_drawing;
+mod tables;
 mod team;
 mod unknown;
 
@@ -62,6 +64,12 @@ pub(crate) fn router(patience: Duration, api: Arc<Value>) -> Router<App> {
             get(comparison::pair::page),
         )
         .route("/evaluations/{id}/episodes", get(episodes::page))
+        .route("/evaluations/{id}/episodes.csv", get(tables::episodes))
+        .route(
+            "/evaluations/{id}/answer-times.csv",
+            get(tables::answer_times),
+        )
+        .route("/submissions/{id}/ablation.csv", get(tables::ablation))
         .route(
             "/evaluations/{id}/episodes/{task}/{episode}",
             get(replay::page),
@@ -73,6 +81,10 @@ pub(crate) fn router(patience: Duration, api: Arc<Value>) -> Router<App> {
         .route("/games/{id}", get(game::page))
         .route("/season", get(season::page))
         .route("/submissions/{id}/ablation", get(ablation::page))
+        .route(
+            "/submissions/{id}/ablation/{profile}/{task}/{episode}",
+            get(ablation::pair::page),
+        )
         .route("/help", get(help::page))
         .route("/problems", get(problems::page))
         .route("/announcements", get(announcements::page))

@@ -108,7 +108,7 @@ impl Shown {
             success: line.success,
             why: line.why.clone(),
             broken: line.broken.iter().map(in_words).collect(),
-            late: if clips.sees_observed { line.late } else { 0 },
+            late: line.late,
             duration_s: format!("{:.2}", f64::from(line.steps) * CONTROL_STEP_S),
             replay: ReplaySection::of(
                 &shown,

@@ -1,7 +1,7 @@
 //! A replay on a page: its picture that does not move, and where the script finds what it draws.
 
 use super::table_drawing::{self, Dot, Ground};
-use crate::views::clips::Episode;
+use crate::views::clip_file::Episode;
 use faceoff_replay::{
     Clip,
     model::{PUCK, TOOL},

@@ -1,8 +1,20 @@
 //! A file of clips among the artifacts.
 
 use crate::{app::AppState, problem::Problem};
-use faceoff_replay::{Pack, ReplayError};
+use faceoff_replay::{Clip, EpisodeLine, Key, Pack, ReplayError};
+use faceoff_types::Task;
 use std::path::PathBuf;
+
+/// All that is shown of an episode.
+pub(crate) struct Episode {
+    pub(crate) line: EpisodeLine,
+    /// Are there the episodes of the task before and after it?
+    pub(crate) has_before: bool,
+    pub(crate) has_after: bool,
+    pub(crate) motion: Clip,
+    /// For whoever gets the dataset.
+    pub(crate) observed: Option<Clip>,
+}
 
 #[derive(Debug)]
 pub(crate) struct ClipFile {
@@ -38,5 +50,55 @@ impl ClipFile {
             .await
             .map_err(Problem::internal)?
             .map_err(Problem::internal)
+    }
+
+    /// An episode's clip, gzip-compressed.
+    ///
+    /// # Errors
+    /// `NotFound` if there is no such episode.
+    pub(crate) async fn clip(&self, key: Key) -> Result<Vec<u8>, Problem> {
+        let clip = self.read(move |pack| pack.clip(key)).await?;
+        clip.ok_or_else(|| Problem::not_found("episode"))
+    }
+
+    /// An episode, read, as somebody sees it who gets the dataset, or everybody.
+    ///
+    /// # Errors
+    /// `NotFound` if there is no such episode.
+    pub(crate) async fn episode(
+        &self,
+        task: Task,
+        episode: u32,
+        sees_observed: bool,
+    ) -> Result<Episode, Problem> {
+        let read = move |pack: &Pack| {
+            let sheet = pack.sheet()?;
+            let clip = |key| -> Result<Option<Clip>, ReplayError> {
+                let bytes = pack.clip(key)?;
+                bytes.map(|bytes| Clip::read(&bytes)).transpose()
+            };
+            let line = sheet.line(task, episode);
+            let Some((line, motion)) = line.zip(clip(Key::motion(task, episode))?) else {
+                return Ok(None);
+            };
+            let has =
+                |other: Option<u32>| other.is_some_and(|other| sheet.line(task, other).is_some());
+            let mut line = line.clone();
+            if !sees_observed {
+                line.make_public();
+            }
+            Ok(Some(Episode {
+                line,
+                has_before: has(episode.checked_sub(1)),
+                has_after: has(episode.checked_add(1)),
+                motion,
+                observed: match sees_observed {
+                    true => clip(Key::observed(task, episode))?,
+                    false => None,
+                },
+            }))
+        };
+        let found = self.read(read).await?;
+        found.ok_or_else(|| Problem::not_found("episode"))
     }
 }

@@ -1,14 +1,17 @@
 //! What replays of an evaluation's episodes are drawn from. The motion, and how each episode went, are there for everybody once the
 //! day is released; what the agent was told and commanded, its times and its faults for whoever gets the dataset.
 
-use super::{clip_file::ClipFile, sight::Sight};
+use super::{
+    clip_file::{ClipFile, Episode},
+    sight::Sight,
+};
 use crate::{
     app::AppState,
     archived,
     problem::{Problem, ProblemKind},
     release::check_released,
 };
-use faceoff_replay::{Clip, EpisodeLine, Key, Pack, ReplayError, Sheet};
+use faceoff_replay::{EpisodeLine, Key, Pack, Sheet};
 use faceoff_store::{Artifacts, Evaluation, EvaluationState};
 use faceoff_types::{EvaluationId, Task};
 use serde::{Deserialize, Serialize};
@@ -22,17 +25,6 @@ pub(crate) struct Clips {
     /// Does the viewer see what was observed, commanded and timed, and the agent's faults?
     pub(crate) sees_observed: bool,
     pub(crate) file: ClipFile,
-}
-
-/// All that is shown of an episode.
-pub(crate) struct Episode {
-    pub(crate) line: EpisodeLine,
-    /// Are there the episodes of the task before and after it?
-    pub(crate) has_before: bool,
-    pub(crate) has_after: bool,
-    pub(crate) motion: Clip,
-    /// For whoever gets the dataset.
-    pub(crate) observed: Option<Clip>,
 }
 
 /// How the episodes of an evaluation went, in order of task and number.
@@ -106,8 +98,7 @@ impl Clips {
     /// # Errors
     /// `NotFound` if there is no such episode.
     pub(crate) async fn clip(&self, key: Key) -> Result<Vec<u8>, Problem> {
-        let clip = self.file.read(move |pack| pack.clip(key)).await?;
-        clip.ok_or_else(|| Problem::not_found("episode"))
+        self.file.clip(key).await
     }
 
     /// An episode, read.
@@ -115,36 +106,20 @@ impl Clips {
     /// # Errors
     /// `NotFound` if there is no such episode.
     pub(crate) async fn episode(&self, task: Task, episode: u32) -> Result<Episode, Problem> {
-        let sees_observed = self.sees_observed;
-        let read = move |pack: &Pack| {
-            let sheet = pack.sheet()?;
-            let clip = |key| -> Result<Option<Clip>, ReplayError> {
-                let bytes = pack.clip(key)?;
-                bytes.map(|bytes| Clip::read(&bytes)).transpose()
-            };
-            let line = sheet.line(task, episode);
-            let Some((line, motion)) = line.zip(clip(Key::motion(task, episode))?) else {
-                return Ok(None);
-            };
-            let has =
-                |other: Option<u32>| other.is_some_and(|other| sheet.line(task, other).is_some());
-            let mut line = line.clone();
-            if !sees_observed {
-                line.forget_fault();
-            }
-            Ok(Some(Episode {
-                line,
-                has_before: has(episode.checked_sub(1)),
-                has_after: has(episode.checked_add(1)),
-                motion,
-                observed: match sees_observed {
-                    true => clip(Key::observed(task, episode))?,
-                    false => None,
-                },
-            }))
-        };
-        let found = self.file.read(read).await?;
-        found.ok_or_else(|| Problem::not_found("episode"))
+        self.file.episode(task, episode, self.sees_observed).await
+    }
+
+    /// By task how many control steps were answered in which time; empty for whom that is not.
+    ///
+    /// # Errors
+    /// An internal problem, if the file cannot be read.
+    pub(crate) async fn computation_times(
+        &self,
+    ) -> Result<BTreeMap<Task, Vec<TimeBinView>>, Problem> {
+        match self.sees_observed {
+            true => Ok(self.episodes().await?.computation_times),
+            false => Ok(BTreeMap::new()),
+        }
     }
 
     /// How the episodes went.
@@ -158,7 +133,7 @@ impl Clips {
             ..
         } = self.file.read(Pack::sheet).await?;
         if !self.sees_observed {
-            episodes.iter_mut().for_each(EpisodeLine::forget_fault);
+            episodes.iter_mut().for_each(EpisodeLine::make_public);
         }
         let bins = |(task, times): (Task, faceoff_replay::TimeBins)| {
             let bins = times

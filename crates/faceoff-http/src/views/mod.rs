@@ -5,6 +5,7 @@
 //! file alone, `sight.rs`: of blind stages, whose scores the organiser sees, and of evaluations that are not public.
 
 pub mod ablation;
+pub(crate) mod ablation_clips;
 pub mod announcement;
 pub mod archived;
 pub mod attempt;

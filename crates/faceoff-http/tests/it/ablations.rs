@@ -1,8 +1,11 @@
 //! Ablations: ordered by the organiser, shown to everybody, in the way of nobody.
 
-use crate::site::{ADMIN, Site, TestTeam, outcome};
+use crate::{
+    clips,
+    site::{ADMIN, Site, TestTeam, outcome},
+};
 use faceoff_scoring::EpisodeSummary;
-use faceoff_store::ShardCommit;
+use faceoff_store::{Artifacts, ShardCommit};
 use faceoff_types::{Profile, SubmissionId};
 use scraper::{Html, Selector};
 use serde_json::json;
@@ -101,6 +104,10 @@ async fn an_organiser_orders_one_and_its_team_and_visitors_see_what_came_of_it()
     ] {
         assert!(row.contains(part), "{part:?} is not in {row:?}");
     }
+    let table = site.get(&format!("{page}.csv"), None).await;
+    assert_eq!(table.body.lines().count(), 1 + 18, "{}", table.body);
+    let loss = table.body.lines().nth(5).unwrap();
+    assert!(loss.starts_with("hit,tracking_loss,8,0,0,"), "{loss}");
 }
 
 #[tokio::test]
@@ -171,4 +178,58 @@ async fn its_outcomes_are_read_once_and_never_again() {
     assert_eq!(restarted["tasks"]["hit"][4]["successes"], 1);
     let page = site.get(&page, None).await;
     assert!(page.body.contains("1 of 4"), "{}", page.body);
+}
+
+#[tokio::test]
+async fn an_episode_that_a_perturbation_changes_is_shown_beside_the_ideal_one() {
+    let site = Site::start().await;
+    let (team, api, page) = competitor(&site).await;
+    let order = json!({ "episodes_per_task": 1 });
+    site.post(&api, Some(ADMIN), &order).await.json(201);
+    play(&site, 18).await;
+    let without = site.get(&page, None).await;
+    assert!(!without.body.contains("What changes"), "{}", without.body);
+
+    let submission = api.split('/').nth(4).unwrap().parse().unwrap();
+    let ablation = site.store.newest_ablation(submission).await.unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let pack = clips::pack(folder.path());
+    for profile in [Profile::Ideal, Profile::TrackingLoss] {
+        let key = Artifacts::ablation_clips(ablation.as_ref().unwrap().id, profile);
+        site.store.artifacts().put_file(&key, &pack).await.unwrap();
+    }
+    let pair = format!("{page}/tracking_loss/prepare/0");
+    let shown = site.get(&page, None).await;
+    assert!(shown.body.contains(&pair), "{}", shown.body);
+    assert!(!shown.body.contains("/noise/"), "{}", shown.body);
+
+    let shown = site.get(&pair, None).await;
+    assert_eq!(shown.status, 200, "{}", shown.body);
+    let html = Html::parse_document(&shown.body);
+    assert!(html.errors.is_empty(), "{:?}", html.errors);
+    let replays = Selector::parse("section.replay").unwrap();
+    let motions: Vec<_> = html
+        .select(&replays)
+        .map(|replay| replay.attr("data-motion").unwrap().to_owned())
+        .collect();
+    let expected = ["ideal", "tracking_loss"].map(|of| format!("{api}/{of}/prepare/0/motion"));
+    assert_eq!(motions, expected);
+    for motion in &motions {
+        assert_eq!(site.get(motion, None).await.status, 200, "{motion}");
+        let observed = motion.replace("/motion", "/observed");
+        assert_eq!(site.get(&observed, None).await.status, 401);
+        let other = site.team(&format!("Beta {}", motion.len())).await;
+        assert_eq!(site.get(&observed, Some(&other.token)).await.status, 403);
+        for own in [&*team.token, ADMIN] {
+            assert_eq!(site.get(&observed, Some(own)).await.status, 200);
+        }
+    }
+    for nothing in [
+        format!("{page}/disturbance/prepare/0"),
+        format!("{page}/tracking_loss/hit/0"),
+        format!("{page}/wind/hit/0"),
+        format!("{api}/tracking_loss/prepare/99/motion"),
+    ] {
+        assert_eq!(site.get(&nothing, None).await.status, 404, "{nothing}");
+    }
 }

@@ -167,6 +167,9 @@ async fn everybody_sees_the_motion_and_who_gets_the_dataset_the_rest() {
     assert_eq!(last["end"], "agent_fault");
     assert_eq!(last["why"], "a fault of the agent ended the episode");
     assert_eq!(view.get("computation_times"), None);
+    for line in view["episodes"].as_array().unwrap() {
+        assert_eq!((line.get("longest_s"), line.get("late")), (None, None));
+    }
     let (view, last) = told(recorded.get("episodes", alpha).await);
     assert!(last["why"].as_str().unwrap().contains(SECRET), "{last}");
     let steps: u64 = view["computation_times"]["prepare"]
@@ -178,6 +181,38 @@ async fn everybody_sees_the_motion_and_who_gets_the_dataset_the_rest() {
     let played = view["episodes"].as_array().unwrap().iter();
     let played: u64 = played.map(|line| line["steps"].as_u64().unwrap()).sum();
     assert_eq!(steps, played);
+    assert!(last["longest_s"].as_f64().unwrap() > 0.0, "{last}");
+    // The same for spreadsheets, and drawn.
+    let evaluation = recorded.page.trim_end_matches("/episodes");
+    for (token, sees) in [(None, false), (alpha, true)] {
+        let site = &recorded.site;
+        let table = site.get(&format!("{evaluation}/episodes.csv"), token).await;
+        assert!(table.header("content-type").starts_with("text/csv"));
+        let mut reader = csv::Reader::from_reader(table.body.as_bytes());
+        let column = |name: &str| {
+            let mut reader = csv::Reader::from_reader(table.body.as_bytes());
+            let headers = reader.headers().unwrap();
+            headers.iter().position(|one| one == name).unwrap()
+        };
+        let rows: Vec<_> = reader.records().map(Result::unwrap).collect();
+        assert_eq!(rows.len(), EPISODES as usize);
+        let last = &rows[EPISODES as usize - 1];
+        assert_eq!(&last[column("end")], "agent_fault");
+        assert_eq!(last[column("why")].contains(SECRET), sees);
+        assert_eq!(!last[column("longest_s")].is_empty(), sees);
+        let times = site
+            .get(&format!("{evaluation}/answer-times.csv"), token)
+            .await;
+        let page = site.get(evaluation, token).await;
+        assert_eq!(page.body.contains("class=\"shape\""), sees);
+        if sees {
+            let mut reader = csv::Reader::from_reader(times.body.as_bytes());
+            let counted = reader.records().map(|row| row.unwrap()[3].parse::<u64>());
+            assert_eq!(counted.map(Result::unwrap).sum::<u64>(), steps);
+        } else {
+            assert_eq!(times.status, 401);
+        }
+    }
     let page = recorded.page("/prepare/4").await;
     assert!(!page.html().contains(SECRET), "a page for everybody");
     for path in ["prepare/99/motion", "hit/0/motion", "juggle/0/motion"] {

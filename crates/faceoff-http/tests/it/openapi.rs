@@ -68,6 +68,8 @@ async fn the_document_lists_what_is_there_and_nothing_else() {
         "GET /api/v1/submissions",
         "GET /api/v1/submissions/{id}",
         "GET /api/v1/submissions/{id}/ablation",
+        "GET /api/v1/submissions/{id}/ablation/{profile}/{task}/{episode}/motion",
+        "GET /api/v1/submissions/{id}/ablation/{profile}/{task}/{episode}/observed",
         "GET /api/v1/submissions/{id}/archive",
         "GET /api/v1/teams",
         "GET /api/v1/teams/{id}",

@@ -87,6 +87,14 @@ const TABLE: &[(&str, &str)] = &[
     ("PATCH /submissions/{id}", "?00++--"),
     ("GET /submissions/{id}/ablation", "?00++++"),
     ("POST /submissions/{id}/ablation", "?----++"),
+    (
+        "GET /submissions/{id}/ablation/{profile}/{task}/{episode}/motion",
+        "+++++++",
+    ),
+    (
+        "GET /submissions/{id}/ablation/{profile}/{task}/{episode}/observed",
+        "?--++++",
+    ),
     ("POST /submissions/{id}/activate", "?00++--"),
     ("POST /submissions/{id}/evaluations", "+++++++"),
     ("POST /submissions/{id}/withdraw", "?00++--"),
@@ -356,6 +364,7 @@ impl Cast {
             .replace("{day}", "2020-01-01")
             .replace("{side}", "1")
             .replace("{episode}", "0")
+            .replace("{profile}", "ideal")
             .replace("{chunk}", "0")
             .replace("{version}", "7");
         format!("/api/v1{path}")

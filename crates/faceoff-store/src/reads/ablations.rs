@@ -3,11 +3,11 @@ use crate::{
     reads::progress,
     store::Store,
     tables::{
-        ablations::{self, Ablation, AblationState},
+        ablations::{self, Ablation, AblationRow, AblationState},
         runs,
     },
 };
-use faceoff_types::SubmissionId;
+use faceoff_types::{AblationId, SubmissionId};
 use sqlx::SqliteConnection;
 use std::collections::BTreeMap;
 
@@ -16,10 +16,14 @@ pub(crate) async fn newest(
     connection: &mut SqliteConnection,
     submission: SubmissionId,
 ) -> Result<Option<Ablation>> {
-    let Some(row) = ablations::newest(connection, submission).await? else {
-        return Ok(None);
-    };
-    let id = row.id.0;
+    match ablations::newest(connection, submission).await? {
+        Some(row) => of_row(connection, row).await.map(Some),
+        None => Ok(None),
+    }
+}
+
+async fn of_row(connection: &mut SqliteConnection, row: AblationRow) -> Result<Ablation> {
+    let (id, submission) = (row.id.0, row.submission_id.0);
     let (mut of_profile, mut episodes_total, mut episodes_per_task) = (BTreeMap::new(), 0, 0);
     for run in ablations::runs(connection, id).await? {
         let plan = runs::find(connection, run).await?.plan;
@@ -42,17 +46,24 @@ pub(crate) async fn newest(
             reason,
         },
     };
-    Ok(Some(Ablation {
+    Ok(Ablation {
         id,
         submission,
         runs: of_profile,
         episodes_per_task,
         created_at: row.created_at.0,
         state,
-    }))
+    })
 }
 
 impl Store {
+    /// An ablation; [`StoreError::NotFound`](crate::StoreError::NotFound) if there is none of this id.
+    pub async fn ablation(&self, id: AblationId) -> Result<Ablation> {
+        let mut connection = self.database.read.begin().await?;
+        let row = ablations::find(&mut connection, id).await?;
+        of_row(&mut connection, row).await
+    }
+
     /// The newest ablation of a submission, if there was one.
     pub async fn newest_ablation(&self, submission: SubmissionId) -> Result<Option<Ablation>> {
         newest(&mut *self.database.read.begin().await?, submission).await

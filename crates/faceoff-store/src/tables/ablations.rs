@@ -51,6 +51,7 @@ pub enum AblationState {
 /// An ablation without its runs.
 pub(crate) struct AblationRow {
     pub(crate) id: Text<AblationId>,
+    pub(crate) submission_id: Text<SubmissionId>,
     pub(crate) created_at: Instant,
     pub(crate) finished_at: Option<Instant>,
     pub(crate) reason: Option<String>,
@@ -64,13 +65,29 @@ pub(crate) async fn newest(
     let submission = Text(submission);
     Ok(sqlx::query_as!(
         AblationRow,
-        r#"SELECT id AS "id: Text<AblationId>", created_at AS "created_at: Instant",
+        r#"SELECT id AS "id: Text<AblationId>", submission_id AS "submission_id: Text<SubmissionId>",
+                  created_at AS "created_at: Instant",
                   finished_at AS "finished_at: Instant", reason
            FROM ablations WHERE submission_id = ? ORDER BY created_at DESC, id DESC LIMIT 1"#,
         submission
     )
     .fetch_optional(connection)
     .await?)
+}
+
+/// An ablation by its id.
+pub(crate) async fn find(connection: &mut SqliteConnection, id: AblationId) -> Result<AblationRow> {
+    let id = Text(id);
+    sqlx::query_as!(
+        AblationRow,
+        r#"SELECT id AS "id: Text<AblationId>", submission_id AS "submission_id: Text<SubmissionId>",
+                  created_at AS "created_at: Instant", finished_at AS "finished_at: Instant", reason
+           FROM ablations WHERE id = ?"#,
+        id
+    )
+    .fetch_optional(connection)
+    .await?
+    .ok_or(StoreError::NotFound("ablation"))
 }
 
 /// The ablation that owns a run, if one does.

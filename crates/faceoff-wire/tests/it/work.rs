@@ -58,7 +58,7 @@ fn shard(recording: Option<&str>) -> Assignment {
             max_faults: 6,
             perturbations: Default::default(),
         },
-        recording: recording.map(str::to_owned),
+        keeps: recording.map_or(Keeps::Nothing, |key| Keeps::Recording(key.to_owned())),
     }
 }
 

@@ -80,6 +80,10 @@ impl WorkServer for Between {
         self.server.store_recording(key, folder)
     }
 
+    fn store_clips(&self, key: &str, clips: &Path) -> anyhow::Result<()> {
+        self.server.store_clips(key, clips)
+    }
+
     fn store_dataset(&self, key: &str, archive: &Path, clips: Option<&Path>) -> anyhow::Result<()> {
         self.server.store_dataset(key, archive, clips)
     }

@@ -10,9 +10,10 @@ use crate::{
     slot_threads::SlotThreads,
 };
 use faceoff_metrics::Metrics;
+use faceoff_replay::{EpisodeLine, Key, PackWriter, Sheet};
 use faceoff_runner::{
-    AgentEnvironment, Assembled, EvaluationMeta, GameAudience, GameReport, GameSpec, Observer,
-    PlatformFault, ShardReport, ShardSpec, SmokeReport, SmokeSpec, TimeLimits,
+    AgentEnvironment, Assembled, CLIPS_FILE, EvaluationMeta, GameAudience, GameReport, GameSpec,
+    Observer, PlatformFault, ShardReport, ShardSpec, SmokeReport, SmokeSpec, TimeLimits,
     bundle::{Bundle, BundleError, BundleLimits},
 };
 use faceoff_sandbox::{Isolation, Limits};
@@ -101,6 +102,32 @@ pub(super) fn outcome(task: Task, episode: u32) -> EpisodeOutcome {
     }
 }
 
+/// Clips that are none, with real lines: with perturbations the second episode of a task is not solved.
+fn clips(spec: &ShardSpec) -> Vec<u8> {
+    let mut pack = PackWriter::new(Vec::new()).unwrap();
+    let mut sheet = Sheet::default();
+    for episode in spec.episodes.clone() {
+        let told = format!("{} {episode}", spec.profile);
+        pack.add(Key::motion(spec.task, episode), told.as_bytes())
+            .unwrap();
+        sheet.episodes.push(EpisodeLine {
+            task: spec.task,
+            episode,
+            steps: 10,
+            success: spec.profile == Profile::Ideal || episode != 1,
+            end: EpisodeEnd::Horizon,
+            why: told,
+            start: [0.0; 4],
+            last: [0.0; 4],
+            broken: Vec::new(),
+            longest_s: Some(0.001),
+            late: 0,
+        });
+    }
+    pack.add_sheet(&sheet).unwrap();
+    pack.finish().unwrap()
+}
+
 impl Evaluator for Scripted {
     fn unpack(
         &self,
@@ -165,6 +192,7 @@ impl Evaluator for Scripted {
             format!("{} {}", spec.task, spec.episodes.start),
         )
         .unwrap();
+        std::fs::write(out.join(CLIPS_FILE), clips(spec)).unwrap();
         let outcomes = spec
             .episodes
             .clone()

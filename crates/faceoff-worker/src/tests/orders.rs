@@ -7,7 +7,7 @@ use super::{
 use crate::server::{Claimed, Holding, WorkServer as _};
 use faceoff_store::*;
 use faceoff_types::{Profile, SmokeOutcome, Task};
-use faceoff_wire::work::{Assignment, WorkOrder, WorkReport};
+use faceoff_wire::work::{Assignment, Keeps, WorkOrder, WorkReport};
 
 async fn next(server: &Server) -> Option<WorkOrder> {
     let local = server.local();
@@ -32,10 +32,12 @@ async fn report(server: &Server, order: &WorkOrder) -> WorkReport {
             timing: Vec::new(),
             log: String::new(),
         }),
-        Assignment::Play {
-            spec, recording, ..
-        } => {
-            if let Some(key) = recording {
+        Assignment::Play { spec, keeps, .. } => {
+            let recording = match keeps {
+                Keeps::Recording(key) => Some(key.clone()),
+                Keeps::Clips(_) | Keeps::Nothing => None,
+            };
+            if let Some(key) = &recording {
                 server.put(&format!("{key}/steps.parquet"), b"steps").await;
             }
             WorkReport::Play {
@@ -46,7 +48,7 @@ async fn report(server: &Server, order: &WorkOrder) -> WorkReport {
                     .collect(),
                 log: String::new(),
                 stopped_by_faults: false,
-                recording: recording.clone(),
+                recording,
             }
         }
         Assignment::Game { .. } => panic!("no game is queued"),
@@ -88,7 +90,10 @@ async fn no_order_tells_the_seasons_secret() {
         assert!(!text.contains(&secret.to_string()), "{text}");
         match &order.assignment {
             Assignment::Smoke { .. } => smoke += 1,
-            Assignment::Play { recording, .. } if recording.is_some() => recorded += 1,
+            Assignment::Play {
+                keeps: Keeps::Recording(_),
+                ..
+            } => recorded += 1,
             Assignment::Play { .. } => unrecorded += 1,
             Assignment::Game { .. } => panic!("no game is queued"),
             Assignment::Finalise { recordings, .. } => {
@@ -138,7 +143,7 @@ async fn a_stages_weights_bounds_and_magnitudes_go_with_its_orders_and_its_ablat
         match &order.assignment {
             Assignment::Play {
                 spec,
-                recording: None,
+                keeps: Keeps::Clips(_),
                 ..
             } => {
                 assert_eq!(spec.perturbations, wild.perturbations);

@@ -1,6 +1,8 @@
 //! Units from claim to commit, and faults of ours.
 
 use super::fixture::*;
+use crate::tidying;
+use faceoff_replay::{Key, Pack};
 use faceoff_runner::PlatformFault;
 use faceoff_store::*;
 use faceoff_types::*;
@@ -334,6 +336,32 @@ async fn an_ablation_is_played_on_episodes_of_its_own_in_every_profile() {
             );
             assert_eq!(run.mismatch_seed, secret.model_mismatch());
         }
+    }
+    // What ends otherwise than in the ideal simulator is kept, beside how it ended there.
+    let artifacts = server.store.artifacts();
+    for profile in Profile::ABLATION {
+        let key = Artifacts::ablation_clips(ablation.id, profile);
+        assert_eq!(artifacts.bytes_of(&key).await.unwrap(), None, "not yet");
+    }
+    for _ in 0..2 {
+        tidying::tidy(&server.store, server.now()).await;
+        assert_eq!(artifacts.ablations_in_parts().await.unwrap(), []);
+        for profile in Profile::ABLATION {
+            let key = Artifacts::ablation_clips(ablation.id, profile);
+            let pack = Pack::open(&artifacts.path_of(&key).unwrap()).unwrap();
+            let lines = pack.sheet().unwrap().episodes;
+            let lines = lines.iter().map(|line| (line.task, line.episode));
+            let expected = Task::ALL.map(|task| (task, 1));
+            assert_eq!(lines.collect::<Vec<_>>(), expected, "{profile}");
+            for task in Task::ALL {
+                let told = format!("{profile} 1").into_bytes();
+                assert_eq!(pack.clip(Key::motion(task, 1)).unwrap(), Some(told));
+                assert_eq!(pack.clip(Key::motion(task, 0)).unwrap(), None);
+            }
+        }
+        // A part that comes late changes nothing.
+        let late = Artifacts::ablation_part(ablation.id, Profile::Ideal, Task::Hit, 0);
+        server.put(&late, b"late").await;
     }
     for run in ablation.runs.into_values() {
         assert_eq!(server.store.outcomes(run).await.unwrap().len(), 9);

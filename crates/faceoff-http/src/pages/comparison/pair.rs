@@ -5,10 +5,9 @@ use crate::{
     extract::PathParams,
     pages::{
         assets,
-        episode_words::in_words,
         frame::{Frame, PageProblem, render},
         replay::page_path,
-        replay_section::ReplaySection,
+        side_by_side::Side,
     },
     paths,
     problem::{Problem, ProblemKind},
@@ -23,20 +22,9 @@ use crate::{
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
-use faceoff_replay::model::CONTROL_STEP_S;
 use faceoff_scoring::WhoSolved;
 use faceoff_types::{EvaluationId, Task};
 use jiff::civil::Date;
-
-/// How one of the two went.
-struct Side {
-    team: String,
-    path: String,
-    success: bool,
-    duration_s: String,
-    broken: Vec<String>,
-    replay: ReplaySection,
-}
 
 #[derive(Template)]
 #[template(path = "comparison_pair.html")]
@@ -46,6 +34,7 @@ struct Page {
     task: Task,
     episode: u32,
     day: Date,
+    teams: [String; 2],
     sides: Vec<Side>,
     /// The nearest episodes of the task that one alone solved.
     before: Option<u32>,
@@ -82,6 +71,7 @@ pub(in crate::pages) async fn page(
         task,
         episode,
         day: view.day,
+        teams: [&view.a, &view.b].map(|side| side.team.to_string()),
         sides: sides.into(),
         before,
         after,
@@ -103,19 +93,9 @@ async fn side(
         "{}/episodes/{task}/{episode}",
         paths::evaluation(of.evaluation)
     );
-    let name = format!("{task}, episode {episode}, {}", of.team);
-    let title = format!("{}, {task} {episode}", of.team);
     Ok(Side {
-        team: of.team.to_string(),
-        path: page_path(of.evaluation, task, episode),
-        success: found.line.success,
-        duration_s: format!("{:.2}", f64::from(found.line.steps) * CONTROL_STEP_S),
-        broken: found.line.broken.iter().map(in_words).collect(),
-        replay: ReplaySection {
-            id,
-            together: Some("both"),
-            ..ReplaySection::of(&found, &api, name, title)
-        },
+        path: Some(page_path(of.evaluation, task, episode)),
+        ..Side::of(id, &found, &api, of.team.to_string())
     })
 }
 

@@ -17,7 +17,7 @@ pub(super) struct Row {
 }
 
 impl Row {
-    pub(super) fn of(id: EvaluationId, line: &EpisodeLine, sees_times: bool) -> Self {
+    pub(super) fn of(id: EvaluationId, line: &EpisodeLine) -> Self {
         let EpisodeLine { task, episode, .. } = line;
         Self {
             task: *task,
@@ -27,7 +27,7 @@ impl Row {
             why: line.why.clone(),
             broken: line.broken.iter().map(in_words).collect(),
             duration_s: format!("{:.2}", f64::from(line.steps) * CONTROL_STEP_S),
-            longest_ms: sees_times.then(|| figures::milliseconds(line.longest_s)),
+            longest_ms: line.longest_s.map(figures::milliseconds),
         }
     }
 }

@@ -1,0 +1,111 @@
+//! What replays of an ablation's episodes are drawn from: of those that do not end as in the ideal simulator.
+
+use super::clip_file::{ClipFile, Episode};
+use crate::{app::AppState, problem::Problem, viewer::Viewer};
+use faceoff_replay::{EpisodeLine, Pack};
+use faceoff_store::Artifacts;
+use faceoff_types::{Profile, SubmissionId, Task};
+use std::collections::BTreeMap;
+
+/// The clips that are kept of a submission's newest ablation.
+#[derive(Debug)]
+pub(crate) struct AblationClips {
+    /// Profiles in which all episodes end as in the ideal one are left out.
+    files: BTreeMap<Profile, ClipFile>,
+    /// Does the viewer see what was observed, commanded and timed, and the agent's faults?
+    pub(crate) sees_observed: bool,
+}
+
+/// An episode that ends otherwise with a perturbation than without any.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Differing {
+    pub(crate) ideal: EpisodeLine,
+    pub(crate) perturbed: EpisodeLine,
+}
+
+impl Differing {
+    pub(crate) fn both(&self) -> [&EpisodeLine; 2] {
+        [&self.ideal, &self.perturbed]
+    }
+}
+
+impl AblationClips {
+    /// Of a submission; without files while nothing is kept.
+    ///
+    /// # Errors
+    /// `NotFound` if there is no such submission.
+    pub(crate) async fn of(
+        app: &AppState,
+        viewer: Viewer,
+        submission: SubmissionId,
+    ) -> Result<Self, Problem> {
+        let team = app.store.submission(submission).await?.team;
+        let mut files = BTreeMap::new();
+        if let Some(ablation) = app.store.newest_ablation(submission).await? {
+            for profile in Profile::ABLATION {
+                let key = Artifacts::ablation_clips(ablation.id, profile);
+                if let Some(file) = ClipFile::find(app, key).await? {
+                    files.insert(profile, file);
+                }
+            }
+        }
+        Ok(Self {
+            files,
+            sees_observed: match viewer {
+                Viewer::Organiser => true,
+                Viewer::Team(own) => own == team,
+                Viewer::Anybody => false,
+            },
+        })
+    }
+
+    /// Those of a profile.
+    ///
+    /// # Errors
+    /// `NotFound` if none are kept of it.
+    pub(crate) fn of_profile(&self, profile: Profile) -> Result<&ClipFile, Problem> {
+        let file = self.files.get(&profile);
+        file.ok_or_else(|| Problem::not_found("episode"))
+    }
+
+    /// By profile, in order of task and number.
+    ///
+    /// # Errors
+    /// An internal problem, if a file cannot be read.
+    pub(crate) async fn differing(&self) -> Result<BTreeMap<Profile, Vec<Differing>>, Problem> {
+        let Some(ideal) = self.files.get(&Profile::Ideal) else {
+            return Ok(BTreeMap::new());
+        };
+        let ideal = ideal.read(Pack::sheet).await?;
+        let mut differing = BTreeMap::new();
+        let others = self.files.iter();
+        for (profile, file) in others.filter(|(profile, _)| **profile != Profile::Ideal) {
+            let perturbed = file.read(Pack::sheet).await?.episodes;
+            let pairs = perturbed.into_iter().filter_map(|perturbed| {
+                let ideal = ideal.line(perturbed.task, perturbed.episode)?.clone();
+                let mut pair = Differing { ideal, perturbed };
+                if !self.sees_observed {
+                    pair.ideal.make_public();
+                    pair.perturbed.make_public();
+                }
+                Some(pair)
+            });
+            differing.insert(*profile, pairs.collect());
+        }
+        Ok(differing)
+    }
+
+    /// An episode, read.
+    ///
+    /// # Errors
+    /// `NotFound` if it is not kept.
+    pub(crate) async fn episode(
+        &self,
+        profile: Profile,
+        task: Task,
+        episode: u32,
+    ) -> Result<Episode, Problem> {
+        let file = self.of_profile(profile)?;
+        file.episode(task, episode, self.sees_observed).await
+    }
+}
