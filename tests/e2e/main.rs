@@ -9,6 +9,7 @@ mod commands;
 mod crash;
 mod cut;
 mod demo;
+mod desks;
 mod fair_shares;
 mod full_disk;
 mod growth;

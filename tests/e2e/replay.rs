@@ -194,3 +194,83 @@ fn a_replay_that_cannot_be_loaded_says_so() {
         absent.text("h1")
     );
 }
+
+#[test]
+fn two_replays_of_one_start_run_in_step() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    let teams = ["Alpha", "Beta"].map(|name| Team::create(&server, name));
+    let submissions = teams
+        .each_ref()
+        .map(|team| team.submit(&server, &repository().join("agents/hold")));
+    let day = start_day(&server);
+    let [a, b] = [0, 1].map(|index: usize| {
+        let path = path_of(&day, &submissions[index]);
+        let finished = teams[index].finished(&server, &path);
+        assert_eq!(finished["state"], "finished", "{finished}");
+        path.replace("/api/v1", "")
+    });
+    let other = b.rsplit('/').next().expect("a path has an end");
+    let browser = Browser::start(scratch.path());
+    let page = browser.open(&format!("{}{a}/compare/{other}/defend/1", server.url));
+    page.wait_until("document.querySelectorAll('.replay[data-state=ready]').length == 2");
+    let _ = page.evaluate(
+        "(() => {
+            const slider = document.querySelector('#replay-a input[type=range]');
+            slider.value = 12;
+            slider.dispatchEvent(new Event('input', { bubbles: true }));
+        })()",
+    );
+    page.wait_until(
+        "[...document.querySelectorAll('.replay')].every(replay => replay.dataset.step == '12')",
+    );
+    for view in [View::PHONE, View::PROJECTOR] {
+        page.look_through(view);
+        assert_eq!(page.overflow(), 0, "{view:?}");
+    }
+    assert_eq!(page.console_errors(), [""; 0]);
+}
+
+#[test]
+fn without_webgl_the_flat_view_is_shown_and_says_why() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let (server, evaluation) = released(scratch.path());
+    let browser = Browser::start(scratch.path());
+    let page = browser.open(&format!("{}/", server.url));
+    page.before_scripts(
+        "const whole = HTMLCanvasElement.prototype.getContext;
+        HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+            return kind.startsWith('webgl') ? null : whole.call(this, kind, ...rest);
+        };",
+    );
+    page.go(&format!("{}{evaluation}/episodes/hit/0", server.url));
+    page.wait_for("#replay[data-state=ready][data-view=flat]");
+    assert!(page.text("#replay").contains("offers no 3-D drawing"));
+    scrub(&page, 3);
+    let [_, _, count] = puck_in_pixels(&page);
+    assert!(count > 20.0, "the puck is drawn");
+}
+
+#[test]
+fn replays_that_are_opened_again_and_again_leave_nothing_behind() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let (server, evaluation) = released(scratch.path());
+    let browser = Browser::start(scratch.path());
+    let page = browser.open(&format!("{}/", server.url));
+    let mut held = Vec::new();
+    for cycle in 0..20 {
+        let number = cycle % 2;
+        page.go(&format!(
+            "{}{evaluation}/episodes/defend/{number}",
+            server.url
+        ));
+        page.wait_for("#replay[data-state=ready]");
+        scrub(&page, 20);
+        scrub(&page, 0);
+        held.push(page.script_bytes());
+    }
+    let most = |of: &[f64]| of.iter().copied().fold(0.0, f64::max);
+    let (first, last) = (most(&held[..10]), most(&held[10..]));
+    assert!(last < 1.2 * first, "bytes held by scripts: {held:?}");
+    assert_eq!(page.console_errors(), [""; 0]);
+}

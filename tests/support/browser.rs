@@ -56,6 +56,12 @@ impl View {
         scripts: true,
         time_zone: "UTC",
     };
+    /// A projector.
+    pub const PROJECTOR: Self = Self {
+        width: 2560,
+        height: 1440,
+        ..Self::DESK
+    };
     /// The narrowest that pages are made for.
     pub const PHONE: Self = Self {
         width: 320,
@@ -204,14 +210,71 @@ impl Page<'_> {
         );
     }
 
-    /// Goes to an address and waits until it is loaded.
+    /// Goes to an address of another document and waits until it is loaded.
     ///
     /// # Panics
     /// If it cannot be loaded at all.
     pub fn go(&self, url: &str) {
+        self.mark();
         let gone = self.ask("Page.navigate", &json!({ "url": url }));
         assert!(gone["errorText"].is_null(), "{url}: {}", gone["errorText"]);
-        self.wait_until("location.href != 'about:blank' && document.readyState == 'complete'");
+        self.wait_for_another();
+    }
+
+    /// Does what leads to another document, and waits until that is loaded.
+    ///
+    /// # Panics
+    /// If the expression throws.
+    pub fn leave_by(&self, expression: &str) {
+        self.mark();
+        let _ = self.evaluate(expression);
+        self.wait_for_another();
+    }
+
+    fn mark(&self) {
+        let _ = self.evaluate("window.isBefore = true");
+    }
+
+    fn wait_for_another(&self) {
+        self.wait_until(
+            "window.isBefore === undefined && location.href != 'about:blank' && document.readyState == 'complete'",
+        );
+    }
+
+    /// Runs a script before those of each document that is loaded from now on.
+    ///
+    /// # Panics
+    /// If the browser has ended.
+    pub fn before_scripts(&self, script: &str) {
+        let params = json!({ "source": script });
+        self.ask("Page.addScriptToEvaluateOnNewDocument", &params);
+    }
+
+    /// Bytes that its scripts hold, once what nobody needs is gone.
+    ///
+    /// # Panics
+    /// If the browser has ended.
+    #[must_use]
+    pub fn script_bytes(&self) -> f64 {
+        self.ask("HeapProfiler.collectGarbage", &json!({}));
+        let usage = self.ask("Runtime.getHeapUsage", &json!({}));
+        usage["usedSize"].as_f64().expect("a number of bytes")
+    }
+
+    /// Fills fields of the page's form, by their names, and sends it as its button does.
+    ///
+    /// # Panics
+    /// If there is no such form or field.
+    pub fn send_form(&self, form: &str, fields: &[(&str, &str)]) {
+        self.leave_by(&format!(
+            "(() => {{
+                const form = document.querySelector({});
+                for (const [name, value] of {}) form.elements[name].value = value;
+                form.requestSubmit();
+            }})()",
+            json!(form),
+            json!(fields)
+        ));
     }
 
     /// What an expression comes to, after it is settled if it is a promise.

@@ -105,7 +105,9 @@ async function follow() {
   const isBusy = document.hidden || document.querySelector("[data-live] details[open]");
   if (!isBusy) {
     try {
-      const answer = await fetch(location.pathname, { headers: { accept: "text/html" } });
+      const here = new URL(location.href);
+      here.searchParams.delete("done");
+      const answer = await fetch(here, { headers: { accept: "text/html" } });
       if (answer.ok && !answer.redirected) {
         const page = new DOMParser().parseFromString(await answer.text(), "text/html");
         for (const old of document.querySelectorAll("[data-live]")) {
