@@ -11,6 +11,8 @@ const SPREAD_MS = 800;
 
 const main = document.querySelector("main");
 const about = main?.dataset.live;
+// A page about a game under way follows the game's own stream in place of the season's.
+const address = main?.dataset.liveStream ?? `${STREAM}?about=${encodeURIComponent(about)}`;
 const said = document.querySelector("[data-live-said]");
 
 const clock = new Intl.DateTimeFormat(undefined, { weekday: "short", hour: "2-digit", minute: "2-digit", timeZoneName: "short" });
@@ -92,6 +94,13 @@ async function load() {
 }
 
 function show(page) {
+  const next = page.querySelector("main").dataset.liveStream;
+  if (main.dataset.liveStream !== undefined && next === undefined) {
+    // The game is over: what is shown of it from now on, its replay among it, is another page.
+    stop();
+    location.reload();
+    return;
+  }
   const words = [];
   for (const next of regionsOf(page)) {
     const name = nameOf(next);
@@ -105,6 +114,15 @@ function show(page) {
   }
   document.title = page.title;
   if (words.length > 0 && said) said.textContent = words.join(" ");
+}
+
+// Where puck and mallets are, between what is loaded: table frame, metres; drawn are millimetres, y upwards.
+function place({ puck, mallets }) {
+  for (const [name, [x, y]] of [["puck", puck], ["mallet-1", mallets[0]], ["mallet-2", mallets[1]]]) {
+    const mark = document.querySelector(`[data-live-place="${name}"]`);
+    mark?.setAttribute("cx", Math.round(1000 * x));
+    mark?.setAttribute("cy", Math.round(-1000 * y));
+  }
 }
 
 let stream = null;
@@ -131,9 +149,10 @@ function lookAgain() {
 
 function follow() {
   stop();
-  stream = new EventSource(`${STREAM}?about=${encodeURIComponent(about)}`);
+  stream = new EventSource(address);
   stream.addEventListener("open", () => { wait = FIRST_WAIT_MS; });
-  for (const name of ["now", "change", "reset"]) stream.addEventListener(name, soon);
+  for (const name of ["now", "change", "reset", "snapshot", "happening", "waiting", "over"]) stream.addEventListener(name, soon);
+  stream.addEventListener("position", (event) => place(JSON.parse(event.data)));
   stream.addEventListener("error", () => {
     // Otherwise the browser comes again by itself.
     if (stream?.readyState !== EventSource.CLOSED) return;

@@ -7,7 +7,7 @@ use faceoff_notify::Feed;
 use faceoff_scoring::tournament::rating::Ratings;
 use faceoff_store::Store;
 use faceoff_types::TokenId;
-use std::sync::Arc;
+use std::sync::{Arc, atomic::AtomicBool};
 use tokio::sync::Semaphore;
 use uuid::Uuid;
 
@@ -27,6 +27,8 @@ pub(crate) struct AppState {
     pub(crate) kept_answers: KeptAnswers,
     pub(crate) ratings: Kept<Ratings>,
     pub(crate) certainties: Kept<CertaintyView>,
+    /// Is it known that the season has a tournament? None is ever removed.
+    pub(crate) has_tournaments: AtomicBool,
     /// One permit per reader of a game under way.
     pub(crate) watching: Arc<Semaphore>,
     /// One permit per reader of the stream of events.
@@ -55,6 +57,7 @@ impl AppState {
             kept_answers: KeptAnswers::default(),
             ratings: Kept::default(),
             certainties: Kept::default(),
+            has_tournaments: AtomicBool::new(false),
             watching: Arc::new(Semaphore::new(config.limits.live_readers)),
             following: Arc::new(Semaphore::new(config.limits.event_readers)),
             feed: Feed::new(store.clone()),

@@ -22,8 +22,14 @@ const KEPT_FOR: Duration = Duration::from_secs(2);
 const LARGEST_BYTES: usize = 64 << 20;
 
 /// Pages that anybody may see, by their paths; below the last ones, too.
-const PAGES: [&str; 4] = ["/", "/season", "/announcements", "/feed.atom"];
-const BELOW: [&str; 2] = ["/tasks/", "/teams/"];
+const PAGES: [&str; 5] = [
+    "/",
+    "/season",
+    "/announcements",
+    "/feed.atom",
+    "/tournaments",
+];
+const BELOW: [&str; 3] = ["/tasks/", "/teams/", "/tournaments/"];
 /// Likewise of the API.
 const RESOURCES: [&str; 4] = ["/board", "/season", "/stages", "/announcements"];
 const RESOURCES_BELOW: [&str; 2] = ["/board/", "/stages/"];

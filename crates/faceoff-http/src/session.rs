@@ -9,15 +9,20 @@ use faceoff_store::SESSION;
 
 const NAME: &str = "faceoff_session";
 
-/// The cookie's value, if one came.
+/// The session's secret, if one came.
 pub(crate) fn cookie(headers: &HeaderMap) -> Option<&str> {
+    named(headers, NAME)
+}
+
+/// A cookie's value, if one of that name came.
+pub(crate) fn named<'a>(headers: &'a HeaderMap, wanted: &str) -> Option<&'a str> {
     headers
         .get_all(header::COOKIE)
         .iter()
         .filter_map(|line| line.to_str().ok())
         .flat_map(|line| line.split(';'))
         .filter_map(|pair| pair.trim().split_once('='))
-        .find_map(|(name, value)| (name == NAME && !value.is_empty()).then_some(value))
+        .find_map(|(name, value)| (name == wanted && !value.is_empty()).then_some(value))
 }
 
 /// The header that makes a browser keep the session, or forget it (`None`).
@@ -28,11 +33,7 @@ pub(crate) fn set_cookie(
     config: &HttpConfig,
     session: Option<&str>,
 ) -> Result<HeaderValue, Problem> {
-    let by_tls = config
-        .public_url
-        .as_deref()
-        .is_some_and(|url| url.starts_with("https://"));
-    let secure = if by_tls { "; Secure" } else { "" };
+    let secure = secure(config);
     let (value, age) = match session {
         Some(session) => (session, SESSION.as_secs()),
         None => ("", 0),
@@ -41,6 +42,15 @@ pub(crate) fn set_cookie(
         "{NAME}={value}; Path=/; HttpOnly; SameSite=Lax; Max-Age={age}{secure}"
     ))
     .map_err(Problem::internal)
+}
+
+/// What a cookie says beside: over TLS it is sent over nothing else.
+pub(crate) fn secure(config: &HttpConfig) -> &'static str {
+    let by_tls = config
+        .public_url
+        .as_deref()
+        .is_some_and(|url| url.starts_with("https://"));
+    if by_tls { "; Secure" } else { "" }
 }
 
 /// Refuses what a foreign page made a browser send. Browsers say where a request comes from; what says nothing is

@@ -5,6 +5,7 @@
 //! clips apart. A [`Pack`] is a file of clips with an index, made while a shard or a game is played; its
 //! [`Sheet`] has a line for each episode: where it began and ended, why, and what it broke. `docs/replay.md` describes the bytes.
 
+mod analysis;
 mod clip;
 mod column;
 mod episode;
@@ -23,6 +24,7 @@ mod sheet;
 mod viewer_model;
 mod violations;
 
+pub use analysis::{Breach, GameAnalysis, Shot};
 pub use clip::Clip;
 pub use column::Column;
 pub use error::ReplayError;

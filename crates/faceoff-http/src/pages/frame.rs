@@ -6,6 +6,7 @@ use axum::{
     response::{Html, IntoResponse, Response},
 };
 use faceoff_types::RULESET;
+use std::sync::atomic::Ordering;
 
 /// What surrounds the content of every page.
 #[derive(Debug)]
@@ -22,6 +23,8 @@ pub(super) struct Frame {
     pub(super) style: &'static str,
     pub(super) script: &'static str,
     pub(super) icon: &'static str,
+    /// Has the season a tournament?
+    has_tournaments: bool,
     /// Address of the picture that a preview of a link to the page shows; none where the server does not know its own.
     pub(super) preview: Option<String>,
 }
@@ -41,6 +44,7 @@ impl Frame {
                     archived.made_at.strftime("%Y-%m-%d at %H:%M UTC")
                 )
             }),
+            has_tournaments: app.has_tournaments.load(Ordering::Relaxed),
             preview: app
                 .config
                 .public_url
@@ -61,8 +65,22 @@ impl Frame {
             style: assets::STYLE.url(),
             script: assets::SCRIPT.url(),
             icon: assets::ICON.url(),
+            has_tournaments: false,
             preview: None,
         }
+    }
+
+    /// The entries of the navigation: paths and names.
+    pub(super) fn entries(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
+        let tournaments = self
+            .has_tournaments
+            .then_some(("/tournaments", "Tournament"));
+        [("/", "Board")].into_iter().chain(tournaments).chain([
+            ("/season", "Season"),
+            ("/announcements", "News"),
+            ("/docs", "Docs"),
+            ("/account", "Account"),
+        ])
     }
 
     /// Is the page below this entry of the navigation? The boards of the tasks are below the first one.

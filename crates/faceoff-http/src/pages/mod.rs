@@ -21,6 +21,8 @@ mod feed;
 mod figures;
 mod frame;
 mod game;
+mod game_row;
+mod head_to_head;
 mod help;
 mod join;
 mod organiser;
@@ -33,10 +35,14 @@ mod season;
 mod side_by_side;
 mod sign_in;
 mod signed_in;
+mod spoilers;
 mod standing;
 mod table_drawing;
 mod tables;
 mod team;
+mod tournament;
+mod tournament_words;
+mod tournaments;
 mod unknown;
 
 pub(crate) use unknown::{for_whom, unknown_method, unknown_path};
@@ -79,6 +85,10 @@ pub(crate) fn router(patience: Duration, api: Arc<Value>) -> Router<App> {
             get(replay::embedded),
         )
         .route("/games/{id}", get(game::page))
+        .route("/tournaments", get(tournaments::page))
+        .route("/tournaments/{id}", get(tournament::page))
+        .route("/tournaments/{id}/teams/{a}/{b}", get(head_to_head::page))
+        .route("/spoilers", post(spoilers::choose))
         .route("/season", get(season::page))
         .route("/submissions/{id}/ablation", get(ablation::page))
         .route(

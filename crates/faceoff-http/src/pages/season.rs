@@ -14,7 +14,7 @@ use crate::{
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
-use faceoff_types::StageId;
+use faceoff_types::{StageId, StageName, TournamentId};
 use jiff::Timestamp;
 
 #[derive(Template)]
@@ -24,6 +24,8 @@ struct Page {
     season: SeasonView,
     opened: String,
     closed: Option<String>,
+    /// Ids and names.
+    tournaments: Vec<(TournamentId, StageName)>,
 }
 
 impl Page {
@@ -70,7 +72,12 @@ pub(super) async fn page(
 ) -> Result<Response, PageProblem> {
     let season = SeasonView::now(&app, viewer?).await?;
     let instant = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M:%S UTC").to_string();
+    let tournaments = app.store.tournaments().await.map_err(Problem::from)?;
     render(&Page {
+        tournaments: tournaments
+            .into_iter()
+            .map(|one| (one.id, one.name))
+            .collect(),
         frame: Frame::of(&app, season.name.clone(), "/season"),
         opened: instant(season.created_at),
         closed: season.closed_at.map(instant),

@@ -49,10 +49,18 @@ impl IntoResponse for Refused {
 /// The places that one is led back to.
 const PLACES: [&str; 4] = ["/desk", "/organiser", "/account", "/log"];
 
+/// Those that the choice not to see results leads back to.
+pub(super) const SPOILED: [&str; 2] = ["/tournaments", "/games"];
+
 /// A path of this server's own, and nothing else: where somebody is led to is not a stranger's choice.
 pub(super) fn own_place(path: &str) -> Option<&str> {
+    own_place_of(&PLACES, path)
+}
+
+/// Likewise, below one of some places.
+pub(super) fn own_place_of<'a>(places: &[&str], path: &'a str) -> Option<&'a str> {
     let is_plain = path.bytes().all(|byte| byte.is_ascii_graphic()) && !path.contains('\\');
-    let is_place = PLACES.iter().any(|place| {
+    let is_place = places.iter().any(|place| {
         let rest = path.strip_prefix(place);
         rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(['/', '?']))
     });

@@ -16,12 +16,13 @@ use crate::{
     views::{
         evaluation::EvaluationView, history::HistoryView, ruling::RulingView, season::SeasonHead,
         sight::Sight, stage::StageView, submission::SubmissionView, team::TeamView,
+        tournament::entered_by,
     },
 };
 use askama::Template;
 use axum::{extract::State, response::Response};
 use days::{Broken, Day, Now};
-use faceoff_types::{StageDay, TeamId};
+use faceoff_types::{StageDay, StageName, TeamId, TournamentId};
 
 #[derive(Template)]
 #[template(path = "team.html")]
@@ -34,6 +35,8 @@ struct Page {
     /// Its scores are not for the viewer.
     is_hidden: bool,
     frozen: Option<RulingView>,
+    /// Those that it has entered: ids and names.
+    tournaments: Vec<(TournamentId, StageName)>,
     now: Option<Now>,
     panels: Vec<Panel>,
     /// The newest first.
@@ -95,6 +98,7 @@ pub(super) async fn page(
     let others = StageView::all(&app).await?;
     let others = others.into_iter().filter(|of| of.id != stage.id);
     render(&Page {
+        tournaments: entered_by(&app, id).await?,
         frame: Frame::of(&app, season.name, ""),
         stage: stage.name.to_string(),
         others: others

@@ -7,7 +7,7 @@ use crate::{
     problem::{Problem, ProblemKind},
     viewer::Viewer,
 };
-use faceoff_replay::{CHUNK_STEPS, Key};
+use faceoff_replay::{CHUNK_STEPS, Clip, GameAnalysis, Key, Pack, ReplayError};
 use faceoff_store::{Game, GameState};
 use faceoff_types::{GameId, Side};
 
@@ -65,5 +65,21 @@ impl GameClips {
             );
             Problem::new(ProblemKind::NotFound, detail)
         })
+    }
+
+    /// What the motion of all of the game says of the play.
+    ///
+    /// # Errors
+    /// An internal problem, if it cannot be read.
+    pub(crate) async fn analysis(&self, steps: u32) -> Result<GameAnalysis, Problem> {
+        let read = move |pack: &Pack| {
+            let chunks = 0..steps.div_ceil(CHUNK_STEPS);
+            let clip = |chunk| -> Result<Option<Clip>, ReplayError> {
+                let bytes = pack.clip(Key::game_motion(chunk))?;
+                bytes.map(|bytes| Clip::read(&bytes)).transpose()
+            };
+            GameAnalysis::of(chunks.filter_map(|chunk| clip(chunk).transpose()))
+        };
+        self.file.read(read).await
     }
 }

@@ -26,6 +26,7 @@ pub(crate) mod feed;
 pub mod finalised;
 pub mod game;
 pub(crate) mod game_clips;
+pub(crate) mod game_live;
 pub mod health;
 pub mod history;
 pub mod invitation;

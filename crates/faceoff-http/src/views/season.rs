@@ -11,7 +11,7 @@ use crate::{app::AppState, problem::Problem, viewer::Viewer};
 use faceoff_types::{DivisionName, RULESET, Seed, StageDay, StageId};
 use jiff::{Timestamp, civil::Date};
 use serde::{Deserialize, Serialize};
-use std::collections::HashMap;
+use std::{collections::HashMap, sync::atomic::Ordering};
 use utoipa::ToSchema;
 
 /// What everybody may know of the season.
@@ -83,6 +83,7 @@ pub struct SeasonDay {
 impl SeasonView {
     pub(crate) async fn now(app: &AppState, viewer: Viewer) -> Result<Self, Problem> {
         let season = app.store.season().await?;
+        look_for_tournaments(app).await?;
         let sight = Sight::of(app, viewer).await?;
         let days = app.store.days().await?;
         let missed: HashMap<StageDay, String> =
@@ -139,10 +140,19 @@ pub(crate) struct SeasonHead {
 impl SeasonHead {
     pub(crate) async fn now(app: &AppState) -> Result<Self, Problem> {
         let season = app.store.season().await?;
+        look_for_tournaments(app).await?;
         Ok(Self {
             name: season.name,
             commitment: season.commitment,
             paused: season.paused.map(RulingView::from),
         })
     }
+}
+
+/// Pages lead to tournaments once there is one.
+async fn look_for_tournaments(app: &AppState) -> Result<(), Problem> {
+    if !app.has_tournaments.load(Ordering::Relaxed) && !app.store.tournaments().await?.is_empty() {
+        app.has_tournaments.store(true, Ordering::Relaxed);
+    }
+    Ok(())
 }

@@ -224,6 +224,21 @@ impl TournamentView {
     }
 }
 
+/// The tournaments that a team has entered, the first one first: ids and names.
+pub(crate) async fn entered_by(
+    app: &AppState,
+    team: TeamId,
+) -> Result<Vec<(TournamentId, StageName)>, Problem> {
+    let mut entered = Vec::new();
+    for tournament in app.store.tournaments().await? {
+        let sheet = TournamentSheet::unscored(app, tournament.id).await?;
+        if sheet.entrants.iter().any(|entrant| entrant.team == team) {
+            entered.push((tournament.id, tournament.name));
+        }
+    }
+    Ok(entered)
+}
+
 impl From<Entrant> for EntrantView {
     fn from(entrant: Entrant) -> Self {
         Self {

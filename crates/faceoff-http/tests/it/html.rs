@@ -36,3 +36,17 @@ pub fn texts(html: &Html, selector: &str) -> Vec<String> {
         })
         .collect()
 }
+
+/// Rows of tables, each as the words of its cells, one space between.
+pub fn rows(html: &Html, selector: &str) -> Vec<String> {
+    let cell = Selector::parse("th, td").unwrap();
+    html.select(&Selector::parse(selector).unwrap())
+        .map(|row| {
+            let cells = row.select(&cell).map(|cell| {
+                let text: String = cell.text().collect();
+                text.split_whitespace().collect::<Vec<_>>().join(" ")
+            });
+            cells.collect::<Vec<_>>().join(" ")
+        })
+        .collect()
+}

@@ -8,6 +8,7 @@ mod formats;
 mod free_games;
 mod game_page;
 mod live;
+mod pages;
 mod paper;
 mod replays;
 mod rulings;

@@ -1,7 +1,10 @@
 //! A game's page, and the clips that its replay is drawn from.
 
 use super::cup::{Cup, first_by_name_wins};
-use crate::{html::texts, site::text};
+use crate::{
+    html::{rows, texts},
+    site::text,
+};
 use faceoff_episode::{Answered, Arena, Entry, GameCourse, Response};
 use faceoff_replay::{CHUNK_STEPS, Clip, GameClipRecorder};
 use faceoff_store::Game;
@@ -153,4 +156,47 @@ async fn a_games_motion_is_everybodys_and_a_sides_observations_its_own() {
         let nobodys = cup.site.get(&observed(side), None).await;
         nobodys.problem(401, "unauthenticated", &["its team's"]);
     }
+}
+
+#[tokio::test]
+async fn a_games_page_tells_of_the_play_what_its_clips_say() {
+    let (cup, game) = played("never").await;
+    add_clips(&cup, &game).await;
+    let html = page(&cup, &game).await;
+    // Both arms hold: the puck lies where it was served, for all of the game.
+    let found = rows(&html, "[aria-labelledby=possession] tbody tr");
+    assert!(
+        found[0] == "Puck on the own half 100.0 0.0"
+            || found[0] == "Puck on the own half 0.0 100.0",
+        "{found:?}"
+    );
+    assert_eq!(found[1], "Touched it last 0.0 0.0");
+    let caption = texts(&html, "[aria-labelledby=possession] caption").remove(0);
+    assert!(caption.contains("In 100.0 % of it neither"), "{caption}");
+    let shots = texts(&html, "[aria-labelledby=shots] figcaption");
+    assert!(
+        shots
+            .iter()
+            .all(|told| told.ends_with(": 0 shots, 0 goals")),
+        "{shots:?}"
+    );
+    let safety = texts(&html, "[aria-labelledby=safety] figcaption");
+    assert_eq!(safety.len(), 2);
+
+    let hidden = cup
+        .site
+        .request(reqwest::Method::GET, &format!("/games/{}", game.id), None);
+    let hidden = hidden
+        .header("cookie", "spoilers=hidden")
+        .send()
+        .await
+        .unwrap();
+    let hidden = Html::parse_document(&hidden.text().await.unwrap());
+    let replay = Selector::parse("#replay").unwrap();
+    let samples = |html: &Html| {
+        let replay = html.select(&replay).next().unwrap();
+        replay.attr("data-samples").unwrap().to_owned()
+    };
+    assert_eq!(samples(&hidden), "45001", "as long as the rules have it");
+    assert!(texts(&hidden, "[aria-labelledby=possession]").is_empty());
 }

@@ -1,0 +1,186 @@
+//! Who had the puck, who shot from where and how fast, who broke limits where.
+
+use super::live::at;
+use crate::pages::{
+    episode_words::group_word,
+    figures,
+    table_drawing::{self, Place},
+};
+use faceoff_replay::{Breach, GameAnalysis, Group, Shot, model::CONTROL_STEP_S};
+
+/// Shares of the time, each side's.
+pub(super) struct Possession {
+    /// That the puck lay on each side's half, in percent.
+    pub(super) halves: [String; 2],
+    /// That each side had touched it last in the rally.
+    pub(super) touched: [String; 2],
+    /// That neither had.
+    pub(super) untouched: String,
+}
+
+/// A side's shots.
+pub(super) struct Shots {
+    pub(super) team: String,
+    pub(super) count: usize,
+    pub(super) goals: usize,
+    /// m/s; none without a shot.
+    pub(super) mean: Option<String>,
+    pub(super) fastest: Option<String>,
+    /// Where goals, and where other shots came from.
+    pub(super) scored: String,
+    pub(super) others: String,
+    pub(super) rows: Vec<ShotRow>,
+}
+
+pub(super) struct ShotRow {
+    pub(super) at: String,
+    pub(super) place: String,
+    pub(super) speed: String,
+    pub(super) goal: bool,
+}
+
+/// A side's broken limits.
+pub(super) struct Safety {
+    pub(super) team: String,
+    pub(super) count: usize,
+    pub(super) places: Vec<Places>,
+    pub(super) rows: Vec<BreachRow>,
+}
+
+/// The places of a group.
+pub(super) struct Places {
+    pub(super) word: &'static str,
+    pub(super) class: &'static str,
+    pub(super) marks: String,
+    /// One of them, for the key.
+    pub(super) sign: String,
+    pub(super) count: usize,
+}
+
+pub(super) struct BreachRow {
+    pub(super) at: String,
+    pub(super) word: &'static str,
+    pub(super) duration_s: String,
+    pub(super) worst: String,
+    pub(super) place: String,
+}
+
+/// The most rows of a table: a robot that shakes at a limit breaks it thousands of times.
+const MOST_ROWS: usize = 500;
+
+impl Possession {
+    pub(super) fn of(analysis: &GameAnalysis) -> Self {
+        let share =
+            |steps: u32| figures::one(100.0 * f64::from(steps) / f64::from(analysis.steps.max(1)));
+        Self {
+            halves: analysis.halves.map(share),
+            touched: analysis.touched.map(share),
+            untouched: share(analysis.untouched),
+        }
+    }
+}
+
+impl Shots {
+    pub(super) fn of(analysis: &GameAnalysis, side: usize, team: &str) -> Self {
+        let shots = analysis.shots_of(side);
+        let places = |goal: bool| -> Vec<Place> {
+            let those = shots.iter().filter(|shot| shot.goal == goal);
+            those.map(|shot| shot.at).collect()
+        };
+        let speeds = || shots.iter().map(|shot| shot.speed);
+        let fastest = speeds().reduce(f64::max);
+        let count = u32::try_from(shots.len()).unwrap_or(u32::MAX);
+        Self {
+            team: team.to_owned(),
+            count: shots.len(),
+            goals: shots.iter().filter(|shot| shot.goal).count(),
+            mean: fastest.map(|_| figures::one(speeds().sum::<f64>() / f64::from(count))),
+            fastest: fastest.map(figures::one),
+            scored: table_drawing::dots(&places(true)),
+            others: table_drawing::crosses(&places(false)),
+            rows: shots.iter().take(MOST_ROWS).map(ShotRow::of).collect(),
+        }
+    }
+}
+
+impl ShotRow {
+    fn of(shot: &Shot) -> Self {
+        Self {
+            at: at(step(shot.t)),
+            place: place(shot.at),
+            speed: figures::one(shot.speed),
+            goal: shot.goal,
+        }
+    }
+}
+
+impl Safety {
+    pub(super) fn of(analysis: &GameAnalysis, side: usize, team: &str) -> Self {
+        let own: Vec<&Breach> = analysis
+            .breaches
+            .iter()
+            .filter(|breach| breach.side == side)
+            .collect();
+        let places = Group::ALL.into_iter().filter_map(|group| {
+            let at: Vec<Place> = own
+                .iter()
+                .filter(|breach| breach.group == group)
+                .map(|breach| breach.at)
+                .collect();
+            let (class, draw): (_, fn(&[Place]) -> String) = match group {
+                Group::Ee => ("ee", table_drawing::crosses),
+                Group::Link => ("link", table_drawing::squares),
+                Group::JointPos => ("joint-pos", table_drawing::dots),
+                Group::JointVel => ("joint-vel", table_drawing::triangles),
+            };
+            (!at.is_empty()).then(|| Places {
+                word: group_word(group),
+                class,
+                marks: draw(&at),
+                sign: draw(&[[0.0; 2]]),
+                count: at.len(),
+            })
+        });
+        Self {
+            team: team.to_owned(),
+            count: own.len(),
+            places: places.collect(),
+            rows: own
+                .iter()
+                .take(MOST_ROWS)
+                .map(|breach| BreachRow {
+                    at: at(breach.from),
+                    word: group_word(breach.group),
+                    duration_s: format!(
+                        "{:.2}",
+                        f64::from(breach.to + 1 - breach.from) * CONTROL_STEP_S
+                    ),
+                    worst: worst(breach),
+                    place: place(breach.at),
+                })
+                .collect(),
+        }
+    }
+}
+
+fn worst(breach: &Breach) -> String {
+    match breach.group {
+        Group::Ee | Group::Link => format!("{} mm", figures::one(1e3 * breach.worst)),
+        Group::JointPos => format!("{:.3} rad", breach.worst),
+        Group::JointVel => format!("{:.3} rad/s", breach.worst),
+    }
+}
+
+fn place([x, y]: Place) -> String {
+    format!("{x:.2}, {y:.2}")
+}
+
+/// The control step in which a moment lies.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a moment of a game"
+)]
+fn step(t: f64) -> u32 {
+    (t / CONTROL_STEP_S).round() as u32
+}

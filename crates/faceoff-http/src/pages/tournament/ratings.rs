@@ -1,0 +1,88 @@
+//! How strong the submissions are, apart from the standings.
+
+use faceoff_scoring::tournament::rating::{Pool, Ratings};
+use faceoff_types::TeamName;
+use std::collections::BTreeMap;
+
+/// A table of ratings.
+pub(super) struct RatingTable {
+    pub(super) id: String,
+    pub(super) caption: String,
+    /// The strongest first.
+    pub(super) rows: Vec<Row>,
+}
+
+pub(super) struct Row {
+    pub(super) team: TeamName,
+    /// The rounds that the submission plays.
+    pub(super) rounds: Option<String>,
+    pub(super) rating: String,
+    pub(super) interval: String,
+    pub(super) games: u32,
+}
+
+/// By results, then by goals; more than one of each where no chain of games connects all submissions.
+pub(super) fn tables(ratings: &Ratings, rounds: &BTreeMap<String, String>) -> Vec<RatingTable> {
+    let mut tables = Vec::new();
+    for (by, what, pools) in [
+        (
+            "results",
+            "who won: a draw is half a win for each",
+            &ratings.results,
+        ),
+        ("goals", "goals alone, whoever won the game", &ratings.goals),
+    ] {
+        for (number, pool) in (1..).zip(pools) {
+            let of_many = match pools.len() {
+                1 => String::new(),
+                many => format!(
+                    " Pool {number} of {many}, which no game connects: their numbers cannot be compared."
+                ),
+            };
+            tables.push(RatingTable {
+                id: format!("ratings-by-{by}-{number}"),
+                caption: format!("By {what}.{of_many}"),
+                rows: rows(pool, rounds),
+            });
+        }
+    }
+    tables
+}
+
+fn rows(pool: &Pool, rounds: &BTreeMap<String, String>) -> Vec<Row> {
+    let ratings = pool.ratings.iter();
+    ratings
+        .map(|rating| {
+            let submission = rating.rated.submission.as_ref();
+            Row {
+                team: rating.rated.team.clone(),
+                rounds: submission.and_then(|label| rounds.get(&label.to_string()).cloned()),
+                rating: format!("{:.0}", rating.rating),
+                interval: interval(rating.ci95),
+                games: rating.games,
+            }
+        })
+        .collect()
+}
+
+fn interval(ends: [Option<f64>; 2]) -> String {
+    match ends {
+        [Some(low), Some(high)] => format!("{low:.0} – {high:.0}"),
+        [Some(low), None] => format!("above {low:.0}"),
+        [None, Some(high)] => format!("below {high:.0}"),
+        [None, None] => "none: too few games".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_end_that_games_do_not_give_is_said() {
+        assert_eq!(interval([Some(1400.4), Some(1600.0)]), "1400 – 1600");
+        assert_eq!(interval([Some(1870.0), None]), "above 1870");
+        assert_eq!(interval([None, Some(1180.0)]), "below 1180");
+        assert_eq!(interval([None, None]), "none: too few games");
+    }
+}
