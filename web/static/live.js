@@ -82,7 +82,14 @@ async function load() {
       const answer = await fetch(location.href, { headers: { accept: "text/html" }, cache: "no-cache" });
       if (!answer.ok || answer.redirected) return;
       const page = new DOMParser().parseFromString(await answer.text(), "text/html");
-      if (page.querySelector("main")?.dataset.live === undefined) return;
+      const next = page.querySelector("main")?.dataset;
+      if (main.dataset.liveStream !== undefined && next && next.liveStream === undefined) {
+        // The game is over: what is shown of it from now on, its replay among it, is another page.
+        stop();
+        location.reload();
+        return;
+      }
+      if (next?.live === undefined) return;
       show(page);
     }
   } catch {
@@ -94,13 +101,6 @@ async function load() {
 }
 
 function show(page) {
-  const next = page.querySelector("main").dataset.liveStream;
-  if (main.dataset.liveStream !== undefined && next === undefined) {
-    // The game is over: what is shown of it from now on, its replay among it, is another page.
-    stop();
-    location.reload();
-    return;
-  }
   const words = [];
   for (const next of regionsOf(page)) {
     const name = nameOf(next);

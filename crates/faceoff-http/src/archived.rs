@@ -18,7 +18,10 @@ pub(crate) async fn refuse_changes(
     next: Next,
 ) -> Response {
     match app.store.archived() {
-        Some(archived) if !request.method().is_safe() => {
+        // What somebody wants to see is no change of the season.
+        Some(archived)
+            if !request.method().is_safe() && request.uri().path() != pages::SPOILERS_PATH =>
+        {
             let problem = Problem::archived(archived.made_at, archived.imported_at);
             pages::for_whom(request.uri().path(), request.headers(), problem)
         }

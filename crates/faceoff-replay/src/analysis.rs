@@ -6,6 +6,7 @@ use crate::{
     group::Group,
     header::{Break, BreakKind, Contact, ContactWith},
 };
+use std::collections::VecDeque;
 
 /// What the clips of a game say. Sides are 0 and 1; places are in the table's frame, in m.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -20,11 +21,27 @@ pub struct GameAnalysis {
     pub touched: [u32; 2],
     /// Those before either had touched it in the rally.
     pub untouched: u32,
+    /// The puck's ways into the goals, in order.
+    pub goals: Vec<GoalWay>,
     /// Each time that a mallet sent the puck over the middle line.
     pub shots: Vec<Shot>,
     /// Limits that were broken, in order.
     pub breaches: Vec<Breach>,
 }
+
+/// How the puck came into a goal: in the last [`GOAL_WAY_STEPS`] control steps at most, and no further back than its rally.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GoalWay {
+    /// Who scored.
+    pub side: usize,
+    /// The rally's last sample.
+    pub sample: u32,
+    /// Where the puck was.
+    pub places: Vec<[f64; 2]>,
+}
+
+/// Control steps of the way into a goal: two seconds.
+pub const GOAL_WAY_STEPS: usize = 100;
 
 /// A mallet touched the puck, which crossed the middle line towards the other side before any mallet touched it again.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,6 +89,8 @@ struct Watch {
     touch: Option<Touch>,
     /// The shot by which the puck came to lie on the half where it is, among those found.
     open: Option<usize>,
+    /// Where the puck was last in the rally.
+    way: VecDeque<[f64; 2]>,
 }
 
 impl GameAnalysis {
@@ -150,11 +169,17 @@ impl Watch {
     }
 
     /// The puck after a control step.
-    fn lie(&mut self, [x, _]: [f64; 2], speed: f64) {
+    fn lie(&mut self, [x, y]: [f64; 2], speed: f64) {
         let half = usize::from(x >= 0.0);
+        if self.way.len() > GOAL_WAY_STEPS {
+            self.way.pop_front();
+        }
+        self.way.push_back([x, y]);
         self.found.steps += 1;
         self.found.halves[half] += 1;
-        let Self { found, touch, open } = self;
+        let Self {
+            found, touch, open, ..
+        } = self;
         // Back on the half that it was shot from.
         if open.is_some_and(|shot| found.shots[shot].side == half) {
             *open = None;
@@ -184,6 +209,14 @@ impl Watch {
             shot.goal = scored == Some(shot.side);
         }
         self.touch = None;
+        let places = std::mem::take(&mut self.way);
+        if let Some(side) = scored {
+            self.found.goals.push(GoalWay {
+                side,
+                sample: end.sample,
+                places: places.into(),
+            });
+        }
     }
 
     fn add_breaches(&mut self, clip: &Clip) {
@@ -314,6 +347,14 @@ mod tests {
             .collect();
         assert_eq!(told, [(0, false), (1, false)], "the second came back, too");
         assert!((found.shots[0].t - 0.041).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_way_into_a_goal_is_its_last_two_seconds() {
+        let mut game = clip(0, &[-0.5; 300]);
+        game.header.breaks = vec![goal(250, 1)];
+        let found = of(vec![game]);
+        assert_eq!(found.goals[0].places.len(), GOAL_WAY_STEPS + 1);
     }
 
     #[test]

@@ -24,7 +24,7 @@ mod sheet;
 mod viewer_model;
 mod violations;
 
-pub use analysis::{Breach, GameAnalysis, Shot};
+pub use analysis::{Breach, GOAL_WAY_STEPS, GameAnalysis, GoalWay, Shot};
 pub use clip::Clip;
 pub use column::Column;
 pub use error::ReplayError;

@@ -187,7 +187,7 @@ impl Chunks {
 impl Play {
     fn of(analysis: &GameAnalysis, teams: &[String; 2]) -> Self {
         Self {
-            time_line: TimeLine::of(&analysis.breaks, analysis.steps, teams),
+            time_line: TimeLine::of(analysis, teams),
             possession: Possession::of(analysis),
             shots: [0, 1].map(|side| Shots::of(analysis, side, &teams[side])),
             safety: [0, 1].map(|side| Safety::of(analysis, side, &teams[side])),

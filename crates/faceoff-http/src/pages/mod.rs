@@ -45,6 +45,7 @@ mod tournament_words;
 mod tournaments;
 mod unknown;
 
+pub(crate) use spoilers::SPOILERS_PATH;
 pub(crate) use unknown::{for_whom, unknown_method, unknown_path};
 
 use crate::{app::App, extract::MAX_JSON_BYTES, layers};
@@ -88,7 +89,7 @@ pub(crate) fn router(patience: Duration, api: Arc<Value>) -> Router<App> {
         .route("/tournaments", get(tournaments::page))
         .route("/tournaments/{id}", get(tournament::page))
         .route("/tournaments/{id}/teams/{a}/{b}", get(head_to_head::page))
-        .route("/spoilers", post(spoilers::choose))
+        .route(SPOILERS_PATH, post(spoilers::choose))
         .route("/season", get(season::page))
         .route("/submissions/{id}/ablation", get(ablation::page))
         .route(

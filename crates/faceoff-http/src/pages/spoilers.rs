@@ -15,6 +15,8 @@ use faceoff_types::RoundNumber;
 use serde::Deserialize;
 use std::convert::Infallible;
 
+/// Where the choice is sent.
+pub(crate) const SPOILERS_PATH: &str = "/spoilers";
 const NAME: &str = "spoilers";
 const HIDDEN: &str = "hidden";
 /// A year.

@@ -1,8 +1,8 @@
-//! How the score came about: a chart over the game's time, and the same as a table.
+//! How the score came about: a chart over the game's time, the same as a table, and the puck's ways into the goals.
 
-use super::live::at;
-use crate::pages::chart::Course;
-use faceoff_replay::{Break, BreakKind};
+use super::live::{at, before};
+use crate::pages::{chart::Course, table_drawing::way};
+use faceoff_replay::{Break, BreakKind, GameAnalysis};
 
 /// The time line.
 pub(super) struct TimeLine {
@@ -10,24 +10,34 @@ pub(super) struct TimeLine {
     pub(super) rows: Vec<Row>,
     /// Rallies that ended without goal or foul.
     pub(super) others: usize,
+    /// Each side's ways into the goal: SVG paths.
+    pub(super) ways: [String; 2],
 }
 
 /// A goal or a foul, or another end of a rally.
 pub(super) struct Row {
     pub(super) at: String,
+    /// The replay a little before.
+    pub(super) link: String,
     pub(super) what: &'static str,
     pub(super) who: String,
     pub(super) score: [u32; 2],
 }
 
 impl TimeLine {
-    pub(super) fn of(breaks: &[Break], steps: u32, teams: &[String; 2]) -> Self {
+    pub(super) fn of(analysis: &GameAnalysis, teams: &[String; 2]) -> Self {
+        let GameAnalysis { breaks, steps, .. } = analysis;
+        let ways = [0, 1].map(|side| {
+            let goals = analysis.goals.iter().filter(|goal| goal.side == side);
+            goals.map(|goal| way(&goal.places)).collect()
+        });
         let is_told = |end: &&Break| matches!(end.what, BreakKind::Goal | BreakKind::Foul);
         let rows: Vec<Row> = breaks
             .iter()
             .filter(|end| end.what != BreakKind::GameOver)
             .map(|end| Row {
                 at: at(end.sample),
+                link: before(end.sample),
                 what: word(end.what),
                 who: match end.by {
                     Some(0) => teams[0].clone(),
@@ -39,7 +49,7 @@ impl TimeLine {
             .collect();
         Self {
             chart: Course::of(
-                steps,
+                *steps,
                 breaks.iter().filter(is_told).map(|end| {
                     let foul_by = (end.what == BreakKind::Foul)
                         .then_some(end.by)
@@ -50,8 +60,15 @@ impl TimeLine {
                 teams,
             ),
             others: breaks.iter().filter(|end| !is_told(end)).count(),
+            ways,
             rows,
         }
+    }
+}
+
+impl TimeLine {
+    pub(super) fn has_goals(&self) -> bool {
+        self.ways.iter().any(|ways| !ways.is_empty())
     }
 }
 

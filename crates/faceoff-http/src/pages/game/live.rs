@@ -63,7 +63,7 @@ impl Live {
     pub(super) fn told(&self) -> String {
         let [home, away] = self.score;
         match self.happened.first() {
-            Some((_, words)) => format!("{words}. {home} : {away}."),
+            Some((_, words)) => format!("{words}."),
             None => format!("{home} : {away}."),
         }
     }
@@ -84,6 +84,11 @@ pub(super) fn at(step: u32) -> String {
     let seconds = f64::from(step) * CONTROL_STEP_S;
     let minutes = (seconds / 60.0).floor();
     format!("{minutes:.0}:{:04.1}", (seconds - 60.0 * minutes).min(59.9))
+}
+
+/// Where the replay is two seconds before a control step, as its script reads it from the address.
+pub(super) fn before(step: u32) -> String {
+    format!("#t={}", step.saturating_sub(100))
 }
 
 /// None of what is no news.

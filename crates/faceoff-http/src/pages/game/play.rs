@@ -1,6 +1,6 @@
 //! Who had the puck, who shot from where and how fast, who broke limits where.
 
-use super::live::at;
+use super::live::{at, before};
 use crate::pages::{
     episode_words::group_word,
     figures,
@@ -34,6 +34,8 @@ pub(super) struct Shots {
 
 pub(super) struct ShotRow {
     pub(super) at: String,
+    /// The replay a little before.
+    pub(super) link: String,
     pub(super) place: String,
     pub(super) speed: String,
     pub(super) goal: bool,
@@ -59,6 +61,7 @@ pub(super) struct Places {
 
 pub(super) struct BreachRow {
     pub(super) at: String,
+    pub(super) link: String,
     pub(super) word: &'static str,
     pub(super) duration_s: String,
     pub(super) worst: String,
@@ -107,6 +110,7 @@ impl ShotRow {
     fn of(shot: &Shot) -> Self {
         Self {
             at: at(step(shot.t)),
+            link: before(step(shot.t)),
             place: place(shot.at),
             speed: figures::one(shot.speed),
             goal: shot.goal,
@@ -150,6 +154,7 @@ impl Safety {
                 .take(MOST_ROWS)
                 .map(|breach| BreachRow {
                     at: at(breach.from),
+                    link: before(breach.from),
                     word: group_word(breach.group),
                     duration_s: format!(
                         "{:.2}",

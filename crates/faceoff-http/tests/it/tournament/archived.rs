@@ -3,6 +3,7 @@
 use super::cup::{Cup, first_by_name_wins};
 use crate::{
     archive::{exported, imported, read},
+    browser::Browser,
     site::ADMIN,
 };
 use serde_json::json;
@@ -40,6 +41,17 @@ async fn an_archive_shows_a_tournament_as_it_was() {
             asked.status.as_u16(),
             if token.is_some() { 200 } else { 401 }
         );
+        // Pages, and the choice of what they show, which is no change of the season.
+        let page = cup.path.replace("/api/v1", "");
+        let shown = server.get(&page, None).await;
+        assert_eq!(shown.status, 200, "{edition}: {}", shown.body);
+        assert!(shown.body.contains("Archived season"), "{edition}");
+        let game_page = server.get(&format!("/games/{}", game.id), None).await;
+        assert_eq!(game_page.status, 200, "{edition}: {}", game_page.body);
+        let mut browser = Browser::new(&server);
+        let fields = [("results", "hidden"), ("next", page.as_str())];
+        let chosen = browser.submit("/spoilers", &fields).await;
+        assert_eq!(chosen.status, 303, "{edition}: {}", chosen.body);
         let rounds = format!("{}/rounds", cup.path);
         let start = server.post(&rounds, Some(ADMIN), &json!({})).await;
         start.problem(403, "read-only", &["archive"]);
