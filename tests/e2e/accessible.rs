@@ -35,7 +35,7 @@ const VIEWS: [View; 4] = [
     View::PROJECTOR,
 ];
 
-fn axe() -> String {
+pub fn axe() -> String {
     let axe = repository().join("web/client/node_modules/axe-core/axe.min.js");
     fs::read_to_string(&axe).unwrap_or_else(|error| {
         panic!(
@@ -46,7 +46,7 @@ fn axe() -> String {
 }
 
 /// What is wrong with a page that is open, wherever it is looked at.
-fn faults(page: &Page, axe: &str, path: &str) -> Vec<String> {
+pub fn faults(page: &Page, axe: &str, path: &str) -> Vec<String> {
     let mut faults = Vec::new();
     let _ = page.evaluate(&format!("{axe};1"));
     for view in VIEWS {

@@ -22,6 +22,7 @@ mod live;
 mod luck;
 mod packages;
 mod people;
+mod pictures;
 mod privacy;
 mod real_time;
 mod replay;
@@ -35,6 +36,7 @@ mod undisturbed;
 mod upgrade;
 mod uploads;
 mod void_at_will;
+mod watching;
 
 use bytes::Bytes;
 use faceoff_tests::{bundle, program, repository, server::Server};

@@ -1,0 +1,95 @@
+//! The pictures of the README and the documentation that show pages: `make pictures`.
+
+use crate::{Team, path_of, start_day};
+use faceoff_replay::ContactWith;
+use faceoff_tests::{
+    browser::{Browser, Page, View},
+    bundle, repository,
+    server::Server,
+};
+use serde_json::Value;
+use std::{io::Write, path::PathBuf};
+
+/// A day like the demo's.
+const CONFIG: &str = concat!(
+    include_str!("../patient.toml"),
+    "
+[season]
+name = \"Air hockey 2026\"
+[evaluation]
+episodes_per_task = 50
+"
+);
+
+fn image(name: &str) -> PathBuf {
+    repository().join("docs/images").join(name)
+}
+
+/// Of all that is seen, and no more.
+fn picture(page: &Page, view: View, name: &str) {
+    page.look_through(view);
+    page.screenshot(&image(name));
+}
+
+#[test]
+#[ignore = "it writes docs/images; `make pictures` runs it"]
+fn pictures_of_the_pages() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let server = Server::start(&scratch.path().join("data"), CONFIG);
+    let mut played = Vec::new();
+    for name in ["hold", "striker", "reckless"] {
+        let team = Team::create(&server, name);
+        let submission = team.submit(&server, &bundle::reference(name, scratch.path()));
+        assert_eq!(submission["state"], "valid", "{submission:#}");
+        played.push((team, submission));
+    }
+    let day = start_day(&server);
+    for (team, submission) in &played {
+        let finished = team.finished(&server, &path_of(&day, submission));
+        assert_eq!(finished["state"], "finished", "{finished}");
+    }
+    let browser = Browser::start(scratch.path());
+    let board = browser.open(&format!("{}/", server.url));
+    let view = View {
+        height: 860,
+        ..View::DESK
+    };
+    picture(&board, view, "board.png");
+
+    // The striker's first goal, at the moment of the strike.
+    let (_, striker) = &played[1];
+    let api = path_of(&day, striker);
+    let episodes: Value = server
+        .get(&format!("{api}/episodes"), None)
+        .json()
+        .expect("the API speaks JSON");
+    let lines = episodes["episodes"].as_array().expect("a list of episodes");
+    let goal = lines
+        .iter()
+        .find(|line| line["task"] == "hit" && line["success"] == true);
+    let number = &goal.expect("the striker hits a goal")["episode"];
+    let path = format!("{api}/episodes/hit/{number}");
+    let bytes = server.get(&format!("{path}/motion"), None).bytes();
+    // Whether it came compressed was the client's to undo.
+    let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    packed
+        .write_all(&bytes.expect("the clip comes whole"))
+        .expect("memory can be written");
+    let clip = faceoff_replay::Clip::read(&packed.finish().expect("memory can be written"));
+    let clip = clip.expect("it is a clip");
+    let mut contacts = clip.header.contacts.iter();
+    let strike = contacts.rfind(|contact| contact.what == ContactWith::Mallet);
+    let step = (strike.expect("a goal was struck").t / clip.header.step_s).ceil();
+    let page = path.replace("/api/v1", "");
+    let replay = browser.open(&format!("{}{page}#t={step}&cam=corner", server.url));
+    replay.wait_for("#replay[data-state=ready]");
+    replay.wait_until(&format!(
+        "document.querySelector('#replay').dataset.step == '{step}'"
+    ));
+    let view = View {
+        width: 1200,
+        height: 1290,
+        ..View::DESK
+    };
+    picture(&replay, view, "replay-page.png");
+}
