@@ -25,10 +25,10 @@ fn image(name: &str) -> PathBuf {
     repository().join("docs/images").join(name)
 }
 
-/// Of all that is seen, and no more.
+/// Of what a window of this size shows.
 fn picture(page: &Page, view: View, name: &str) {
     page.look_through(view);
-    page.screenshot(&image(name));
+    page.window(&image(name));
 }
 
 #[test]

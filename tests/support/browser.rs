@@ -372,10 +372,20 @@ impl Page<'_> {
     /// # Panics
     /// If it cannot be written.
     pub fn screenshot(&self, file: &Path) {
-        let taken = self.ask(
-            "Page.captureScreenshot",
-            &json!({ "captureBeyondViewport": true }),
-        );
+        self.capture(true, file);
+    }
+
+    /// A picture of what its window shows.
+    ///
+    /// # Panics
+    /// If it cannot be written.
+    pub fn window(&self, file: &Path) {
+        self.capture(false, file);
+    }
+
+    fn capture(&self, beyond_window: bool, file: &Path) {
+        let params = json!({ "captureBeyondViewport": beyond_window });
+        let taken = self.ask("Page.captureScreenshot", &params);
         let picture = STANDARD.decode(taken["data"].as_str().unwrap_or_default());
         fs::write(file, picture.expect("a picture in base 64")).expect("a file can be written");
     }
