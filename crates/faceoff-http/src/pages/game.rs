@@ -76,6 +76,8 @@ struct Page {
     /// Test games may be against a team that is not in the tournament.
     is_of_round: bool,
     state: String,
+    /// The team by whose leaving it does not count.
+    taken_out_by: Option<String>,
     next: String,
     /// Is it, or may it be, played by and by?
     is_open: bool,
@@ -152,6 +154,7 @@ pub(super) async fn page(
         is_of_round: matches!(view.purpose, PurposeView::Round { .. }),
         purpose: in_words(&view.purpose),
         state: state(&view.status, is_hidden),
+        taken_out_by: view.taken_out_by.map(|team| team.to_string()),
         next: view.next,
         is_open: matches!(view.status, GameStatus::Queued | GameStatus::Running { .. }),
         has_result: matches!(view.status, GameStatus::Played { .. }),

@@ -217,6 +217,31 @@ async fn what_was_voided_and_who_left_stand_in_the_schedule_with_the_reason() {
 }
 
 #[tokio::test]
+async fn a_game_that_was_taken_out_says_by_whose_leaving() {
+    let cup = Cup::open(&["A", "B", "C"], one_round()).await;
+    cup.start_round().await;
+    let game = cup.play_next(first_by_name_wins).await.unwrap();
+    let [home, _] = cup.names(&game).await;
+    let out =
+        json!({ "team": home, "as": "withdrawn", "reason": "the arm is sold", "confirm": home });
+    cup.post("departures", out).await.json(200);
+    let words = format!("since {home} left");
+    let of_game = page(&cup.site, &format!("/games/{}", game.id)).await;
+    assert!(texts(&of_game, ".lead")[0].contains(&words));
+    let html = page(&cup.site, &path(&cup)).await;
+    assert_eq!(
+        links(&html, ".cross a.out").len(),
+        4,
+        "its two games are struck through, from both sides"
+    );
+    let told = texts(&html, ".games td:last-child");
+    assert!(told.iter().any(|told| told.ends_with(&words)), "{told:?}");
+    let teams = texts(&html, "[data-live-region=entrants] th");
+    let left = format!("{home} withdrawn from round 1 on: the arm is sold");
+    assert!(teams.contains(&left), "{teams:?}");
+}
+
+#[tokio::test]
 async fn who_wants_no_spoilers_finds_no_result_anywhere_and_can_ask_for_one() {
     let cup = Cup::open(&["Ant", "Bee", "Cat"], one_round()).await;
     cup.start_round().await;
