@@ -4,7 +4,9 @@
 pub(super) mod pair;
 
 use super::{
-    assets, figures,
+    assets,
+    chart::{Bars, Rated},
+    figures,
     frame::{Frame, PageProblem, render},
 };
 use crate::{
@@ -25,30 +27,12 @@ use axum::{extract::State, response::Response};
 use faceoff_scoring::{ProfileEffect, SIGNIFICANCE};
 use faceoff_types::{Profile, SubmissionId, Task};
 
-/// The chart's measures, in its own units.
-const LEFT: f64 = 46.0;
-const TOP: f64 = 22.0;
-const PLOT_HEIGHT: f64 = 240.0;
-const BAR: f64 = 26.0;
-const BAR_STEP: f64 = 36.0;
-const GROUP_STEP: f64 = 248.0;
-
-/// One bar of the chart and one row of the table.
-struct Bar {
+/// One row of the table.
+struct Row {
     profile: Profile,
-    /// One letter, written under the bar.
-    sign: char,
-    x: String,
-    y: String,
-    height: String,
-    /// Middle of the bar.
-    middle: String,
-    /// Ends of the 95 % interval, and where the figure stands.
-    low_y: String,
-    high_y: String,
-    label_y: String,
+    /// One letter, written under its bar in the chart.
+    letter: char,
     percent: String,
-    whole_percent: String,
     low: String,
     high: String,
     successes: u32,
@@ -69,8 +53,8 @@ struct Difference {
 
 struct Group {
     task: Task,
-    middle: String,
-    bars: Vec<Bar>,
+    chart: Bars,
+    rows: Vec<Row>,
 }
 
 #[derive(Template)]
@@ -109,9 +93,9 @@ pub(super) async fn page(
     let season = SeasonHead::now(&app).await?;
     let groups = match &view.status {
         AblationStatus::Finished { tasks, .. } => {
-            let left = (0..).map(|group| LEFT + f64::from(group) * GROUP_STEP);
-            left.zip(tasks)
-                .map(|(left, (task, effects))| group(left, *task, effects))
+            let groups = tasks.iter();
+            groups
+                .map(|(task, effects)| Group::of(*task, effects))
                 .collect()
         }
         AblationStatus::Open { .. } | AblationStatus::Failed { .. } => Vec::new(),
@@ -133,52 +117,50 @@ pub(super) async fn page(
     })
 }
 
-fn group(left: f64, task: Task, effects: &[ProfileEffect]) -> Group {
-    let bars: Vec<Bar> = (0..)
-        .zip(effects)
-        .map(|(index, effect)| bar(left + 16.0 + f64::from(index) * BAR_STEP, effect))
-        .collect();
-    let width = 16.0 + BAR_STEP * effects.len() as f64;
-    Group {
-        task,
-        middle: figures::one(left + width / 2.0),
-        bars,
+impl Group {
+    fn of(task: Task, effects: &[ProfileEffect]) -> Self {
+        let rates: Vec<Rated> = effects
+            .iter()
+            .map(|effect| Rated {
+                name: effect.profile.as_str(),
+                letter: letter(effect.profile),
+                percent: 100.0 * effect.success_rate,
+                interval: effect.success_ci95.map(|end| 100.0 * end),
+            })
+            .collect();
+        Self {
+            task,
+            chart: Bars::of(task.as_str(), &rates),
+            rows: effects.iter().map(Row::of).collect(),
+        }
     }
 }
 
-fn bar(x: f64, effect: &ProfileEffect) -> Bar {
-    let y = |rate: f64| TOP + PLOT_HEIGHT * (1.0 - rate.clamp(0.0, 1.0));
-    let [low, high] = effect.success_ci95;
-    let rate = effect.success_rate;
-    Bar {
-        profile: effect.profile,
-        sign: sign(effect.profile),
-        x: figures::one(x),
-        y: figures::one(y(rate)),
-        height: figures::one(TOP + PLOT_HEIGHT - y(rate)),
-        middle: figures::one(x + BAR / 2.0),
-        low_y: figures::one(y(low)),
-        high_y: figures::one(y(high)),
-        label_y: figures::one(y(high) - 5.0),
-        percent: figures::one(100.0 * rate),
-        whole_percent: format!("{:.0}", 100.0 * rate),
-        low: figures::one(100.0 * low),
-        high: figures::one(100.0 * high),
-        successes: effect.successes,
-        episodes: effect.episodes,
-        penalty_points: figures::one(effect.penalty_points),
-        difference: (effect.profile != Profile::Ideal).then(|| Difference {
-            points: format!("{:+.1}", 100.0 * effect.difference),
-            lost: effect.lost,
-            gained: effect.gained,
-            p: format!("{:.3}", effect.p_value),
-            clear: effect.p_value <= SIGNIFICANCE,
-        }),
+impl Row {
+    fn of(effect: &ProfileEffect) -> Self {
+        let [low, high] = effect.success_ci95;
+        Self {
+            profile: effect.profile,
+            letter: letter(effect.profile),
+            percent: figures::one(100.0 * effect.success_rate),
+            low: figures::one(100.0 * low),
+            high: figures::one(100.0 * high),
+            successes: effect.successes,
+            episodes: effect.episodes,
+            penalty_points: figures::one(effect.penalty_points),
+            difference: (effect.profile != Profile::Ideal).then(|| Difference {
+                points: format!("{:+.1}", 100.0 * effect.difference),
+                lost: effect.lost,
+                gained: effect.gained,
+                p: format!("{:.3}", effect.p_value),
+                clear: effect.p_value <= SIGNIFICANCE,
+            }),
+        }
     }
 }
 
 /// A letter for each profile, since colour alone must not carry it.
-const fn sign(profile: Profile) -> char {
+const fn letter(profile: Profile) -> char {
     match profile {
         Profile::Ideal => 'I',
         Profile::ModelMismatch => 'M',
@@ -196,9 +178,9 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn every_profile_has_a_letter_of_its_own_and_a_bar_as_high_as_its_rate() {
-        let signs: BTreeSet<char> = Profile::ABLATION.into_iter().map(sign).collect();
-        assert_eq!(signs.len(), Profile::ABLATION.len());
+    fn every_profile_has_a_letter_of_its_own_and_is_told_apart_by_its_p_value() {
+        let letters: BTreeSet<char> = Profile::ABLATION.into_iter().map(letter).collect();
+        assert_eq!(letters.len(), Profile::ABLATION.len());
         let effect = ProfileEffect {
             profile: Profile::Evaluation,
             episodes: 4,
@@ -211,10 +193,7 @@ mod tests {
             gained: 0,
             p_value: 0.5,
         };
-        let bar = bar(100.0, &effect);
-        assert_eq!((bar.y.as_str(), bar.height.as_str()), ("202.0", "60.0"));
-        assert_eq!((bar.low_y.as_str(), bar.high_y.as_str()), ("250.0", "94.0"));
-        let difference = bar.difference.unwrap();
+        let difference = Row::of(&effect).difference.unwrap();
         assert_eq!(
             (difference.points.as_str(), difference.clear),
             ("-50.0", false)
