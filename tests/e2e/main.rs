@@ -1,6 +1,7 @@
 //! End to end: what an organiser, a team and a visitor get from the real program.
 
 mod accessible;
+mod axe;
 mod backup;
 mod bad_agents;
 mod busy_host;

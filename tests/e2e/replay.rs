@@ -1,6 +1,10 @@
 //! A replay in a real browser, against the clips that the server sends.
 
-use crate::{CONFIG, Team, path_of, start_day};
+use crate::{
+    CONFIG, Team,
+    axe::{axe, faults},
+    path_of, start_day,
+};
 use faceoff_replay::Clip;
 use faceoff_tests::{
     browser::{Browser, Page, View},
@@ -224,11 +228,12 @@ fn two_replays_of_one_start_run_in_step() {
     page.wait_until(
         "[...document.querySelectorAll('.replay')].every(replay => replay.dataset.step == '12')",
     );
-    for view in [View::PHONE, View::PROJECTOR] {
-        page.look_through(view);
-        assert_eq!(page.overflow(), 0, "{view:?}");
-    }
-    assert_eq!(page.console_errors(), [""; 0]);
+    let axe = axe();
+    let mut broken = faults(&page, &axe, "an episode twice");
+    page.look_through(View::DESK);
+    page.go(&format!("{}{a}/compare/{other}", server.url));
+    broken.extend(faults(&page, &axe, "a comparison"));
+    assert!(broken.is_empty(), "{}", broken.join("\n"));
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use crate::{
     CONFIG, Team,
-    accessible::{axe, faults},
+    axe::{axe, faults},
     commands::admin,
 };
 use faceoff_tests::{
@@ -88,10 +88,16 @@ fn a_round_is_followed_without_being_loaded_again_and_its_results_can_be_hidden(
     later.go(&format!("{}{game}?show=result", server.url));
     assert!(later.html().contains(because), "this one alone is shown");
 
+    let two = tournament.evaluate(
+        "document.querySelector('a[href*=\"/teams/\"][href^=\"/tournaments/\"]').pathname",
+    );
+    let two = two.as_str().expect("a path is text").to_owned();
     let mut broken = Vec::new();
     for (page, path) in [
         (&tournament, "/tournaments".to_owned()),
         (&tournament, format!("/tournaments/{cup}")),
+        (&tournament, two.clone()),
+        (&later, two),
         (&later, format!("/tournaments/{cup}")),
         (&watched, game.to_owned()),
         (&later, game.to_owned()),

@@ -149,10 +149,10 @@ impl Row {
             episodes: effect.episodes,
             penalty_points: figures::one(effect.penalty_points),
             difference: (effect.profile != Profile::Ideal).then(|| Difference {
-                points: format!("{:+.1}", 100.0 * effect.difference),
+                points: figures::signed(100.0 * effect.difference),
                 lost: effect.lost,
                 gained: effect.gained,
-                p: format!("{:.3}", effect.p_value),
+                p: figures::p_value(effect.p_value),
                 clear: effect.p_value <= SIGNIFICANCE,
             }),
         }
@@ -196,7 +196,7 @@ mod tests {
         let difference = Row::of(&effect).difference.unwrap();
         assert_eq!(
             (difference.points.as_str(), difference.clear),
-            ("-50.0", false)
+            ("−50.0", false)
         );
     }
 }

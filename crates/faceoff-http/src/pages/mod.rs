@@ -8,6 +8,7 @@ mod announcements;
 mod assets;
 mod baselines;
 mod board;
+mod broken_places;
 mod chart;
 mod comparison;
 mod desk;

@@ -98,7 +98,7 @@ async fn an_organiser_orders_one_and_its_team_and_visitors_see_what_came_of_it()
         "hit",
         "T · tracking_loss",
         "0 of 8",
-        "-100.0",
+        "−100.0",
         "0.008",
         "told apart",
     ] {

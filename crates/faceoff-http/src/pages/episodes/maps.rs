@@ -1,7 +1,7 @@
 //! Where episodes began, and where limits were broken.
 
 use crate::pages::{
-    episode_words::group_word,
+    broken_places::Places,
     figures,
     table_drawing::{self, Place},
 };
@@ -126,17 +126,6 @@ pub(super) struct SafetyMap {
     pub(super) episodes: usize,
 }
 
-/// The places of a group.
-pub(super) struct Places {
-    pub(super) word: &'static str,
-    pub(super) class: &'static str,
-    /// Of crosses or of dots, by the group.
-    pub(super) marks: String,
-    /// One of them, for the key.
-    pub(super) sign: String,
-    pub(super) count: usize,
-}
-
 /// How many episodes broke a joint's limits first at that joint.
 pub(super) struct Joint {
     pub(super) joint: u32,
@@ -147,28 +136,10 @@ pub(super) struct Joint {
 impl SafetyMap {
     pub(super) fn of(lines: &[&EpisodeLine]) -> Self {
         let broken = || lines.iter().flat_map(|line| &line.broken);
-        let places = Group::ALL
-            .into_iter()
-            .filter_map(|group| {
-                let at: Vec<Place> = broken()
-                    .filter(|one| one.group == group)
-                    .map(|one| one.at)
-                    .collect();
-                let (class, draw): (_, fn(&[Place]) -> String) = match group {
-                    Group::Ee => ("ee", table_drawing::crosses),
-                    Group::Link => ("link", table_drawing::squares),
-                    Group::JointPos => ("joint-pos", table_drawing::dots),
-                    Group::JointVel => ("joint-vel", table_drawing::triangles),
-                };
-                (!at.is_empty()).then(|| Places {
-                    word: group_word(group),
-                    class,
-                    marks: draw(&at),
-                    sign: draw(&[[0.0; 2]]),
-                    count: at.len(),
-                })
-            })
-            .collect();
+        let places = Places::by_group(|group| {
+            let those = broken().filter(|one| one.group == group);
+            those.map(|one| one.at).collect()
+        });
         let count = |group, joint| {
             let those = broken().filter(|one| one.group == group && one.joint == Some(joint));
             those.count()

@@ -2,6 +2,7 @@
 
 use super::live::{at, before};
 use crate::pages::{
+    broken_places::Places,
     episode_words::group_word,
     figures,
     table_drawing::{self, Place},
@@ -47,16 +48,6 @@ pub(super) struct Safety {
     pub(super) count: usize,
     pub(super) places: Vec<Places>,
     pub(super) rows: Vec<BreachRow>,
-}
-
-/// The places of a group.
-pub(super) struct Places {
-    pub(super) word: &'static str,
-    pub(super) class: &'static str,
-    pub(super) marks: String,
-    /// One of them, for the key.
-    pub(super) sign: String,
-    pub(super) count: usize,
 }
 
 pub(super) struct BreachRow {
@@ -125,30 +116,14 @@ impl Safety {
             .iter()
             .filter(|breach| breach.side == side)
             .collect();
-        let places = Group::ALL.into_iter().filter_map(|group| {
-            let at: Vec<Place> = own
-                .iter()
-                .filter(|breach| breach.group == group)
-                .map(|breach| breach.at)
-                .collect();
-            let (class, draw): (_, fn(&[Place]) -> String) = match group {
-                Group::Ee => ("ee", table_drawing::crosses),
-                Group::Link => ("link", table_drawing::squares),
-                Group::JointPos => ("joint-pos", table_drawing::dots),
-                Group::JointVel => ("joint-vel", table_drawing::triangles),
-            };
-            (!at.is_empty()).then(|| Places {
-                word: group_word(group),
-                class,
-                marks: draw(&at),
-                sign: draw(&[[0.0; 2]]),
-                count: at.len(),
-            })
-        });
+        let of_group = |group: Group| {
+            let those = own.iter().filter(|breach| breach.group == group);
+            those.map(|breach| breach.at).collect()
+        };
         Self {
             team: team.to_owned(),
             count: own.len(),
-            places: places.collect(),
+            places: Places::by_group(of_group),
             rows: own
                 .iter()
                 .take(MOST_ROWS)
