@@ -72,7 +72,7 @@ pub(crate) async fn ablation_motion(
 ) -> Result<Response, Problem> {
     let clips = AblationClips::of(&app, viewer, path.submission).await?;
     let key = Key::motion(path.task, path.episode);
-    send_episode(&clips, key, "motion", path, &conditions, &headers).await
+    send_episode(&app, &clips, key, "motion", path, &conditions, &headers).await
 }
 
 /// What the agent was told and commanded in such an episode, and how long its answers took, as a clip; for its team and
@@ -104,10 +104,11 @@ pub(crate) async fn ablation_observed(
         ));
     }
     let key = Key::observed(path.task, path.episode);
-    send_episode(&clips, key, "observed", path, &conditions, &headers).await
+    send_episode(&app, &clips, key, "observed", path, &conditions, &headers).await
 }
 
 async fn send_episode(
+    app: &App,
     clips: &AblationClips,
     key: Key,
     what: &str,
@@ -115,7 +116,7 @@ async fn send_episode(
     conditions: &Conditions,
     headers: &HeaderMap,
 ) -> Result<Response, Problem> {
-    let file = clips.of_profile(path.profile)?;
+    let file = clips.of_profile(app, path.profile).await?;
     let tag = ETag::of(
         what,
         &[&file.key, path.task.as_str(), &path.episode.to_string()],

@@ -101,7 +101,7 @@ pub(super) async fn page(
         AblationStatus::Open { .. } | AblationStatus::Failed { .. } => Vec::new(),
     };
     let clips = AblationClips::of(&app, viewer?, id).await?;
-    let changed = clips.differing().await?.into_iter();
+    let changed = clips.differing(&app).await?.into_iter();
     render(&Page {
         frame: Frame::of(&app, season.name, ""),
         style: assets::EPISODES_STYLE.url(),

@@ -4,14 +4,14 @@ use super::clip_file::{ClipFile, Episode};
 use crate::{app::AppState, problem::Problem, viewer::Viewer};
 use faceoff_replay::{EpisodeLine, Pack};
 use faceoff_store::Artifacts;
-use faceoff_types::{Profile, SubmissionId, Task};
+use faceoff_types::{AblationId, Profile, SubmissionId, Task};
 use std::collections::BTreeMap;
 
 /// The clips that are kept of a submission's newest ablation.
 #[derive(Debug)]
 pub(crate) struct AblationClips {
-    /// Profiles in which all episodes end as in the ideal one are left out.
-    files: BTreeMap<Profile, ClipFile>,
+    /// `None` without one.
+    ablation: Option<AblationId>,
     /// Does the viewer see what was observed, commanded and timed, and the agent's faults?
     pub(crate) sees_observed: bool,
 }
@@ -30,7 +30,7 @@ impl Differing {
 }
 
 impl AblationClips {
-    /// Of a submission; without files while nothing is kept.
+    /// Of a submission, whether anything is kept or not.
     ///
     /// # Errors
     /// `NotFound` if there is no such submission.
@@ -40,17 +40,9 @@ impl AblationClips {
         submission: SubmissionId,
     ) -> Result<Self, Problem> {
         let team = app.store.submission(submission).await?.team;
-        let mut files = BTreeMap::new();
-        if let Some(ablation) = app.store.newest_ablation(submission).await? {
-            for profile in Profile::ABLATION {
-                let key = Artifacts::ablation_clips(ablation.id, profile);
-                if let Some(file) = ClipFile::find(app, key).await? {
-                    files.insert(profile, file);
-                }
-            }
-        }
+        let newest = app.store.newest_ablation(submission).await?;
         Ok(Self {
-            files,
+            ablation: newest.map(|ablation| ablation.id),
             sees_observed: match viewer {
                 Viewer::Organiser => true,
                 Viewer::Team(own) => own == team,
@@ -59,12 +51,24 @@ impl AblationClips {
         })
     }
 
+    /// `None` of a profile in which all episodes end as in the ideal one.
+    async fn find(&self, app: &AppState, profile: Profile) -> Result<Option<ClipFile>, Problem> {
+        match self.ablation {
+            Some(id) => ClipFile::find(app, Artifacts::ablation_clips(id, profile)).await,
+            None => Ok(None),
+        }
+    }
+
     /// Those of a profile.
     ///
     /// # Errors
     /// `NotFound` if none are kept of it.
-    pub(crate) fn of_profile(&self, profile: Profile) -> Result<&ClipFile, Problem> {
-        let file = self.files.get(&profile);
+    pub(crate) async fn of_profile(
+        &self,
+        app: &AppState,
+        profile: Profile,
+    ) -> Result<ClipFile, Problem> {
+        let file = self.find(app, profile).await?;
         file.ok_or_else(|| Problem::not_found("episode"))
     }
 
@@ -72,14 +76,20 @@ impl AblationClips {
     ///
     /// # Errors
     /// An internal problem, if a file cannot be read.
-    pub(crate) async fn differing(&self) -> Result<BTreeMap<Profile, Vec<Differing>>, Problem> {
-        let Some(ideal) = self.files.get(&Profile::Ideal) else {
+    pub(crate) async fn differing(
+        &self,
+        app: &AppState,
+    ) -> Result<BTreeMap<Profile, Vec<Differing>>, Problem> {
+        let Some(ideal) = self.find(app, Profile::Ideal).await? else {
             return Ok(BTreeMap::new());
         };
         let ideal = ideal.read(Pack::sheet).await?;
         let mut differing = BTreeMap::new();
-        let others = self.files.iter();
-        for (profile, file) in others.filter(|(profile, _)| **profile != Profile::Ideal) {
+        let all = Profile::ABLATION.into_iter();
+        for profile in all.filter(|profile| *profile != Profile::Ideal) {
+            let Some(file) = self.find(app, profile).await? else {
+                continue;
+            };
             let perturbed = file.read(Pack::sheet).await?.episodes;
             let pairs = perturbed.into_iter().filter_map(|perturbed| {
                 let ideal = ideal.line(perturbed.task, perturbed.episode)?.clone();
@@ -90,7 +100,7 @@ impl AblationClips {
                 }
                 Some(pair)
             });
-            differing.insert(*profile, pairs.collect());
+            differing.insert(profile, pairs.collect());
         }
         Ok(differing)
     }
@@ -101,11 +111,12 @@ impl AblationClips {
     /// `NotFound` if it is not kept.
     pub(crate) async fn episode(
         &self,
+        app: &AppState,
         profile: Profile,
         task: Task,
         episode: u32,
     ) -> Result<Episode, Problem> {
-        let file = self.of_profile(profile)?;
+        let file = self.of_profile(app, profile).await?;
         file.episode(task, episode, self.sees_observed).await
     }
 }

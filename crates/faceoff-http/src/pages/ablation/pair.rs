@@ -54,11 +54,11 @@ pub(in crate::pages) async fn page(
     let clips = AblationClips::of(&app, viewer?, id).await?;
     let mut sides = Vec::new();
     for (element, of) in [("replay-a", Profile::Ideal), ("replay-b", profile)] {
-        let found = clips.episode(of, task, episode).await?;
+        let found = clips.episode(&app, of, task, episode).await?;
         let api = format!("{}/ablation/{of}/{task}/{episode}", paths::submission(id));
         sides.push(Side::of(element, &found, &api, of.to_string()));
     }
-    let differing = clips.differing().await?;
+    let differing = clips.differing(&app).await?;
     let of_task = || {
         let all = differing.get(&profile).into_iter().flatten();
         let of_task = all.filter(|Differing { ideal, .. }| ideal.task == task);
