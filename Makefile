@@ -11,7 +11,7 @@ CARGO      ?= cargo
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
 
-.PHONY: demo test web wheel pictures test-api test-python test-learning fuzz busy load soak steady lint format fidelity setup setup-test agents dist clean-demo help
+.PHONY: demo test web wheel pictures test-api test-python test-learning fuzz busy load soak steady frames lint format fidelity setup setup-test agents dist clean-demo help
 
 help:
 	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
@@ -28,6 +28,7 @@ help:
 	@echo "make load   how much looking on a server bears, and that agents notice nothing of it"
 	@echo "make soak   upload, play, read, fill the disk and kill the server, all at once: MINUTES=$(MINUTES)"
 	@echo "make steady run the tests ten times, and three times on a busy machine"
+	@echo "make frames   how much CPU time a frame of a replay takes its script"
 	@echo "make pictures   take the pictures of pages in README and docs/ anew"
 	@echo "make lint   format check and lints"
 	@echo "make fidelity   draw how far the simulator is from the recordings"
@@ -136,6 +137,11 @@ fidelity:
 pictures: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
 	$(CARGO) test --locked --workspace --test e2e pictures:: -- --include-ignored
+
+# Of the replay's script: so many milliseconds are the machine's, which is why no other test asks.
+frames: setup-test
+	$(CARGO) build --locked --workspace --bins --tests
+	$(CARGO) test --locked --workspace --test e2e replay::a_frame -- --include-ignored --nocapture
 
 lint:
 	$(CARGO) fmt --all --check

@@ -279,3 +279,43 @@ fn replays_that_are_opened_again_and_again_leave_nothing_behind() {
     assert!(last < 1.2 * first, "bytes held by scripts: {held:?}");
     assert_eq!(page.console_errors(), [""; 0]);
 }
+
+/// How much CPU time a frame may take its script, ms, in 19 of 20.
+const FRAME_MS: f64 = 4.0;
+
+#[test]
+#[ignore = "how fast a machine is, is the machine's; `make frames` runs it"]
+#[expect(
+    clippy::print_stdout,
+    reason = "what it measures is what it is run for"
+)]
+fn a_frame_takes_its_script_little_time() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let (server, evaluation) = released(scratch.path());
+    let browser = Browser::start(scratch.path());
+    let page = browser.open(&format!("{}{evaluation}/episodes/defend/0", server.url));
+    page.wait_for("#replay[data-state=ready]");
+    let samples = page.evaluate("document.querySelector('#replay input[type=range]').max");
+    let samples = samples.as_str().and_then(|text| text.parse().ok());
+    let samples: usize = samples.expect("the slider has an end");
+    // First all of it once: what is made when it is needed first is no frame's.
+    let mut frames = Vec::new();
+    for turn in 0..2 {
+        for sample in (0..samples).rev() {
+            let before = page.script_s();
+            scrub(&page, sample);
+            if turn > 0 {
+                frames.push(1e3 * (page.script_s() - before));
+            }
+        }
+    }
+    frames.sort_by(f64::total_cmp);
+    let share = |percent: usize| frames[(frames.len() - 1) * percent / 100];
+    println!(
+        "script per frame, ms of CPU: median {:.2}, 95th percentile {:.2}, of {} frames",
+        share(50),
+        share(95),
+        frames.len()
+    );
+    assert!(share(95) <= FRAME_MS, "{frames:?}");
+}

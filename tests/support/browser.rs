@@ -261,6 +261,25 @@ impl Page<'_> {
         usage["usedSize"].as_f64().expect("a number of bytes")
     }
 
+    /// CPU time that its scripts have taken since it was asked first, in s.
+    ///
+    /// # Panics
+    /// If the browser has ended.
+    #[must_use]
+    pub fn script_s(&self) -> f64 {
+        self.ask(
+            "Performance.enable",
+            &json!({ "timeDomain": "threadTicks" }),
+        );
+        let measured = self.ask("Performance.getMetrics", &json!({}));
+        let metrics = measured["metrics"].as_array().into_iter().flatten();
+        let of_scripts = metrics
+            .into_iter()
+            .find(|metric| metric["name"] == "ScriptDuration");
+        let taken = of_scripts.and_then(|metric| metric["value"].as_f64());
+        taken.expect("the browser measures it")
+    }
+
     /// Fills fields of the page's form, by their names, and sends it as its button does.
     ///
     /// # Panics

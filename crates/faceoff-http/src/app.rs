@@ -1,7 +1,7 @@
 use crate::{
-    config::HttpConfig, kept::Kept, kept_answers::KeptAnswers, passwords::Passwords,
-    problem::Problem, rates::Rates, standing::KeptRows, summaries::Summaries, uploads::Uploads,
-    views::certainty::CertaintyView,
+    config::HttpConfig, kept::Kept, kept_analyses::KeptAnalyses, kept_answers::KeptAnswers,
+    passwords::Passwords, problem::Problem, rates::Rates, standing::KeptRows, summaries::Summaries,
+    uploads::Uploads, views::certainty::CertaintyView,
 };
 use faceoff_notify::Feed;
 use faceoff_scoring::tournament::rating::Ratings;
@@ -26,6 +26,7 @@ pub(crate) struct AppState {
     pub(crate) rows: KeptRows,
     pub(crate) kept_answers: KeptAnswers,
     pub(crate) ratings: Kept<Ratings>,
+    pub(crate) kept_analyses: KeptAnalyses,
     pub(crate) certainties: Kept<CertaintyView>,
     /// Is it known that the season has a tournament? None is ever removed.
     pub(crate) has_tournaments: AtomicBool,
@@ -56,6 +57,7 @@ impl AppState {
             rows: KeptRows::new(store.clone()),
             kept_answers: KeptAnswers::default(),
             ratings: Kept::default(),
+            kept_analyses: KeptAnalyses::default(),
             certainties: Kept::default(),
             has_tournaments: AtomicBool::new(false),
             watching: Arc::new(Semaphore::new(config.limits.live_readers)),

@@ -24,6 +24,7 @@ mod extract;
 mod form_file;
 mod in_flight;
 mod kept;
+mod kept_analyses;
 mod kept_answers;
 mod layers;
 mod link_key;

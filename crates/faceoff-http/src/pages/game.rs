@@ -29,7 +29,7 @@ use course::TimeLine;
 use faceoff_replay::{GameAnalysis, model::CONTROL_STEP_S};
 use faceoff_types::{GameId, Side, SubmissionId, TeamId, TournamentId};
 use live::Live;
-use play::{Possession, Safety, Shots};
+use play::{Possession, Safety, Shots, Speeds};
 
 /// A line of the table: what it counts, and each side's number.
 struct Line {
@@ -58,6 +58,7 @@ struct Play {
     time_line: TimeLine,
     possession: Possession,
     shots: [Shots; 2],
+    speeds: Option<Speeds>,
     safety: [Safety; 2],
 }
 
@@ -132,10 +133,10 @@ pub(super) async fn page(
             replay = clips.as_ref().map(|clips| Chunks::of(id, clips, steps));
             if !is_hidden {
                 played = Some(Played::of(result));
-                play = match &clips {
-                    Some(clips) => Some(Play::of(&clips.analysis(result.steps).await?, &teams)),
-                    None => None,
-                };
+                if let Some(clips) = &clips {
+                    let analysis = clips.analysis(&app, result.steps).await?;
+                    play = Some(Play::of(&analysis, &teams));
+                }
             }
         }
         _ => {}
@@ -193,6 +194,7 @@ impl Play {
             time_line: TimeLine::of(analysis, teams),
             possession: Possession::of(analysis),
             shots: [0, 1].map(|side| Shots::of(analysis, side, &teams[side])),
+            speeds: Speeds::of(analysis, teams),
             safety: [0, 1].map(|side| Safety::of(analysis, side, &teams[side])),
         }
     }

@@ -10,6 +10,7 @@ use crate::{
 use faceoff_replay::{CHUNK_STEPS, Clip, GameAnalysis, Key, Pack, ReplayError};
 use faceoff_store::{Game, GameState};
 use faceoff_types::{GameId, Side};
+use std::sync::Arc;
 
 /// The recorded clips of a game.
 #[derive(Debug)]
@@ -67,11 +68,20 @@ impl GameClips {
         })
     }
 
-    /// What the motion of all of the game says of the play.
+    /// What the motion of all of the game says of the play: worked out once for all who ask about then.
     ///
     /// # Errors
     /// An internal problem, if it cannot be read.
-    pub(crate) async fn analysis(&self, steps: u32) -> Result<GameAnalysis, Problem> {
+    pub(crate) async fn analysis(
+        &self,
+        app: &App,
+        steps: u32,
+    ) -> Result<Arc<GameAnalysis>, Problem> {
+        let key = self.file.key.clone();
+        app.kept_analyses.get(key, self.analyse(steps)).await
+    }
+
+    async fn analyse(&self, steps: u32) -> Result<GameAnalysis, Problem> {
         let read = move |pack: &Pack| {
             let chunks = 0..steps.div_ceil(CHUNK_STEPS);
             let clip = |chunk| -> Result<Option<Clip>, ReplayError> {

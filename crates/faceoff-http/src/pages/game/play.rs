@@ -3,6 +3,7 @@
 use super::live::{at, before};
 use crate::pages::{
     broken_places::Places,
+    chart::{Bins, Histogram},
     episode_words::group_word,
     figures,
     table_drawing::{self, Place},
@@ -42,6 +43,13 @@ pub(super) struct ShotRow {
     pub(super) goal: bool,
 }
 
+/// How fast the shots of both sides were.
+pub(super) struct Speeds {
+    pub(super) charts: [Histogram; 2],
+    /// From where to where, in m/s, and how many of each side's lay there.
+    pub(super) rows: Vec<(String, [usize; 2])>,
+}
+
 /// A side's broken limits.
 pub(super) struct Safety {
     pub(super) team: String,
@@ -59,6 +67,8 @@ pub(super) struct BreachRow {
     pub(super) place: String,
 }
 
+/// The width of a column of speeds, m/s.
+const SPEED_STEP: f64 = 0.5;
 /// The most rows of a table: a robot that shakes at a limit breaks it thousands of times.
 const MOST_ROWS: usize = 500;
 
@@ -94,6 +104,31 @@ impl Shots {
             others: table_drawing::crosses(&places(false)),
             rows: shots.iter().take(MOST_ROWS).map(ShotRow::of).collect(),
         }
+    }
+}
+
+impl Speeds {
+    /// `None` without shots.
+    pub(super) fn of(analysis: &GameAnalysis, teams: &[String; 2]) -> Option<Self> {
+        let speeds = [0, 1].map(|side| -> Vec<f64> {
+            let shots = analysis.shots_of(side).into_iter();
+            shots.map(|shot| shot.speed).collect()
+        });
+        let all = || speeds.iter().flatten().copied();
+        all().next()?;
+        let bins = Bins::for_all(SPEED_STEP, all());
+        let counts = speeds.each_ref().map(|speeds| bins.counts(speeds));
+        let most = counts.iter().flatten().copied().max().unwrap_or_default();
+        let in_column = |column: usize| counts.each_ref().map(|counts| counts[column]);
+        Some(Self {
+            charts: [0, 1].map(|side| {
+                let title = format!("Shots of {}", teams[side]);
+                Histogram::of(&title, "m/s", bins, &counts[side], most)
+            }),
+            rows: (0..bins.count)
+                .map(|column| (bins.words(column), in_column(column)))
+                .collect(),
+        })
     }
 }
 
