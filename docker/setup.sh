@@ -33,6 +33,8 @@ if [ "$purpose" = test ] || [ "$purpose" = steady ]; then
     # A client of the API in TypeScript is made and run.
     need node nodejs
     need npm npm
+    # Workers on other machines are given work by it.
+    need nats-server nats-server
     # Databases are given what no version of ours writes.
     need sqlite3 sqlite3
     # The examples for organisers are tried: systemd's own judgement of the unit, and the proxies.

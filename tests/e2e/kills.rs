@@ -130,10 +130,10 @@ impl Event {
     }
 }
 
-type Archive = zip::ZipArchive<Cursor<Vec<u8>>>;
+pub(crate) type Archive = zip::ZipArchive<Cursor<Vec<u8>>>;
 
 /// Waits for the score and downloads the dataset.
-fn outcome(server: &Server, team: &Team, evaluation: &str) -> (Value, Archive) {
+pub(crate) fn outcome(server: &Server, team: &Team, evaluation: &str) -> (Value, Archive) {
     let finished = team.finished(server, evaluation);
     assert_eq!(finished["state"], "finished", "{finished:#}");
     let dataset = server.get(&format!("{evaluation}/dataset"), Some(&team.token));
@@ -211,6 +211,36 @@ fn rows(table: &[RecordBatch]) -> usize {
     table.iter().map(RecordBatch::num_rows).sum()
 }
 
+/// Compares score and dataset of two runs of the same past, but for what no run can repeat. How many episodes they have.
+pub(crate) fn assert_same(
+    (result, mut dataset): (Value, Archive),
+    (expected, mut expected_dataset): (Value, Archive),
+) -> usize {
+    assert_eq!(without_times(&result), without_times(&expected));
+    for name in ["episodes.parquet", "steps.parquet"] {
+        let (one, other) = (
+            table(&mut dataset, name),
+            table(&mut expected_dataset, name),
+        );
+        assert_eq!(rows(&one), rows(&other), "{name}");
+        assert_eq!(differing_columns(&one, &other), [""; 0], "{name}");
+    }
+    let episodes = table(&mut dataset, "episodes.parquet");
+    // No fault in it: nothing was blamed on the agent.
+    assert_eq!(
+        String::from_utf8_lossy(&file(&mut dataset, "agent.log")),
+        String::from_utf8_lossy(&file(&mut expected_dataset, "agent.log")),
+    );
+    for name in ["manifest.json", "violations.json"] {
+        let [one, other] = [&mut dataset, &mut expected_dataset].map(|dataset| {
+            let file = file(dataset, name);
+            without_slow_episodes(serde_json::from_slice(&file).expect("it is JSON"))
+        });
+        assert_eq!(one, other, "{name}");
+    }
+    rows(&episodes)
+}
+
 #[test]
 fn killed_at_any_moment_a_run_ends_as_an_undisturbed_one() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
@@ -228,7 +258,7 @@ fn killed_at_any_moment_a_run_ends_as_an_undisturbed_one() {
 
     let started = Instant::now();
     let server = Server::start(&undisturbed, CONFIG);
-    let (expected, mut expected_dataset) = outcome(&server, &team, &evaluation);
+    let expected = outcome(&server, &team, &evaluation);
     server.kill();
     let per_episode = started.elapsed() / (3 * EPISODES);
 
@@ -257,29 +287,6 @@ fn killed_at_any_moment_a_run_ends_as_an_undisturbed_one() {
     // Every fourth life lasts until a commit.
     assert!(committed.len() as u64 >= KILLS / 4, "{committed:?}");
     let server = Server::start(&killed, CONFIG);
-    let (result, mut dataset) = outcome(&server, &team, &evaluation);
-
-    assert_eq!(without_times(&result), without_times(&expected));
-    for name in ["episodes.parquet", "steps.parquet"] {
-        let (one, other) = (
-            table(&mut dataset, name),
-            table(&mut expected_dataset, name),
-        );
-        assert_eq!(rows(&one), rows(&other), "{name}");
-        assert_eq!(differing_columns(&one, &other), [""; 0], "{name}");
-    }
-    let episodes = table(&mut dataset, "episodes.parquet");
-    assert_eq!(rows(&episodes), 3 * EPISODES as usize);
-    // No fault in it: nothing was blamed on the agent.
-    assert_eq!(
-        String::from_utf8_lossy(&file(&mut dataset, "agent.log")),
-        String::from_utf8_lossy(&file(&mut expected_dataset, "agent.log")),
-    );
-    for name in ["manifest.json", "violations.json"] {
-        let [one, other] = [&mut dataset, &mut expected_dataset].map(|dataset| {
-            let file = file(dataset, name);
-            without_slow_episodes(serde_json::from_slice(&file).expect("it is JSON"))
-        });
-        assert_eq!(one, other, "{name}");
-    }
+    let rows = assert_same(outcome(&server, &team, &evaluation), expected);
+    assert_eq!(rows, 3 * EPISODES as usize);
 }

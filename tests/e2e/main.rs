@@ -11,6 +11,7 @@ mod crash;
 mod cut;
 mod demo;
 mod desks;
+mod elsewhere;
 mod fair_shares;
 mod full_disk;
 mod growth;

@@ -3,9 +3,12 @@
 
 pub mod browser;
 pub mod bundle;
+pub mod nats;
 pub mod packages;
+pub mod relay;
 pub mod server;
 pub mod small_disk;
+pub mod worker;
 
 use std::path::PathBuf;
 

@@ -36,7 +36,7 @@ pub fn http() -> ClientBuilder {
 pub(crate) struct Process(pub(crate) Child);
 
 impl Process {
-    fn end(&mut self) {
+    pub(crate) fn end(&mut self) {
         // Already ended is fine.
         let _ = self.0.kill();
         let _ = self.0.wait();
@@ -143,16 +143,7 @@ impl Server {
     /// # Panics
     /// After [`PATIENCE`], with the log.
     pub fn wait_for_log(&self, words: &str, times: usize) {
-        let started = Instant::now();
-        while self.log().matches(words).count() < times {
-            assert!(
-                started.elapsed() < PATIENCE,
-                "still waiting for {words:?}:\n{}",
-                self.log()
-            );
-            // A log is looked at, as people do.
-            thread::sleep(Duration::from_millis(20));
-        }
+        self.log.wait_for(words, times);
     }
 
     /// How many sockets it has open: connections, and the one that listens.
@@ -334,13 +325,13 @@ pub(crate) fn serve(command: &mut Command, data_dir: &Path, config_file: &Path) 
 
 /// A child's log, drained so that the child never blocks.
 #[derive(Debug)]
-struct Log {
+pub(crate) struct Log {
     text: Arc<Mutex<String>>,
     reader: thread::JoinHandle<()>,
 }
 
 impl Log {
-    fn collect(stderr: impl std::io::Read + Send + 'static) -> Self {
+    pub(crate) fn collect(stderr: impl std::io::Read + Send + 'static) -> Self {
         let text = Arc::new(Mutex::new(String::new()));
         let reader = thread::spawn({
             let text = Arc::clone(&text);
@@ -355,11 +346,24 @@ impl Log {
         Self { text, reader }
     }
 
-    fn so_far(&self) -> String {
+    pub(crate) fn so_far(&self) -> String {
         self.text
             .lock()
             .expect("nobody panics with the log")
             .clone()
+    }
+
+    pub(crate) fn wait_for(&self, words: &str, times: usize) {
+        let started = Instant::now();
+        while self.so_far().matches(words).count() < times {
+            assert!(
+                started.elapsed() < PATIENCE,
+                "still waiting for {words:?}:\n{}",
+                self.so_far()
+            );
+            // A log is looked at, as people do.
+            thread::sleep(Duration::from_millis(20));
+        }
     }
 
     /// Of a child that has ended.

@@ -55,6 +55,7 @@ mod uploads;
 mod viewer;
 pub mod views;
 mod watched;
+mod work_files;
 
 pub use axum::Router;
 pub use capacity_watch::{CapacityWatch, Overflow};
@@ -83,6 +84,7 @@ pub fn router(store: Store, config: HttpConfig) -> Router {
         .merge(api)
         .merge(pages::router(patience, document))
         .merge(probes::router(patience))
+        .merge(work_files::router())
         .fallback(pages::unknown_path)
         .method_not_allowed_fallback(pages::unknown_method)
         .layer(middleware::from_fn_with_state(

@@ -1,3 +1,4 @@
+use faceoff_wire::grant::GrantKey;
 use std::fmt;
 
 /// What links of this server are signed with, beside their maker's token: whoever has a copy of the database alone can sign
@@ -28,6 +29,12 @@ impl LinkKey {
     #[must_use]
     pub fn to_hex(&self) -> String {
         hex::encode(self.0)
+    }
+
+    /// What grants of work orders are sealed with.
+    #[must_use]
+    pub fn of_grants(&self) -> GrantKey {
+        GrantKey::of(&self.0)
     }
 
     pub(crate) const fn bytes(&self) -> &[u8; 32] {

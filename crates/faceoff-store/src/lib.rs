@@ -54,6 +54,7 @@ pub use operations::{
     give_back::MAX_ATTEMPTS,
     invitations::{Code, Joined, Joining, MAX_OPEN_INVITATIONS, NewInvitation},
     proposals::Reevaluation,
+    purpose::Lot,
     registrations::{MAX_WAITING, NewRegistration},
     rerun::RERUN_PAUSES_S,
     retention::{FILES_KEPT, Removed},

@@ -11,15 +11,18 @@
 //! * [`Manifest`][]: `agent.toml`;
 //! * [`dataset`]: `manifest.json` and `violations.json` of a recorded evaluation;
 //! * [`game`]: what a slot is told to play as a game, and `manifest.json` of its recording;
-//! * [`work`]: what a worker slot is told to do and reports back.
+//! * [`work`]: what a worker slot is told to do and reports back;
+//! * [`remote`]: what passes between the server and workers on other machines, and [`grant`]: what they may read and write.
 
 pub mod answer;
 pub mod dataset;
 pub mod game;
+pub mod grant;
 mod manifest;
 pub mod message;
 mod protocol;
 mod quote;
+pub mod remote;
 pub mod work;
 
 pub use manifest::{MANIFEST_MAX_BYTES, Manifest, ManifestError};

@@ -105,8 +105,7 @@ fn keep(
     over: &CancellationToken,
     shutdown: &CancellationToken,
 ) {
-    // three tries before the lease ends
-    let due_every = Duration::from_secs(lease.duration_s.into()) / 3;
+    let due_every = server.renews_every(lease);
     let mut told = 0;
     let mut renewed_at = Instant::now();
     let mut failing = false;

@@ -18,6 +18,7 @@ mod executor;
 mod full_disk;
 mod lease;
 mod local;
+mod remote;
 mod schedule;
 mod scratch;
 mod server;
@@ -30,7 +31,8 @@ mod tests;
 mod tidying;
 
 pub use cpus::{CpuLayout, SlotCpus};
+pub use remote::{NatsConfig, RemoteConfig, RemoteWorker, dispatch, work};
 pub use schedule::{run_schedule, start_due};
-pub use service::{WorkerConfig, run};
+pub use service::{SlotsConfig, WorkerConfig, run};
 pub use slot_threads::{SlotStarter, SlotThreads};
 pub use tidying::tidy;

@@ -7,7 +7,7 @@ use crate::{
     tidying,
 };
 use faceoff_store::{
-    Artifacts, Claim, Claimed as Leased, Committed, GameCommit, GameRecording, RunOwner,
+    Artifacts, Claim, Claimed as Leased, Committed, GameCommit, GameRecording, Lot, RunOwner,
     ShardCommit, Store, StoreError, Work,
 };
 use faceoff_types::{AgentLimits, BundleRef, Clock, EvaluationResult, GameId, StageLimits};
@@ -32,6 +32,8 @@ pub(crate) struct LocalServer {
     pub(crate) lease_s: u32,
     pub(crate) limits: AgentLimits,
     pub(crate) pause: Pause,
+    /// Which work its slots ask for.
+    pub(crate) lot: Lot,
 }
 
 impl LocalServer {
@@ -233,7 +235,10 @@ impl WorkServer for LocalServer {
             if self.pause.holds(&self.store, self.lease_s, now).await? {
                 return Ok(Claimed::Nothing { queue });
             }
-            let claimed = self.store.claim(slot, self.lease_s, now).await?;
+            let claimed = self
+                .store
+                .claim_of(self.lot, slot, self.lease_s, now)
+                .await?;
             self.store.looked_for_work(now);
             Ok(match claimed {
                 Some(leased) => Claimed::Order(Box::new(self.order(leased))),

@@ -15,6 +15,11 @@ pub(crate) trait WorkServer: Send + Sync {
     /// Extends the lease and tells how far the work is.
     fn renew(&self, lease: &Lease, episodes_done: u32) -> anyhow::Result<Holding>;
 
+    /// How often a slot asks whether its work is still its own: three tries before the lease ends.
+    fn renews_every(&self, lease: &Lease) -> Duration {
+        Duration::from_secs(lease.duration_s.into()) / 3
+    }
+
     /// Shows an attempt at a game to those who watch it. Cheap, and as good as it goes: a connection that is slow or
     /// broken loses positions.
     fn show(&self, lease: &Lease, attempt: (GameId, u32), show: GameShow);

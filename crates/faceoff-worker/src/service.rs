@@ -14,7 +14,7 @@ use crate::{
 use anyhow::Context as _;
 use faceoff_metrics::Metrics;
 use faceoff_runner::{AgentEnvironment, bundle::BundleLimits};
-use faceoff_store::{Store, StoreError};
+use faceoff_store::{Lot, Store, StoreError};
 use faceoff_types::{AgentLimits, Clock};
 use std::{path::PathBuf, sync::Arc, time::Duration};
 use tokio::{runtime::Handle, sync::oneshot, task::JoinSet};
@@ -45,18 +45,27 @@ impl Default for Intervals {
 /// How this process works.
 #[derive(Debug, Clone)]
 pub struct WorkerConfig {
+    /// Its own slots.
+    pub slots: SlotsConfig,
+    /// Which work they do.
+    pub lot: Lot,
+    /// How long a claim lasts without renewal, seconds; after a crash the work rests that long.
+    pub lease_s: u32,
+    /// What an archive may hold.
+    pub bundle_limits: BundleLimits,
+}
+
+/// How slots work, whoever gives them work.
+#[derive(Debug, Clone)]
+pub struct SlotsConfig {
     /// The slots, each with its CPUs; at least one. So many units are worked on at a time.
     pub cpus: CpuLayout,
     /// Who starts the slots' threads.
     pub threads: SlotThreads,
-    /// How long a claim lasts without renewal, seconds; after a crash the work rests that long.
-    pub lease_s: u32,
     /// A folder of this process's own for unpacked bundles and recordings; emptied at the start.
     pub scratch_dir: PathBuf,
     /// How agents are run; each slot's agent on the slot's CPUs.
     pub agent: AgentEnvironment,
-    /// What an archive may hold.
-    pub bundle_limits: BundleLimits,
     /// What slots do is counted here.
     pub metrics: Metrics,
 }
@@ -95,9 +104,10 @@ impl WorkerConfig {
             pause: Pause::default(),
             limits: AgentLimits {
                 bundle: self.bundle_limits,
-                resources: self.agent.limits.clone(),
-                time: self.agent.time.clone(),
+                resources: self.slots.agent.limits.clone(),
+                time: self.slots.agent.time.clone(),
             },
+            lot: self.lot,
         }
     }
 }
@@ -111,12 +121,8 @@ pub(crate) async fn run_with(
     intervals: Intervals,
     shutdown: CancellationToken,
 ) -> anyhow::Result<()> {
-    anyhow::ensure!(
-        !config.cpus.slots.is_empty(),
-        "a worker needs at least one slot"
-    );
     anyhow::ensure!(config.lease_s > 0, "a lease lasts at least one second");
-    let folder = config.scratch_dir.clone();
+    let folder = config.slots.scratch_dir.clone();
     let scratch = tokio::task::spawn_blocking(move || Scratch::take(&folder)).await??;
 
     match server.end_leases_of(scratch.worker()).await {
@@ -129,21 +135,59 @@ pub(crate) async fn run_with(
         Err(error) => return Err(error.into()),
     }
 
+    let tidying = tokio::spawn(tidy(server, intervals.tidy, shutdown.clone()));
+    let of_slots = (0..config.slots.cpus.slots.len()).map(|index| SlotServer {
+        slot: format!("{}/slot-{index}", scratch.worker()),
+        server: Arc::clone(&slots_server),
+    });
+    let of_slots = of_slots.collect();
+    let ended = run_slots(
+        config.slots,
+        &scratch,
+        of_slots,
+        evaluator,
+        intervals,
+        shutdown,
+    )
+    .await;
+    tidying.abort();
+    ended
+}
+
+/// What a slot is called, and who gives it work.
+pub(crate) struct SlotServer {
+    pub(crate) slot: String,
+    pub(crate) server: Arc<dyn WorkServer>,
+}
+
+/// Runs the slots, for as many servers, until `shutdown` is cancelled.
+pub(crate) async fn run_slots(
+    config: SlotsConfig,
+    scratch: &Scratch,
+    servers: Vec<SlotServer>,
+    evaluator: Arc<dyn Evaluator>,
+    intervals: Intervals,
+    shutdown: CancellationToken,
+) -> anyhow::Result<()> {
+    anyhow::ensure!(
+        !config.cpus.slots.is_empty(),
+        "a worker needs at least one slot"
+    );
     let stop = shutdown.child_token();
     // However this function ends, its threads do, too.
     let _stop = stop.clone().drop_guard();
     let mut slots = JoinSet::new();
-    for (index, cpus) in config.cpus.slots.into_iter().enumerate() {
+    let all = config.cpus.slots.into_iter().zip(servers);
+    for (index, (cpus, SlotServer { slot: name, server })) in all.enumerate() {
         let folder = scratch.slot(index)?;
         let slot = Slot {
-            name: format!("{}/slot-{index}", scratch.worker()),
+            name,
             number: index.to_string(),
             metrics: config.metrics.clone(),
             idle_poll: intervals.idle_poll,
-            server: Arc::clone(&slots_server),
             executor: Executor {
                 timing: None,
-                server: Arc::clone(&slots_server),
+                server: Arc::clone(&server),
                 evaluator: Arc::clone(&evaluator),
                 host: AgentHost {
                     isolation: config.agent.isolation.clone(),
@@ -153,16 +197,13 @@ pub(crate) async fn run_with(
                 bundles: BundleCache::new(&folder),
                 folder,
             },
+            server,
             shutdown: stop.clone(),
         };
         let end = start(&config.threads, index, slot)?;
         slots.spawn(async move { end.await.map_err(|_| index) });
     }
-    let tidying = tokio::spawn(tidy(server, intervals.tidy, shutdown.clone()));
-
-    let ended = wait_for(slots, intervals.shutdown_grace, &stop).await;
-    tidying.abort();
-    ended
+    wait_for(slots, intervals.shutdown_grace, &stop).await
 }
 
 /// Starts a slot's thread; the receiver hears of its end, or of its panic by the sender's drop.

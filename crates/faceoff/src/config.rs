@@ -40,6 +40,8 @@ pub struct Config {
     pub evaluation: EvaluationConfig,
     /// How this machine evaluates.
     pub workers: WorkersConfig,
+    /// Work on other machines.
+    pub nats: NatsSection,
     /// What an agent's process tree may use.
     pub limits: Limits,
     /// How long an agent may take.
@@ -172,6 +174,8 @@ pub struct WorkersConfig {
     pub slots: Option<usize>,
     /// Seconds after which the work of a dead worker is given to another.
     pub lease_s: u32,
+    /// Do this server's own slots play? If not, they only try uploads and score what others have played.
+    pub play: bool,
     /// CPUs of all agents; empty = every slot has its own, where there are two per slot.
     pub agent_cpus: Vec<usize>,
     /// Folder for unpacked bundles and recordings under way; left out, `scratch` in the data folder.
@@ -183,6 +187,7 @@ impl Default for WorkersConfig {
         Self {
             slots: None,
             lease_s: 30,
+            play: true,
             agent_cpus: Vec::new(),
             scratch_dir: None,
         }
@@ -422,6 +427,27 @@ impl Config {
         }
     }
 
+    /// Has NATS be elsewhere than the file says, if it is named.
+    ///
+    /// # Errors
+    /// If it is no address.
+    pub fn reach_nats(&mut self, url: Option<String>) -> anyhow::Result<()> {
+        if url.is_some() {
+            self.nats.url = url;
+        }
+        self.nats.check()
+    }
+
+    /// Has so many slots, whatever the file says.
+    ///
+    /// # Errors
+    /// If this host cannot have so many.
+    pub fn have_slots(&mut self, slots: usize) -> anyhow::Result<()> {
+        anyhow::ensure!(slots > 0, "--slots: expected at least 1");
+        self.workers.slots = Some(slots);
+        self.check_host(&affinity::allowed().context("asking for this host's CPUs")?)
+    }
+
     /// Worker slots: as configured, or one per two CPUs once the server has one.
     #[must_use]
     pub fn slots(&self) -> usize {
@@ -448,11 +474,13 @@ impl Config {
 }
 
 mod check;
+mod nats;
 mod nearest;
 mod rates;
 mod runtime;
 #[cfg(test)]
 mod tests;
 
+pub use nats::NatsSection;
 pub use rates::RatesConfig;
 pub use runtime::RuntimeConfig;

@@ -29,6 +29,7 @@ struct Cli {
 enum Command {
     /// Run the competition server: API, board and worker slots.
     Serve(commands::serve::ServeCommand),
+    Worker(commands::worker::WorkerCommand),
     /// Write a configuration with every default, unit and meaning.
     Init(commands::init::InitCommand),
     /// Play a whole competition day with the reference agents.
@@ -91,6 +92,7 @@ enum Command {
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Serve(command) => command.run(),
+        Command::Worker(command) => command.run(),
         Command::Init(command) => command.run(),
         Command::Demo(command) => command.run(),
         Command::New(command) => command.run(),

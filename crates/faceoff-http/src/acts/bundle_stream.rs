@@ -60,10 +60,7 @@ pub(crate) async fn receive(
         return Err((allowance.beyond)(Some(bytes)));
     }
 
-    let file = tempfile::Builder::new()
-        .prefix("upload-")
-        .tempfile_in(dir)
-        .map_err(room::unwritten)?;
+    let file = new_file(dir)?;
     let mut writer = tokio::fs::File::from_std(file.reopen().map_err(Problem::internal)?);
     let mut hasher = blake3::Hasher::new();
     let mut head = Vec::with_capacity(ArchiveFormat::LONGEST_MAGIC);
@@ -105,6 +102,42 @@ pub(crate) async fn receive(
         blake3: hasher.finalize(),
         format,
     })
+}
+
+/// Streams a body of any kind into a file under `dir`.
+///
+/// # Errors
+/// `TooLarge` beyond `max_bytes`; otherwise as [`receive`].
+pub(crate) async fn receive_file(
+    body: Body,
+    dir: &Path,
+    max_bytes: u64,
+    rate: LeastRate,
+) -> Result<NamedTempFile, Problem> {
+    let mut incoming = Incoming::new(body, rate);
+    let file = new_file(dir)?;
+    let mut writer = tokio::fs::File::from_std(file.reopen().map_err(Problem::internal)?);
+    let mut bytes = 0;
+    while let Some(chunk) = incoming.next().await? {
+        bytes += chunk.len() as u64;
+        if bytes > max_bytes {
+            incoming.drain(DRAIN_BYTES).await;
+            return Err(too_large(max_bytes, None));
+        }
+        if let Err(error) = writer.write_all(&chunk).await {
+            incoming.drain(DRAIN_BYTES).await;
+            return Err(room::unwritten(error));
+        }
+    }
+    writer.flush().await.map_err(room::unwritten)?;
+    Ok(file)
+}
+
+fn new_file(dir: &Path) -> Result<NamedTempFile, Problem> {
+    tempfile::Builder::new()
+        .prefix("upload-")
+        .tempfile_in(dir)
+        .map_err(room::unwritten)
 }
 
 /// Throws a body away that is refused before it is looked at.

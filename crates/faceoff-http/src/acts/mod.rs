@@ -1,6 +1,6 @@
 //! What API and pages both do, each for its own kind of client.
 
-mod bundle_stream;
+pub(crate) mod bundle_stream;
 pub(crate) mod deciding;
 pub(crate) mod drawing;
 pub(crate) mod entering;

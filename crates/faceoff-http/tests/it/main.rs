@@ -63,3 +63,4 @@ mod variation;
 mod watched;
 mod webhooks;
 mod whole_season;
+mod work_files;

@@ -9,6 +9,7 @@ use faceoff_metrics::{Metrics, Process};
 use faceoff_notify::WebhookRules;
 use faceoff_store::*;
 use faceoff_types::*;
+use faceoff_wire::grant::GrantKey;
 use jiff::{SignedDuration, Timestamp};
 use reqwest::{Method, RequestBuilder, Response, StatusCode};
 use serde_json::{Value, json};
@@ -306,6 +307,11 @@ impl Site {
     }
 
     /// What warns of days that do not fit, with nothing seen yet.
+    /// What it seals grants of work orders with.
+    pub fn grant_key(&self) -> GrantKey {
+        self.config.link_key.of_grants()
+    }
+
     pub fn capacity_watch(&self) -> CapacityWatch {
         let HttpConfig {
             clock, capacity, ..

@@ -4,7 +4,7 @@ use crate::{
     operations::{
         ends,
         give_back::give_up,
-        purpose::{self, Purpose},
+        purpose::{self, Lot, Purpose},
         runs,
         tournament::play,
         work::{Claimed, RunSeeds, Work},
@@ -39,13 +39,26 @@ impl Store {
         lease_s: u32,
         now: Timestamp,
     ) -> Result<Option<Claimed>> {
+        self.claim_of(Lot::All, worker, lease_s, now).await
+    }
+
+    /// [`claim`](Self::claim), of some of the work alone.
+    pub async fn claim_of(
+        &self,
+        lot: Lot,
+        worker: &str,
+        lease_s: u32,
+        now: Timestamp,
+    ) -> Result<Option<Claimed>> {
         let actor = Actor::Worker(worker.to_owned());
         self.write(actor, now, async |tx| {
             if season::is_paused(tx).await? {
                 return Ok(None);
             }
             let nonce = Uuid::now_v7();
-            while let Some(unit) = queue::claim_next(tx, worker, nonce, lease_s, now).await? {
+            while let Some(unit) =
+                queue::claim_next(tx, worker, nonce, lot.lanes(), lease_s, now).await?
+            {
                 let reason = if unit.attempts > MAX_LEASES {
                     format!("{MAX_LEASES} workers died over it")
                 } else {

@@ -29,4 +29,21 @@ impl Store {
         })
         .await
     }
+
+    /// What was claimed in advance, by `claim.worker`, is begun by another, with a new lease of `lease_s` seconds. False: the
+    /// lease was lost, or another one has begun. So of several who are given the same order one works at it.
+    pub async fn hand_over(
+        &self,
+        claim: &Claim,
+        to: &str,
+        lease_s: u32,
+        now: Timestamp,
+    ) -> Result<bool> {
+        let actor = Actor::Worker(to.to_owned());
+        self.write(actor, now, async |tx| {
+            Ok(queue::hand_over(tx, claim, to).await?
+                && queue::renew(tx, claim, 0, lease_s, now).await?.is_some())
+        })
+        .await
+    }
 }

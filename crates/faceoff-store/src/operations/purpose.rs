@@ -62,6 +62,30 @@ pub(crate) const FREE_GAME: NewUnit = Kind::Game.waiting_in(lane("free_game", 2,
 pub(crate) const REPLAY_GAME: NewUnit = Kind::Game.waiting_in(lane("replay", 2, 3));
 pub(crate) const PROPOSAL_SHARD: NewUnit = Kind::Shard.waiting_in(lane("proposal", 2, 1));
 
+/// Which work is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lot {
+    /// Whatever there is.
+    All,
+    /// What is played: shards and games.
+    Plays,
+    /// What is not: smoke runs and finalisations.
+    Rest,
+}
+
+impl Lot {
+    /// The names of its lanes, as a JSON array.
+    pub(crate) const fn lanes(self) -> &'static str {
+        match self {
+            Self::All => {
+                r#"["finalise","smoke","shard","ablation","proposal","game","free_game","replay"]"#
+            }
+            Self::Plays => r#"["shard","ablation","proposal","game","free_game","replay"]"#,
+            Self::Rest => r#"["finalise","smoke"]"#,
+        }
+    }
+}
+
 /// Finalisations are done for nobody in particular, in the order in which evaluations were played.
 pub(crate) const PLATFORM: &str = "";
 
@@ -110,4 +134,37 @@ pub(crate) async fn of_unit(
             "unit {unit}: it is labelled {label:?}, and no such row refers to it"
         ))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_lane_is_somebodys() {
+        let units = [
+            FINALISE,
+            SMOKE,
+            SHARD,
+            ABLATION_SHARD,
+            PROPOSAL_SHARD,
+            ROUND_GAME,
+            FREE_GAME,
+            REPLAY_GAME,
+        ];
+        let lanes =
+            |lot: Lot| serde_json::from_str::<Vec<String>>(lot.lanes()).expect("it is JSON");
+        let (all, plays, rest) = (lanes(Lot::All), lanes(Lot::Plays), lanes(Lot::Rest));
+        assert_eq!(
+            (all.len(), plays.len() + rest.len()),
+            (units.len(), units.len())
+        );
+        for unit in units {
+            let lane = unit.lane.name.to_owned();
+            assert!(all.contains(&lane), "{lane}");
+            let is_played = matches!(unit.kind, "shard" | "game");
+            assert_eq!(plays.contains(&lane), is_played, "{lane}");
+            assert_eq!(rest.contains(&lane), !is_played, "{lane}");
+        }
+    }
 }

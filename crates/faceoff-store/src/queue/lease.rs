@@ -76,6 +76,43 @@ pub(crate) async fn renew(
     .await?)
 }
 
+/// Is the unit leased under this nonce?
+pub(crate) async fn is_leased(
+    connection: &mut SqliteConnection,
+    unit: Uuid,
+    nonce: Uuid,
+) -> Result<bool> {
+    let (unit, nonce) = (Text(unit), Text(nonce));
+    let held = sqlx::query_scalar!(
+        r#"SELECT state = 'leased' AS "held!: bool" FROM units WHERE id = ? AND nonce = ?"#,
+        unit,
+        nonce,
+    )
+    .fetch_optional(connection)
+    .await?;
+    Ok(held.unwrap_or_default())
+}
+
+/// Names another as the lease's holder; false if it is not `claim.worker`'s any more.
+pub(crate) async fn hand_over(
+    connection: &mut SqliteConnection,
+    claim: &Claim,
+    to: &str,
+) -> Result<bool> {
+    let (id, nonce) = (Text(claim.unit), Text(claim.nonce));
+    let handed = sqlx::query!(
+        "UPDATE units SET worker = ?1
+         WHERE id = ?2 AND nonce = ?3 AND worker = ?4 AND state = 'leased'",
+        to,
+        id,
+        nonce,
+        claim.worker,
+    )
+    .execute(connection)
+    .await?;
+    Ok(handed.rows_affected() == 1)
+}
+
 /// Takes a held unit out of the queue. What is left of its lease is given back to its account, and what
 /// it took beyond the lease is charged.
 pub(crate) async fn mark_done(tx: &mut Tx, claim: &Claim, progress: u32) -> Result<()> {

@@ -55,12 +55,14 @@ pub(crate) struct Leased {
     pub(crate) attempts: u32,
 }
 
-/// Claims the unit whose turn it is, one whose lease is over included, in one statement. The whole lease is
+/// Claims the unit whose turn it is among those that wait in `lanes` (a JSON array of their names), one whose lease is over
+/// included, in one statement. The whole lease is
 /// charged at once, so that who holds one slot is no longer the least served when the next is free.
 pub(crate) async fn claim_next(
     connection: &mut SqliteConnection,
     worker: &str,
     nonce: Uuid,
+    lanes: &str,
     lease_s: u32,
     now: Timestamp,
 ) -> Result<Option<Leased>> {
@@ -79,6 +81,7 @@ pub(crate) async fn claim_next(
                     WHERE u.account_no = a.account_no AND u.state IN ('queued', 'leased')
                       AND u.claimable_at <= ?5
                     ORDER BY u.batch, u.queue_no LIMIT 1)
+               WHERE l.lane IN (SELECT value FROM json_each(?6))
                ORDER BY l.urgency, l.served_ms, l.rank, f.batch, a.served_ms, f.queue_no LIMIT 1)
            RETURNING id AS "id!: Text<Uuid>", kind AS "kind!", attempts AS "attempts!: u32""#,
         worker,
@@ -86,6 +89,7 @@ pub(crate) async fn claim_next(
         until,
         lease_ms,
         now,
+        lanes,
     )
     .fetch_optional(connection)
     .await?)

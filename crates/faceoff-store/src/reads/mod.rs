@@ -6,6 +6,7 @@ pub(crate) mod concerns;
 mod days;
 pub(crate) mod evaluations;
 mod events;
+mod leases;
 pub(crate) mod numbers;
 pub(crate) mod outlook;
 pub(crate) mod progress;

@@ -77,6 +77,67 @@ async fn an_expired_lease_is_leased_again_and_its_holder_told() {
 }
 
 #[tokio::test]
+async fn what_is_played_can_be_left_to_others() {
+    let f = Fixture::new().await;
+    let submission = f.ready_team("Alpha").await;
+    let evaluation = f.evaluate(submission.id, &plan()).await;
+    let team = f.team("Beta").await;
+    f.upload(&team).await;
+    let claim = async |lot| f.store.claim_of(lot, "slot", LEASE_S, f.now).await.unwrap();
+    let rest = claim(Lot::Rest).await.unwrap();
+    assert!(matches!(rest.work, Work::Smoke { .. }), "{rest:?}");
+    assert!(claim(Lot::Rest).await.is_none(), "shards wait, for others");
+    while let Some(Claimed { claim, work }) = claim(Lot::Plays).await {
+        let Work::Shard { shard, .. } = work else {
+            panic!("expected a shard");
+        };
+        f.play(&claim, &shard, 0).await;
+    }
+    let scoring = claim(Lot::Rest).await.unwrap();
+    assert!(
+        matches!(scoring.work, Work::Finalise { evaluation: of, .. } if of == evaluation.id),
+        "{scoring:?}"
+    );
+}
+
+#[tokio::test]
+async fn of_those_who_are_given_the_same_order_one_begins() {
+    let mut f = Fixture::new().await;
+    let submission = f.ready_team("Alpha").await;
+    f.evaluate(submission.id, &plan()).await;
+    let given = f.store.claim("given out", LEASE_S, f.now).await;
+    let Claimed { claim, .. } = given.unwrap().unwrap();
+    f.later(i64::from(LEASE_S) - 1);
+    let hand_over = async |to: &str| f.store.hand_over(&claim, to, LEASE_S, f.now).await.unwrap();
+    assert!(hand_over("one").await);
+    assert!(!hand_over("another").await);
+    assert!(!hand_over("one").await, "nor the same one twice");
+    let store = f.store.clone();
+    let is_held = async || store.is_held(claim.unit, claim.nonce).await.unwrap();
+    assert!(is_held().await);
+    assert_eq!(
+        f.store.end_leases_of("given out", f.now).await.unwrap(),
+        0,
+        "it is another's now"
+    );
+    // With the lease's time anew.
+    f.later(i64::from(LEASE_S) - 1);
+    let mut others = Vec::new();
+    while let Some(other) = f.claim().await {
+        others.push(other.claim.unit);
+    }
+    assert!(!others.contains(&claim.unit));
+    f.store.release(&claim, f.now).await.unwrap();
+    assert!(!is_held().await);
+    assert!(
+        !f.store
+            .hand_over(&claim, "late", LEASE_S, f.now)
+            .await
+            .unwrap()
+    );
+}
+
+#[tokio::test]
 async fn a_dead_workers_units_are_free_at_once_and_only_those() {
     let f = Fixture::new().await;
     let submission = f.ready_team("Alpha").await;

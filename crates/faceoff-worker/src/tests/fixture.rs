@@ -6,7 +6,7 @@ use crate::{
     evaluator::Evaluator,
     local::LocalServer,
     server::WorkServer,
-    service::{Intervals, WorkerConfig, run_with},
+    service::{Intervals, SlotsConfig, WorkerConfig, run_with},
     slot_threads::SlotThreads,
 };
 use faceoff_metrics::Metrics;
@@ -424,31 +424,34 @@ impl Server {
 
     fn config(&self, slots: usize) -> WorkerConfig {
         WorkerConfig {
-            cpus: CpuLayout::with_agents_on(&[0], &[0], slots),
-            threads: SlotThreads::of_the_caller(),
-            lease_s: LEASE_S,
-            scratch_dir: self.folder.path().join("scratch"),
-            agent: AgentEnvironment {
-                limits: limits(),
-                time: TimeLimits {
-                    startup_s: 1.0,
-                    reset_s: 1.0,
-                    step_s: 1.0,
-                    bye_s: 1.0,
-                    host_noise_reruns: 0,
-                    ..TimeLimits::default()
+            slots: SlotsConfig {
+                cpus: CpuLayout::with_agents_on(&[0], &[0], slots),
+                threads: SlotThreads::of_the_caller(),
+                scratch_dir: self.folder.path().join("scratch"),
+                agent: AgentEnvironment {
+                    limits: limits(),
+                    time: TimeLimits {
+                        startup_s: 1.0,
+                        reset_s: 1.0,
+                        step_s: 1.0,
+                        bye_s: 1.0,
+                        host_noise_reruns: 0,
+                        ..TimeLimits::default()
+                    },
+                    isolation: Isolation::None,
+                    runtimes: BTreeMap::new(),
+                    agent_cpus: Vec::new(),
                 },
-                isolation: Isolation::None,
-                runtimes: BTreeMap::new(),
-                agent_cpus: Vec::new(),
+                metrics: Metrics::new("0.0.0"),
             },
+            lot: Lot::All,
+            lease_s: LEASE_S,
             bundle_limits: BundleLimits {
                 packed_bytes: 1,
                 unpacked_bytes: 1,
                 files: 1,
                 unpack_s: 1,
             },
-            metrics: Metrics::new("0.0.0"),
         }
     }
 

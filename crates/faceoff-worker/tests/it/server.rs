@@ -5,7 +5,7 @@ use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::BundleLimits};
 use faceoff_sandbox::{Isolation, Limits, Runtime};
 use faceoff_store::*;
 use faceoff_types::*;
-use faceoff_worker::{CpuLayout, SlotThreads, WorkerConfig};
+use faceoff_worker::{CpuLayout, SlotThreads, SlotsConfig, WorkerConfig};
 use jiff::Timestamp;
 use std::{
     collections::BTreeMap,
@@ -63,32 +63,35 @@ impl Server {
             Runtime::python3().expect("this machine has Python"),
         )]);
         let config = WorkerConfig {
-            cpus: CpuLayout::of_a_server(slots, &[]),
-            threads: SlotThreads::of_the_caller(),
+            slots: SlotsConfig {
+                cpus: CpuLayout::of_a_server(slots, &[]),
+                threads: SlotThreads::of_the_caller(),
+                scratch_dir: self.path().join("scratch"),
+                agent: AgentEnvironment {
+                    limits: Limits::default(),
+                    // Only a dead machine meets them: what an agent does must not depend on a busy one.
+                    time: TimeLimits {
+                        startup_s: 600.0,
+                        reset_s: 600.0,
+                        step_s: 600.0,
+                        bye_s: 600.0,
+                        mean_s: 600.0,
+                        episode_extra_s: 600.0,
+                        resets_extra_s: 600.0,
+                        ..TimeLimits::default()
+                    },
+                    isolation: Isolation::Sandboxed {
+                        given_up: Vec::new(),
+                    },
+                    runtimes,
+                    agent_cpus: Vec::new(),
+                },
+                metrics: Metrics::new("0.0.0"),
+            },
+            lot: Lot::All,
             // Nobody waits for its end: a killed worker's successor takes over at once.
             lease_s: 3600,
-            scratch_dir: self.path().join("scratch"),
-            agent: AgentEnvironment {
-                limits: Limits::default(),
-                // Only a dead machine meets them: what an agent does must not depend on a busy one.
-                time: TimeLimits {
-                    startup_s: 600.0,
-                    reset_s: 600.0,
-                    step_s: 600.0,
-                    bye_s: 600.0,
-                    mean_s: 600.0,
-                    episode_extra_s: 600.0,
-                    resets_extra_s: 600.0,
-                    ..TimeLimits::default()
-                },
-                isolation: Isolation::Sandboxed {
-                    given_up: Vec::new(),
-                },
-                runtimes,
-                agent_cpus: Vec::new(),
-            },
             bundle_limits: BundleLimits::default(),
-            metrics: Metrics::new("0.0.0"),
         };
         let shutdown = CancellationToken::new();
         let clock = Clock::new(Timestamp::now);

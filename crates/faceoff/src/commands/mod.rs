@@ -19,6 +19,7 @@ pub mod game;
 pub mod health;
 pub mod import;
 pub mod init;
+mod introduction;
 pub mod join;
 pub mod link;
 mod local_bundle;
@@ -55,6 +56,7 @@ pub mod verify;
 pub mod webhook;
 pub mod whoami;
 pub mod withdraw;
+pub mod worker;
 
 use anyhow::Context;
 

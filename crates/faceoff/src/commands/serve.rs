@@ -4,22 +4,24 @@ mod answering;
 mod archived;
 mod folder;
 mod looking_in;
+mod remote;
 mod watching;
 
+pub use answering::signalled;
 pub use folder::{ADMIN_TOKEN_FILE, claim};
 
 use super::staging::private;
 use crate::{client, config::Config, descriptors::Descriptors, log::LogFormat, machine};
-use answering::{answer, signalled};
+use answering::answer;
 use anyhow::{Context, bail};
 use clap::Args;
 use faceoff_http::{Capacity, CapacityWatch, ConnectionLimits, HttpConfig, Offer};
 use faceoff_metrics::Metrics;
 use faceoff_notify::Deliverer;
 use faceoff_sandbox::{HostFeature, Layer, MemoryImage, Runtime, affinity, probe_host};
-use faceoff_store::{Actor, Room, Store};
+use faceoff_store::{Actor, Lot, Room, Store};
 use faceoff_types::Clock;
-use faceoff_worker::{CpuLayout, SlotThreads, WorkerConfig};
+use faceoff_worker::{CpuLayout, SlotThreads, SlotsConfig, WorkerConfig};
 use folder::{empty_folder, link_key, set_admin_token};
 use jiff::Timestamp;
 use sd_notify::NotifyState;
@@ -39,6 +41,9 @@ pub struct ServeCommand {
     /// Folder of database and artifacts; replaces server.data_dir of the configuration
     #[arg(long, value_name = "FOLDER")]
     data_dir: Option<PathBuf>,
+    /// NATS, by which workers on other machines are given work; replaces nats.url of the configuration
+    #[arg(long, value_name = "URL")]
+    nats: Option<String>,
     /// How the log is written, to standard error; RUST_LOG sets what is logged
     #[arg(long, value_enum, default_value_t = LogFormat::Text)]
     log_format: LogFormat,
@@ -58,6 +63,7 @@ impl ServeCommand {
         if let Some(data_dir) = self.data_dir {
             config.server.data_dir = data_dir;
         }
+        config.reach_nats(self.nats)?;
         let archived = super::block_on(async {
             let data_dir = &config.server.data_dir;
             let found = Store::archived_in(data_dir).await;
@@ -215,6 +221,8 @@ async fn serve(
     };
     let watch = CapacityWatch::new(store.clone(), clock.clone(), capacity.clone());
     let metrics = Metrics::new(env!("CARGO_PKG_VERSION"));
+    let link_key = link_key(&data_dir)?;
+    let given_elsewhere = remote::config(&config, address, &link_key, &capacity.runtimes)?;
     let site = HttpConfig {
         max_bundle_bytes: config.bundle.packed_bytes,
         public_url: config.server.public_url.clone(),
@@ -225,7 +233,7 @@ async fn serve(
         offer,
         webhooks: config.webhooks.clone(),
         rates: config.rates.limits(),
-        link_key: link_key(&data_dir)?,
+        link_key,
         metrics: metrics.clone(),
         process: machine::process,
     };
@@ -246,24 +254,39 @@ async fn serve(
     // For as long as agents run.
     let _image = in_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
     let workers = WorkerConfig {
-        cpus,
-        threads,
+        slots: SlotsConfig {
+            cpus,
+            threads,
+            scratch_dir,
+            agent,
+            metrics: metrics.clone(),
+        },
+        lot: match config.workers.play {
+            true => Lot::All,
+            false => Lot::Rest,
+        },
         lease_s: config.workers.lease_s,
-        scratch_dir,
-        agent,
         bundle_limits: config.bundle,
-        metrics: metrics.clone(),
     };
     tracing::info!(
         %address,
         data_dir = %data_dir.display(),
-        slots = workers.cpus.slots.len(),
-        service_cpus = ?workers.cpus.service,
+        slots = workers.slots.cpus.slots.len(),
+        service_cpus = ?workers.slots.cpus.service,
         "serving"
     );
 
     let shutdown = CancellationToken::new();
     let mut parts = JoinSet::new();
+    if let Some(remote) = given_elsewhere {
+        parts.spawn(faceoff_worker::dispatch(
+            store.clone(),
+            clock.clone(),
+            workers.clone(),
+            remote,
+            shutdown.clone(),
+        ));
+    }
     parts.spawn(faceoff_worker::run(
         store.clone(),
         clock.clone(),
@@ -347,7 +370,7 @@ fn ended_early(part: Result<anyhow::Result<()>, tokio::task::JoinError>) -> anyh
 }
 
 /// Refuses a host that lacks a layer which the organiser has not given up by name.
-fn check_sandbox(features: &[HostFeature], given_up: &[Layer]) -> anyhow::Result<()> {
+pub fn check_sandbox(features: &[HostFeature], given_up: &[Layer]) -> anyhow::Result<()> {
     let mut missing = Vec::new();
     for feature in features.iter().filter(|feature| !feature.available) {
         if given_up.contains(&feature.layer) {
@@ -376,7 +399,10 @@ fn check_sandbox(features: &[HostFeature], given_up: &[Layer]) -> anyhow::Result
 }
 
 /// Has agents use a copy of the runtimes' files in memory, if there may be one.
-fn in_memory(runtimes: &mut BTreeMap<String, Runtime>, limit_bytes: u64) -> Option<MemoryImage> {
+pub fn in_memory(
+    runtimes: &mut BTreeMap<String, Runtime>,
+    limit_bytes: u64,
+) -> Option<MemoryImage> {
     faceoff_sandbox::sweep_stale();
     match MemoryImage::make(runtimes, limit_bytes) {
         Ok(image) => {

@@ -70,6 +70,7 @@ impl Config {
 
     /// What types alone cannot say.
     pub(super) fn check(&self) -> anyhow::Result<()> {
+        self.nats.check()?;
         if let Some(url) = &self.server.public_url {
             let rest = url
                 .strip_prefix("https://")

@@ -1,0 +1,79 @@
+//! Files for workers on other machines: the bundles that their orders name, and what they have recorded. An order opens nothing
+//! else (`Grant`), and nothing once it is not its holder's any more. No part of the API: both sides are this program.
+
+use crate::{
+    acts::bundle_stream,
+    app::App,
+    problem::{Problem, ProblemKind},
+    room,
+};
+use axum::{
+    Router,
+    body::Body,
+    extract::{FromRequestParts, Path, State},
+    http::{StatusCode, header, request::Parts},
+    response::{IntoResponse, Response},
+    routing::{get, put},
+};
+use faceoff_wire::grant::Grant;
+
+/// The largest file of a recording, in bytes: far more than any shard has.
+const LARGEST_BYTES: u64 = 4 << 30;
+
+pub(crate) fn router() -> Router<App> {
+    Router::new()
+        .route("/work/bundles/{blake3}", get(bundle))
+        .route("/work/files/{name}", put(store))
+}
+
+/// An order that is its sender's.
+struct Holder(Grant);
+
+impl FromRequestParts<App> for Holder {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, app: &App) -> Result<Self, Problem> {
+        let refused = |why| Problem::new(ProblemKind::Forbidden, why);
+        let sent = parts.headers.get(header::AUTHORIZATION);
+        let sent = sent.and_then(|value| value.to_str().ok()?.strip_prefix("Grant "));
+        let grant = sent.and_then(|text| Grant::open(text, &app.config.link_key.of_grants()));
+        let grant = grant.ok_or_else(|| {
+            refused("only workers of this server come here, with the grant of their order")
+        })?;
+        if !app.store.is_held(grant.unit, grant.nonce).await? {
+            return Err(refused("the order is no longer this worker's"));
+        }
+        Ok(Self(grant))
+    }
+}
+
+async fn bundle(
+    Holder(grant): Holder,
+    State(app): State<App>,
+    Path(blake3): Path<String>,
+) -> Result<Response, Problem> {
+    let bundle = grant.bundle(&blake3);
+    let bundle = bundle.ok_or_else(|| Problem::not_found("bundle of this order"))?;
+    let (bytes, stream) = app.store.artifacts().read(&bundle.key).await?;
+    let headers = [(header::CONTENT_LENGTH, bytes.to_string())];
+    Ok((headers, Body::from_stream(stream)).into_response())
+}
+
+async fn store(
+    Holder(grant): Holder,
+    State(app): State<App>,
+    Path(name): Path<String>,
+    body: Body,
+) -> Result<StatusCode, Problem> {
+    let key = grant.key_of(&name);
+    let key = key.ok_or_else(|| Problem::not_found("file that this order stores"))?;
+    if let Err(refused) = room::check(&app) {
+        bundle_stream::discard(body, app.config.limits.upload_rate).await;
+        return Err(refused);
+    }
+    let (dir, rate) = (&app.config.upload_dir, app.config.limits.upload_rate);
+    let file = bundle_stream::receive_file(body, dir, LARGEST_BYTES, rate).await?;
+    // It may have been taken from its holder meanwhile; then what was stored goes with the lease that was lost.
+    app.store.artifacts().put_file(&key, file.path()).await?;
+    Ok(StatusCode::NO_CONTENT)
+}

@@ -1,0 +1,136 @@
+//! What passes between the server and workers on other machines, as JSON: orders, what is asked meanwhile, and what came of them.
+
+use crate::work::{Lease, WorkOrder, WorkReport};
+use faceoff_types::{GameId, LiveHappening, LivePosition};
+use serde::{Deserialize, Serialize};
+
+/// An order, and what it opens.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RemoteOrder {
+    /// What is to be done.
+    pub order: WorkOrder,
+    /// A sealed [`Grant`](crate::grant::Grant).
+    pub grant: String,
+    /// Where the server's files are: an address of http or https, without a slash at its end.
+    pub files: String,
+}
+
+/// What a worker is: its orders depend on it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Introduction {
+    /// BLAKE3 of the program that it runs, 64 hexadecimal digits: only the same program has the same bits.
+    pub program: String,
+    /// The program's version, for people.
+    pub version: String,
+    /// The runtimes that it offers to agents.
+    pub runtimes: Vec<String>,
+}
+
+/// What a worker asks, and is answered at once.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Ask {
+    /// May it work?
+    MayWork(Introduction),
+    /// It has an order, and is to be the only one that works at it.
+    Begin {
+        /// As the order has it.
+        lease: Lease,
+        /// Which of its slots.
+        slot: String,
+    },
+    /// Is it still to work at an order?
+    Renew {
+        /// As the order has it.
+        lease: Lease,
+        /// How far it is.
+        episodes_done: u32,
+    },
+}
+
+/// The answer to [`Ask`].
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Answer {
+    /// Yes.
+    Yes,
+    /// No, and this is why.
+    No {
+        /// For the worker's log.
+        reason: String,
+    },
+    /// Nobody can tell now; it may ask again.
+    Unknown,
+}
+
+/// What is told of a game under way; it decides nothing, and may get lost.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RemoteShow {
+    /// Under which it is played.
+    pub lease: Lease,
+    /// Which.
+    pub game: GameId,
+    /// Which attempt at it, from 1.
+    pub attempt: u32,
+    /// What happens.
+    pub shown: Shown,
+}
+
+/// What happens in a game under way.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Shown {
+    /// It begins.
+    Begun {
+        /// Control steps that are to be played.
+        steps: u32,
+    },
+    /// It goes on.
+    Goes {
+        /// What happened since.
+        happenings: Vec<LiveHappening>,
+        /// Where things are.
+        position: LivePosition,
+    },
+    /// Nothing more comes.
+    Over,
+}
+
+/// What came of an order.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RemoteOutcome {
+    /// As the order has it.
+    pub lease: Lease,
+    /// As the order has it.
+    pub grant: String,
+    /// What came of it.
+    pub outcome: Outcome,
+}
+
+/// How work at an order ended.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Outcome {
+    /// It is done; what is kept of it is stored.
+    Done {
+        /// What came of it.
+        report: Box<WorkReport>,
+    },
+    /// The worker ends; the attempt does not count.
+    Shutdown,
+    /// There was no room for it; the attempt does not count.
+    FullDisk,
+    /// A fault of ours.
+    PlatformFault {
+        /// In words for the team.
+        reason: String,
+    },
+}
+
+impl RemoteOutcome {
+    /// The name under which it is accepted once: unit and lease.
+    #[must_use]
+    pub fn id(&self) -> String {
+        format!("{}/{}", self.lease.unit, self.lease.nonce)
+    }
+}

@@ -1,0 +1,19 @@
+//! Work on other machines. The queue stays the store's: the server claims from it as much as free slots elsewhere ask for, and NATS carries
+//! the orders there and what came of them back. A unit's lease is the only truth about whose it is: what NATS loses ends with its
+//! lease, or is taken back before, and is given out again; what it delivers twice is begun once, by whoever says first that it
+//! begins, and committed once.
+//!
+//! `names.rs` is what both sides call things; `dispatch.rs` and `answers.rs` are the server's side; `far_server.rs` is the server as
+//! a worker's slots see it, `worker.rs` the process that they run in.
+
+mod answers;
+mod connection;
+mod dispatch;
+mod far_server;
+mod names;
+mod taken_back;
+mod worker;
+
+pub use connection::NatsConfig;
+pub use dispatch::{RemoteConfig, dispatch};
+pub use worker::{RemoteWorker, work};

@@ -1,0 +1,244 @@
+//! What workers elsewhere ask the server, and are answered at once.
+
+use super::{
+    names::{self, ALL, Names, WAITING},
+    taken_back::AllGivenOut,
+};
+use async_nats::{Client, Message};
+use faceoff_store::{Claim, Store, StoreError};
+use faceoff_types::Clock;
+use faceoff_wire::{
+    remote::{Answer, Ask, Introduction, RemoteShow, Shown},
+    work::Lease,
+};
+use futures::StreamExt as _;
+use std::{
+    collections::HashMap,
+    sync::{Arc, Mutex, PoisonError},
+    time::{Duration, Instant},
+};
+use tokio_util::sync::CancellationToken;
+use uuid::Uuid;
+
+/// Answers until the shutdown.
+pub(super) struct Answers {
+    pub(super) client: Client,
+    pub(super) names: Names,
+    pub(super) store: Store,
+    pub(super) clock: Clock,
+    pub(super) lease_s: u32,
+    /// What workers must be like.
+    pub(super) like: Introduction,
+    pub(super) given_out: Arc<AllGivenOut>,
+}
+
+/// When leases were last written as renewed, and how far the work was: workers ask more often than the database needs to know.
+#[derive(Debug, Default)]
+struct Renewals(Mutex<HashMap<Uuid, (Instant, u32)>>);
+
+impl Renewals {
+    /// Is it to be written, because it is new, has progressed, or was written so long ago?
+    fn is_due(&self, nonce: Uuid, done: u32, every: Duration, now: Instant) -> bool {
+        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        // What nobody asks about any more is forgotten.
+        all.retain(|_, (at, _)| now.duration_since(*at) < 100 * every);
+        let is_due = all
+            .get(&nonce)
+            .is_none_or(|(at, before)| *before != done || now.duration_since(*at) >= every);
+        if is_due {
+            all.insert(nonce, (now, done));
+        }
+        is_due
+    }
+}
+
+impl Answers {
+    pub(super) async fn answer(&self, shutdown: &CancellationToken) -> anyhow::Result<()> {
+        let mut asks = self.client.subscribe(self.names.asks(ALL)).await?;
+        let renewals = Renewals::default();
+        loop {
+            let asked = tokio::select! {
+                () = shutdown.cancelled() => return Ok(()),
+                asked = asks.next() => asked,
+            };
+            let asked = asked.ok_or_else(|| anyhow::anyhow!("the connection to NATS has ended"))?;
+            let Some(reply) = asked.reply.clone() else {
+                continue;
+            };
+            let answer = self.answer_to(&asked, &renewals).await;
+            let answer = serde_json::to_vec(&answer)?;
+            self.client.publish(reply, answer.into()).await?;
+        }
+    }
+
+    async fn answer_to(&self, asked: &Message, renewals: &Renewals) -> Answer {
+        let no = |reason: &str| Answer::No {
+            reason: reason.to_owned(),
+        };
+        let Some(worker) = names::worker_of(&asked.subject) else {
+            return no("the subject names no worker");
+        };
+        let ask: Ask = match serde_json::from_slice(&asked.payload) {
+            Ok(ask) => ask,
+            Err(error) => {
+                tracing::warn!(worker, %error, "a worker asks what this server does not know");
+                return no(&format!("the server does not know this question: {error}"));
+            }
+        };
+        let answered = match ask {
+            Ask::MayWork(own) => {
+                return match differs(&own, &self.like) {
+                    Some(reason) => Answer::No { reason },
+                    None => Answer::Yes,
+                };
+            }
+            Ask::Begin { lease, slot } if names::is_word(&slot) => {
+                self.begin(&lease, &names::slot(worker, &slot)).await
+            }
+            Ask::Begin { .. } => return no("the slot's name is none"),
+            Ask::Renew {
+                lease,
+                episodes_done,
+            } => self.renew(worker, &lease, episodes_done, renewals).await,
+        };
+        match answered {
+            Ok(true) => Answer::Yes,
+            Ok(false) => no("it is no longer this worker's"),
+            Err(error) => {
+                tracing::warn!(worker, %error, "the queue cannot be asked for a worker");
+                Answer::Unknown
+            }
+        }
+    }
+
+    async fn begin(&self, lease: &Lease, slot: &str) -> Result<bool, StoreError> {
+        self.given_out.remove(lease.nonce);
+        let claim = claim(lease, WAITING);
+        let now = self.clock.now();
+        self.store.hand_over(&claim, slot, self.lease_s, now).await
+    }
+
+    async fn renew(
+        &self,
+        worker: &str,
+        lease: &Lease,
+        done: u32,
+        renewals: &Renewals,
+    ) -> Result<bool, StoreError> {
+        let every = Duration::from_secs(self.lease_s.into()) / 3;
+        if !renewals.is_due(lease.nonce, done, every, Instant::now()) {
+            return self.store.is_held(lease.unit, lease.nonce).await;
+        }
+        let slot = match lease.slot.starts_with(&names::slot(worker, "")) {
+            true => lease.slot.as_str(),
+            false => worker,
+        };
+        let claim = claim(lease, slot);
+        let now = self.clock.now();
+        self.store.heartbeat(&claim, done, self.lease_s, now).await
+    }
+
+    /// Tells those who watch of games that are played elsewhere.
+    pub(super) async fn show(&self, shutdown: &CancellationToken) -> anyhow::Result<()> {
+        let mut shows = self.client.subscribe(self.names.shows(ALL)).await?;
+        loop {
+            let told = tokio::select! {
+                () = shutdown.cancelled() => return Ok(()),
+                told = shows.next() => told,
+            };
+            let told = told.ok_or_else(|| anyhow::anyhow!("the connection to NATS has ended"))?;
+            let Ok(show) = serde_json::from_slice::<RemoteShow>(&told.payload) else {
+                continue;
+            };
+            // Nobody tells of a game that is not theirs.
+            let (unit, nonce) = (show.lease.unit, show.lease.nonce);
+            if self.store.is_held(unit, nonce).await.unwrap_or_default() {
+                let live = self.store.live_games();
+                match show.shown {
+                    Shown::Begun { steps } => live.begin(show.game, show.attempt, steps),
+                    Shown::Goes {
+                        happenings,
+                        position,
+                    } => live.advance(show.game, show.attempt, happenings, Some(position)),
+                    Shown::Over => live.over(show.game, show.attempt),
+                }
+            }
+        }
+    }
+}
+
+fn claim(lease: &Lease, holder: &str) -> Claim {
+    Claim {
+        unit: lease.unit,
+        nonce: lease.nonce,
+        worker: holder.to_owned(),
+        lease_until: lease.expires_at,
+    }
+}
+
+/// Why a worker may not work for this server.
+fn differs(own: &Introduction, like: &Introduction) -> Option<String> {
+    if own.program != like.program {
+        return Some(format!(
+            "the worker runs another program (version {}, BLAKE3 {}) than the server (version {}, BLAKE3 {}): only the same program \
+             has the same results to the last bit; copy the server's to the worker's machine",
+            own.version, own.program, like.version, like.program
+        ));
+    }
+    let missing: Vec<&str> = like
+        .runtimes
+        .iter()
+        .filter(|name| !own.runtimes.contains(name))
+        .map(String::as_str)
+        .collect();
+    (!missing.is_empty()).then(|| {
+        format!(
+            "the worker lacks runtimes that the server offers to agents: {}; set them up in the worker's configuration",
+            missing.join(", ")
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_worker_is_like_the_server_or_is_told_why_not() {
+        let like = Introduction {
+            program: "aa".into(),
+            version: "1".into(),
+            runtimes: vec!["native".into(), "python3".into()],
+        };
+        let with = |program: &str, runtimes: &[&str]| Introduction {
+            program: program.into(),
+            version: "1".into(),
+            runtimes: runtimes.iter().map(|name| (*name).to_owned()).collect(),
+        };
+        assert_eq!(
+            differs(&with("aa", &["python3", "native", "julia"]), &like),
+            None
+        );
+        let other = differs(&with("bb", &["native", "python3"]), &like).unwrap();
+        assert!(other.contains("another program"), "{other}");
+        let lacks = differs(&with("aa", &["native"]), &like).unwrap();
+        assert!(
+            lacks.contains("lacks runtimes") && lacks.contains("python3"),
+            "{lacks}"
+        );
+    }
+
+    #[test]
+    fn renewals_are_written_when_something_has_changed_or_it_is_time() {
+        let renewals = Renewals::default();
+        let (nonce, start, every) = (Uuid::from_u128(1), Instant::now(), Duration::from_secs(10));
+        let is_due = |done, after_s| {
+            renewals.is_due(nonce, done, every, start + Duration::from_secs(after_s))
+        };
+        assert!(is_due(0, 0));
+        assert!(!is_due(0, 1));
+        assert!(is_due(1, 2), "an episode more");
+        assert!(!is_due(1, 11));
+        assert!(is_due(1, 12));
+    }
+}

@@ -1,0 +1,497 @@
+//! The server's side: claims what free slots elsewhere ask for, and takes in what came of it.
+
+use super::{
+    answers::Answers,
+    connection::NatsConfig,
+    names::{self, ALL, Names, ORDERS_CONSUMER, OUTCOMES_CONSUMER, SERVER, WAITING},
+    taken_back::{AllGivenOut, GivenOut},
+};
+use crate::{
+    local::LocalServer,
+    server::{Claimed, GivenBack, Holding, WorkServer},
+    service::WorkerConfig,
+};
+use anyhow::Context as _;
+use async_nats::{
+    Client,
+    jetstream::{
+        self, AckKind,
+        consumer::{AckPolicy, PullConsumer, pull},
+        stream::{self, DiscardPolicy, RetentionPolicy, Stream},
+    },
+};
+use faceoff_store::{Lot, Store};
+use faceoff_types::Clock;
+use faceoff_wire::{
+    grant::{Grant, GrantKey, Writes},
+    remote::{Introduction, Outcome, RemoteOrder, RemoteOutcome},
+    work::{Assignment, Keeps, Lease, WorkOrder, WorkReport},
+};
+use futures::StreamExt as _;
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+use tokio_util::sync::CancellationToken;
+
+/// How often is looked at what nobody tells: orders that nobody begins, work that is due by now.
+const LOOK: Duration = Duration::from_secs(1);
+/// After something failed, until it is tried again.
+const REST: Duration = Duration::from_secs(1);
+/// An outcome that cannot be stored now is taken again after this.
+const AGAIN: Duration = Duration::from_secs(5);
+/// Orders in the stream at most; there are never more than free slots.
+const MOST_ORDERS: i64 = 100_000;
+/// Bytes of outcomes that wait for the server at most.
+const MOST_OUTCOME_BYTES: i64 = 1 << 30;
+/// An outcome that is sent twice within this is stored once by NATS; by the server, always.
+const SENT_TWICE_WITHIN: Duration = Duration::from_secs(120);
+
+/// How a server gives work to other machines.
+#[derive(Debug, Clone)]
+pub struct RemoteConfig {
+    /// Where NATS is.
+    pub nats: NatsConfig,
+    /// Where workers reach this server's files: an address of http or https, without a slash at its end.
+    pub files: String,
+    /// What grants are sealed with.
+    pub key: GrantKey,
+    /// What workers must be like.
+    pub like: Introduction,
+}
+
+/// Gives out work until `shutdown` is cancelled. While NATS is away nothing is given out; what is under way elsewhere goes on.
+///
+/// # Errors
+/// If the configuration is none, or the database cannot be read at the start.
+pub async fn dispatch(
+    store: Store,
+    clock: Clock,
+    config: WorkerConfig,
+    remote: RemoteConfig,
+    shutdown: CancellationToken,
+) -> anyhow::Result<()> {
+    let names = Names::of(&remote.nats.name)?;
+    let server = LocalServer {
+        lot: Lot::Plays,
+        ..config.local_server(store, clock)
+    };
+    // Nobody can begin what a former life of this server has given out.
+    server.end_leases_of(WAITING).await?;
+    let season = server.store.season().await?.commitment;
+    let client = remote.nats.connect(SERVER).await?;
+    let hub = Arc::new(Hub {
+        jetstream: jetstream::new(client.clone()),
+        given_out: Arc::default(),
+        owner: format!("Faceoff, season {season}"),
+        client,
+        names,
+        server,
+        remote,
+    });
+    let answers = Answers {
+        client: hub.client.clone(),
+        names: hub.names.clone(),
+        store: hub.server.store.clone(),
+        clock: hub.server.clock.clone(),
+        lease_s: hub.server.lease_s,
+        like: hub.remote.like.clone(),
+        given_out: Arc::clone(&hub.given_out),
+    };
+    tokio::join!(
+        again("give out work", &shutdown, || hub.give_out(&shutdown)),
+        again("take in what came of work", &shutdown, || hub
+            .take_in(&shutdown)),
+        again("answer workers", &shutdown, || answers.answer(&shutdown)),
+        again("hear of games", &shutdown, || answers.show(&shutdown)),
+    );
+    hub.take_back(hub.given_out.take_all(), None).await;
+    Ok(())
+}
+
+/// Does it until the shutdown, again and again if it fails. The log is told of a change, not of every try.
+async fn again<F: Future<Output = anyhow::Result<()>>>(
+    what: &str,
+    shutdown: &CancellationToken,
+    mut run: impl FnMut() -> F,
+) {
+    let mut told = String::new();
+    while !shutdown.is_cancelled() {
+        let Err(error) = run().await else {
+            continue;
+        };
+        let cause = format!("{error:#}");
+        if cause != told {
+            tracing::error!(cause, "cannot {what}; trying again");
+            told = cause;
+        }
+        tokio::select! {
+            () = shutdown.cancelled() => {}
+            () = tokio::time::sleep(REST) => {}
+        }
+    }
+}
+
+/// What gives out and takes in.
+struct Hub {
+    client: Client,
+    jetstream: jetstream::Context,
+    names: Names,
+    server: LocalServer,
+    remote: RemoteConfig,
+    given_out: Arc<AllGivenOut>,
+    /// Whose streams these are.
+    owner: String,
+}
+
+impl Hub {
+    async fn give_out(&self, shutdown: &CancellationToken) -> anyhow::Result<()> {
+        let stream = self.stream(self.orders_config()).await?;
+        let mut consumer = self.consumer(&stream, orders_consumer()).await?;
+        let mut free = self.client.subscribe(self.names.free(ALL)).await?;
+        let mut signal = self.server.store.work_signal();
+        while !shutdown.is_cancelled() {
+            signal.borrow_and_update();
+            let late = self.given_out.take_late(Instant::now());
+            self.take_back(late, Some(&stream)).await;
+            let info = consumer.info().await.context("asking who waits for work")?;
+            let waiting = u64::try_from(info.num_waiting).unwrap_or_default();
+            for _ in 0..waiting.saturating_sub(info.num_pending) {
+                if !self.give_out_one().await? {
+                    break;
+                }
+            }
+            tokio::select! {
+                () = shutdown.cancelled() => {}
+                changed = signal.changed() => changed.context("listening to the queue")?,
+                told = free.next() => anyhow::ensure!(told.is_some(), "the connection to NATS has ended"),
+                () = tokio::time::sleep(LOOK) => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Is there more to give out?
+    async fn give_out_one(&self) -> anyhow::Result<bool> {
+        let server = self.server.clone();
+        let claimed = tokio::task::spawn_blocking(move || server.claim(WAITING)).await??;
+        let Claimed::Order(order) = claimed else {
+            return Ok(false);
+        };
+        let lease = order.lease.clone();
+        match self.publish(*order).await {
+            Ok(sequence) => {
+                self.given_out.add(lease, sequence, Instant::now());
+                Ok(true)
+            }
+            // It may have gone out all the same: then nobody can begin it.
+            Err(error) => {
+                self.release(lease).await;
+                Err(error)
+            }
+        }
+    }
+
+    /// Its place in the stream.
+    async fn publish(&self, order: WorkOrder) -> anyhow::Result<u64> {
+        let grant = grant_of(&order).sealed(&self.remote.key)?;
+        let files = self.remote.files.clone();
+        let order = serde_json::to_vec(&RemoteOrder {
+            order,
+            grant,
+            files,
+        })?;
+        let published = self.jetstream.publish(self.names.orders(), order.into());
+        let acknowledged = published.await.context("publishing an order")?;
+        let acknowledged = acknowledged.await.context("publishing an order")?;
+        Ok(acknowledged.sequence)
+    }
+
+    /// Puts orders back into the queue that nobody has begun.
+    async fn take_back(&self, orders: Vec<GivenOut>, stream: Option<&Stream>) {
+        for order in orders {
+            self.release(order.lease).await;
+            // Whoever gets it yet is told that it is nobody's.
+            if let Some(stream) = stream
+                && let Err(error) = stream.delete_message(order.sequence).await
+            {
+                tracing::debug!(%error, "an order that was taken back stays in the stream");
+            }
+        }
+    }
+
+    async fn release(&self, lease: Lease) {
+        let server = self.server.clone();
+        let unit = lease.unit;
+        let released =
+            tokio::task::spawn_blocking(move || server.give_back(&lease, GivenBack::Shutdown));
+        let released = released.await.map_err(anyhow::Error::from).flatten();
+        if let Err(error) = released {
+            tracing::warn!(%unit, cause = format!("{error:#}"), "an order could not be taken back; its lease will end");
+        }
+    }
+
+    async fn take_in(&self, shutdown: &CancellationToken) -> anyhow::Result<()> {
+        let stream = self.stream(self.outcomes_config()).await?;
+        let consumer = self.consumer(&stream, outcomes_consumer()).await?;
+        while !shutdown.is_cancelled() {
+            let mut outcomes = consumer
+                .batch()
+                .max_messages(64)
+                .expires(LOOK)
+                .messages()
+                .await
+                .context("asking for what came of work")?;
+            while let Some(outcome) = outcomes.next().await {
+                let message = outcome.map_err(|error| anyhow::anyhow!(error))?;
+                let acknowledgement = self.take(&message).await;
+                message
+                    .ack_with(acknowledgement)
+                    .await
+                    .map_err(|error| anyhow::anyhow!(error))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Stores what came of an order.
+    async fn take(&self, message: &jetstream::Message) -> AckKind {
+        let worker = names::worker_of(&message.subject).unwrap_or("?").to_owned();
+        let outcome: RemoteOutcome = match serde_json::from_slice(&message.payload) {
+            Ok(outcome) => outcome,
+            Err(error) => {
+                tracing::error!(worker, %error, "what a worker sent as an outcome is none; it is left out");
+                return AckKind::Term;
+            }
+        };
+        let (server, key) = (self.server.clone(), self.remote.key.clone());
+        let unit = outcome.lease.unit;
+        let told = worker.clone();
+        let stored = tokio::task::spawn_blocking(move || store(&server, &key, &told, outcome));
+        match stored.await.map_err(anyhow::Error::from).flatten() {
+            Ok(Holding::Held) => {
+                tracing::info!(%unit, worker, "taken in");
+                AckKind::Ack
+            }
+            Ok(Holding::Lost) => {
+                tracing::info!(%unit, worker, "no longer this worker's; what came of it is left out");
+                AckKind::Ack
+            }
+            Err(error) => {
+                tracing::error!(%unit, worker, cause = format!("{error:#}"), "what came of a unit cannot be stored; trying again");
+                AckKind::Nak(Some(AGAIN))
+            }
+        }
+    }
+
+    /// A stream that is as it is to be, and ours.
+    async fn stream(&self, wanted: stream::Config) -> anyhow::Result<Stream> {
+        let name = wanted.name.clone();
+        let doing = || format!("setting up the stream {name}");
+        let stream = self.jetstream.get_or_create_stream(wanted.clone());
+        let mut stream = stream.await.with_context(doing)?;
+        let found = &stream.cached_info().config;
+        anyhow::ensure!(
+            found.description == wanted.description,
+            "the stream {name} is another server's ({}): give each its own nats.name",
+            found
+                .description
+                .as_deref()
+                .unwrap_or("it does not say whose")
+        );
+        if !is_like(found, &wanted) {
+            self.jetstream
+                .update_stream(&wanted)
+                .await
+                .with_context(doing)?;
+            let found = &stream.info().await.with_context(doing)?.config;
+            anyhow::ensure!(
+                is_like(found, &wanted),
+                "NATS keeps the stream {name} otherwise than it was asked to; a newer nats-server may not"
+            );
+        }
+        Ok(stream)
+    }
+
+    async fn consumer(
+        &self,
+        stream: &Stream,
+        wanted: pull::Config,
+    ) -> anyhow::Result<PullConsumer> {
+        let consumer = stream.create_consumer(wanted.clone()).await;
+        let name = wanted.durable_name.as_deref().unwrap_or_default();
+        let consumer = consumer.with_context(|| format!("setting up the consumer {name}"))?;
+        let found = &consumer.cached_info().config;
+        anyhow::ensure!(
+            found.max_deliver == wanted.max_deliver && found.ack_policy == wanted.ack_policy,
+            "NATS keeps the consumer {name} otherwise than it was asked to; a newer nats-server may not"
+        );
+        Ok(consumer)
+    }
+
+    fn orders_config(&self) -> stream::Config {
+        stream::Config {
+            name: self.names.orders_stream(),
+            subjects: vec![self.names.orders()],
+            description: Some(self.owner.clone()),
+            retention: RetentionPolicy::WorkQueue,
+            discard: DiscardPolicy::New,
+            max_messages: MOST_ORDERS,
+            ..stream::Config::default()
+        }
+    }
+
+    fn outcomes_config(&self) -> stream::Config {
+        stream::Config {
+            name: self.names.outcomes_stream(),
+            subjects: vec![self.names.outcomes(ALL)],
+            description: Some(self.owner.clone()),
+            retention: RetentionPolicy::WorkQueue,
+            discard: DiscardPolicy::New,
+            max_bytes: MOST_OUTCOME_BYTES,
+            duplicate_window: SENT_TWICE_WITHIN,
+            ..stream::Config::default()
+        }
+    }
+}
+
+fn is_like(found: &stream::Config, wanted: &stream::Config) -> bool {
+    found.subjects == wanted.subjects
+        && found.retention == wanted.retention
+        && found.discard == wanted.discard
+        && found.storage == wanted.storage
+        && (wanted.max_messages == 0 || found.max_messages == wanted.max_messages)
+        && (wanted.max_bytes == 0 || found.max_bytes == wanted.max_bytes)
+}
+
+/// Each order is delivered once: that nobody has begun it, the server notices by itself.
+fn orders_consumer() -> pull::Config {
+    pull::Config {
+        durable_name: Some(ORDERS_CONSUMER.to_owned()),
+        ack_policy: AckPolicy::Explicit,
+        max_deliver: 1,
+        max_ack_pending: MOST_ORDERS,
+        max_waiting: 8192,
+        ..pull::Config::default()
+    }
+}
+
+fn outcomes_consumer() -> pull::Config {
+    pull::Config {
+        durable_name: Some(OUTCOMES_CONSUMER.to_owned()),
+        ack_policy: AckPolicy::Explicit,
+        ack_wait: Duration::from_secs(60),
+        max_deliver: -1,
+        ..pull::Config::default()
+    }
+}
+
+/// What an order opens.
+fn grant_of(order: &WorkOrder) -> Grant {
+    let (bundles, writes) = match &order.assignment {
+        Assignment::Play { agent, keeps, .. } => {
+            let writes = match keeps {
+                Keeps::Nothing => Writes::Nothing,
+                Keeps::Clips(key) => Writes::File(key.clone()),
+                Keeps::Recording(key) => Writes::Folder(key.clone()),
+            };
+            (vec![agent.bundle.clone()], writes)
+        }
+        Assignment::Game {
+            agents, recording, ..
+        } => {
+            let bundles = agents.each_ref().map(|agent| agent.bundle.clone());
+            let writes = match recording {
+                Some(key) => Writes::Folder(key.clone()),
+                None => Writes::Nothing,
+            };
+            (bundles.into(), writes)
+        }
+        Assignment::Smoke { .. } | Assignment::Finalise { .. } => (Vec::new(), Writes::Nothing),
+    };
+    Grant {
+        unit: order.lease.unit,
+        nonce: order.lease.nonce,
+        bundles,
+        writes,
+    }
+}
+
+/// Stores an outcome, if it is of its order. One that is not is a fault of ours, and ends nobody else's work.
+fn store(
+    server: &LocalServer,
+    key: &GrantKey,
+    worker: &str,
+    outcome: RemoteOutcome,
+) -> anyhow::Result<Holding> {
+    let RemoteOutcome {
+        mut lease,
+        grant,
+        outcome,
+    } = outcome;
+    if !lease.slot.starts_with(&names::slot(worker, "")) {
+        lease.slot = names::slot(worker, "?");
+    }
+    let opened = Grant::open(&grant, key)
+        .filter(|grant| grant.unit == lease.unit && grant.nonce == lease.nonce);
+    let Some(grant) = opened else {
+        tracing::error!(unit = %lease.unit, worker, "a worker sent an outcome without the order that it is of; it is left out");
+        return Ok(Holding::Lost);
+    };
+    match outcome {
+        Outcome::Done { report } if is_of(&report, &grant) => server.commit(&lease, *report),
+        Outcome::Done { .. } => {
+            tracing::error!(unit = %lease.unit, worker, "a worker's report is not of its order");
+            server.give_back(
+                &lease,
+                GivenBack::PlatformFault("a worker's report was not of its order"),
+            )?;
+            Ok(Holding::Lost)
+        }
+        Outcome::Shutdown => {
+            server.give_back(&lease, GivenBack::Shutdown)?;
+            Ok(Holding::Held)
+        }
+        Outcome::FullDisk => {
+            server.give_back(&lease, GivenBack::FullDisk)?;
+            Ok(Holding::Held)
+        }
+        Outcome::PlatformFault { reason } => {
+            server.give_back(&lease, GivenBack::PlatformFault(&reason))?;
+            Ok(Holding::Held)
+        }
+    }
+}
+
+/// Does a report name what its order lets it?
+fn is_of(report: &WorkReport, grant: &Grant) -> bool {
+    match (report, &grant.writes) {
+        (
+            WorkReport::Play {
+                recording: Some(key),
+                ..
+            },
+            Writes::Folder(granted),
+        ) => key == granted,
+        (
+            WorkReport::Play {
+                recording: None, ..
+            },
+            Writes::Nothing | Writes::File(_),
+        ) => true,
+        (
+            WorkReport::Game {
+                recording: Some(stored),
+                ..
+            },
+            Writes::Folder(granted),
+        ) => stored.key == *granted,
+        (
+            WorkReport::Game {
+                recording: None, ..
+            },
+            Writes::Nothing,
+        ) => true,
+        _ => false,
+    }
+}

@@ -1,0 +1,472 @@
+//! The server as a slot on another machine sees it: orders, questions and outcomes go by NATS, files by the server's own HTTP.
+
+use super::{
+    connection::ANSWER,
+    names::{self, Names, ORDERS_CONSUMER},
+};
+use crate::{
+    full_disk,
+    server::{Claimed, GameShow, GivenBack, Holding, QueueMark, WorkServer},
+};
+use anyhow::Context as _;
+use async_nats::{
+    Client, HeaderMap,
+    jetstream::{self, consumer::PullConsumer},
+};
+use faceoff_types::{BundleRef, GameId};
+use faceoff_wire::{
+    remote::{Answer, Ask, Introduction, Outcome, RemoteOrder, RemoteOutcome, RemoteShow, Shown},
+    work::{Lease, WorkReport},
+};
+use futures::{StreamExt as _, TryStreamExt as _};
+use reqwest::{Method, StatusCode, header};
+use std::{
+    path::Path,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::{Duration, Instant},
+};
+use tokio::{io::AsyncWriteExt as _, runtime::Handle};
+use tokio_util::{io::ReaderStream, sync::CancellationToken};
+
+/// How long a request for an order stays open; it may die silently, and is made anew.
+const OPEN_FOR: Duration = Duration::from_secs(5);
+/// How often NATS tells meanwhile that it is still there.
+const HEARTBEAT: Duration = Duration::from_secs(2);
+/// After a refusal or a failure, until it is asked again.
+const REST: Duration = Duration::from_secs(2);
+/// How long a file of the server's is asked for again and again: it may be starting anew.
+const FILES_WITHIN: Duration = Duration::from_secs(60);
+/// Nobody waits longer to show a position.
+const SHOWS_WITHIN: Duration = Duration::from_millis(20);
+
+/// A worker's connection, shared by its slots.
+pub(super) struct Link {
+    pub(super) runtime: Handle,
+    pub(super) client: Client,
+    pub(super) names: Names,
+    pub(super) worker: String,
+    pub(super) own: Introduction,
+    pub(super) http: reqwest::Client,
+    pub(super) shutdown: CancellationToken,
+    /// Why it may not work, as it was told last: the log is told of a change.
+    pub(super) refused: Mutex<Option<String>>,
+}
+
+/// The server of one slot.
+pub(super) struct FarServer {
+    link: Arc<Link>,
+    jetstream: jetstream::Context,
+    current: Mutex<Current>,
+}
+
+/// What the slot works at.
+#[derive(Debug, Default)]
+struct Current {
+    grant: String,
+    files: String,
+    /// When the server last said that it is this slot's.
+    held_at: Option<Instant>,
+}
+
+impl FarServer {
+    pub(super) fn new(link: Arc<Link>) -> Self {
+        Self {
+            jetstream: jetstream::new(link.client.clone()),
+            link,
+            current: Mutex::default(),
+        }
+    }
+
+    fn current(&self) -> MutexGuard<'_, Current> {
+        self.current.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    async fn rest(&self) {
+        tokio::select! {
+            () = self.link.shutdown.cancelled() => {}
+            () = tokio::time::sleep(REST) => {}
+        }
+    }
+
+    async fn ask(&self, ask: &Ask) -> anyhow::Result<Answer> {
+        let question = serde_json::to_vec(ask)?;
+        let subject = self.link.names.asks(&self.link.worker);
+        let answer = self.link.client.request(subject, question.into());
+        let answer = answer.await.context("asking the server")?;
+        serde_json::from_slice(&answer.payload).context("the server's answer")
+    }
+
+    /// May this worker work? The log is told when that changes.
+    async fn may_work(&self) -> anyhow::Result<bool> {
+        let answer = self.ask(&Ask::MayWork(self.link.own.clone())).await?;
+        let reason = match answer {
+            Answer::Yes => None,
+            Answer::No { reason } => Some(reason),
+            Answer::Unknown => return Ok(false),
+        };
+        let mut refused = self
+            .link
+            .refused
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        if *refused != reason {
+            match &reason {
+                Some(reason) => tracing::error!(reason, "the server gives this worker no work"),
+                None => tracing::info!("the server gives this worker work"),
+            }
+            refused.clone_from(&reason);
+        }
+        Ok(reason.is_none())
+    }
+
+    /// Waits for an order.
+    async fn order(&self, slot: &str) -> anyhow::Result<Option<RemoteOrder>> {
+        let link = &self.link;
+        let stream = link.names.orders_stream();
+        let consumer = self
+            .jetstream
+            .get_consumer_from_stream(ORDERS_CONSUMER, stream);
+        let consumer: PullConsumer = consumer
+            .await
+            .map_err(|error| anyhow::anyhow!("asking for orders: {error}"))?;
+        let mut orders = consumer
+            .batch()
+            .max_messages(1)
+            .expires(OPEN_FOR)
+            .heartbeat(HEARTBEAT)
+            .messages()
+            .await
+            .context("asking for an order")?;
+        let free = link.names.free(&link.worker);
+        link.client.publish(free, Default::default()).await?;
+        let order = tokio::select! {
+            // What comes now is not begun, and taken back.
+            () = link.shutdown.cancelled() => return Ok(None),
+            order = orders.next() => order,
+        };
+        let Some(order) = order else {
+            return Ok(None);
+        };
+        let message = order.map_err(|error| anyhow::anyhow!("waiting for an order: {error}"))?;
+        // Each order is delivered once: whose it is decides the lease, and not NATS.
+        message
+            .ack()
+            .await
+            .map_err(|error| anyhow::anyhow!("acknowledging an order: {error}"))?;
+        let mut order: RemoteOrder =
+            serde_json::from_slice(&message.payload).context("an order")?;
+        let begin = Ask::Begin {
+            lease: order.order.lease.clone(),
+            slot: slot.to_owned(),
+        };
+        Ok(match self.ask(&begin).await? {
+            Answer::Yes => {
+                order.order.lease.slot = names::slot(&link.worker, slot);
+                Some(order)
+            }
+            Answer::No { .. } | Answer::Unknown => None,
+        })
+    }
+
+    /// Sends what came of an order, until NATS has stored it.
+    async fn send(&self, lease: &Lease, outcome: Outcome) -> anyhow::Result<()> {
+        let outcome = RemoteOutcome {
+            lease: lease.clone(),
+            grant: self.current().grant.clone(),
+            outcome,
+        };
+        let mut headers = HeaderMap::new();
+        headers.insert("Nats-Msg-Id", outcome.id());
+        let payload = serde_json::to_vec(&outcome)?;
+        let largest = self.link.client.max_payload();
+        anyhow::ensure!(
+            payload.len() <= largest,
+            "what came of the order has {} bytes, and NATS takes {largest}: raise its max_payload",
+            payload.len()
+        );
+        let began = Instant::now();
+        let within = Duration::from_secs(lease.duration_s.into());
+        let subject = self.link.names.outcomes(&self.link.worker);
+        loop {
+            let sent = async {
+                let sent = self.jetstream.publish_with_headers(
+                    subject.clone(),
+                    headers.clone(),
+                    payload.clone().into(),
+                );
+                anyhow::Ok(sent.await?.await?)
+            };
+            match sent.await {
+                Ok(_) => return Ok(()),
+                Err(error) if began.elapsed() >= within => {
+                    return Err(error).context("sending what came of the order");
+                }
+                Err(error) => {
+                    tracing::warn!(unit = %lease.unit, %error, "what came of the order is not stored by NATS yet; trying again");
+                    tokio::time::sleep(REST).await;
+                }
+            }
+        }
+    }
+
+    /// Asks for a file of the server's, or sends one, again while the server is away.
+    async fn files<T>(
+        &self,
+        what: &str,
+        mut once: impl AsyncFnMut(reqwest::RequestBuilder) -> anyhow::Result<T>,
+        (method, path): (Method, String),
+    ) -> anyhow::Result<T> {
+        let (grant, url) = {
+            let current = self.current();
+            (
+                format!("Grant {}", current.grant),
+                format!("{}/work/{path}", current.files),
+            )
+        };
+        let began = Instant::now();
+        loop {
+            let request = self.link.http.request(method.clone(), &url);
+            let request = request.header(header::AUTHORIZATION, &grant);
+            let error = match once(request).await {
+                Ok(done) => return Ok(done),
+                Err(error) => error,
+            };
+            if !is_away(&error) || began.elapsed() >= FILES_WITHIN {
+                return Err(error).with_context(|| format!("{what} {url}"));
+            }
+            tokio::time::sleep(REST).await;
+        }
+    }
+
+    async fn store(&self, name: &str, file: &Path) -> anyhow::Result<()> {
+        let send = async |request: reqwest::RequestBuilder| {
+            let body = tokio::fs::File::open(file).await?;
+            let bytes = body.metadata().await?.len();
+            let answer = request
+                .header(header::CONTENT_LENGTH, bytes)
+                .body(reqwest::Body::wrap_stream(ReaderStream::new(body)))
+                .send()
+                .await?;
+            let _ = good(answer).await?;
+            Ok(())
+        };
+        let to = (Method::PUT, format!("files/{name}"));
+        self.files("storing a file at", send, to).await
+    }
+}
+
+/// The server, or the proxy before it, has no time now.
+#[derive(Debug, thiserror::Error)]
+#[error("the server answered {0}")]
+struct Busy(StatusCode);
+
+/// Is it worth asking again?
+fn is_away(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| {
+        cause.is::<Busy>()
+            || cause
+                .downcast_ref::<reqwest::Error>()
+                .is_some_and(|error| error.is_connect() || error.is_timeout() || error.is_request())
+    })
+}
+
+/// An answer that is no refusal.
+async fn good(answer: reqwest::Response) -> anyhow::Result<reqwest::Response> {
+    let status = answer.status();
+    if status.is_success() {
+        return Ok(answer);
+    }
+    let busy = [
+        StatusCode::TOO_MANY_REQUESTS,
+        StatusCode::BAD_GATEWAY,
+        StatusCode::SERVICE_UNAVAILABLE,
+        StatusCode::GATEWAY_TIMEOUT,
+    ];
+    if busy.contains(&status) {
+        return Err(Busy(status).into());
+    }
+    let told = answer.text().await.unwrap_or_default();
+    if status == StatusCode::INSUFFICIENT_STORAGE {
+        return Err(std::io::Error::from(std::io::ErrorKind::StorageFull).into());
+    }
+    anyhow::bail!("the server answered {status}: {told}")
+}
+
+impl WorkServer for FarServer {
+    fn claim(&self, slot: &str) -> anyhow::Result<Claimed> {
+        // NATS wakes who waits here: there is no queue to look at.
+        let queue = QueueMark(0);
+        self.link.runtime.block_on(async {
+            match self.may_work().await {
+                Ok(true) => {}
+                Ok(false) => {
+                    self.rest().await;
+                    return Ok(Claimed::Nothing { queue });
+                }
+                Err(error) => {
+                    self.rest().await;
+                    return Err(error);
+                }
+            }
+            let order = match self.order(slot).await {
+                Ok(order) => order,
+                Err(error) => {
+                    self.rest().await;
+                    return Err(error);
+                }
+            };
+            let Some(RemoteOrder {
+                order,
+                grant,
+                files,
+            }) = order
+            else {
+                return Ok(Claimed::Nothing { queue });
+            };
+            *self.current() = Current {
+                grant,
+                files,
+                held_at: Some(Instant::now()),
+            };
+            Ok(Claimed::Order(Box::new(order)))
+        })
+    }
+
+    fn renew(&self, lease: &Lease, episodes_done: u32) -> anyhow::Result<Holding> {
+        let ask = Ask::Renew {
+            lease: lease.clone(),
+            episodes_done,
+        };
+        let answer = self.link.runtime.block_on(self.ask(&ask));
+        match answer {
+            Ok(Answer::Yes) => {
+                self.current().held_at = Some(Instant::now());
+                Ok(Holding::Held)
+            }
+            Ok(Answer::No { .. }) => Ok(Holding::Lost),
+            Ok(Answer::Unknown) | Err(_) => {
+                let held_at = self.current().held_at;
+                let cut_off = Duration::from_secs(lease.duration_s.into());
+                if held_at.is_some_and(|at| at.elapsed() > cut_off) {
+                    tracing::error!(unit = %lease.unit, "nothing was heard of the server for as long as the lease is: this worker stops");
+                    return Ok(Holding::Lost);
+                }
+                answer
+                    .map(|_| Holding::Held)
+                    .and_then(|_| anyhow::bail!("the server cannot tell now"))
+            }
+        }
+    }
+
+    fn renews_every(&self, _: &Lease) -> Duration {
+        // So soon a worker hears that its work is not wanted any more.
+        Duration::from_millis(500)
+    }
+
+    fn show(&self, lease: &Lease, (game, attempt): (GameId, u32), show: GameShow) {
+        let shown = match show {
+            GameShow::Begun { steps } => Shown::Begun { steps },
+            GameShow::Goes {
+                happenings,
+                position,
+            } => Shown::Goes {
+                happenings,
+                position,
+            },
+            GameShow::Over => Shown::Over,
+        };
+        let show = RemoteShow {
+            lease: lease.clone(),
+            game,
+            attempt,
+            shown,
+        };
+        let Ok(words) = serde_json::to_vec(&show) else {
+            return;
+        };
+        let subject = self.link.names.shows(&self.link.worker);
+        self.link.runtime.block_on(async {
+            let published = self.link.client.publish(subject, words.into());
+            // What is not shown in time is not shown.
+            let _ = tokio::time::timeout(SHOWS_WITHIN, published).await;
+        });
+    }
+
+    fn commit(&self, lease: &Lease, report: WorkReport) -> anyhow::Result<Holding> {
+        let report = Box::new(report);
+        let sent = self.send(lease, Outcome::Done { report });
+        self.link.runtime.block_on(sent)?;
+        Ok(Holding::Held)
+    }
+
+    fn give_back(&self, lease: &Lease, why: GivenBack<'_>) -> anyhow::Result<()> {
+        let outcome = match why {
+            GivenBack::Shutdown => Outcome::Shutdown,
+            GivenBack::FullDisk => Outcome::FullDisk,
+            GivenBack::PlatformFault(reason) => Outcome::PlatformFault {
+                reason: reason.to_owned(),
+            },
+        };
+        self.link.runtime.block_on(async {
+            let sent = tokio::time::timeout(ANSWER, self.send(lease, outcome));
+            sent.await.context("telling the server")?
+        })
+    }
+
+    fn met_full_disk(&self, error: &anyhow::Error) -> bool {
+        full_disk::is_told_by(error)
+    }
+
+    fn wait(&self, stop: &CancellationToken, at_most: Duration, queue: Option<QueueMark>) {
+        // Who asks for an order has waited already.
+        if queue.is_some() {
+            return;
+        }
+        self.link.runtime.block_on(async {
+            tokio::select! {
+                () = stop.cancelled() => {}
+                () = tokio::time::sleep(at_most) => {}
+            }
+        });
+    }
+
+    fn fetch_bundle(&self, bundle: &BundleRef, archive: &Path) -> anyhow::Result<()> {
+        let fetch = async |request: reqwest::RequestBuilder| {
+            let answer = good(request.send().await?).await?;
+            let mut file = tokio::fs::File::create(archive).await?;
+            let mut bytes = answer.bytes_stream();
+            while let Some(piece) = bytes.try_next().await? {
+                file.write_all(&piece).await?;
+            }
+            file.flush().await?;
+            Ok(())
+        };
+        let from = (Method::GET, format!("bundles/{}", bundle.blake3));
+        let fetched = self.files("fetching the bundle", fetch, from);
+        self.link.runtime.block_on(fetched)
+    }
+
+    fn fetch_recording(&self, key: &str, _: &Path) -> anyhow::Result<()> {
+        anyhow::bail!("no order to another machine asks for the recording {key}")
+    }
+
+    fn store_recording(&self, _: &str, folder: &Path) -> anyhow::Result<()> {
+        self.link.runtime.block_on(async {
+            let mut entries = tokio::fs::read_dir(folder).await?;
+            while let Some(entry) = entries.next_entry().await? {
+                let name = entry.file_name();
+                let name = name.to_str().context("a recording's file without a name")?;
+                self.store(name, &entry.path()).await?;
+            }
+            Ok(())
+        })
+    }
+
+    fn store_clips(&self, _: &str, clips: &Path) -> anyhow::Result<()> {
+        self.link.runtime.block_on(self.store("clips", clips))
+    }
+
+    fn store_dataset(&self, key: &str, _: &Path, _: Option<&Path>) -> anyhow::Result<()> {
+        anyhow::bail!("no order to another machine asks for the dataset {key}")
+    }
+}

@@ -1,0 +1,102 @@
+//! What streams and subjects are called. Each begins with the server's own name, so that several share one NATS.
+
+/// How long a worker's name may be.
+const LONGEST_WORKER: usize = 64;
+
+/// The names of one server's streams and subjects.
+#[derive(Debug, Clone)]
+pub(super) struct Names {
+    server: String,
+}
+
+impl Names {
+    /// Fails unless the name can be a part of all of them.
+    pub(super) fn of(server: &str) -> anyhow::Result<Self> {
+        anyhow::ensure!(
+            is_word(server),
+            "nats.name: expected 1 to {LONGEST_WORKER} of a-z, A-Z, 0-9, - and _, got {server:?}"
+        );
+        Ok(Self {
+            server: server.to_owned(),
+        })
+    }
+
+    /// The stream of orders.
+    pub(super) fn orders_stream(&self) -> String {
+        format!("{}-orders", self.server)
+    }
+
+    /// Where orders are published.
+    pub(super) fn orders(&self) -> String {
+        format!("{}.orders", self.server)
+    }
+
+    /// The stream of what came of them.
+    pub(super) fn outcomes_stream(&self) -> String {
+        format!("{}-outcomes", self.server)
+    }
+
+    /// Where a worker publishes what came of an order; `*`: all of them.
+    pub(super) fn outcomes(&self, worker: &str) -> String {
+        format!("{}.outcomes.{worker}", self.server)
+    }
+
+    /// Where a worker asks; `*`: all of them.
+    pub(super) fn asks(&self, worker: &str) -> String {
+        format!("{}.asks.{worker}", self.server)
+    }
+
+    /// Where a worker tells of games under way; `*`: all of them.
+    pub(super) fn shows(&self, worker: &str) -> String {
+        format!("{}.shows.{worker}", self.server)
+    }
+
+    /// Where a worker tells that a slot has become free; `*`: all of them.
+    pub(super) fn free(&self, worker: &str) -> String {
+        format!("{}.free.{worker}", self.server)
+    }
+}
+
+/// What the server is called where workers have names.
+pub(super) const SERVER: &str = "server";
+/// What workers have in common when they take orders.
+pub(super) const ORDERS_CONSUMER: &str = "workers";
+/// The server, when it takes what came of them.
+pub(super) const OUTCOMES_CONSUMER: &str = "server";
+/// Every worker, where subjects name one.
+pub(super) const ALL: &str = "*";
+/// The holder of leases of orders that nobody has begun. No slot is called this.
+pub(super) const WAITING: &str = "given out";
+
+/// What the queue calls a slot of a worker elsewhere.
+pub(super) fn slot(worker: &str, slot: &str) -> String {
+    format!("remote/{worker}/{slot}")
+}
+
+/// Can it be a token of a subject, and a part of a stream's name?
+pub(super) fn is_word(text: &str) -> bool {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
+    (1..=LONGEST_WORKER).contains(&text.len()) && text.chars().all(allowed)
+}
+
+/// The worker that a subject of its own names.
+pub(super) fn worker_of(subject: &str) -> Option<&str> {
+    let (_, worker) = subject.rsplit_once('.')?;
+    is_word(worker).then_some(worker)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn subjects_name_server_and_worker() {
+        let names = Names::of("faceoff").unwrap();
+        assert_eq!(names.asks("gpu-1"), "faceoff.asks.gpu-1");
+        assert_eq!(worker_of(&names.asks("gpu-1")), Some("gpu-1"));
+        assert_eq!(worker_of(&names.asks(ALL)), None);
+        for bad in ["", "a.b", "a b", "*", ">", &"x".repeat(65)] {
+            assert!(Names::of(bad).is_err(), "{bad:?}");
+        }
+    }
+}

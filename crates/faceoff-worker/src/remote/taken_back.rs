@@ -1,0 +1,88 @@
+//! Orders that were given out and that nobody has begun yet.
+
+use faceoff_wire::work::Lease;
+use std::{
+    collections::HashMap,
+    sync::{Mutex, MutexGuard, PoisonError},
+    time::{Duration, Instant},
+};
+use uuid::Uuid;
+
+/// Whoever asked for an order begins within this time, or has gone: then it is taken back, and given to another.
+const BEGINS_WITHIN: Duration = Duration::from_secs(5);
+
+/// An order that waits for its worker.
+#[derive(Debug, Clone)]
+pub(super) struct GivenOut {
+    pub(super) lease: Lease,
+    /// Its place in the stream.
+    pub(super) sequence: u64,
+    at: Instant,
+}
+
+/// By the leases' nonces.
+#[derive(Debug, Default)]
+pub(super) struct AllGivenOut(Mutex<HashMap<Uuid, GivenOut>>);
+
+impl AllGivenOut {
+    pub(super) fn add(&self, lease: Lease, sequence: u64, now: Instant) {
+        let given_out = GivenOut {
+            lease,
+            sequence,
+            at: now,
+        };
+        self.all().insert(given_out.lease.nonce, given_out);
+    }
+
+    /// It was begun.
+    pub(super) fn remove(&self, nonce: Uuid) {
+        self.all().remove(&nonce);
+    }
+
+    /// Those that nobody has begun in time; they are forgotten.
+    pub(super) fn take_late(&self, now: Instant) -> Vec<GivenOut> {
+        let mut all = self.all();
+        let is_late = |of: &GivenOut| now.duration_since(of.at) >= BEGINS_WITHIN;
+        all.extract_if(|_, of| is_late(of))
+            .map(|(_, late)| late)
+            .collect()
+    }
+
+    /// All of them; they are forgotten.
+    pub(super) fn take_all(&self) -> Vec<GivenOut> {
+        self.all().drain().map(|(_, of)| of).collect()
+    }
+
+    /// Each entry is whole whatever panicked beside it.
+    fn all(&self) -> MutexGuard<'_, HashMap<Uuid, GivenOut>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use jiff::Timestamp;
+
+    #[test]
+    fn what_nobody_begins_in_time_is_taken_back_once() {
+        let all = AllGivenOut::default();
+        let start = Instant::now();
+        let lease = |nonce| Lease {
+            unit: Uuid::from_u128(9),
+            nonce: Uuid::from_u128(nonce),
+            slot: "x".into(),
+            expires_at: Timestamp::UNIX_EPOCH,
+            duration_s: 30,
+        };
+        all.add(lease(1), 11, start);
+        all.add(lease(2), 12, start);
+        all.add(lease(3), 13, start + Duration::from_secs(1));
+        all.remove(Uuid::from_u128(2));
+        assert!(all.take_late(start + Duration::from_secs(4)).is_empty());
+        let late = all.take_late(start + BEGINS_WITHIN);
+        assert_eq!(late.iter().map(|of| of.sequence).collect::<Vec<_>>(), [11]);
+        assert_eq!(all.take_all().len(), 1);
+        assert!(all.take_all().is_empty());
+    }
+}

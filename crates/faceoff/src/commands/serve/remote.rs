@@ -1,0 +1,30 @@
+//! What other machines are given.
+
+use crate::{commands::introduction::introduction, config::Config};
+use faceoff_http::LinkKey;
+use faceoff_worker::RemoteConfig;
+use std::net::SocketAddr;
+
+/// How work is given to other machines, if it is.
+pub(super) fn config(
+    config: &Config,
+    listens_on: SocketAddr,
+    link_key: &LinkKey,
+    runtimes: &[String],
+) -> anyhow::Result<Option<RemoteConfig>> {
+    let Some(nats) = config.nats.connection() else {
+        anyhow::ensure!(
+            config.workers.play,
+            "workers.play is false and no nats.url is set: nobody would play"
+        );
+        return Ok(None);
+    };
+    let files = config.nats.files_url.clone();
+    let files = files.or_else(|| config.server.public_url.clone());
+    Ok(Some(RemoteConfig {
+        nats,
+        files: files.unwrap_or_else(|| format!("http://{listens_on}")),
+        key: link_key.of_grants(),
+        like: introduction(runtimes.to_vec())?,
+    }))
+}

@@ -1,0 +1,113 @@
+//! A real `nats-server` with JetStream.
+
+use crate::server::{PATIENCE, Process};
+use std::{
+    fs,
+    net::{SocketAddr, TcpStream},
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+    thread,
+    time::{Duration, Instant},
+};
+
+/// Its configuration, in its folder.
+const CONFIG: &str = "nats-server.conf";
+
+/// It, on a port of its own. Dropping it ends it at once (SIGKILL).
+#[derive(Debug)]
+pub struct Nats {
+    process: Process,
+    folder: PathBuf,
+    address: SocketAddr,
+}
+
+impl Nats {
+    /// Starts one that keeps its streams below `folder`.
+    ///
+    /// # Panics
+    /// If none is installed, or it does not start.
+    #[must_use]
+    pub fn start(folder: &Path) -> Self {
+        Self::configured(folder, "")
+    }
+
+    /// Starts one with a configuration, but for its port and folder.
+    ///
+    /// # Panics
+    /// As [`start`](Self::start).
+    #[must_use]
+    pub fn configured(folder: &Path, config: &str) -> Self {
+        fs::create_dir_all(folder).expect("a scratch folder can be made");
+        fs::write(folder.join(CONFIG), config).expect("a scratch file can be written");
+        let process = run(folder, "-1");
+        // It tells which port it was given in a file that is named for its process.
+        let told = folder.join(format!("nats-server_{}.ports", process.0.id()));
+        let address = wait_for(|| {
+            let told: serde_json::Value = serde_json::from_slice(&fs::read(&told).ok()?).ok()?;
+            let url = told["nats"][0].as_str()?;
+            url.trim_start_matches("nats://").parse().ok()
+        });
+        Self {
+            process,
+            folder: folder.to_owned(),
+            address,
+        }
+    }
+
+    /// Where it listens.
+    #[must_use]
+    pub const fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// `nats://127.0.0.1:PORT`
+    #[must_use]
+    pub fn url(&self) -> String {
+        format!("nats://{}", self.address)
+    }
+
+    /// Ends it as a power cut would, and starts it again where it was.
+    ///
+    /// # Panics
+    /// If it does not start.
+    pub fn kill_and_start(&mut self) {
+        self.process.end();
+        self.process = run(&self.folder, &self.address.port().to_string());
+        wait_for(|| TcpStream::connect(self.address).ok());
+    }
+}
+
+fn run(folder: &Path, port: &str) -> Process {
+    // Debian has it where ordinary users do not look.
+    let debians = Path::new("/usr/sbin/nats-server");
+    let name = match debians.exists() {
+        true => debians,
+        false => Path::new("nats-server"),
+    };
+    let started = Command::new(name)
+        .args(["-js", "-a", "127.0.0.1", "-p", port])
+        .arg("-c")
+        .arg(folder.join(CONFIG))
+        .arg("-sd")
+        .arg(folder)
+        .arg("--ports_file_dir")
+        .arg(folder)
+        .arg("-l")
+        .arg(folder.join("log"))
+        .stdin(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn();
+    Process(started.expect("nats-server is installed; `make setup-test` installs it"))
+}
+
+fn wait_for<T>(mut look: impl FnMut() -> Option<T>) -> T {
+    let started = Instant::now();
+    loop {
+        if let Some(found) = look() {
+            return found;
+        }
+        assert!(started.elapsed() < PATIENCE, "nats-server does not start");
+        // It tells nobody that it is ready.
+        thread::sleep(Duration::from_millis(20));
+    }
+}
