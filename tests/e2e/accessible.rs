@@ -112,6 +112,7 @@ fn no_page_of_a_desk_breaks_a_rule_of_accessibility() {
         &format!("/organiser/stages/{stage}"),
         "/organiser/messages",
         "/organiser/storage",
+        "/organiser/workers",
         "/organiser/access",
         "/organiser/log",
         "/organiser/decide/pause",

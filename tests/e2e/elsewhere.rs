@@ -247,6 +247,16 @@ fn without_nats_a_server_starts_waits_and_goes_on_once_it_is_there() {
     let server = Server::start(&scratch.path().join("data"), &config);
     files.lead_to(server.address().into());
     server.wait_for_log("NATS cannot be reached", 1);
+    // Whoever watches it is told: nobody would play.
+    let not_ready = |word: &str| {
+        let health = server.poll("/api/v1/health", &server.admin_token, |told| {
+            told["detail"]
+                .as_str()
+                .is_some_and(|detail| detail.contains(word))
+        });
+        assert_eq!(health["status"], 503, "{health:#}");
+    };
+    not_ready("The server cannot give out work");
     let worker = Worker::start(scratch.path(), "worker", &taking(link.address(), 1));
     worker.wait_for_log("NATS cannot be reached", 1);
     let team = Team::create(&server, "Alpha");
@@ -256,6 +266,14 @@ fn without_nats_a_server_starts_waits_and_goes_on_once_it_is_there() {
     link.lead_to(nats.address());
     let finished = team.finished(&server, &evaluation);
     assert_eq!(finished["state"], "finished", "{finished:#}");
+    let workers = server.poll("/api/v1/workers", &server.admin_token, |told| {
+        told["troubles"] == json!([])
+    });
+    assert_eq!(workers["remote_slots"], 1, "{workers:#}");
+    assert_eq!(workers["workers"][0]["name"], "worker");
+    let _ = server.poll("/api/v1/health", &server.admin_token, |told| {
+        told["status"] == "ok"
+    });
 }
 
 /// A key for NATS: its public half; the secret one is in the file.

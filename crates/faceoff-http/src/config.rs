@@ -47,7 +47,7 @@ impl Default for HttpLimits {
 /// What evaluates, as far as the web side tells of it.
 #[derive(Debug, Clone)]
 pub struct Capacity {
-    /// Units of work that are done at the same time.
+    /// Units of work that the server's own slots play at the same time; 0: others play.
     pub slots: u32,
     /// How long an agent may take.
     pub time: TimeLimits,

@@ -67,6 +67,14 @@ async fn standing(app: &AppState) -> Result<Standing, Problem> {
         },
         open_evaluations: numbers.open_evaluations,
         slots: app.config.capacity.slots,
+        remote_slots: app.store.workers().slots(now),
+        remote_workers: app
+            .store
+            .workers()
+            .all()
+            .iter()
+            .filter(|worker| worker.is_there(now))
+            .count(),
         disks: disks
             .filter_map(|(of, space)| {
                 space.map(|space| Disk {

@@ -16,6 +16,10 @@ pub struct Standing {
     pub open_evaluations: u32,
     /// Slots of this process.
     pub slots: u32,
+    /// Slots of workers elsewhere that can be given work.
+    pub remote_slots: u32,
+    /// Workers elsewhere that were heard of a moment ago.
+    pub remote_workers: usize,
     /// The disks that the server writes to.
     pub disks: Vec<Disk>,
     /// What the process holds.
@@ -77,6 +81,8 @@ pub(crate) struct Gauges {
     oldest_wait: Latest,
     evaluations: Gauge,
     slots: Gauge,
+    remote_slots: Gauge,
+    remote_workers: Gauge,
     free: Family<OfDisk, Gauge>,
     size: Family<OfDisk, Gauge>,
     resident: Gauge,
@@ -114,6 +120,16 @@ impl Gauges {
             gauges.evaluations.clone(),
         );
         all.register("slots", "Slots of this process", gauges.slots.clone());
+        all.register(
+            "remote_slots",
+            "Slots of workers on other machines that can be given work",
+            gauges.remote_slots.clone(),
+        );
+        all.register(
+            "remote_workers",
+            "Workers on other machines that were heard of in the last half minute",
+            gauges.remote_workers.clone(),
+        );
         all.register_with_unit(
             "disk_free",
             "Room on the disks that the server writes to",
@@ -151,6 +167,8 @@ impl Gauges {
             queue,
             open_evaluations,
             slots,
+            remote_slots,
+            remote_workers,
             disks,
             process,
         } = now;
@@ -168,6 +186,9 @@ impl Gauges {
         self.oldest_wait.set(queue.oldest_wait_s);
         self.evaluations.set((*open_evaluations).into());
         self.slots.set((*slots).into());
+        self.remote_slots.set((*remote_slots).into());
+        self.remote_workers
+            .set(i64::try_from(*remote_workers).unwrap_or(i64::MAX));
         for disk in disks {
             let of = OfDisk { disk: disk.of };
             self.free.get_or_create(&of).set(whole(disk.free_bytes));

@@ -37,6 +37,7 @@ mod schema;
 mod signals;
 mod store;
 mod tables;
+mod workers;
 mod write;
 
 pub use artifacts::{ArtifactStream, Artifacts};
@@ -126,3 +127,4 @@ pub use tables::{
     tournaments::Tournament,
     webhooks::{DeadWebhook, Webhook, WebhookKeys},
 };
+pub use workers::{WORKER_SILENT, WorkerBusy, WorkerHeard, Workers};

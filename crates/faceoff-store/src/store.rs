@@ -1,6 +1,7 @@
 use crate::{
     artifacts::Artifacts, database::Database, error::Result, event::Change, live::LiveGames,
     pulse::Pulse, room::Room, schema::Upgrade, signals::Signals, tables::archived::Archived,
+    workers::Workers,
 };
 use std::sync::Arc;
 use tokio::sync::{broadcast, watch};
@@ -15,6 +16,7 @@ pub struct Store {
     pub(crate) room: Arc<Room>,
     pub(crate) pulse: Arc<Pulse>,
     pub(crate) live: LiveGames,
+    pub(crate) workers: Workers,
     pub(crate) archived: Option<Arc<Archived>>,
 }
 
@@ -63,6 +65,12 @@ impl Store {
     #[must_use]
     pub const fn live_games(&self) -> &LiveGames {
         &self.live
+    }
+
+    /// Workers on other machines, as this process hears of them.
+    #[must_use]
+    pub const fn workers(&self) -> &Workers {
+        &self.workers
     }
 
     /// What changes from now on, of this process's doing, told after the commit. A receiver that falls

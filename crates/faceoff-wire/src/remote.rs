@@ -24,6 +24,8 @@ pub struct Introduction {
     pub version: String,
     /// The runtimes that it offers to agents.
     pub runtimes: Vec<String>,
+    /// Units that it works at at the same time.
+    pub slots: u32,
 }
 
 /// What a worker asks, and is answered at once.

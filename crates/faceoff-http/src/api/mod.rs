@@ -51,6 +51,7 @@ mod tournaments;
 mod turns;
 mod upload;
 mod webhooks;
+mod workers;
 
 use crate::{app::App, extract::MAX_JSON_BYTES, layers, paths::API_BASE};
 use axum::{Json, Router, extract::DefaultBodyLimit, middleware, routing::get};
@@ -142,6 +143,7 @@ pub(crate) fn router(patience: Duration) -> (Router<App>, Arc<Value>) {
         .routes(routes!(submission_archives::submission_archive))
         .routes(routes!(submission_archives::link_archive))
         .routes(routes!(storage::storage))
+        .routes(routes!(workers::workers))
         .routes(routes!(storage::team_storage))
         .routes(routes!(submissions::withdraw_submission))
         .routes(routes!(submissions::activate_submission))

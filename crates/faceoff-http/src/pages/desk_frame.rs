@@ -24,13 +24,14 @@ const TEAM: [(&str, &str); 3] = [
 ];
 
 /// The pages of the organiser's.
-const ORGANISER: [(&str, &str); 8] = [
+const ORGANISER: [(&str, &str); 9] = [
     ("/organiser", "Attention"),
     ("/organiser/day", "Day"),
     ("/organiser/teams", "Teams"),
     ("/organiser/stages", "Stages"),
     ("/organiser/messages", "Messages"),
     ("/organiser/storage", "Storage"),
+    ("/organiser/workers", "Workers"),
     ("/organiser/access", "People and tokens"),
     ("/organiser/log", "Log"),
 ];

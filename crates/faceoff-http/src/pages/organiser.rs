@@ -11,6 +11,7 @@ mod stage_form;
 mod stages;
 mod storage;
 mod teams;
+mod workers;
 
 use super::desk::access;
 use crate::app::App;
@@ -39,6 +40,7 @@ pub(super) fn router() -> Router<App> {
         .route("/organiser/messages/terms", post(messages::publish_terms))
         .route("/organiser/messages/{id}", post(messages::answer))
         .route("/organiser/storage", get(storage::page))
+        .route("/organiser/workers", get(workers::page))
         .route("/organiser/log", get(log::page))
         .route("/log", get(log::moved))
         .route(

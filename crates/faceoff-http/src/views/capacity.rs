@@ -236,11 +236,12 @@ impl CapacityView {
             let cut_at = at.unwrap_or(now).max(now);
             loads.push(next_load(&stage, day, cut_at, &teams, &measured, capacity));
         }
-        let of_load = |load: &Load| DayLoad::of(load, capacity.slots);
+        let slots = capacity.slots + store.workers().slots(now);
+        let of_load = |load: &Load| DayLoad::of(load, slots);
         Ok(Self {
             stage: stage.id,
             stage_name: stage.name.clone(),
-            slots: capacity.slots,
+            slots,
             days: loads.iter().map(of_load).collect(),
         })
     }

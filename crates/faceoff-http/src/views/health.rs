@@ -1,6 +1,6 @@
 //! Is the server up, and is it fit for work?
 
-use super::ruling::RulingView;
+use super::{ruling::RulingView, workers::WorkersView};
 use crate::{
     app::AppState,
     problem::{Problem, ProblemKind},
@@ -86,6 +86,9 @@ impl HealthView {
             QueueHealth::Unknown => missing.push("the queue cannot be read".to_owned()),
             QueueHealth::Moving { .. } | QueueHealth::Held { .. } | QueueHealth::Paused { .. } => {}
         }
+        if app.config.capacity.slots == 0 {
+            missing.extend(elsewhere(app, waiting));
+        }
         if missing.is_empty() {
             return Ok(Self {
                 status: "ok".to_owned(),
@@ -120,6 +123,18 @@ impl HealthView {
             .with("min_free_bytes", room.min_free_bytes())
             .with("waiting", waiting))
     }
+}
+
+/// What is missing where others play.
+fn elsewhere(app: &AppState, waiting: u32) -> Vec<String> {
+    let workers = WorkersView::now(app);
+    let mut missing = workers.troubles;
+    if workers.remote_slots == 0 && waiting > 0 {
+        missing.push(format!(
+            "{waiting} units of work wait, the server's own slots do not play, and no worker elsewhere can be given any"
+        ));
+    }
+    missing
 }
 
 impl LiveView {

@@ -55,6 +55,7 @@ pub(crate) mod tournament_sheet;
 pub(crate) mod trail;
 pub mod violations;
 pub mod webhook;
+pub mod workers;
 
 /// Text of agents as API and pages show it; what older versions have stored may hold anything.
 fn shown(text: String) -> String {

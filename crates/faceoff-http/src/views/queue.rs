@@ -28,8 +28,14 @@ impl From<QueuePlace> for QueueView {
     }
 }
 
+/// Slots that play now, here and on other machines.
+pub(crate) fn slots(app: &AppState) -> u32 {
+    let elsewhere = app.store.workers().slots(app.config.clock.now());
+    app.config.capacity.slots + elsewhere
+}
+
 /// Where everything stands that waits or is under way.
 pub(crate) async fn outlook(app: &AppState) -> Result<Outlook, Problem> {
     let now = app.config.clock.now();
-    Ok(app.store.outlook(app.config.capacity.slots, now).await?)
+    Ok(app.store.outlook(slots(app), now).await?)
 }

@@ -64,3 +64,4 @@ mod watched;
 mod webhooks;
 mod whole_season;
 mod work_files;
+mod workers;

@@ -87,6 +87,7 @@ async fn the_document_lists_what_is_there_and_nothing_else() {
         "GET /api/v1/webhooks/{id}",
         "GET /api/v1/webhooks/{id}/deliveries",
         "GET /api/v1/whoami",
+        "GET /api/v1/workers",
         "PATCH /api/v1/season",
         "PATCH /api/v1/stages/{id}",
         "PATCH /api/v1/submissions/{id}",

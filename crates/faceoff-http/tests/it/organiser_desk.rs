@@ -37,13 +37,14 @@ async fn decision(grace: &mut Browser<'_>, on: &str, label: &str) -> (String, An
     (link, page)
 }
 
-const PAGES: [&str; 9] = [
+const PAGES: [&str; 10] = [
     "/organiser",
     "/organiser/day",
     "/organiser/teams",
     "/organiser/stages",
     "/organiser/messages",
     "/organiser/storage",
+    "/organiser/workers",
     "/organiser/access",
     "/organiser/log",
     "/organiser/decide/pause",

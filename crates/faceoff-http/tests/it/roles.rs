@@ -102,6 +102,7 @@ const TABLE: &[(&str, &str)] = &[
     ("POST /submissions/{id}/archive/link", "?00++++"),
     ("DELETE /submissions/{id}", "?00++++"),
     ("GET /storage", "?----++"),
+    ("GET /workers", "?----++"),
     ("GET /teams/{id}/storage", "?00++++"),
     ("GET /teams", "?----++"),
     ("POST /teams", "?----++"),

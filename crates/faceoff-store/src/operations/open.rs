@@ -8,6 +8,7 @@ use crate::{
     signals::Signals,
     store::Store,
     tables::{archived, season},
+    workers::Workers,
 };
 use std::{fs::File, path::Path, sync::Arc};
 
@@ -30,6 +31,7 @@ impl Store {
             room: Arc::new(Room::new(vec![data_dir.to_owned()], 0)),
             pulse: Arc::new(Pulse::new()),
             live: LiveGames::default(),
+            workers: Workers::default(),
             archived: archived.map(Arc::new),
         })
     }

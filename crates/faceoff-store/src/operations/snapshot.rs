@@ -13,6 +13,7 @@ use crate::{
         archived::{self, Archived, Edition, KeptArtifact},
         days, drafts, evaluations, season, stages,
     },
+    workers::Workers,
 };
 use jiff::Timestamp;
 use sqlx::{
@@ -82,6 +83,7 @@ impl Store {
             room: Arc::new(Room::new(vec![folder.to_owned()], 0)),
             pulse: Arc::new(Pulse::new()),
             live: LiveGames::default(),
+            workers: Workers::default(),
             archived: archived.map(Arc::new),
         };
         Ok(Snapshot {

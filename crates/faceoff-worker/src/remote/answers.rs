@@ -87,13 +87,17 @@ impl Answers {
         };
         let answered = match ask {
             Ask::MayWork(own) => {
-                return match differs(&own, &self.like) {
+                let reason = differs(&own, &self.like);
+                let now = self.clock.now();
+                let workers = self.store.workers();
+                workers.heard(worker, &own.version, own.slots, reason.as_deref(), now);
+                return match reason {
                     Some(reason) => Answer::No { reason },
                     None => Answer::Yes,
                 };
             }
             Ask::Begin { lease, slot } if names::is_word(&slot) => {
-                self.begin(&lease, &names::slot(worker, &slot)).await
+                self.begin(worker, &lease, &slot).await
             }
             Ask::Begin { .. } => return no("the slot's name is none"),
             Ask::Renew {
@@ -111,11 +115,21 @@ impl Answers {
         }
     }
 
-    async fn begin(&self, lease: &Lease, slot: &str) -> Result<bool, StoreError> {
-        self.given_out.remove(lease.nonce);
+    async fn begin(&self, worker: &str, lease: &Lease, slot: &str) -> Result<bool, StoreError> {
+        let given_out = self.given_out.take(lease.nonce);
         let claim = claim(lease, WAITING);
         let now = self.clock.now();
-        self.store.hand_over(&claim, slot, self.lease_s, now).await
+        let holder = names::slot(worker, slot);
+        let begins = self
+            .store
+            .hand_over(&claim, &holder, self.lease_s, now)
+            .await?;
+        if begins {
+            let what = given_out.map(|order| order.what);
+            let workers = self.store.workers();
+            workers.works(worker, slot, lease.unit, what.as_deref(), now);
+        }
+        Ok(begins)
     }
 
     async fn renew(
@@ -126,16 +140,23 @@ impl Answers {
         renewals: &Renewals,
     ) -> Result<bool, StoreError> {
         let every = Duration::from_secs(self.lease_s.into()) / 3;
-        if !renewals.is_due(lease.nonce, done, every, Instant::now()) {
-            return self.store.is_held(lease.unit, lease.nonce).await;
-        }
-        let slot = match lease.slot.starts_with(&names::slot(worker, "")) {
-            true => lease.slot.as_str(),
-            false => worker,
-        };
-        let claim = claim(lease, slot);
         let now = self.clock.now();
-        self.store.heartbeat(&claim, done, self.lease_s, now).await
+        let own = lease.slot.strip_prefix(&names::slot(worker, ""));
+        let held = if renewals.is_due(lease.nonce, done, every, Instant::now()) {
+            let claim = claim(lease, own.map_or(worker, |_| &lease.slot));
+            self.store
+                .heartbeat(&claim, done, self.lease_s, now)
+                .await?
+        } else {
+            self.store.is_held(lease.unit, lease.nonce).await?
+        };
+        let workers = self.store.workers();
+        match own {
+            Some(slot) if held => workers.works(worker, slot, lease.unit, None, now),
+            _ if !held => workers.ended(lease.unit),
+            _ => {}
+        }
+        Ok(held)
     }
 
     /// Tells those who watch of games that are played elsewhere.
@@ -209,11 +230,13 @@ mod tests {
             program: "aa".into(),
             version: "1".into(),
             runtimes: vec!["native".into(), "python3".into()],
+            slots: 1,
         };
         let with = |program: &str, runtimes: &[&str]| Introduction {
             program: program.into(),
             version: "1".into(),
             runtimes: runtimes.iter().map(|name| (*name).to_owned()).collect(),
+            slots: 4,
         };
         assert_eq!(
             differs(&with("aa", &["python3", "native", "julia"]), &like),

@@ -20,7 +20,7 @@ use async_nats::{
         stream::{self, DiscardPolicy, RetentionPolicy, Stream},
     },
 };
-use faceoff_store::{Lot, Store};
+use faceoff_store::{Lot, Store, Workers};
 use faceoff_types::Clock;
 use faceoff_wire::{
     grant::{Grant, GrantKey, Writes},
@@ -29,6 +29,7 @@ use faceoff_wire::{
 };
 use futures::StreamExt as _;
 use std::{
+    pin::pin,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -36,8 +37,10 @@ use tokio_util::sync::CancellationToken;
 
 /// How often is looked at what nobody tells: orders that nobody begins, work that is due by now.
 const LOOK: Duration = Duration::from_secs(1);
-/// After something failed, until it is tried again.
+/// From one try of what fails to the next.
 const REST: Duration = Duration::from_secs(1);
+/// What has not failed within this goes well: questions to NATS that is away fail before.
+const WELL: Duration = Duration::from_secs(10);
 /// An outcome that cannot be stored now is taken again after this.
 const AGAIN: Duration = Duration::from_secs(5);
 /// Orders in the stream at most; there are never more than free slots.
@@ -98,36 +101,61 @@ pub async fn dispatch(
         like: hub.remote.like.clone(),
         given_out: Arc::clone(&hub.given_out),
     };
+    let workers = hub.server.store.workers();
+    workers.use_them();
+    let again = Again {
+        workers,
+        shutdown: &shutdown,
+    };
     tokio::join!(
-        again("give out work", &shutdown, || hub.give_out(&shutdown)),
-        again("take in what came of work", &shutdown, || hub
-            .take_in(&shutdown)),
-        again("answer workers", &shutdown, || answers.answer(&shutdown)),
-        again("hear of games", &shutdown, || answers.show(&shutdown)),
+        again.run("give out work", || hub.give_out(&shutdown)),
+        again.run("take in what came of work", || hub.take_in(&shutdown)),
+        again.run("answer workers", || answers.answer(&shutdown)),
+        again.run("hear of games", || answers.show(&shutdown)),
     );
     hub.take_back(hub.given_out.take_all(), None).await;
     Ok(())
 }
 
-/// Does it until the shutdown, again and again if it fails. The log is told of a change, not of every try.
-async fn again<F: Future<Output = anyhow::Result<()>>>(
-    what: &str,
-    shutdown: &CancellationToken,
-    mut run: impl FnMut() -> F,
-) {
-    let mut told = String::new();
-    while !shutdown.is_cancelled() {
-        let Err(error) = run().await else {
-            continue;
-        };
-        let cause = format!("{error:#}");
-        if cause != told {
-            tracing::error!(cause, "cannot {what}; trying again");
-            told = cause;
-        }
-        tokio::select! {
-            () = shutdown.cancelled() => {}
-            () = tokio::time::sleep(REST) => {}
+/// Does what is to be done until the shutdown, again and again if it fails. The log is told of a change, not of every try; whoever
+/// looks after the server finds what is missing as long as it is.
+struct Again<'a> {
+    workers: &'a Workers,
+    shutdown: &'a CancellationToken,
+}
+
+impl Again<'_> {
+    async fn run<F: Future<Output = anyhow::Result<()>>>(
+        &self,
+        what: &str,
+        mut run: impl FnMut() -> F,
+    ) {
+        let mut told = String::new();
+        while !self.shutdown.is_cancelled() {
+            let began = Instant::now();
+            let mut running = pin!(run());
+            // What goes well for so long is well.
+            let ended = match tokio::time::timeout(WELL, &mut running).await {
+                Ok(ended) => ended,
+                Err(_) => {
+                    self.workers.trouble(what, None);
+                    told.clear();
+                    running.await
+                }
+            };
+            let Err(error) = ended else {
+                continue;
+            };
+            let cause = format!("{error:#}");
+            if cause != told {
+                tracing::error!(cause, "cannot {what}; trying again");
+                self.workers.trouble(what, Some(&cause));
+                told = cause;
+            }
+            tokio::select! {
+                () = self.shutdown.cancelled() => {}
+                () = tokio::time::sleep_until((began + REST).into()) => {}
+            }
         }
     }
 }
@@ -178,10 +206,10 @@ impl Hub {
         let Claimed::Order(order) = claimed else {
             return Ok(false);
         };
-        let lease = order.lease.clone();
+        let (lease, what) = (order.lease.clone(), order.assignment.to_string());
         match self.publish(*order).await {
             Ok(sequence) => {
-                self.given_out.add(lease, sequence, Instant::now());
+                self.given_out.add(lease, what, sequence, Instant::now());
                 Ok(true)
             }
             // It may have gone out all the same: then nobody can begin it.
@@ -266,6 +294,7 @@ impl Hub {
         };
         let (server, key) = (self.server.clone(), self.remote.key.clone());
         let unit = outcome.lease.unit;
+        self.server.store.workers().ended(unit);
         let told = worker.clone();
         let stored = tokio::task::spawn_blocking(move || store(&server, &key, &told, outcome));
         match stored.await.map_err(anyhow::Error::from).flatten() {

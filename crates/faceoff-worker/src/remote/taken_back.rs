@@ -15,6 +15,8 @@ const BEGINS_WITHIN: Duration = Duration::from_secs(5);
 #[derive(Debug, Clone)]
 pub(super) struct GivenOut {
     pub(super) lease: Lease,
+    /// In words.
+    pub(super) what: String,
     /// Its place in the stream.
     pub(super) sequence: u64,
     at: Instant,
@@ -25,18 +27,19 @@ pub(super) struct GivenOut {
 pub(super) struct AllGivenOut(Mutex<HashMap<Uuid, GivenOut>>);
 
 impl AllGivenOut {
-    pub(super) fn add(&self, lease: Lease, sequence: u64, now: Instant) {
+    pub(super) fn add(&self, lease: Lease, what: String, sequence: u64, now: Instant) {
         let given_out = GivenOut {
             lease,
+            what,
             sequence,
             at: now,
         };
         self.all().insert(given_out.lease.nonce, given_out);
     }
 
-    /// It was begun.
-    pub(super) fn remove(&self, nonce: Uuid) {
-        self.all().remove(&nonce);
+    /// It is begun.
+    pub(super) fn take(&self, nonce: Uuid) -> Option<GivenOut> {
+        self.all().remove(&nonce)
     }
 
     /// Those that nobody has begun in time; they are forgotten.
@@ -75,10 +78,11 @@ mod tests {
             expires_at: Timestamp::UNIX_EPOCH,
             duration_s: 30,
         };
-        all.add(lease(1), 11, start);
-        all.add(lease(2), 12, start);
-        all.add(lease(3), 13, start + Duration::from_secs(1));
-        all.remove(Uuid::from_u128(2));
+        let add = |nonce, sequence, at| all.add(lease(nonce), "hit".into(), sequence, at);
+        add(1, 11, start);
+        add(2, 12, start);
+        add(3, 13, start + Duration::from_secs(1));
+        assert!(all.take(Uuid::from_u128(2)).is_some());
         assert!(all.take_late(start + Duration::from_secs(4)).is_empty());
         let late = all.take_late(start + BEGINS_WITHIN);
         assert_eq!(late.iter().map(|of| of.sequence).collect::<Vec<_>>(), [11]);

@@ -4,11 +4,11 @@ use anyhow::Context as _;
 use faceoff_wire::remote::Introduction;
 use std::fs;
 
-/// What this program is, with these runtimes.
+/// What this program is, with these runtimes and slots.
 ///
 /// # Errors
 /// If it cannot read its own file.
-pub fn introduction(runtimes: Vec<String>) -> anyhow::Result<Introduction> {
+pub fn introduction(runtimes: Vec<String>, slots: usize) -> anyhow::Result<Introduction> {
     let program = std::env::current_exe().context("finding this program's file")?;
     let mut hasher = blake3::Hasher::new();
     fs::File::open(&program)
@@ -18,5 +18,6 @@ pub fn introduction(runtimes: Vec<String>) -> anyhow::Result<Introduction> {
         program: hasher.finalize().to_string(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         runtimes,
+        slots: u32::try_from(slots).unwrap_or(u32::MAX),
     })
 }

@@ -215,7 +215,10 @@ async fn serve(
         .context("evaluation: giving the season's first stage its rules")?;
     let mut agent = config.agent_environment();
     let capacity = Capacity {
-        slots: u32::try_from(cpus.slots.len()).unwrap_or(u32::MAX),
+        slots: match config.workers.play {
+            true => u32::try_from(cpus.slots.len()).unwrap_or(u32::MAX),
+            false => 0,
+        },
         time: config.time.clone(),
         runtimes: agent.runtimes.keys().cloned().collect(),
     };

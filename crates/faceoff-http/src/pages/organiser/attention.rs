@@ -15,9 +15,11 @@ use crate::{
         day::NextCut,
         evaluation::{EvaluationStatus, EvaluationView},
         health::HealthView,
+        queue,
         season::SeasonHead,
         sight::Sight,
         storage::StorageView,
+        workers::WorkersView,
     },
 };
 use askama::Template;
@@ -91,6 +93,14 @@ async fn of_server(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Problem
             detail: format!("{}.", problem.detail()),
             links: vec![("/organiser/storage".into(), "Storage".into())],
         }),
+    }
+    for trouble in WorkersView::now(app).troubles {
+        items.push(Item {
+            class: "bad",
+            title: "Work is not given to other machines".to_owned(),
+            detail: format!("{trouble}. It is tried again until it can."),
+            links: vec![("/organiser/workers".into(), "Workers".into())],
+        });
     }
     for team in StorageView::all(app).await? {
         if team.archive_bytes.saturating_mul(100) >= team.quota_bytes.saturating_mul(NEARLY_FULL) {
@@ -262,7 +272,7 @@ pub(super) async fn page(
         season,
         items,
         queue,
-        slots: app.config.capacity.slots,
+        slots: queue::slots(&app),
         teams: app.store.teams().await.map_err(Problem::from)?.len(),
         stages,
     };

@@ -25,6 +25,6 @@ pub(super) fn config(
         nats,
         files: files.unwrap_or_else(|| format!("http://{listens_on}")),
         key: link_key.of_grants(),
-        like: introduction(runtimes.to_vec())?,
+        like: introduction(runtimes.to_vec(), config.slots())?,
     }))
 }

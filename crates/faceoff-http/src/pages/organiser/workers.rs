@@ -1,0 +1,54 @@
+//! `/organiser/workers`: who plays, on this machine and on others.
+
+use crate::{
+    app::App,
+    pages::{
+        desk_frame::{Head, Said},
+        frame::{Frame, PageProblem, render},
+        signed_in::Organising,
+    },
+    views::{
+        season::SeasonHead,
+        workers::{WorkerState, WorkerView, WorkersView},
+    },
+};
+use askama::Template;
+use axum::{extract::State, response::Response};
+use jiff::Timestamp;
+
+#[derive(Template)]
+#[template(path = "organiser_workers.html")]
+struct Page {
+    frame: Frame,
+    head: Head,
+    of: WorkersView,
+}
+
+impl Page {
+    /// The sign of its state, and what that is called.
+    fn state(&self, worker: &WorkerView) -> (&'static str, &'static str) {
+        match worker.state {
+            WorkerState::Working => ("good", "works"),
+            WorkerState::Idle => ("good", "waits for work"),
+            WorkerState::Refused => ("bad", "gets no work"),
+            WorkerState::Silent => ("waiting", "silent"),
+        }
+    }
+
+    fn minute(&self, at: &Timestamp) -> String {
+        at.strftime("%Y-%m-%d %H:%M UTC").to_string()
+    }
+}
+
+pub(super) async fn page(
+    organising: Organising,
+    State(app): State<App>,
+) -> Result<Response, PageProblem> {
+    let season = SeasonHead::now(&app).await?.name;
+    let path = "/organiser/workers";
+    render(&Page {
+        frame: Frame::of(&app, season, path),
+        head: Head::of(&organising.caller, path, Said::Nothing),
+        of: WorkersView::now(&app),
+    })
+}

@@ -1,0 +1,130 @@
+//! Who works for the server on other machines.
+
+use crate::app::AppState;
+use faceoff_store::WorkerHeard;
+use jiff::{SignedDuration, Timestamp};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+/// A unit that takes longer than this is worth a look.
+const LONG: SignedDuration = SignedDuration::from_hours(1);
+
+/// Who plays, and what keeps others from it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct WorkersView {
+    /// Slots of the server itself that play; 0 if others do.
+    pub own_slots: u32,
+    /// Slots elsewhere that can be given work now.
+    pub remote_slots: u32,
+    /// Is work given to other machines?
+    pub is_given: bool,
+    /// What the server cannot do for other machines, and why; empty if nothing is missing.
+    #[schema(example = json!([]))]
+    pub troubles: Vec<String>,
+    /// By name, as far as this process has heard of them.
+    pub workers: Vec<WorkerView>,
+}
+
+/// A worker on another machine.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct WorkerView {
+    /// What it is called.
+    #[schema(example = "rack-1")]
+    pub name: String,
+    /// The version of its program.
+    pub version: String,
+    /// Units that it works at at the same time.
+    pub slots: u32,
+    /// When the server heard of it first, since it was started.
+    pub first_at: Timestamp,
+    /// When it did last.
+    pub last_at: Timestamp,
+    /// How it stands.
+    pub state: WorkerState,
+    /// Why it gets no work; absent unless it is `refused`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refused: Option<String>,
+    /// What its slots do.
+    pub busy: Vec<BusyView>,
+}
+
+/// How a worker stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum WorkerState {
+    /// A slot has something to do.
+    Working,
+    /// None has.
+    Idle,
+    /// It is not like the server, and gets no work.
+    Refused,
+    /// Nothing was heard of it for half a minute.
+    Silent,
+}
+
+/// What a slot does.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct BusyView {
+    /// Which slot.
+    #[schema(example = "slot-0")]
+    pub slot: String,
+    /// The unit of work, as the server's log names it.
+    pub unit: Uuid,
+    /// What it is; absent if it was begun before the server was started.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = "hit episodes 0 to 49")]
+    pub what: Option<String>,
+    /// Since when.
+    pub since: Timestamp,
+    /// It takes longer than an hour.
+    pub is_long: bool,
+}
+
+impl WorkersView {
+    pub(crate) fn now(app: &AppState) -> Self {
+        let (workers, now) = (app.store.workers(), app.config.clock.now());
+        let troubles = workers.troubles().into_iter();
+        Self {
+            own_slots: app.config.capacity.slots,
+            remote_slots: workers.slots(now),
+            is_given: workers.are_used(),
+            troubles: troubles
+                .map(|(what, why)| format!("The server cannot {what}: {why}"))
+                .collect(),
+            workers: workers
+                .all()
+                .into_iter()
+                .map(|worker| WorkerView::of(worker, now))
+                .collect(),
+        }
+    }
+}
+
+impl WorkerView {
+    fn of(worker: WorkerHeard, now: Timestamp) -> Self {
+        let state = match &worker.refused {
+            _ if !worker.is_there(now) => WorkerState::Silent,
+            Some(_) => WorkerState::Refused,
+            None if worker.busy.is_empty() => WorkerState::Idle,
+            None => WorkerState::Working,
+        };
+        let busy = worker.busy.into_iter().map(|(slot, busy)| BusyView {
+            slot,
+            unit: busy.unit,
+            what: busy.what,
+            since: busy.since,
+            is_long: now.duration_since(busy.since) > LONG,
+        });
+        Self {
+            busy: busy.collect(),
+            name: worker.name,
+            version: worker.version,
+            slots: worker.slots,
+            first_at: worker.first_at,
+            last_at: worker.last_at,
+            refused: worker.refused,
+            state,
+        }
+    }
+}

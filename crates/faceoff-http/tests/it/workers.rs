@@ -1,0 +1,97 @@
+//! Who plays on other machines, as organisers see it.
+
+use crate::{
+    browser::Browser,
+    desk::shown,
+    html::texts,
+    site::{ADMIN, Site},
+};
+use serde_json::{Value, json};
+use uuid::Uuid;
+
+#[tokio::test]
+async fn organisers_see_who_plays_elsewhere_and_what_keeps_others_from_it() {
+    let site = Site::start().await;
+    let role = json!({ "role": "organiser", "note": "Grace" });
+    let mut grace = Browser::joined(&site, "Grace", role).await;
+    let told = async || site.get("/api/v1/workers", Some(ADMIN)).await.json(200);
+    let none = told().await;
+    assert_eq!(
+        (&none["own_slots"], &none["is_given"]),
+        (&json!(2), &json!(false))
+    );
+    let html = shown(&grace.open("/organiser/workers").await, 200);
+    assert!(texts(&html, "main")[0].contains("No work is given to other machines"));
+
+    let (workers, unit) = (site.store.workers().clone(), Uuid::from_u128(7));
+    workers.use_them();
+    workers.heard("rack-1", "1.0", 4, None, site.now());
+    workers.heard(
+        "rack-2",
+        "0.9",
+        8,
+        Some("the worker runs another <program>"),
+        site.now(),
+    );
+    workers.works(
+        "rack-1",
+        "slot-2",
+        unit,
+        Some("hit episodes 0 to 49"),
+        site.now(),
+    );
+    let all = told().await;
+    assert_eq!(all["remote_slots"], 4, "who is refused plays nothing");
+    let states = |of: &Value| {
+        let workers = of["workers"].as_array().unwrap().iter();
+        workers
+            .map(|worker| worker["state"].clone())
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(states(&all), ["working", "refused"]);
+    let busy = &all["workers"][0]["busy"][0];
+    assert_eq!(
+        (&busy["slot"], &busy["is_long"]),
+        (&json!("slot-2"), &json!(false))
+    );
+    let html = shown(&grace.open("/organiser/workers").await, 200);
+    let rows = texts(&html, "tbody tr");
+    assert!(
+        rows[0].contains("rack-1") && rows[0].contains("slot-2: hit episodes 0 to 49"),
+        "{rows:?}"
+    );
+    assert!(
+        rows[1].contains("gets no work") && rows[1].contains("another <program>"),
+        "{rows:?}"
+    );
+    let metrics = site.get("/metrics", Some(ADMIN)).await.body;
+    assert!(metrics.contains("faceoff_remote_slots 4\n"), "{metrics}");
+    assert!(metrics.contains("faceoff_remote_workers 2\n"), "{metrics}");
+
+    // Half a minute later nothing more was heard of them; the unit is worth a look after an hour.
+    site.later(30);
+    assert_eq!(states(&told().await), ["silent", "silent"]);
+    assert_eq!(told().await["remote_slots"], 0);
+    site.later(3600);
+    workers.works("rack-1", "slot-2", unit, None, site.now());
+    let all = told().await;
+    assert_eq!(all["workers"][0]["busy"][0]["is_long"], true, "{all:#}");
+    workers.ended(unit);
+    assert_eq!(states(&told().await), ["idle", "silent"]);
+
+    workers.trouble("give out work", Some("no connection to <NATS>"));
+    let told = told().await;
+    assert_eq!(
+        told["troubles"],
+        json!(["The server cannot give out work: no connection to <NATS>"])
+    );
+    for path in ["/organiser", "/organiser/workers"] {
+        let html = shown(&grace.open(path).await, 200);
+        assert!(
+            texts(&html, "main")[0].contains("no connection to <NATS>"),
+            "{path}"
+        );
+    }
+    // Its own slots play: it is fit for work.
+    site.get("/api/v1/health", None).await.json(200);
+}

@@ -1,0 +1,212 @@
+//! Workers on other machines, as far as this process has heard of them: in memory alone, since whose work is stands in the queue.
+
+use jiff::{SignedDuration, Timestamp};
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+};
+use uuid::Uuid;
+
+/// Nothing was heard of a worker for so long: it has gone, or is cut off. A slot that has nothing to do asks every few seconds.
+pub const WORKER_SILENT: SignedDuration = SignedDuration::from_secs(30);
+/// After this it is forgotten.
+const FORGOTTEN: SignedDuration = SignedDuration::from_hours(24);
+/// So many are remembered at most.
+const MOST: usize = 10_000;
+
+/// What is known of workers elsewhere. Cloning is cheap.
+#[derive(Debug, Clone, Default)]
+pub struct Workers(Arc<Mutex<Known>>);
+
+#[derive(Debug, Default)]
+struct Known {
+    workers: BTreeMap<String, WorkerHeard>,
+    /// By what it keeps the server from.
+    troubles: BTreeMap<String, String>,
+    is_used: bool,
+}
+
+/// A worker, as it was heard of.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WorkerHeard {
+    /// What it is called.
+    pub name: String,
+    /// The version of its program.
+    pub version: String,
+    /// Units that it works at at the same time.
+    pub slots: u32,
+    /// When this process heard of it first.
+    pub first_at: Timestamp,
+    /// When it did last.
+    pub last_at: Timestamp,
+    /// Why it gets no work, if it gets none.
+    pub refused: Option<String>,
+    /// What its slots do, by their names; those that do nothing are not here.
+    pub busy: BTreeMap<String, WorkerBusy>,
+}
+
+/// What a slot elsewhere does.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WorkerBusy {
+    /// The unit.
+    pub unit: Uuid,
+    /// What it is, in words; none if it was begun before this process.
+    pub what: Option<String>,
+    /// Since when, as far as this process knows.
+    pub since: Timestamp,
+}
+
+impl WorkerHeard {
+    /// Was it heard of a moment ago?
+    #[must_use]
+    pub fn is_there(&self, now: Timestamp) -> bool {
+        now.duration_since(self.last_at) < WORKER_SILENT
+    }
+}
+
+impl Workers {
+    /// Work is given to other machines.
+    pub fn use_them(&self) {
+        self.known().is_used = true;
+    }
+
+    /// Is work given to other machines?
+    #[must_use]
+    pub fn are_used(&self) -> bool {
+        self.known().is_used
+    }
+
+    /// A worker asks for work.
+    pub fn heard(
+        &self,
+        name: &str,
+        version: &str,
+        slots: u32,
+        refused: Option<&str>,
+        now: Timestamp,
+    ) {
+        let mut known = self.known();
+        known
+            .workers
+            .retain(|_, worker| now.duration_since(worker.last_at) < FORGOTTEN);
+        let is_full = known.workers.len() >= MOST;
+        let worker = match known.workers.get_mut(name) {
+            Some(worker) => worker,
+            None if is_full => return,
+            None => known.workers.entry(name.to_owned()).or_insert(WorkerHeard {
+                name: name.to_owned(),
+                version: String::new(),
+                slots: 0,
+                first_at: now,
+                last_at: now,
+                refused: None,
+                busy: BTreeMap::new(),
+            }),
+        };
+        version.clone_into(&mut worker.version);
+        worker.slots = slots;
+        worker.refused = refused.map(str::to_owned);
+        worker.last_at = now;
+    }
+
+    /// One of its slots works at a unit.
+    pub fn works(&self, name: &str, slot: &str, unit: Uuid, what: Option<&str>, now: Timestamp) {
+        let mut known = self.known();
+        let Some(worker) = known.workers.get_mut(name) else {
+            return;
+        };
+        worker.last_at = now;
+        let begun = WorkerBusy {
+            unit,
+            what: what.map(str::to_owned),
+            since: now,
+        };
+        let busy = worker.busy.entry(slot.to_owned()).or_insert(begun.clone());
+        if busy.unit != unit {
+            *busy = begun;
+        }
+    }
+
+    /// Whoever works at a unit does so no more.
+    pub fn ended(&self, unit: Uuid) {
+        for worker in self.known().workers.values_mut() {
+            worker.busy.retain(|_, busy| busy.unit != unit);
+        }
+    }
+
+    /// All of them, by name.
+    #[must_use]
+    pub fn all(&self) -> Vec<WorkerHeard> {
+        self.known().workers.values().cloned().collect()
+    }
+
+    /// Slots elsewhere that can be given work now.
+    #[must_use]
+    pub fn slots(&self, now: Timestamp) -> u32 {
+        let known = self.known();
+        let work = known
+            .workers
+            .values()
+            .filter(|worker| worker.refused.is_none() && worker.is_there(now));
+        work.map(|worker| worker.slots).sum()
+    }
+
+    /// What keeps the server from `what`; none: nothing any more.
+    pub fn trouble(&self, what: &str, cause: Option<&str>) {
+        let mut known = self.known();
+        match cause {
+            Some(cause) => drop(known.troubles.insert(what.to_owned(), cause.to_owned())),
+            None => drop(known.troubles.remove(what)),
+        }
+    }
+
+    /// What the server cannot do for other machines, and why.
+    #[must_use]
+    pub fn troubles(&self) -> Vec<(String, String)> {
+        let known = self.known();
+        let troubles = known.troubles.iter();
+        troubles
+            .map(|(what, why)| (what.clone(), why.clone()))
+            .collect()
+    }
+
+    /// What is known is whole whatever panicked beside it.
+    fn known(&self) -> MutexGuard<'_, Known> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn workers_count_while_they_are_heard_of_and_get_work() {
+        let workers = Workers::default();
+        let start: Timestamp = "2026-03-01T10:00:00Z".parse().expect("an instant");
+        let at = |s: i64| start + SignedDuration::from_secs(s);
+        workers.heard("a", "1.0", 4, None, at(0));
+        workers.heard("b", "1.0", 2, Some("it is another program"), at(0));
+        assert_eq!(workers.slots(at(29)), 4);
+        assert_eq!(workers.slots(at(30)), 0, "it is silent");
+        let unit = Uuid::from_u128(1);
+        workers.works("a", "slot-0", unit, Some("hit"), at(40));
+        workers.works("a", "slot-0", unit, None, at(50));
+        workers.works("nobody", "slot-0", unit, None, at(50));
+        let all = workers.all();
+        assert_eq!(all.len(), 2);
+        assert_eq!((all[0].first_at, all[0].last_at), (at(0), at(50)));
+        let busy = &all[0].busy["slot-0"];
+        assert_eq!((busy.what.as_deref(), busy.since), (Some("hit"), at(40)));
+        workers.ended(unit);
+        assert!(workers.all()[0].busy.is_empty());
+        // A day later it is as if it had never been.
+        workers.heard("c", "1.0", 1, None, at(50) + FORGOTTEN);
+        assert_eq!(workers.all().len(), 1);
+
+        workers.trouble("give out work", Some("NATS is away"));
+        assert_eq!(workers.troubles().len(), 1);
+        workers.trouble("give out work", None);
+        assert!(workers.troubles().is_empty());
+    }
+}
