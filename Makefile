@@ -11,7 +11,7 @@ CARGO      ?= cargo
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
 
-.PHONY: demo test web wheel pictures test-api test-python test-learning fuzz busy load soak steady frames lint format fidelity setup setup-test agents dist clean-demo help
+.PHONY: demo test web wheel pictures test-api test-python test-learning fuzz busy load elsewhere soak steady frames lint format fidelity setup setup-test agents dist clean-demo help
 
 help:
 	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
@@ -26,6 +26,7 @@ help:
 	@echo "make fuzz   feed the readers what is nearly valid: MINUTES=$(MINUTES)"
 	@echo "make busy   play beside hogs, floods and bursts of processes"
 	@echo "make load   how much looking on a server bears, and that agents notice nothing of it"
+	@echo "make elsewhere   what it costs to play on another machine"
 	@echo "make soak   upload, play, read, fill the disk and kill the server, all at once: MINUTES=$(MINUTES)"
 	@echo "make steady run the tests ten times, and three times on a busy machine"
 	@echo "make frames   how much CPU time a frame of a replay takes its script"
@@ -118,6 +119,11 @@ load:
 	@docker/setup.sh load
 	$(CARGO) build --release --locked --package faceoff --package striker --package baseline
 	python3 tests/load/load.py $(RELEASE)/faceoff $(RELEASE)/striker
+
+# A slot of a worker against one of the server's own; nothing else should run.
+elsewhere: setup-test
+	$(CARGO) build --release --locked --package faceoff
+	python3 tests/load/elsewhere.py $(RELEASE)/faceoff
 
 # All disturbances at once; SOAK_SEED=N for other moments than last time.
 soak: setup-test

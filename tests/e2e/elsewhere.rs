@@ -266,11 +266,14 @@ fn without_nats_a_server_starts_waits_and_goes_on_once_it_is_there() {
     link.lead_to(nats.address());
     let finished = team.finished(&server, &evaluation);
     assert_eq!(finished["state"], "finished", "{finished:#}");
+    // One that is paid by the hour goes when there is nothing to do.
+    let words = ["--drain-after-idle", "1s"];
+    Worker::start_with(scratch.path(), "idle", &taking(link.address(), 1), &words).ends();
     let workers = server.poll("/api/v1/workers", &server.admin_token, |told| {
         told["troubles"] == json!([])
     });
-    assert_eq!(workers["remote_slots"], 1, "{workers:#}");
-    assert_eq!(workers["workers"][0]["name"], "worker");
+    let names = [0, 1].map(|index: usize| workers["workers"][index]["name"].clone());
+    assert_eq!(names, ["idle", "worker"], "{workers:#}");
     let _ = server.poll("/api/v1/health", &server.admin_token, |told| {
         told["status"] == "ok"
     });

@@ -24,6 +24,15 @@ impl Worker {
     /// If it cannot be started.
     #[must_use]
     pub fn start(scratch: &Path, name: &str, config: &str) -> Self {
+        Self::start_with(scratch, name, config, &[])
+    }
+
+    /// Likewise, with more words on its command line.
+    ///
+    /// # Panics
+    /// As [`start`](Self::start).
+    #[must_use]
+    pub fn start_with(scratch: &Path, name: &str, config: &str, words: &[&str]) -> Self {
         let folder = scratch.join(name);
         fs::create_dir_all(&folder).expect("a scratch folder can be made");
         let file = folder.join("faceoff.toml");
@@ -33,6 +42,7 @@ impl Worker {
             .arg(&file)
             .arg("--scratch-dir")
             .arg(folder.join("scratch"))
+            .args(words)
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
@@ -63,10 +73,18 @@ impl Worker {
     ///
     /// # Panics
     /// If it ends with an error.
-    pub fn end(mut self) {
+    pub fn end(self) {
         let id = rustix::process::Pid::from_child(&self.process.0);
         rustix::process::kill_process(id, rustix::process::Signal::TERM)
             .expect("a child can be signalled");
+        self.ends();
+    }
+
+    /// Waits until it has ended by itself.
+    ///
+    /// # Panics
+    /// If it ends with an error.
+    pub fn ends(mut self) {
         let status = self.process.0.wait().expect("a child can be reaped");
         assert!(status.success(), "{status}:\n{}", self.log.so_far());
     }

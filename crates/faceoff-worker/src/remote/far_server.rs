@@ -50,6 +50,21 @@ pub(super) struct Link {
     pub(super) shutdown: CancellationToken,
     /// Why it may not work, as it was told last: the log is told of a change.
     pub(super) refused: Mutex<Option<String>>,
+    /// When a slot last had something to do.
+    pub(super) busy_at: Mutex<Instant>,
+}
+
+impl Link {
+    /// For how long no slot has had anything to do.
+    pub(super) fn idle_for(&self) -> Duration {
+        let busy_at = self.busy_at.lock();
+        busy_at.unwrap_or_else(PoisonError::into_inner).elapsed()
+    }
+
+    fn is_busy(&self) {
+        let mut busy_at = self.busy_at.lock().unwrap_or_else(PoisonError::into_inner);
+        *busy_at = Instant::now();
+    }
 }
 
 /// The server of one slot.
@@ -323,6 +338,7 @@ impl WorkServer for FarServer {
             else {
                 return Ok(Claimed::Nothing { queue });
             };
+            self.link.is_busy();
             *self.current() = Current {
                 grant,
                 files,
@@ -333,6 +349,7 @@ impl WorkServer for FarServer {
     }
 
     fn renew(&self, lease: &Lease, episodes_done: u32) -> anyhow::Result<Holding> {
+        self.link.is_busy();
         let ask = Ask::Renew {
             lease: lease.clone(),
             episodes_done,
@@ -396,6 +413,7 @@ impl WorkServer for FarServer {
         let report = Box::new(report);
         let sent = self.send(lease, Outcome::Done { report });
         self.link.runtime.block_on(sent)?;
+        self.link.is_busy();
         Ok(Holding::Held)
     }
 

@@ -12,7 +12,10 @@ use crate::{
 };
 use anyhow::Context as _;
 use faceoff_wire::remote::Introduction;
-use std::sync::{Arc, Mutex};
+use std::{
+    sync::{Arc, Mutex},
+    time::{Duration, Instant},
+};
 use tokio::runtime::Handle;
 use tokio_util::sync::CancellationToken;
 
@@ -27,11 +30,16 @@ pub struct RemoteWorker {
     pub own: Introduction,
     /// Fetches and stores files.
     pub http: reqwest::Client,
+    /// It ends once no slot has had anything to do for so long; none: it goes on.
+    pub ends_after: Option<Duration>,
     /// How it works.
     pub slots: SlotsConfig,
 }
 
-/// Works until `shutdown` is cancelled; then every unit is given back at once. While NATS or the server is away it waits.
+/// How often a worker looks for how long it had nothing to do.
+const LOOK: Duration = Duration::from_secs(1);
+
+/// Works until `shutdown` is cancelled, or it had nothing to do for as long as it is to wait; then every unit is given back at once. While NATS or the server is away it waits.
 ///
 /// # Errors
 /// If a name is none, the scratch folder cannot be had, or a slot dies.
@@ -54,7 +62,18 @@ pub async fn work(config: RemoteWorker, shutdown: CancellationToken) -> anyhow::
         http: config.http,
         shutdown: shutdown.clone(),
         refused: Mutex::default(),
+        busy_at: Mutex::new(Instant::now()),
     });
+    if let Some(ends_after) = config.ends_after {
+        let (link, shutdown) = (Arc::clone(&link), shutdown.clone());
+        tokio::spawn(async move {
+            while link.idle_for() < ends_after {
+                tokio::time::sleep(LOOK.min(ends_after)).await;
+            }
+            tracing::info!(?ends_after, "ending: there was nothing to do");
+            shutdown.cancel();
+        });
+    }
     let servers = (0..config.slots.cpus.slots.len()).map(|index| SlotServer {
         slot: format!("slot-{index}"),
         server: Arc::new(FarServer::new(Arc::clone(&link))),

@@ -10,6 +10,7 @@ use clap::Args;
 use faceoff_metrics::Metrics;
 use faceoff_sandbox::probe_host;
 use faceoff_worker::{CpuLayout, RemoteWorker, SlotThreads, SlotsConfig};
+use jiff::SignedDuration;
 use std::{
     fs,
     io::{self, Write as _},
@@ -46,6 +47,9 @@ pub struct WorkerCommand {
     /// Folder for what is under way, of this worker alone; replaces workers.scratch_dir of the configuration
     #[arg(long, value_name = "FOLDER")]
     scratch_dir: Option<PathBuf>,
+    /// Ends once no slot has had anything to do for so long, as 10m; left out, it goes on
+    #[arg(long, value_name = "TIME")]
+    drain_after_idle: Option<SignedDuration>,
     /// Makes a key by which NATS knows a server or a worker, keeps its secret half in FILE, for nats.nkey_file, prints the other half
     /// for NATS' configuration, and ends
     #[arg(long, value_name = "FILE")]
@@ -100,6 +104,7 @@ impl WorkerCommand {
             name,
             own,
             http,
+            ends_after: self.drain_after_idle.map(SignedDuration::unsigned_abs),
             slots: SlotsConfig {
                 cpus: CpuLayout::of_a_server(config.slots(), &config.workers.agent_cpus),
                 threads: SlotThreads::of_the_caller(),

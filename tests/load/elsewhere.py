@@ -1,0 +1,130 @@
+"""What it costs to play on another machine: one slot elsewhere against one of the server's own, on the loopback.
+
+    python3 tests/load/elsewhere.py target/release/faceoff [ROUNDS]
+
+In turns, so that what else the machine does falls on both alike: a season of its own, one team with the agent hold, 30 shards of 50
+episodes, played by the server's own slot or by one of a worker, who gets them by a nats-server on this machine. Measured is the time from
+the first shard's beginning to the last one's commit, by the log of whoever plays. Prints each round's times and the median of
+their ratios. Nothing is asserted: how fast a machine is, is the machine's.
+"""
+
+import json
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+from datetime import datetime
+from pathlib import Path
+
+CONFIG = """
+[server]
+listen = "127.0.0.1:0"
+[evaluation]
+episodes_per_task = 500
+episodes_per_shard = 50
+[workers]
+slots = 1
+"""
+
+
+class Season:
+    """A server, and a worker beside it if others are to play."""
+
+    def __init__(self, program: Path, folder: Path, nats: str | None):
+        folder.mkdir()
+        self.folder, self.processes = folder, []
+        config = folder / "faceoff.toml"
+        config.write_text(CONFIG + (f'play = false\n[nats]\nurl = "{nats}"\nname = "{folder.name}"\n' if nats else ""))
+        self.log = folder / ("worker.log" if nats else "server.log")
+        serve = [program, "serve", "--config", config, "--data-dir", folder / "data", "--log-format", "json"]
+        self.server = self.start(serve, folder / "server.log")
+        self.url = self.server.stdout.readline().strip()
+        self.admin = (folder / "data/admin-token").read_text().strip()
+        if nats:
+            worker = folder / "worker.toml"
+            worker.write_text(f'[workers]\nslots = 1\n[nats]\nurl = "{nats}"\nname = "{folder.name}"\n')
+            words = [program, "worker", "--name", "one", "--config", worker, "--scratch-dir", folder / "scratch"]
+            self.start([*words, "--log-format", "json"], self.log)
+
+    def start(self, words: list, log: Path) -> subprocess.Popen:
+        process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=log.open("w"), text=True)
+        self.processes.append(process)
+        return process
+
+    def ask(self, method: str, path: str, token: str, body=None, media="application/json"):
+        body = json.dumps(body).encode() if media == "application/json" and body is not None else body
+        request = urllib.request.Request(self.url + path, body, method=method)
+        request.add_header("Authorization", f"Bearer {token}")
+        request.add_header("Content-Type", media)
+        with urllib.request.urlopen(request) as answer:
+            return json.load(answer)
+
+    def until(self, path: str, token: str, done):
+        while not done(answer := self.ask("GET", path, token)):
+            time.sleep(0.5)
+        return answer
+
+    def play(self) -> float:
+        """Seconds that all shards took."""
+        team = self.ask("POST", "/api/v1/teams", self.admin, {"name": "Alpha"})
+        hold = Path(__file__).parents[2] / "agents/hold"
+        archive = Path(shutil.make_archive(str(self.folder / "hold"), "gztar", hold)).read_bytes()
+        path = "/api/v1/submissions?file_name=hold.tar.gz"
+        made = self.ask("POST", path, team["token"], archive, "application/octet-stream")
+        path = f"/api/v1/submissions/{made['id']}"
+        found = self.until(path, team["token"], lambda one: one["state"] != "validating")
+        assert found["state"] == "valid", found
+        day = self.ask("POST", "/api/v1/days", self.admin, {})
+        path = f"/api/v1/evaluations/{day['created'][0]['id']}"
+        ended = self.until(path, self.admin, lambda one: one["state"] not in ("queued", "running", "finalising"))
+        assert ended["state"] == "finished", ended
+        begun, committed = [], []
+        for line in self.log.read_text().splitlines():
+            entry = json.loads(line)
+            fields = entry["fields"]
+            if " episodes " in fields.get("work", ""):
+                at = datetime.fromisoformat(entry["timestamp"].replace("Z", "+00:00")).timestamp()
+                {"begun": begun, "committed": committed}.get(fields["message"], []).append(at)
+        assert len(begun) == len(committed) == 30, (len(begun), len(committed))
+        return max(committed) - min(begun)
+
+    def end(self):
+        for process in reversed(self.processes):
+            process.terminate()
+            process.wait()
+
+
+def main() -> None:
+    program, rounds = Path(sys.argv[1]).resolve(), int((sys.argv[2:] or ["5"])[0])
+    with tempfile.TemporaryDirectory(prefix="faceoff-elsewhere-") as name:
+        folder = Path(name)
+        words = [shutil.which("nats-server", path="/usr/sbin:/usr/bin"), "-js", "-a", "127.0.0.1", "-p", "-1"]
+        words += ["-sd", folder / "nats", "--ports_file_dir", folder, "-l", folder / "nats.log"]
+        nats = subprocess.Popen(words)
+        try:
+            told = folder / f"nats-server_{nats.pid}.ports"
+            while not told.exists():
+                time.sleep(0.05)
+            url = json.loads(told.read_text())["nats"][0]
+            ratios = []
+            for number in range(rounds):
+                times = {}
+                for who in ("own", "elsewhere") if number % 2 == 0 else ("elsewhere", "own"):
+                    season = Season(program, folder / f"{who}-{number}", url if who == "elsewhere" else None)
+                    try:
+                        times[who] = season.play()
+                    finally:
+                        season.end()
+                ratios.append(times["elsewhere"] / times["own"])
+                print(f"own slot {times['own']:.2f} s, elsewhere {times['elsewhere']:.2f} s, ratio {ratios[-1]:.4f}", flush=True)
+            print(f"median of {rounds} ratios: {statistics.median(ratios):.4f}")
+        finally:
+            nats.terminate()
+            nats.wait()
+
+
+if __name__ == "__main__":
+    main()
