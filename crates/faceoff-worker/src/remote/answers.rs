@@ -32,6 +32,9 @@ pub(super) struct Answers {
     pub(super) given_out: Arc<AllGivenOut>,
 }
 
+/// So many are answered at the same time.
+const AT_ONCE: usize = 64;
+
 /// When leases were last written as renewed, and how far the work was: workers ask more often than the database needs to know.
 #[derive(Debug, Default)]
 struct Renewals(Mutex<HashMap<Uuid, (Instant, u32)>>);
@@ -54,20 +57,28 @@ impl Renewals {
 
 impl Answers {
     pub(super) async fn answer(&self, shutdown: &CancellationToken) -> anyhow::Result<()> {
-        let mut asks = self.client.subscribe(self.names.asks(ALL)).await?;
+        let asks = self.client.subscribe(self.names.asks(ALL)).await?;
         let renewals = Renewals::default();
-        loop {
-            let asked = tokio::select! {
-                () = shutdown.cancelled() => return Ok(()),
-                asked = asks.next() => asked,
-            };
-            let asked = asked.ok_or_else(|| anyhow::anyhow!("the connection to NATS has ended"))?;
-            let Some(reply) = asked.reply.clone() else {
-                continue;
-            };
-            let answer = self.answer_to(&asked, &renewals).await;
+        // Nobody waits for another's write to the database.
+        asks.take_until(shutdown.cancelled())
+            .for_each_concurrent(AT_ONCE, |asked| self.reply_to(asked, &renewals))
+            .await;
+        anyhow::ensure!(shutdown.is_cancelled(), "the connection to NATS has ended");
+        Ok(())
+    }
+
+    async fn reply_to(&self, asked: Message, renewals: &Renewals) {
+        let Some(reply) = asked.reply.clone() else {
+            return;
+        };
+        let answer = self.answer_to(&asked, renewals).await;
+        let sent = async {
             let answer = serde_json::to_vec(&answer)?;
-            self.client.publish(reply, answer.into()).await?;
+            anyhow::Ok(self.client.publish(reply, answer.into()).await?)
+        };
+        if let Err(error) = sent.await {
+            // Who was not answered asks again.
+            tracing::debug!(%error, "a worker was not answered");
         }
     }
 
