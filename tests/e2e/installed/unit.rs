@@ -1,4 +1,4 @@
-//! The unit for systemd: systemd takes it, and its command does what its type promises.
+//! The units for systemd: systemd takes them, and the server's command does what its type promises.
 
 use faceoff_tests::{
     program, repository,
@@ -14,30 +14,35 @@ use std::{
     time::{Duration, Instant},
 };
 
-fn unit() -> PathBuf {
-    repository().join("docker/systemd/faceoff.service")
+const SERVER: &str = "faceoff.service";
+const WORKER: &str = "faceoff-worker.service";
+
+fn unit(name: &str) -> PathBuf {
+    repository().join("docker/systemd").join(name)
 }
 
 /// The unit's text for the program that was built.
-fn with_program() -> String {
-    let text = fs::read_to_string(unit()).expect("there is a unit");
+fn with_program(name: &str) -> String {
+    let text = fs::read_to_string(unit(name)).expect("there is a unit");
     let program = program("faceoff");
     text.replace("/usr/local/bin/faceoff", &program.display().to_string())
 }
 
 #[test]
-fn systemd_takes_the_unit() {
-    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let file = scratch.path().join("faceoff.service");
-    fs::write(&file, with_program()).expect("a scratch file can be written");
-    let verified = Command::new("systemd-analyze")
-        .args(["verify", "--man=no", "--recursive-errors=no"])
-        .arg(&file)
-        .output()
-        .expect("docker/setup.sh installs systemd-analyze");
-    let told = String::from_utf8_lossy(&verified.stderr);
-    assert!(verified.status.success(), "{told}");
-    assert_eq!(told, "", "a warning is a mistake, too");
+fn systemd_takes_the_units() {
+    for name in [SERVER, WORKER] {
+        let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+        let file = scratch.path().join(name);
+        fs::write(&file, with_program(name)).expect("a scratch file can be written");
+        let verified = Command::new("systemd-analyze")
+            .args(["verify", "--man=no", "--recursive-errors=no"])
+            .arg(&file)
+            .output()
+            .expect("docker/setup.sh installs systemd-analyze");
+        let told = String::from_utf8_lossy(&verified.stderr);
+        assert!(verified.status.success(), "{name}: {told}");
+        assert_eq!(told, "", "{name}: a warning is a mistake, too");
+    }
 }
 
 /// What the server tells its service manager.
@@ -82,7 +87,7 @@ impl Drop for Manager {
 
 /// The words of the unit's command, in a scratch folder in place of the system's.
 fn command(scratch: &Path) -> Command {
-    let text = with_program();
+    let text = with_program(SERVER);
     let line = text
         .lines()
         .find_map(|line| line.strip_prefix("ExecStart="));
@@ -105,7 +110,7 @@ fn command(scratch: &Path) -> Command {
 
 #[test]
 fn the_units_command_tells_when_it_answers_and_when_it_ends() {
-    let text = with_program();
+    let text = with_program(SERVER);
     assert!(text.lines().any(|line| line == "Type=notify"));
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let address = scratch.path().join("notify");
