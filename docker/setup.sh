@@ -6,6 +6,7 @@
 #   docker/setup.sh test     also what the tests drive (a browser, so that pages are really opened)
 #   docker/setup.sh load     also what asks a server for pages, as often as it can
 #   docker/setup.sh steady   also what keeps the machine busy while the tests run again and again
+#   docker/setup.sh cgroup2  also a virtual machine, for the tests of the other version of control groups
 #
 # As root it installs them with apt-get; otherwise it prints the command and fails.
 set -eu
@@ -45,6 +46,11 @@ fi
 if [ "$purpose" = load ]; then
     need wrk wrk
     need hey hey
+fi
+if [ "$purpose" = cgroup2 ]; then
+    need qemu-system-x86_64 qemu-system-x86
+    need busybox busybox-static
+    need cpio cpio
 fi
 if [ "$purpose" = steady ]; then
     need stress-ng stress-ng
