@@ -11,7 +11,7 @@ CARGO      ?= cargo
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
 
-.PHONY: demo test web wheel pictures test-api test-python test-learning fuzz busy load elsewhere soak steady frames test-cgroup2 lint format fidelity setup setup-test agents dist clean-demo help
+.PHONY: demo test web wheel pictures test-api test-python test-learning fuzz busy load elsewhere soak steady frames test-cgroup2 test-box lint format fidelity setup setup-test agents dist clean-demo help
 
 help:
 	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
@@ -24,6 +24,7 @@ help:
 	@echo "make test-python   make it, install it where nothing else is, test it"
 	@echo "make test-learning   learn from nothing, and try the libraries that need torch (8 GB)"
 	@echo "make test-cgroup2   the sandbox's limits on cgroup v2, in a virtual machine that has nothing else"
+	@echo "make test-box   make the images' file systems without an engine, and start what is in them"
 	@echo "make fuzz   feed the readers what is nearly valid: MINUTES=$(MINUTES)"
 	@echo "make busy   play beside hogs, floods and bursts of processes"
 	@echo "make load   how much looking on a server bears, and that agents notice nothing of it"
@@ -110,6 +111,12 @@ test-cgroup2: setup
 	@docker/setup.sh cgroup2
 	$(CARGO) build --locked --workspace --bins --tests
 	TARGET_DIR=$(TARGET_DIR) docker/cgroup2.sh
+
+# The steps of docker/Dockerfile, and the configurations of Compose and Kubernetes. As root.
+test-box: setup
+	@docker/setup.sh box
+	$(CARGO) build --locked --workspace --bins --tests
+	TARGET_DIR=$(TARGET_DIR) docker/test-box.sh
 
 # The fuzz targets, all at once for so many minutes; FUZZ_SEED=N for other inputs than last time.
 fuzz: setup-test

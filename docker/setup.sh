@@ -7,6 +7,7 @@
 #   docker/setup.sh load     also what asks a server for pages, as often as it can
 #   docker/setup.sh steady   also what keeps the machine busy while the tests run again and again
 #   docker/setup.sh cgroup2  also a virtual machine, for the tests of the other version of control groups
+#   docker/setup.sh box      also what the images are made of, where no engine makes them
 #
 # As root it installs them with apt-get; otherwise it prints the command and fails.
 set -eu
@@ -51,6 +52,13 @@ if [ "$purpose" = cgroup2 ]; then
     need qemu-system-x86_64 qemu-system-x86
     need busybox busybox-static
     need cpio cpio
+fi
+if [ "$purpose" = box ]; then
+    need mmdebstrap mmdebstrap
+    need nats-server nats-server
+    need curl curl
+    need ip iproute2
+    python3 -c 'import ensurepip' 2>/dev/null || missing="$missing python3-venv"
 fi
 if [ "$purpose" = steady ]; then
     need stress-ng stress-ng

@@ -1,0 +1,225 @@
+#!/bin/sh
+# Tries the images without an engine for them: does each step of docker/Dockerfile in a folder, and starts what comes of it in
+# namespaces, as a privileged container, with the configurations of docker/compose.yaml and of docker/kubernetes/.
+#
+#   TARGET_DIR=target docker/test-box.sh         (as root, after cargo build --bins; docker/setup.sh box)
+#   TARGET_DIR=target docker/test-box.sh start   what an earlier call has made
+#
+# The program is the one that was built here, not one of the Dockerfile's first stage. On a host with version 1 of the cgroup
+# interface the entry point leaves the program root; `make test-cgroup2` is for the other.
+set -eu
+: "${TARGET_DIR:=target}"
+repository=$(dirname "$(dirname "$(realpath "$0")")")
+program=$(realpath "$TARGET_DIR/debug/faceoff")
+work=$(mkdir -p "$TARGET_DIR/box" && realpath "$TARGET_DIR/box")
+dockerfile=$repository/docker/Dockerfile
+fail() {
+    echo "error: $*" >&2
+    exit 1
+}
+[ "$(id -u)" -eq 0 ] || fail "root file systems are made by root"
+
+# It is started outside of the image and ends inside: none of the host's programs is needed there.
+cat >"$work/enter" <<'END'
+#!/bin/sh
+# enter ROOT COMMAND…: as a privileged container with the namespaces that it is started in.
+set -eu
+root=$1
+shift
+mount --bind "$root" "$root"
+mount -t proc proc "$root/proc"
+mount --rbind /dev "$root/dev"
+if [ -e /sys/fs/cgroup/cgroup.controllers ]; then
+    mount -t sysfs sys "$root/sys"
+    mount -t cgroup2 cgroup2 "$root/sys/fs/cgroup"
+else
+    mount --rbind /sys "$root/sys"
+fi
+for folder in dev/shm tmp run; do
+    mount -t tmpfs -o mode=1777 memory "$root/$folder"
+done
+# The names that Compose and Kubernetes give to the others.
+echo '127.0.0.1 localhost nats server faceoff' >"$root/run/hosts"
+touch "$root/etc/hosts"
+mount --bind "$root/run/hosts" "$root/etc/hosts"
+if [ -n "${BOX_CONFIG:-}" ]; then
+    mkdir -p "$root/etc/faceoff"
+    mount --bind "$BOX_CONFIG" "$root/etc/faceoff"
+fi
+# A program that makes user namespaces may not be in a chroot.
+mkdir -p "$root/old"
+cd "$root"
+pivot_root . old
+umount -l /old
+rmdir /old
+cd /
+exec env -i PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin ${FACEOFF_CONFIG:+FACEOFF_CONFIG="$FACEOFF_CONFIG"} "$@"
+END
+chmod 755 "$work/enter"
+# box ROOT COMMAND…: in a control group and namespaces of its own; the network is the caller's. Nothing from outside of its namespace of
+# processes is in the group, as in a container.
+box() {
+    # shellcheck disable=SC2016 # the inner shell's words
+    unshare --pid --fork --kill-child sh -c '
+        if [ -e /sys/fs/cgroup/cgroup.controllers ]; then
+            group=$(mktemp -d /sys/fs/cgroup/faceoff-box-XXXXXX) && echo 0 >"$group/cgroup.procs"
+        fi
+        exec unshare --mount --cgroup --ipc --uts "$@"' sh "$work/enter" "$@"
+}
+
+# Server, worker and NATS with one set of configurations, in a network that nobody else sees.
+together() {
+    kind=$1
+    entrypoint=$(cat "$work/base.ENTRYPOINT")
+    ip link set lo up
+    rm -rf "$work/streams" "$work/run" "$work/server/data"
+    install -d -o 990 -g 990 -m 0700 "$work/server/data"
+    mkdir "$work/streams" "$work/run"
+    sed "s,/var/lib/nats,$work/streams," "$work/$kind/nats-server.conf" >"$work/run/nats.conf"
+    nats-server --config "$work/run/nats.conf" >"$work/run/nats" 2>&1 &
+    export BOX_CONFIG="$work/$kind"
+    # shellcheck disable=SC2046 # the words of CMD
+    FACEOFF_CONFIG=/etc/faceoff/faceoff.toml box "$work/server" "$entrypoint" $(cat "$work/server.CMD") >"$work/run/server" 2>&1 &
+    # shellcheck disable=SC2046
+    FACEOFF_CONFIG=/etc/faceoff/worker.toml box "$work/worker" "$entrypoint" $(cat "$work/worker.CMD") >"$work/run/worker" 2>&1 &
+    answers=''
+    for _ in $(seq 120); do
+        sleep 1
+        answers=$(for path in livez readyz; do
+            curl --silent --output /dev/null --write-out '%{http_code} ' "http://127.0.0.1:8080/$path" || true
+        done)
+        if [ "$answers" = '200 200 ' ] && grep -q 'connected to NATS' "$work/run/worker"; then
+            # A slot that is free asks the server for work. It does so again after some seconds if there was no server yet.
+            sleep 10
+            errors=$(grep -c ERROR "$work/run/worker" || true)
+            sleep 10
+            if grep ERROR "$work/run/server" || [ "$(grep -c ERROR "$work/run/worker" || true)" != "$errors" ]; then
+                cat "$work/run/worker" >&2
+                echo "error: $kind: server and worker do not understand each other" >&2
+                return 1
+            fi
+            echo "$kind: the server answers /livez and /readyz, and the worker asks it for work"
+            return 0
+        fi
+    done
+    cat "$work/run/server" "$work/run/worker" "$work/run/nats" >&2
+    echo "error: $kind: /livez and /readyz answered ${answers:-nothing}, or the worker did not connect" >&2
+    return 1
+}
+if [ "${1:-}" = together ]; then
+    together "$2"
+    exit
+fi
+
+# The files for engines that are not here: what their schemas say of them.
+[ -x "$work/schemas/bin/kubernetes-validate" ] || {
+    python3 -m venv "$work/schemas"
+    "$work/schemas/bin/pip" install --quiet check-jsonschema==0.39.0 kubernetes-validate==1.37.0 pyyaml
+}
+"$work/schemas/bin/check-jsonschema" --builtin-schema vendor.compose-spec "$repository/docker/compose.yaml"
+"$work/schemas/bin/kubernetes-validate" --strict --quiet "$repository"/docker/kubernetes/*.yaml
+echo "the schemas of Compose and Kubernetes take the files"
+# Their configurations, as compose/ and kubernetes/; and every path that Compose mounts or builds from is there.
+"$work/schemas/bin/python" - "$repository/docker" "$work" <<'END'
+import pathlib, sys, yaml
+docker, work = map(pathlib.Path, sys.argv[1:])
+compose = yaml.safe_load((docker / "compose.yaml").read_text())
+maps = [part for file in sorted((docker / "kubernetes").glob("*.yaml")) for part in yaml.safe_load_all(file.read_text())
+        if part["kind"] == "ConfigMap"]
+found = {
+    "compose": {name: config["content"] for name, config in compose["configs"].items()},
+    "kubernetes": {name: text for part in maps for name, text in part["data"].items()},
+}
+for kind, files in found.items():
+    (work / kind).mkdir(exist_ok=True)
+    assert sorted(files) == ["faceoff.toml", "nats-server.conf", "worker.toml"], files.keys()
+    for name, text in files.items():
+        (work / kind / name).write_text(text)
+for name, service in compose["services"].items():
+    paths = [volume.split(":")[0] for volume in service.get("volumes", []) if volume.startswith(".")]
+    if "build" in service:
+        context = docker / service["build"]["context"]
+        paths.append(context.relative_to(docker) / service["build"]["dockerfile"])
+    for path in paths:
+        assert (docker / path).is_file(), f"{name} names {path}, which is not there"
+END
+
+# in_root COMMAND: as in an image that is being built, with this host's network.
+in_root() {
+    # shellcheck disable=SC2016 # the inner shell's words
+    unshare --mount --pid --fork sh -c '
+        set -eu
+        mount --bind "$1" "$1"
+        mount -t proc proc "$1/proc"
+        mount --rbind /dev "$1/dev"
+        mount --bind /etc/resolv.conf "$1/etc/resolv.conf"
+        exec chroot "$1" /bin/sh -c "$2"' sh "$root" "$1"
+}
+
+# image TARGET: makes $work/TARGET by the steps of the stages that it is built from, and keeps ENTRYPOINT and CMD.
+image() {
+    root=$work/$1
+    rm -rf "$root"
+    # One step a line, comments left out; then only the stages from the target back to an image of others.
+    awk '/^#/ { next } { line = line $0 } /\\$/ { sub(/\\$/, "", line); next } line != "" { print line; line = "" }' "$dockerfile" >"$work/steps"
+    stages=$1
+    while from=$(awk -v stage="${stages%% *}" '$1 == "FROM" && $4 == stage { print $2 }' "$work/steps") && case $from in *:*) false ;; esac; do
+        [ -n "$from" ] || fail "$dockerfile has no stage ${stages%% *}"
+        stages="$from $stages"
+    done
+    suite=${from#debian:}
+    [ "$suite" != "$from" ] || fail "this script makes images of Debian only, and ${stages%% *} is from $from"
+    echo "image $1: $from, then the stages $stages"
+    # mmdebstrap needs a folder that is empty; what of minbase the slim images leave out is documents.
+    mmdebstrap --quiet --variant=minbase "${suite%-slim}" "$root" >"$work/log" 2>&1 || {
+        cat "$work/log" >&2
+        fail "mmdebstrap cannot make $from"
+    }
+    for stage in $stages; do
+        awk -v stage="$stage" '$1 == "FROM" { in_it = $4 == stage; next } in_it' "$work/steps" >"$work/stage"
+        while read -r step words; do
+            case $step in
+            RUN) in_root "$words" </dev/null >"$work/log" 2>&1 || {
+                cat "$work/log" >&2
+                fail "RUN $words"
+            } ;;
+            COPY)
+                # shellcheck disable=SC2086 # words on purpose
+                set -- $words
+                case $1 in
+                --from=build)
+                    [ "$2" = /src/target/release/faceoff ] || fail "the first stage builds no $2"
+                    source=$program
+                    shift
+                    ;;
+                *) source=$repository/$1 ;;
+                esac
+                [ -e "$source" ] || fail "COPY $words: there is no $source"
+                cp "$source" "$root$2"
+                ;;
+            ENTRYPOINT | CMD) printf '%s\n' "$words" | tr -d '[]",' >"$work/$stage.$step" ;;
+            VOLUME) mkdir -p "$root/$words" ;;
+            EXPOSE) [ "$words" = 8080 ] || fail "expected to expose 8080, got $words" ;;
+            *) fail "this script does not know the step $step" ;;
+            esac
+        done <"$work/stage"
+    done
+}
+trap 'find /sys/fs/cgroup/faceoff-box-* -depth -type d -exec rmdir {} + 2>/dev/null || true' EXIT
+[ "${1:-}" = start ] || for image in worker server; do
+    image "$image"
+done
+
+entrypoint=$(cat "$work/base.ENTRYPOINT")
+version=$(box "$work/server" "$entrypoint" faceoff --version)
+[ "$version" = "$("$program" --version)" ] || fail "expected the version of $program, got $version"
+echo "faceoff --version: $version"
+for image in server worker; do
+    echo "faceoff doctor in the image $image:"
+    box "$work/$image" "$entrypoint" faceoff doctor || fail "the sandbox lacks something in the image $image"
+done
+
+for kind in compose kubernetes; do
+    unshare --net --pid --fork --kill-child --mount-proc "$0" together "$kind"
+done
+echo "the images start, and do what they are for"
