@@ -2,8 +2,8 @@
 
     python3 tests/load/elsewhere.py target/release/faceoff [ROUNDS]
 
-In turns, so that what else the machine does falls on both alike: a season of its own, one team with the agent hold, 30 shards of 50
-episodes, played by the server's own slot or by one of a worker, who gets them by a nats-server on this machine. Measured is the time from
+In turns, so that what else the machine does falls on both alike: a season of its own, one team with the agent hold, nine shards of
+50 episodes, played by the server's own slot or by one of a worker, who gets them by a nats-server on this machine. Measured is the time from
 the first shard's beginning to the last one's commit, by the log of whoever plays. Prints each round's times and the median of
 their ratios. Nothing is asserted: how fast a machine is, is the machine's.
 """
@@ -19,11 +19,12 @@ import urllib.request
 from datetime import datetime
 from pathlib import Path
 
+SHARDS = 9  # three of each task
 CONFIG = """
 [server]
 listen = "127.0.0.1:0"
 [evaluation]
-episodes_per_task = 500
+episodes_per_task = 150
 episodes_per_shard = 50
 [workers]
 slots = 1
@@ -88,7 +89,7 @@ class Season:
             if " episodes " in fields.get("work", ""):
                 at = datetime.fromisoformat(entry["timestamp"].replace("Z", "+00:00")).timestamp()
                 {"begun": begun, "committed": committed}.get(fields["message"], []).append(at)
-        assert len(begun) == len(committed) == 30, (len(begun), len(committed))
+        assert len(begun) == len(committed) == SHARDS, (len(begun), len(committed))
         return max(committed) - min(begun)
 
     def end(self):
