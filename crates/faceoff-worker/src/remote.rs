@@ -3,13 +3,14 @@
 //! lease, or is taken back before, and is given out again; what it delivers twice is begun once, by whoever says first that it
 //! begins, and committed once.
 //!
-//! `names.rs` is what both sides call things; `dispatch.rs` and `answers.rs` are the server's side; `far_server.rs` is the server as
+//! `names.rs` is what both sides call things; `dispatch.rs`, `granted.rs` and `answers.rs` are the server's side; `far_server.rs` is the server as
 //! a worker's slots see it, `worker.rs` the process that they run in.
 
 mod answers;
 mod connection;
 mod dispatch;
 mod far_server;
+mod granted;
 mod names;
 mod taken_back;
 mod worker;

@@ -182,7 +182,7 @@ impl Answers {
             let Ok(show) = serde_json::from_slice::<RemoteShow>(&told.payload) else {
                 continue;
             };
-            // Nobody tells of a game that is not theirs.
+            // Whoever has no work tells of no game. (That it is their own game is believed: what is told decides nothing.)
             let (unit, nonce) = (show.lease.unit, show.lease.nonce);
             if self.store.is_held(unit, nonce).await.unwrap_or_default() {
                 let live = self.store.live_games();

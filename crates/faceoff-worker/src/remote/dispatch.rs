@@ -3,6 +3,7 @@
 use super::{
     answers::Answers,
     connection::NatsConfig,
+    granted::{grant_of, store},
     names::{self, ALL, Names, ORDERS_CONSUMER, OUTCOMES_CONSUMER, SERVER, WAITING},
     taken_back::{AllGivenOut, GivenOut},
 };
@@ -23,9 +24,9 @@ use async_nats::{
 use faceoff_store::{Lot, Store, Workers};
 use faceoff_types::Clock;
 use faceoff_wire::{
-    grant::{Grant, GrantKey, Writes},
-    remote::{Introduction, Outcome, RemoteOrder, RemoteOutcome},
-    work::{Assignment, Keeps, Lease, WorkOrder, WorkReport},
+    grant::GrantKey,
+    remote::{Introduction, RemoteOrder, RemoteOutcome},
+    work::{Lease, WorkOrder},
 };
 use futures::StreamExt as _;
 use std::{
@@ -294,11 +295,11 @@ impl Hub {
         };
         let (server, key) = (self.server.clone(), self.remote.key.clone());
         let unit = outcome.lease.unit;
-        self.server.store.workers().ended(unit);
         let told = worker.clone();
         let stored = tokio::task::spawn_blocking(move || store(&server, &key, &told, outcome));
         match stored.await.map_err(anyhow::Error::from).flatten() {
             Ok(Holding::Held) => {
+                self.server.store.workers().ended(unit);
                 tracing::info!(%unit, worker, "taken in");
                 AckKind::Ack
             }
@@ -412,115 +413,5 @@ fn outcomes_consumer() -> pull::Config {
         ack_wait: Duration::from_secs(60),
         max_deliver: -1,
         ..pull::Config::default()
-    }
-}
-
-/// What an order opens.
-fn grant_of(order: &WorkOrder) -> Grant {
-    let (bundles, writes) = match &order.assignment {
-        Assignment::Play { agent, keeps, .. } => {
-            let writes = match keeps {
-                Keeps::Nothing => Writes::Nothing,
-                Keeps::Clips(key) => Writes::File(key.clone()),
-                Keeps::Recording(key) => Writes::Folder(key.clone()),
-            };
-            (vec![agent.bundle.clone()], writes)
-        }
-        Assignment::Game {
-            agents, recording, ..
-        } => {
-            let bundles = agents.each_ref().map(|agent| agent.bundle.clone());
-            let writes = match recording {
-                Some(key) => Writes::Folder(key.clone()),
-                None => Writes::Nothing,
-            };
-            (bundles.into(), writes)
-        }
-        Assignment::Smoke { .. } | Assignment::Finalise { .. } => (Vec::new(), Writes::Nothing),
-    };
-    Grant {
-        unit: order.lease.unit,
-        nonce: order.lease.nonce,
-        bundles,
-        writes,
-    }
-}
-
-/// Stores an outcome, if it is of its order. One that is not is a fault of ours, and ends nobody else's work.
-fn store(
-    server: &LocalServer,
-    key: &GrantKey,
-    worker: &str,
-    outcome: RemoteOutcome,
-) -> anyhow::Result<Holding> {
-    let RemoteOutcome {
-        mut lease,
-        grant,
-        outcome,
-    } = outcome;
-    if !lease.slot.starts_with(&names::slot(worker, "")) {
-        lease.slot = names::slot(worker, "?");
-    }
-    let opened = Grant::open(&grant, key)
-        .filter(|grant| grant.unit == lease.unit && grant.nonce == lease.nonce);
-    let Some(grant) = opened else {
-        tracing::error!(unit = %lease.unit, worker, "a worker sent an outcome without the order that it is of; it is left out");
-        return Ok(Holding::Lost);
-    };
-    match outcome {
-        Outcome::Done { report } if is_of(&report, &grant) => server.commit(&lease, *report),
-        Outcome::Done { .. } => {
-            tracing::error!(unit = %lease.unit, worker, "a worker's report is not of its order");
-            server.give_back(
-                &lease,
-                GivenBack::PlatformFault("a worker's report was not of its order"),
-            )?;
-            Ok(Holding::Lost)
-        }
-        Outcome::Shutdown => {
-            server.give_back(&lease, GivenBack::Shutdown)?;
-            Ok(Holding::Held)
-        }
-        Outcome::FullDisk => {
-            server.give_back(&lease, GivenBack::FullDisk)?;
-            Ok(Holding::Held)
-        }
-        Outcome::PlatformFault { reason } => {
-            server.give_back(&lease, GivenBack::PlatformFault(&reason))?;
-            Ok(Holding::Held)
-        }
-    }
-}
-
-/// Does a report name what its order lets it?
-fn is_of(report: &WorkReport, grant: &Grant) -> bool {
-    match (report, &grant.writes) {
-        (
-            WorkReport::Play {
-                recording: Some(key),
-                ..
-            },
-            Writes::Folder(granted),
-        ) => key == granted,
-        (
-            WorkReport::Play {
-                recording: None, ..
-            },
-            Writes::Nothing | Writes::File(_),
-        ) => true,
-        (
-            WorkReport::Game {
-                recording: Some(stored),
-                ..
-            },
-            Writes::Folder(granted),
-        ) => stored.key == *granted,
-        (
-            WorkReport::Game {
-                recording: None, ..
-            },
-            Writes::Nothing,
-        ) => true,
-        _ => false,
     }
 }
