@@ -9,11 +9,11 @@ use async_nats::{ConnectOptions, Event};
 use faceoff_tests::{
     bundle, nats::Nats, program, relay::Relay, repository, server::Server, worker::Worker,
 };
-use serde_json::json;
+use serde_json::{Value, json};
 use std::{fs, net::SocketAddr, path::Path, process::Command, sync::mpsc, time::Duration};
 
 /// Of each task.
-const EPISODES: u32 = 10;
+pub(crate) const EPISODES: u32 = 10;
 
 const COMMON: &str = concat!(
     include_str!("../patient.toml"),
@@ -27,12 +27,12 @@ resident_bytes = 0
 );
 
 /// Of a server whose own slots play.
-fn alone() -> String {
+pub(crate) fn alone() -> String {
     format!("{COMMON}[workers]\nslots = 1\n")
 }
 
 /// Of a server for which others play, and which they reach at `files`.
-fn giving(nats: &Nats, files: SocketAddr) -> String {
+pub(crate) fn giving(nats: &Nats, files: SocketAddr) -> String {
     format!(
         "{COMMON}[workers]\nslots = 1\nplay = false\nlease_s = 10\n[nats]\nurl = \"{}\"\nfiles_url = \"http://{files}\"\n",
         nats.url()
@@ -40,12 +40,12 @@ fn giving(nats: &Nats, files: SocketAddr) -> String {
 }
 
 /// Of a worker that reaches NATS there.
-fn taking(nats: SocketAddr, slots: usize) -> String {
+pub(crate) fn taking(nats: SocketAddr, slots: usize) -> String {
     format!("{COMMON}[workers]\nslots = {slots}\n[nats]\nurl = \"nats://{nats}\"\n")
 }
 
 /// An evaluation of striker that is queued and that nobody has begun, in a data folder: its path, and the team.
-fn queued(data: &Path, scratch: &Path) -> (String, Team) {
+pub(crate) fn queued(data: &Path, scratch: &Path) -> (String, Team) {
     let server = Server::start(data, &alone());
     let team = Team::create(&server, "Phoenix");
     let submission = team.submit(&server, &bundle::reference("striker", scratch));
@@ -57,7 +57,7 @@ fn queued(data: &Path, scratch: &Path) -> (String, Team) {
     (path, team)
 }
 
-fn resume(server: &Server) {
+pub(crate) fn resume(server: &Server) {
     let resumed = server.post("/api/v1/queue/resume", &server.admin_token, &json!({}));
     assert!(resumed.status().is_success(), "{}", resumed.status());
 }
@@ -202,6 +202,24 @@ fn a_worker_that_is_not_like_the_server_is_told_so_and_gets_nothing() {
     files.lead_to(server.address().into());
     let lacks = Worker::start(scratch.path(), "lacks", &taking(nats.address(), 1));
     lacks.wait_for_log("lacks runtimes that the server offers to agents: other", 1);
+    // So does `doctor`, before a worker is started.
+    for (runtimes, found) in [
+        ("", "would give no work"),
+        (runtime, "would give work to a worker \"asks\""),
+    ] {
+        let file = scratch.path().join("asks.toml");
+        fs::write(&file, taking(nats.address(), 1) + runtimes).expect("a file can be written");
+        let asked = Command::new(program("faceoff"))
+            .args(["doctor", "--name", "asks", "--config"])
+            .arg(&file)
+            .output()
+            .expect("the program can be started");
+        let told = String::from_utf8_lossy(&asked.stdout);
+        assert!(
+            told.contains("nats-server 2.") && told.contains(found),
+            "{told}"
+        );
+    }
     // Another server on the same streams says so, and disturbs nobody.
     let other = Server::start(&scratch.path().join("other"), &config);
     other.wait_for_log("is another server's", 1);
@@ -224,15 +242,26 @@ fn a_worker_that_is_not_like_the_server_is_told_so_and_gets_nothing() {
     let team = Team::create(&server, "Alpha");
     let submission = team.submit(&server, &repository().join("agents/hold"));
     let evaluation = team.evaluate(&server, &submission);
-    let like = Worker::start(
+    let like = Worker::start_with(
         scratch.path(),
         "like",
         &(taking(nats.address(), 1) + runtime),
+        &["--label", "lab 3", "--label", "rack"],
     );
     let finished = team.finished(&server, &evaluation);
     assert_eq!(finished["state"], "finished", "{finished:#}");
     assert!(like.log().contains("committed"));
     assert!(!lacks.log().contains("begun"), "{}", lacks.log());
+    let told = server.get("/api/v1/workers", Some(&server.admin_token));
+    let told: Value = told.json().expect("the API speaks JSON");
+    let labels = json!(["lab 3", "rack"]);
+    let workers = told["workers"].as_array().expect("workers are a list");
+    let like = workers.iter().find(|worker| worker["name"] == "like");
+    assert_eq!(
+        like.map(|worker| &worker["labels"]),
+        Some(&labels),
+        "{told:#}"
+    );
 }
 
 #[test]

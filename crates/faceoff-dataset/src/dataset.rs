@@ -14,7 +14,7 @@ pub use layout::Layout;
 pub use steps::{StepBatches, StepTable};
 
 pub(crate) use container::Container;
-pub(crate) use episodes::Columns;
+pub(crate) use episodes::{Columns, batches as episode_batches};
 pub(crate) use file_range::FileRange;
 pub(crate) use footer::check as check_footer;
 pub(crate) use steps::{BATCH_ROWS, has_columns};

@@ -11,10 +11,12 @@ mod error;
 mod feed;
 mod replay;
 mod season;
+mod shard;
 
 pub use difference::Difference;
 pub use error::VerifyError;
 pub use season::{SeasonClaim, SeasonMismatch};
+pub use shard::verify_shard;
 
 use crate::{
     dataset::Dataset,
@@ -23,6 +25,7 @@ use crate::{
     score::{Scored, Tally, json_file, score},
     simulator::simulator_id,
 };
+use faceoff_episode::Arena;
 use faceoff_types::{EvaluationResult, Ruleset, Task, UnknownRuleset};
 use feed::{Feed, Recorded};
 use rayon::{
@@ -61,7 +64,15 @@ pub fn verify(
     let ruleset = made_here(dataset)?;
     let mut feed = Feed::open(dataset)?;
     let mut totals = Totals::new(dataset, feed.steps_of_tasks());
-    let replay = Replay::new(ruleset, dataset.manifest());
+    let manifest = dataset.manifest();
+    let arena = Arena::by(
+        ruleset,
+        manifest.profile,
+        &manifest.variation.perturbations,
+        manifest.seed,
+        manifest.mismatch_seed,
+    );
+    let replay = Replay::new(ruleset, arena);
     let pool = ThreadPoolBuilder::new()
         .num_threads(workers.get())
         .thread_name(|index| format!("verify-{index}"))

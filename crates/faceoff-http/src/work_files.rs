@@ -73,6 +73,13 @@ async fn store(
     }
     let (dir, rate) = (&app.config.upload_dir, app.config.limits.upload_rate);
     let file = bundle_stream::receive_file(body, dir, LARGEST_BYTES, rate).await?;
+    let storing = app.store.workers().storing(grant.nonce);
+    let _storing = storing.ok_or_else(|| {
+        Problem::new(
+            ProblemKind::Forbidden,
+            "what came of the order is being looked at: its files stay what they are",
+        )
+    })?;
     // It may have been taken from its holder meanwhile; then what was stored goes with the lease that was lost.
     app.store.artifacts().put_file(&key, file.path()).await?;
     Ok(StatusCode::NO_CONTENT)

@@ -576,6 +576,20 @@ pub enum Event {
     },
     /// The queue goes on.
     QueueResumed,
+    /// Nothing is taken of a worker on another machine any more.
+    WorkerBanned {
+        /// What it is called.
+        worker: String,
+        /// Why.
+        reason: String,
+        /// How many shards that it played are played again.
+        again: u32,
+    },
+    /// A worker's work is taken again.
+    WorkerReadmitted {
+        /// What it is called.
+        worker: String,
+    },
     /// The season has another name.
     SeasonNamed {
         /// The new one.

@@ -88,6 +88,7 @@ pub use reads::{
     standings::BoardDays,
     storage::{Counted, TeamStorage},
     tournaments::{GamesOf, TournamentRecord},
+    worker_bans::PlayedBy,
 };
 pub use room::{DiskSpace, Room};
 pub use schema::Upgrade;
@@ -126,5 +127,8 @@ pub use tables::{
     tokens::{Token, TokenKind, TokenOwner},
     tournaments::Tournament,
     webhooks::{DeadWebhook, Webhook, WebhookKeys},
+    worker_bans::WorkerBan,
 };
-pub use workers::{WORKER_SILENT, WorkerBusy, WorkerHeard, Workers};
+pub use workers::{
+    NoWorkerName, Storing, WORKER_SILENT, WorkerAbout, WorkerBusy, WorkerHeard, WorkerName, Workers,
+};

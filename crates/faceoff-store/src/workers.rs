@@ -2,7 +2,9 @@
 
 use jiff::{SignedDuration, Timestamp};
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, HashMap},
+    fmt,
+    str::FromStr,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 use uuid::Uuid;
@@ -14,6 +16,48 @@ const FORGOTTEN: SignedDuration = SignedDuration::from_hours(24);
 /// So many are remembered at most.
 const MOST: usize = 10_000;
 
+/// How long a worker's name may be.
+const LONGEST_NAME: usize = 64;
+
+/// What a worker elsewhere is called: 1 to 64 of a-z, A-Z, 0-9, - and _, so that it can be a token of a subject of NATS.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct WorkerName(String);
+
+/// A text that is no [`WorkerName`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("expected a worker's name: 1 to {LONGEST_NAME} of a-z, A-Z, 0-9, - and _")]
+pub struct NoWorkerName;
+
+impl WorkerName {
+    /// The name.
+    #[must_use]
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+
+    /// What its leases name, and below it its slots.
+    #[must_use]
+    pub fn holder(&self) -> String {
+        format!("remote/{}", self.0)
+    }
+}
+
+impl fmt::Display for WorkerName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl FromStr for WorkerName {
+    type Err = NoWorkerName;
+
+    fn from_str(text: &str) -> Result<Self, NoWorkerName> {
+        let allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
+        let is_name = (1..=LONGEST_NAME).contains(&text.len()) && text.chars().all(allowed);
+        is_name.then(|| Self(text.to_owned())).ok_or(NoWorkerName)
+    }
+}
+
 /// What is known of workers elsewhere. Cloning is cheap.
 #[derive(Debug, Clone, Default)]
 pub struct Workers(Arc<Mutex<Known>>);
@@ -23,7 +67,48 @@ struct Known {
     workers: BTreeMap<String, WorkerHeard>,
     /// By what it keeps the server from.
     troubles: BTreeMap<String, String>,
+    /// By the names of those of whom nothing is taken: why.
+    banned: BTreeMap<String, String>,
+    /// Orders whose files are being stored, or must not change any more, by their nonces.
+    files: HashMap<Uuid, Files>,
     is_used: bool,
+}
+
+/// How the files of an order stand.
+#[derive(Debug, Default)]
+struct Files {
+    being_stored: u32,
+    are_closed: bool,
+}
+
+/// A file of an order is being stored until this is dropped.
+#[derive(Debug)]
+pub struct Storing {
+    nonce: Uuid,
+    workers: Workers,
+}
+
+impl Drop for Storing {
+    fn drop(&mut self) {
+        let mut known = self.workers.known();
+        if let Some(files) = known.files.get_mut(&self.nonce) {
+            files.being_stored = files.being_stored.saturating_sub(1);
+            if files.being_stored == 0 && !files.are_closed {
+                known.files.remove(&self.nonce);
+            }
+        }
+    }
+}
+
+/// What a worker says of itself.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct WorkerAbout {
+    /// The version of its program.
+    pub version: String,
+    /// Units that it works at at the same time.
+    pub slots: u32,
+    /// What its owner calls it by beside its name.
+    pub labels: Vec<String>,
 }
 
 /// A worker, as it was heard of.
@@ -31,10 +116,8 @@ struct Known {
 pub struct WorkerHeard {
     /// What it is called.
     pub name: String,
-    /// The version of its program.
-    pub version: String,
-    /// Units that it works at at the same time.
-    pub slots: u32,
+    /// What it says of itself.
+    pub about: WorkerAbout,
     /// When this process heard of it first.
     pub first_at: Timestamp,
     /// When it did last.
@@ -77,14 +160,7 @@ impl Workers {
     }
 
     /// A worker asks for work.
-    pub fn heard(
-        &self,
-        name: &str,
-        version: &str,
-        slots: u32,
-        refused: Option<&str>,
-        now: Timestamp,
-    ) {
+    pub fn heard(&self, name: &str, about: WorkerAbout, refused: Option<&str>, now: Timestamp) {
         let mut known = self.known();
         known
             .workers
@@ -95,16 +171,14 @@ impl Workers {
             None if is_full => return,
             None => known.workers.entry(name.to_owned()).or_insert(WorkerHeard {
                 name: name.to_owned(),
-                version: String::new(),
-                slots: 0,
+                about: WorkerAbout::default(),
                 first_at: now,
                 last_at: now,
                 refused: None,
                 busy: BTreeMap::new(),
             }),
         };
-        version.clone_into(&mut worker.version);
-        worker.slots = slots;
+        worker.about = about;
         worker.refused = refused.map(str::to_owned);
         worker.last_at = now;
     }
@@ -148,7 +222,7 @@ impl Workers {
             .workers
             .values()
             .filter(|worker| worker.refused.is_none() && worker.is_there(now));
-        work.map(|worker| worker.slots).sum()
+        work.map(|worker| worker.about.slots).sum()
     }
 
     /// What keeps the server from `what`; none: nothing any more.
@@ -170,6 +244,56 @@ impl Workers {
             .collect()
     }
 
+    /// Nothing is taken of these workers, and why; all others are taken.
+    pub fn set_banned(&self, banned: impl IntoIterator<Item = (String, String)>) {
+        self.known().banned = banned.into_iter().collect();
+    }
+
+    pub(crate) fn ban(&self, worker: &str, reason: &str) {
+        let mut known = self.known();
+        known.banned.insert(worker.to_owned(), reason.to_owned());
+        if let Some(worker) = known.workers.get_mut(worker) {
+            worker.busy.clear();
+        }
+    }
+
+    pub(crate) fn readmit(&self, worker: &str) {
+        self.known().banned.remove(worker);
+    }
+
+    /// Why nothing is taken of a worker, if so.
+    #[must_use]
+    pub fn ban_of(&self, worker: &str) -> Option<String> {
+        self.known().banned.get(worker).cloned()
+    }
+
+    /// A file of the order of this nonce is being stored; `None` if its files are closed.
+    #[must_use]
+    pub fn storing(&self, nonce: Uuid) -> Option<Storing> {
+        let mut known = self.known();
+        let files = known.files.entry(nonce).or_default();
+        if files.are_closed {
+            return None;
+        }
+        files.being_stored += 1;
+        let workers = self.clone();
+        Some(Storing { nonce, workers })
+    }
+
+    /// From now on the files of this order stay what they are; false while one is still being stored.
+    #[must_use]
+    pub fn close_files(&self, nonce: Uuid) -> bool {
+        let mut known = self.known();
+        let files = known.files.entry(nonce).or_default();
+        files.are_closed = true;
+        files.being_stored == 0
+    }
+
+    /// Nothing of this order can be stored any more, whoever asks.
+    pub fn forget_files(&self, nonce: Uuid) {
+        self.known().files.remove(&nonce);
+    }
+
     /// What is known is whole whatever panicked beside it.
     fn known(&self) -> MutexGuard<'_, Known> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
@@ -183,10 +307,15 @@ mod tests {
     #[test]
     fn workers_count_while_they_are_heard_of_and_get_work() {
         let workers = Workers::default();
+        let about = |slots| WorkerAbout {
+            version: "1.0".to_owned(),
+            slots,
+            labels: Vec::new(),
+        };
         let start: Timestamp = "2026-03-01T10:00:00Z".parse().expect("an instant");
         let at = |s: i64| start + SignedDuration::from_secs(s);
-        workers.heard("a", "1.0", 4, None, at(0));
-        workers.heard("b", "1.0", 2, Some("it is another program"), at(0));
+        workers.heard("a", about(4), None, at(0));
+        workers.heard("b", about(2), Some("it is another program"), at(0));
         assert_eq!(workers.slots(at(29)), 4);
         assert_eq!(workers.slots(at(30)), 0, "it is silent");
         let unit = Uuid::from_u128(1);
@@ -201,12 +330,26 @@ mod tests {
         workers.ended(unit);
         assert!(workers.all()[0].busy.is_empty());
         // A day later it is as if it had never been.
-        workers.heard("c", "1.0", 1, None, at(50) + FORGOTTEN);
+        workers.heard("c", about(1), None, at(50) + FORGOTTEN);
         assert_eq!(workers.all().len(), 1);
 
         workers.trouble("give out work", Some("NATS is away"));
         assert_eq!(workers.troubles().len(), 1);
         workers.trouble("give out work", None);
         assert!(workers.troubles().is_empty());
+    }
+
+    #[test]
+    fn files_of_an_order_are_closed_once_nobody_stores_one() {
+        let (workers, nonce) = (Workers::default(), Uuid::from_u128(1));
+        let first = workers.storing(nonce).expect("open");
+        assert!(!workers.close_files(nonce), "one is being stored");
+        assert!(workers.storing(nonce).is_none(), "no other is begun");
+        drop(first);
+        assert!(workers.close_files(nonce));
+        assert!(workers.storing(nonce).is_none());
+        workers.forget_files(nonce);
+        drop(workers.storing(nonce).expect("another life"));
+        assert!(workers.known().files.is_empty(), "nothing is left of it");
     }
 }

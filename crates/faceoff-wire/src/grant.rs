@@ -1,6 +1,7 @@
 //! What the holder of a work order may read and write of the server's files: sealed by the server, so that it needs to remember
 //! none, and nobody can make one. That the order is still its holder's is asked of the queue each time.
 
+use crate::{game::GameSpec, work::ShardSpec};
 use faceoff_types::BundleRef;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -17,6 +18,20 @@ pub struct Grant {
     pub bundles: Vec<BundleRef>,
     /// What may be stored.
     pub writes: Writes,
+    /// What the recording must be of, if one is stored.
+    pub plays: Plays,
+}
+
+/// What is played under an order.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Plays {
+    /// Nothing that is recorded.
+    Nothing,
+    /// Episodes.
+    Shard(ShardSpec),
+    /// A game.
+    Game(GameSpec),
 }
 
 /// What may be stored under an order.
@@ -43,6 +58,18 @@ impl GrantKey {
     #[must_use]
     pub fn of(secret: &[u8; 32]) -> Self {
         Self(blake3::derive_key("faceoff: grants of work orders", secret))
+    }
+
+    /// A number that nobody knows before who does not know the secret, the `number`th of a lease.
+    #[must_use]
+    pub fn draw(&self, nonce: Uuid, number: u32) -> u64 {
+        let mut hasher = blake3::Hasher::new_keyed(&self.0);
+        hasher.update(b"draw");
+        hasher.update(nonce.as_bytes());
+        hasher.update(&number.to_le_bytes());
+        let mut bytes = [0; 8];
+        hasher.finalize_xof().fill(&mut bytes);
+        u64::from_le_bytes(bytes)
     }
 
     fn seal(&self, words: &[u8]) -> blake3::Hash {
@@ -77,6 +104,15 @@ impl Grant {
             return None;
         }
         serde_json::from_slice(&words).ok()
+    }
+
+    /// How many episodes are recorded under it.
+    #[must_use]
+    pub fn episodes(&self) -> u32 {
+        match &self.plays {
+            Plays::Shard(spec) => spec.episodes.end.saturating_sub(spec.episodes.start),
+            Plays::Game(_) | Plays::Nothing => 0,
+        }
     }
 
     /// The bundle of this hash (BLAKE3, 64 hexadecimal digits), if it may be fetched.
@@ -118,6 +154,7 @@ mod tests {
                 file_name: "agent.zip".into(),
             }],
             writes: Writes::Folder("runs/r/n".into()),
+            plays: Plays::Nothing,
         }
     }
 

@@ -13,6 +13,8 @@ pub struct RemoteOrder {
     pub grant: String,
     /// Where the server's files are: an address of http or https, without a slash at its end.
     pub files: String,
+    /// BLAKE3 of the server's program, 64 hexadecimal digits: a worker that runs another declines.
+    pub program: String,
 }
 
 /// What a worker is: its orders depend on it.
@@ -26,6 +28,16 @@ pub struct Introduction {
     pub runtimes: Vec<String>,
     /// Units that it works at at the same time.
     pub slots: u32,
+    /// What its owner calls it by beside its name, for people.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub labels: Vec<String>,
+}
+
+impl Introduction {
+    /// More labels are left out.
+    pub const MOST_LABELS: usize = 8;
+    /// In characters; what is longer is cut.
+    pub const LONGEST_LABEL: usize = 40;
 }
 
 /// What a worker asks, and is answered at once.
@@ -34,6 +46,8 @@ pub struct Introduction {
 pub enum Ask {
     /// May it work?
     MayWork(Introduction),
+    /// Might it work, if it were started?
+    WouldWork(Introduction),
     /// It has an order, and is to be the only one that works at it.
     Begin {
         /// As the order has it.

@@ -148,7 +148,7 @@ impl Place {
 }
 
 /// BLAKE3 of a file, 64 hexadecimal digits.
-fn blake3_of(file: &Path) -> anyhow::Result<String> {
+pub(crate) fn blake3_of(file: &Path) -> anyhow::Result<String> {
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(fs::File::open(file)?)?;
     Ok(hasher.finalize().to_string())

@@ -31,7 +31,7 @@ mod tests;
 mod tidying;
 
 pub use cpus::{CpuLayout, SlotCpus};
-pub use remote::{NatsConfig, RemoteConfig, RemoteWorker, dispatch, work};
+pub use remote::{Examined, NatsConfig, RemoteConfig, RemoteWorker, dispatch, examine, work};
 pub use schedule::{run_schedule, start_due};
 pub use service::{SlotsConfig, WorkerConfig, run};
 pub use slot_threads::{SlotStarter, SlotThreads};

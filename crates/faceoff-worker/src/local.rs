@@ -42,6 +42,12 @@ impl LocalServer {
         self.store.end_leases_of(worker, self.clock.now()).await
     }
 
+    /// Is a lease's unit still its holder's?
+    pub(crate) fn is_held(&self, lease: &Lease) -> anyhow::Result<bool> {
+        let held = self.store.is_held(lease.unit, lease.nonce);
+        Ok(self.runtime.block_on(held)?)
+    }
+
     fn order(&self, leased: Leased) -> WorkOrder {
         let Leased { claim, work } = leased;
         let assignment = match work {

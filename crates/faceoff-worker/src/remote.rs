@@ -4,11 +4,13 @@
 //! begins, and committed once.
 //!
 //! `names.rs` is what both sides call things; `dispatch.rs`, `granted.rs` and `answers.rs` are the server's side; `far_server.rs` is the server as
-//! a worker's slots see it, `worker.rs` the process that they run in.
+//! a worker's slots see it, `worker.rs` the process that they run in; `checked.rs` is why the server believes what comes back.
 
 mod answers;
+mod checked;
 mod connection;
 mod dispatch;
+mod examine;
 mod far_server;
 mod granted;
 mod names;
@@ -17,4 +19,5 @@ mod worker;
 
 pub use connection::NatsConfig;
 pub use dispatch::{RemoteConfig, dispatch};
+pub use examine::{Examined, examine};
 pub use worker::{RemoteWorker, work};

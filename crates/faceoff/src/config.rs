@@ -176,6 +176,8 @@ pub struct WorkersConfig {
     pub lease_s: u32,
     /// Do this server's own slots play? If not, they only try uploads and score what others have played.
     pub play: bool,
+    /// How many episodes of each shard that another machine has played are simulated again before they count; 0: none, and no games.
+    pub checked_episodes: u32,
     /// CPUs of all agents; empty = every slot has its own, where there are two per slot.
     pub agent_cpus: Vec<usize>,
     /// Folder for unpacked bundles and recordings under way; left out, `scratch` in the data folder.
@@ -188,6 +190,7 @@ impl Default for WorkersConfig {
             slots: None,
             lease_s: 30,
             play: true,
+            checked_episodes: 2,
             agent_cpus: Vec::new(),
             scratch_dir: None,
         }

@@ -35,7 +35,7 @@ pub struct EpisodeRecord {
 }
 
 /// The table as it is, in batches, its columns checked.
-pub(super) fn batches(table: FileRange) -> Result<Vec<RecordBatch>, DatasetError> {
+pub(crate) fn batches(table: FileRange) -> Result<Vec<RecordBatch>, DatasetError> {
     let bytes = table.bytes;
     let builder = ParquetRecordBatchReaderBuilder::try_new(table)
         .and_then(|builder| {
@@ -106,7 +106,7 @@ impl<'a> Columns<'a> {
             .collect()
     }
 
-    fn record(&self, row: usize) -> Result<EpisodeRecord, String> {
+    pub fn record(&self, row: usize) -> Result<EpisodeRecord, String> {
         let absent = |name: &str| format!("{name} is absent");
         let text = |name| self.text(name, row).ok_or_else(|| absent(name));
         let int = |name| self.int(name, row).ok_or_else(|| absent(name));

@@ -1,12 +1,13 @@
 use super::{difference::Difference, error::VerifyError};
 use crate::{
-    dataset::{Columns, Dataset, StepBatches},
+    dataset::{Columns, Dataset, FileRange, StepBatches, StepTable, episode_batches},
     files::{EPISODES_FILE, STEPS_FILE},
 };
 use arrow_array::RecordBatch;
 use faceoff_sim::EPISODE_STEPS;
 use faceoff_types::Task;
-use std::collections::BTreeMap;
+use faceoff_wire::work::ShardSpec;
+use std::{collections::BTreeMap, path::Path};
 
 /// What is recorded of one episode.
 pub(super) struct Recorded {
@@ -48,7 +49,35 @@ impl<'a> Feed<'a> {
             .episodes
             .iter()
             .flat_map(|(task, count)| (0..*count).map(|episode| (*task, episode)));
-        let batches = dataset.episode_batches()?;
+        Ok(Self::of(
+            Box::new(expected),
+            dataset.episode_batches()?,
+            dataset.steps()?.read(None)?,
+        ))
+    }
+
+    /// The episodes of a shard, the first so many of those that it is of.
+    pub fn of_shard(
+        spec: &ShardSpec,
+        played: usize,
+        episodes: &Path,
+        steps: &Path,
+    ) -> Result<Self, VerifyError> {
+        let task = spec.task;
+        let expected = spec.episodes.clone().take(played);
+        let steps = StepTable::open(FileRange::whole(steps)?)?;
+        Ok(Self::of(
+            Box::new(expected.map(move |episode| (task, episode))),
+            episode_batches(FileRange::whole(episodes)?)?,
+            steps.read(None)?,
+        ))
+    }
+
+    fn of(
+        expected: Box<dyn Iterator<Item = (Task, u32)> + Send + 'a>,
+        batches: Vec<RecordBatch>,
+        steps: StepBatches,
+    ) -> Self {
         let mut steps_of_tasks = BTreeMap::new();
         for batch in &batches {
             let columns = Columns(batch);
@@ -62,12 +91,12 @@ impl<'a> Feed<'a> {
         let rows = batches
             .into_iter()
             .flat_map(|batch| (0..batch.num_rows()).map(move |row| batch.slice(row, 1)));
-        Ok(Self {
-            expected: Box::new(expected),
+        Self {
+            expected,
             rows: Box::new(rows),
-            steps: dataset.steps()?.read(None)?,
+            steps,
             steps_of_tasks,
-        })
+        }
     }
 
     /// How many control steps the episodes of each task have, as their rows say.

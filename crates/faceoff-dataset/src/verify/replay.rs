@@ -14,7 +14,6 @@ use arrow_array::{
 };
 use faceoff_episode::{Answered, Arena, Course, EpisodeStart, RecordError, StepRow, StepSink};
 use faceoff_types::{ACTION_LIMIT, AgentFault, EpisodeOutcome, Interpolation, Ruleset};
-use faceoff_wire::dataset::DatasetManifest;
 
 /// What it takes to simulate the episodes of an evaluation again.
 pub(super) struct Replay {
@@ -83,18 +82,8 @@ struct Given {
 }
 
 impl Replay {
-    pub fn new(ruleset: Ruleset, manifest: &DatasetManifest) -> Self {
-        let (profile, seed) = (manifest.profile, manifest.seed);
-        Self {
-            ruleset,
-            arena: Arena::by(
-                ruleset,
-                profile,
-                &manifest.variation.perturbations,
-                seed,
-                manifest.mismatch_seed,
-            ),
-        }
+    pub const fn new(ruleset: Ruleset, arena: Arena) -> Self {
+        Self { ruleset, arena }
     }
 
     /// Simulates an episode again and compares every number of it.

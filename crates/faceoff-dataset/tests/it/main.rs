@@ -12,3 +12,4 @@ mod layout_3;
 mod played;
 mod variation;
 mod verify;
+mod verify_shard;

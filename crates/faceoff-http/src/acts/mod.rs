@@ -18,3 +18,4 @@ pub(crate) mod teams;
 pub(crate) mod telling;
 pub(crate) mod turns;
 pub(crate) mod uploading;
+pub(crate) mod workers;

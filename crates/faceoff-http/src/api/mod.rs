@@ -144,6 +144,8 @@ pub(crate) fn router(patience: Duration) -> (Router<App>, Arc<Value>) {
         .routes(routes!(submission_archives::link_archive))
         .routes(routes!(storage::storage))
         .routes(routes!(workers::workers))
+        .routes(routes!(workers::ban_worker))
+        .routes(routes!(workers::readmit_worker))
         .routes(routes!(storage::team_storage))
         .routes(routes!(submissions::withdraw_submission))
         .routes(routes!(submissions::activate_submission))

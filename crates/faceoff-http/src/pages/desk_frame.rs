@@ -130,6 +130,14 @@ const DONE: &[(&str, &str)] = &[
     ("paused", "The queue is paused: nothing new is begun."),
     ("resumed", "The queue goes on."),
     (
+        "worker-banned",
+        "The worker is banned: nothing is taken of it.",
+    ),
+    (
+        "worker-readmitted",
+        "The worker is readmitted: it gets work when it asks next.",
+    ),
+    (
         "voided",
         "Voided: it counts no more. It can be played again.",
     ),

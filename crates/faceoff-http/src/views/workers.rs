@@ -1,7 +1,8 @@
 //! Who works for the server on other machines.
 
-use crate::app::AppState;
+use crate::{app::AppState, problem::Problem};
 use faceoff_store::WorkerHeard;
+use faceoff_types::{EvaluationId, GameId};
 use jiff::{SignedDuration, Timestamp};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -24,7 +25,30 @@ pub struct WorkersView {
     pub troubles: Vec<String>,
     /// By name, as far as this process has heard of them.
     pub workers: Vec<WorkerView>,
+    /// Of whom nothing is taken, by name.
+    pub bans: Vec<WorkerBanView>,
 }
+
+/// A worker of which nothing is taken.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct WorkerBanView {
+    /// What it is called.
+    #[schema(example = "rack-1")]
+    pub worker: String,
+    /// Since when.
+    pub at: Timestamp,
+    /// Why.
+    pub reason: String,
+    /// Evaluations that count and of which it has played a part, the newest first, 100 at most: void what is not to be believed.
+    #[schema(example = json!([]))]
+    pub evaluations: Vec<EvaluationId>,
+    /// Games that it has played and whose result counts, the newest first, 100 at most.
+    #[schema(example = json!([]))]
+    pub games: Vec<GameId>,
+}
+
+/// So much is listed of what a worker has played.
+const MOST_PLAYED: u32 = 100;
 
 /// A worker on another machine.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -36,6 +60,10 @@ pub struct WorkerView {
     pub version: String,
     /// Units that it works at at the same time.
     pub slots: u32,
+    /// What its owner calls it by beside its name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schema(example = json!(["lab 3"]))]
+    pub labels: Vec<String>,
     /// When the server heard of it first, since it was started.
     pub first_at: Timestamp,
     /// When it did last.
@@ -82,6 +110,26 @@ pub struct BusyView {
 }
 
 impl WorkersView {
+    pub(crate) async fn with_bans(app: &AppState) -> Result<Self, Problem> {
+        let mut bans = Vec::new();
+        for ban in app.store.worker_bans().await? {
+            let worker = ban.worker.parse().map_err(Problem::internal)?;
+            let played = app.store.played_by(&worker, MOST_PLAYED).await?;
+            bans.push(WorkerBanView {
+                worker: ban.worker,
+                at: ban.at,
+                reason: ban.reason,
+                evaluations: played.evaluations,
+                games: played.games,
+            });
+        }
+        Ok(Self {
+            bans,
+            ..Self::now(app)
+        })
+    }
+
+    /// As far as it is known without asking the database: nothing of bans.
     pub(crate) fn now(app: &AppState) -> Self {
         let (workers, now) = (app.store.workers(), app.config.clock.now());
         let troubles = workers.troubles().into_iter();
@@ -97,6 +145,7 @@ impl WorkersView {
                 .into_iter()
                 .map(|worker| WorkerView::of(worker, now))
                 .collect(),
+            bans: Vec::new(),
         }
     }
 }
@@ -119,8 +168,9 @@ impl WorkerView {
         Self {
             busy: busy.collect(),
             name: worker.name,
-            version: worker.version,
-            slots: worker.slots,
+            version: worker.about.version,
+            slots: worker.about.slots,
+            labels: worker.about.labels,
             first_at: worker.first_at,
             last_at: worker.last_at,
             refused: worker.refused,

@@ -32,6 +32,12 @@ pub fn shown(answer: &Answer, status: u16) -> Html {
     html
 }
 
+#[track_caller]
+pub fn led(answer: &Answer) -> String {
+    assert_eq!(answer.status, 303, "{}", answer.body);
+    answer.header("location").to_owned()
+}
+
 pub fn links(html: &Html, selector: &str) -> Vec<String> {
     html.select(&Selector::parse(selector).unwrap())
         .map(|element| element.value().attr("href").unwrap().to_owned())

@@ -158,6 +158,8 @@ async fn the_document_lists_what_is_there_and_nothing_else() {
         "POST /api/v1/webhooks",
         "POST /api/v1/webhooks/{id}/rotate",
         "POST /api/v1/webhooks/{id}/test",
+        "POST /api/v1/workers/{name}/ban",
+        "POST /api/v1/workers/{name}/readmit",
         "PUT /api/v1/people/{id}/password",
         "PUT /api/v1/questions/{id}/answer",
     ];

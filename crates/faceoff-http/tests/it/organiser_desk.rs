@@ -2,7 +2,7 @@
 
 use crate::{
     browser::{Browser, forms},
-    desk::{links, shown},
+    desk::{led, links, shown},
     html::texts,
     site::{ADMIN, Answer, Site, TestTeam, result, text},
 };
@@ -18,12 +18,6 @@ async fn grace(site: &Site) -> Browser<'_> {
 async fn newest(site: &Site, kind: &str) -> Value {
     let path = format!("/api/v1/events?limit=1&kind={kind}");
     site.get(&path, Some(ADMIN)).await.json(200)["events"][0].clone()
-}
-
-#[track_caller]
-fn led(answer: &Answer) -> String {
-    assert_eq!(answer.status, 303, "{}", answer.body);
-    answer.header("location").to_owned()
 }
 
 /// The page of a decision, and where its link stands.

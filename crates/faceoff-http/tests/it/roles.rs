@@ -103,6 +103,8 @@ const TABLE: &[(&str, &str)] = &[
     ("DELETE /submissions/{id}", "?00++++"),
     ("GET /storage", "?----++"),
     ("GET /workers", "?----++"),
+    ("POST /workers/{name}/ban", "?----++"),
+    ("POST /workers/{name}/readmit", "?----++"),
     ("GET /teams/{id}/storage", "?00++++"),
     ("GET /teams", "?----++"),
     ("POST /teams", "?----++"),
@@ -192,6 +194,7 @@ fn body(route: &str) -> Value {
         | "POST /teams/{id}/disqualify"
         | "POST /teams/{id}/reinstate"
         | "POST /queue/pause"
+        | "POST /workers/{name}/ban"
         | "POST /stages/{id}/freeze"
         | "POST /stages/{id}/trial"
         | "POST /stages/{id}/proposals" => json!({ "reason": "" }),
@@ -364,6 +367,7 @@ impl Cast {
             .replace("{task}", "hit")
             .replace("{day}", "2020-01-01")
             .replace("{side}", "1")
+            .replace("{name}", "nobody")
             .replace("{episode}", "0")
             .replace("{profile}", "ideal")
             .replace("{chunk}", "0")

@@ -3,7 +3,7 @@
 use crate::site::{Answer, GZIP, Site};
 use faceoff_store::{Claimed, Work};
 use faceoff_types::BundleRef;
-use faceoff_wire::grant::{Grant, GrantKey, Writes};
+use faceoff_wire::grant::{Grant, GrantKey, Plays, Writes};
 use reqwest::Method;
 
 async fn ask(site: &Site, method: Method, path: &str, grant: &str, body: &'static [u8]) -> Answer {
@@ -29,6 +29,7 @@ async fn an_order_opens_its_bundles_and_the_place_of_its_recording_while_it_is_h
         nonce: claim.nonce,
         bundles: vec![bundle.clone()],
         writes: Writes::Folder("runs/of-this/lease".into()),
+        plays: Plays::Nothing,
     };
     let sealed = grant.sealed(&site.grant_key()).unwrap();
     let path_of = |bundle: &BundleRef| format!("/work/bundles/{}", bundle.blake3);

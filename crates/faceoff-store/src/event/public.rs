@@ -56,7 +56,9 @@ impl Event {
             | Self::QueueResumed
             | Self::SeasonNamed { .. }
             | Self::SeasonClosed => true,
-            Self::TokenReplaced
+            Self::WorkerBanned { .. }
+            | Self::WorkerReadmitted { .. }
+            | Self::TokenReplaced
             | Self::TokenCreated { .. }
             | Self::TokenRotated { .. }
             | Self::TokenRevoked { .. }

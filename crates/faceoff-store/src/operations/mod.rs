@@ -49,3 +49,4 @@ pub(crate) mod tournament;
 pub(crate) mod webhooks;
 mod withdraw;
 pub(crate) mod work;
+mod worker_bans;

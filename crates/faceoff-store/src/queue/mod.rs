@@ -14,5 +14,6 @@ pub(crate) use lease::{
 };
 pub(crate) use shares::{Account, Lane, account};
 pub(crate) use units::{
-    Leased, NewUnit, Standing, claim_next, drop_units, end_leases_of, goes_on, insert, standing,
+    Leased, NewUnit, Standing, claim_next, drop_units, end_leases_of, goes_on, insert, queue_again,
+    standing,
 };

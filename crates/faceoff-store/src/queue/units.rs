@@ -134,6 +134,21 @@ pub(crate) async fn end_leases_of(tx: &mut Tx, worker: &str) -> Result<u64> {
     Ok(ended)
 }
 
+/// A unit that was done is to be done once more: what came of it is not believed. Its slot time is charged to nobody.
+pub(crate) async fn queue_again(tx: &mut Tx, unit: Uuid) -> Result<()> {
+    let (unit, now) = (Text(unit), Instant(tx.now));
+    sqlx::query!(
+        "UPDATE units SET state = 'queued', worker = NULL, nonce = NULL, progress = 0, charged_ms = 0, claimable_at = ?
+         WHERE id = ? AND state = 'done'",
+        now,
+        unit,
+    )
+    .execute(&mut **tx)
+    .await?;
+    tx.work_added();
+    Ok(())
+}
+
 /// How the queue stands.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Standing {

@@ -20,3 +20,4 @@ mod submissions;
 mod summaries;
 mod teams;
 pub(crate) mod tournaments;
+pub(crate) mod worker_bans;

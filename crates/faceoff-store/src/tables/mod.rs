@@ -48,3 +48,4 @@ pub(crate) mod terms;
 pub(crate) mod tokens;
 pub(crate) mod tournaments;
 pub(crate) mod webhooks;
+pub(crate) mod worker_bans;

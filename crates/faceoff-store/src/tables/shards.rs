@@ -131,6 +131,51 @@ pub(crate) async fn of_unit(
         .map(|row| (row.run.0, row.into())))
 }
 
+/// A shard that a worker has played.
+#[derive(Debug)]
+pub(crate) struct PlayedShard {
+    pub(crate) id: ShardId,
+    pub(crate) unit: Uuid,
+    pub(crate) recording: Option<String>,
+}
+
+/// What a worker elsewhere (`holder`: `remote/WORKER`) has committed of runs that go on.
+pub(crate) async fn of_running_by(
+    connection: &mut SqliteConnection,
+    holder: &str,
+) -> Result<Vec<PlayedShard>> {
+    let rows = sqlx::query!(
+        r#"SELECT s.id AS "id: Text<ShardId>", s.unit_id AS "unit: Text<Uuid>", s.recording
+           FROM units u JOIN shards s ON s.unit_id = u.id JOIN runs r ON r.id = s.run_id
+           -- 0 is what follows / among characters
+           WHERE u.state = 'done' AND u.worker >= 'remote/' AND u.worker < 'remote0'
+             AND u.worker >= ?1 || '/' AND u.worker < ?1 || '0'
+             AND r.state = 'running' AND s.committed_at IS NOT NULL"#,
+        holder,
+    )
+    .fetch_all(connection)
+    .await?;
+    let played = rows.into_iter().map(|row| PlayedShard {
+        id: row.id.0,
+        unit: row.unit.0,
+        recording: row.recording,
+    });
+    Ok(played.collect())
+}
+
+/// What came of a shard is forgotten.
+pub(crate) async fn take_back(connection: &mut SqliteConnection, id: ShardId) -> Result<()> {
+    let id = Text(id);
+    sqlx::query!(
+        "UPDATE shards SET committed_at = NULL, recording = NULL, agent_faults = NULL, outcomes = NULL, log = NULL
+         WHERE id = ?",
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
 /// The shards of a run in (task, first episode) order.
 pub(crate) async fn of_run(connection: &mut SqliteConnection, run: RunId) -> Result<Vec<Shard>> {
     let run = Text(run);

@@ -38,3 +38,4 @@ mod stages;
 mod teams;
 mod tokens;
 mod tournaments;
+mod worker_bans;

@@ -5,8 +5,8 @@ use super::{
     taken_back::AllGivenOut,
 };
 use async_nats::{Client, Message};
-use faceoff_store::{Claim, Store, StoreError};
-use faceoff_types::Clock;
+use faceoff_store::{Claim, Store, StoreError, WorkerAbout, WorkerName};
+use faceoff_types::{Clock, harmless};
 use faceoff_wire::{
     remote::{Answer, Ask, Introduction, RemoteShow, Shown},
     work::Lease,
@@ -92,41 +92,51 @@ impl Answers {
         let ask: Ask = match serde_json::from_slice(&asked.payload) {
             Ok(ask) => ask,
             Err(error) => {
-                tracing::warn!(worker, %error, "a worker asks what this server does not know");
+                tracing::warn!(%worker, %error, "a worker asks what this server does not know");
                 return no(&format!("the server does not know this question: {error}"));
             }
         };
+        let ban = self.store.workers().ban_of(worker.as_str());
+        let ban = ban.map(|reason| format!("the server takes nothing of this worker: {reason}"));
+        if let (Ask::Begin { .. } | Ask::Renew { .. }, Some(reason)) = (&ask, &ban) {
+            return no(reason);
+        }
         let answered = match ask {
             Ask::MayWork(own) => {
-                let reason = differs(&own, &self.like);
-                let now = self.clock.now();
+                let reason = ban.or_else(|| differs(&own, &self.like));
+                let (about, now) = (about(&own), self.clock.now());
                 let workers = self.store.workers();
-                workers.heard(worker, &own.version, own.slots, reason.as_deref(), now);
-                return match reason {
-                    Some(reason) => Answer::No { reason },
-                    None => Answer::Yes,
-                };
+                workers.heard(worker.as_str(), about, reason.as_deref(), now);
+                return yes_unless(reason);
+            }
+            Ask::WouldWork(own) => {
+                return yes_unless(ban.or_else(|| differs(&own, &self.like)));
             }
             Ask::Begin { lease, slot } if names::is_word(&slot) => {
-                self.begin(worker, &lease, &slot).await
+                self.begin(&worker, &lease, &slot).await
             }
             Ask::Begin { .. } => return no("the slot's name is none"),
             Ask::Renew {
                 lease,
                 episodes_done,
-            } => self.renew(worker, &lease, episodes_done, renewals).await,
+            } => self.renew(&worker, &lease, episodes_done, renewals).await,
         };
         match answered {
             Ok(true) => Answer::Yes,
             Ok(false) => no("it is no longer this worker's"),
             Err(error) => {
-                tracing::warn!(worker, %error, "the queue cannot be asked for a worker");
+                tracing::warn!(%worker, %error, "the queue cannot be asked for a worker");
                 Answer::Unknown
             }
         }
     }
 
-    async fn begin(&self, worker: &str, lease: &Lease, slot: &str) -> Result<bool, StoreError> {
+    async fn begin(
+        &self,
+        worker: &WorkerName,
+        lease: &Lease,
+        slot: &str,
+    ) -> Result<bool, StoreError> {
         let given_out = self.given_out.take(lease.nonce);
         let claim = claim(lease, WAITING);
         let now = self.clock.now();
@@ -138,14 +148,14 @@ impl Answers {
         if begins {
             let what = given_out.map(|order| order.what);
             let workers = self.store.workers();
-            workers.works(worker, slot, lease.unit, what.as_deref(), now);
+            workers.works(worker.as_str(), slot, lease.unit, what.as_deref(), now);
         }
         Ok(begins)
     }
 
     async fn renew(
         &self,
-        worker: &str,
+        worker: &WorkerName,
         lease: &Lease,
         done: u32,
         renewals: &Renewals,
@@ -154,7 +164,7 @@ impl Answers {
         let now = self.clock.now();
         let own = lease.slot.strip_prefix(&names::slot(worker, ""));
         let held = if renewals.is_due(lease.nonce, done, every, Instant::now()) {
-            let claim = claim(lease, own.map_or(worker, |_| &lease.slot));
+            let claim = claim(lease, own.map_or(worker.as_str(), |_| &lease.slot));
             self.store
                 .heartbeat(&claim, done, self.lease_s, now)
                 .await?
@@ -163,7 +173,7 @@ impl Answers {
         };
         let workers = self.store.workers();
         match own {
-            Some(slot) if held => workers.works(worker, slot, lease.unit, None, now),
+            Some(slot) if held => workers.works(worker.as_str(), slot, lease.unit, None, now),
             _ if !held => workers.ended(lease.unit),
             _ => {}
         }
@@ -208,6 +218,30 @@ fn claim(lease: &Lease, holder: &str) -> Claim {
     }
 }
 
+fn yes_unless(reason: Option<String>) -> Answer {
+    match reason {
+        Some(reason) => Answer::No { reason },
+        None => Answer::Yes,
+    }
+}
+
+/// What organisers see of a worker: no more of its labels than a page shows.
+fn about(own: &Introduction) -> WorkerAbout {
+    let labels = own.labels.iter().take(Introduction::MOST_LABELS);
+    WorkerAbout {
+        version: own.version.clone(),
+        slots: own.slots,
+        labels: labels
+            .map(|label| {
+                harmless(label)
+                    .chars()
+                    .take(Introduction::LONGEST_LABEL)
+                    .collect()
+            })
+            .collect(),
+    }
+}
+
 /// Why a worker may not work for this server.
 fn differs(own: &Introduction, like: &Introduction) -> Option<String> {
     if own.program != like.program {
@@ -242,12 +276,14 @@ mod tests {
             version: "1".into(),
             runtimes: vec!["native".into(), "python3".into()],
             slots: 1,
+            labels: Vec::new(),
         };
         let with = |program: &str, runtimes: &[&str]| Introduction {
             program: program.into(),
             version: "1".into(),
             runtimes: runtimes.iter().map(|name| (*name).to_owned()).collect(),
             slots: 4,
+            labels: Vec::new(),
         };
         assert_eq!(
             differs(&with("aa", &["python3", "native", "julia"]), &like),

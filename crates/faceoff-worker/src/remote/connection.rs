@@ -25,13 +25,12 @@ pub struct NatsConfig {
 impl NatsConfig {
     /// Connects as `who`, now or as soon as NATS is there.
     pub(super) async fn connect(&self, who: &str) -> anyhow::Result<Client> {
-        let (url, told) = (self.url.clone(), self.url.clone());
-        let mut options = ConnectOptions::new()
-            .name(who)
-            .custom_inbox_prefix(format!("_INBOX.{}.{who}", self.name))
+        let told = self.url.clone();
+        let options = self
+            .options(who)
+            .await?
             .retry_on_initial_connect()
             .max_reconnects(None)
-            .request_timeout(Some(ANSWER))
             .reconnect_delay_callback(|tries| {
                 LONGEST_PAUSE.min(Duration::from_millis(100 << tries.min(6)))
             })
@@ -39,6 +38,16 @@ impl NatsConfig {
                 let url = told.clone();
                 async move { tell(&url, &event) }
             });
+        let connected = options.connect(&self.url).await;
+        connected.with_context(|| format!("connecting to NATS at {}", self.url))
+    }
+
+    /// By which name and key, and whom it trusts.
+    pub(super) async fn options(&self, who: &str) -> anyhow::Result<ConnectOptions> {
+        let mut options = ConnectOptions::new()
+            .name(who)
+            .custom_inbox_prefix(format!("_INBOX.{}.{who}", self.name))
+            .request_timeout(Some(ANSWER));
         if let Some(file) = &self.nkey_file {
             let seed = tokio::fs::read_to_string(file)
                 .await
@@ -48,8 +57,7 @@ impl NatsConfig {
         if let Some(file) = &self.ca_file {
             options = options.add_root_certificates(file.clone());
         }
-        let connected = options.connect(&url).await;
-        connected.with_context(|| format!("connecting to NATS at {url}"))
+        Ok(options)
     }
 }
 

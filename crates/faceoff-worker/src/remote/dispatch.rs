@@ -2,14 +2,15 @@
 
 use super::{
     answers::Answers,
+    checked::Checks,
     connection::NatsConfig,
-    granted::{grant_of, store},
+    granted::{Taken, grant_of, of_its_order, store},
     names::{self, ALL, Names, ORDERS_CONSUMER, OUTCOMES_CONSUMER, SERVER, WAITING},
     taken_back::{AllGivenOut, GivenOut},
 };
 use crate::{
     local::LocalServer,
-    server::{Claimed, GivenBack, Holding, WorkServer},
+    server::{Claimed, GivenBack, WorkServer},
     service::WorkerConfig,
 };
 use anyhow::Context as _;
@@ -21,14 +22,14 @@ use async_nats::{
         stream::{self, DiscardPolicy, RetentionPolicy, Stream},
     },
 };
-use faceoff_store::{Lot, Store, Workers};
+use faceoff_store::{Actor, Lot, Store, StoreError, WorkerName, Workers};
 use faceoff_types::Clock;
 use faceoff_wire::{
-    grant::GrantKey,
+    grant::{Grant, GrantKey},
     remote::{Introduction, RemoteOrder, RemoteOutcome},
     work::{Lease, WorkOrder},
 };
-use futures::StreamExt as _;
+use futures::{StreamExt as _, TryStreamExt as _};
 use std::{
     pin::pin,
     sync::Arc,
@@ -44,6 +45,10 @@ const REST: Duration = Duration::from_secs(1);
 const WELL: Duration = Duration::from_secs(10);
 /// An outcome that cannot be stored now is taken again after this.
 const AGAIN: Duration = Duration::from_secs(5);
+/// What is still being stored of an outcome is there soon.
+const SOON: Duration = Duration::from_secs(1);
+/// So many outcomes are checked at the same time: each takes a thread of its own for a while.
+const CHECKED_AT_ONCE: usize = 2;
 /// Orders in the stream at most; there are never more than free slots.
 const MOST_ORDERS: i64 = 100_000;
 /// Bytes of outcomes that wait for the server at most.
@@ -62,6 +67,17 @@ pub struct RemoteConfig {
     pub key: GrantKey,
     /// What workers must be like.
     pub like: Introduction,
+    /// Episodes of each shard that are simulated again before it counts; 0: nothing is.
+    pub checked_episodes: u32,
+}
+
+impl RemoteConfig {
+    fn checks(&self) -> Checks {
+        Checks {
+            episodes: self.checked_episodes,
+            key: self.key.clone(),
+        }
+    }
 }
 
 /// Gives out work until `shutdown` is cancelled. While NATS is away nothing is given out; what is under way elsewhere goes on.
@@ -104,6 +120,8 @@ pub async fn dispatch(
     };
     let workers = hub.server.store.workers();
     workers.use_them();
+    let banned = hub.server.store.worker_bans().await?;
+    workers.set_banned(banned.into_iter().map(|ban| (ban.worker, ban.reason)));
     let again = Again {
         workers,
         shutdown: &shutdown,
@@ -229,6 +247,7 @@ impl Hub {
             order,
             grant,
             files,
+            program: self.remote.like.program.clone(),
         })?;
         let published = self.jetstream.publish(self.names.orders(), order.into());
         let acknowledged = published.await.context("publishing an order")?;
@@ -264,51 +283,123 @@ impl Hub {
         let stream = self.stream(self.outcomes_config()).await?;
         let consumer = self.consumer(&stream, outcomes_consumer()).await?;
         while !shutdown.is_cancelled() {
-            let mut outcomes = consumer
+            let outcomes = consumer
                 .batch()
                 .max_messages(64)
                 .expires(LOOK)
                 .messages()
                 .await
                 .context("asking for what came of work")?;
-            while let Some(outcome) = outcomes.next().await {
-                let message = outcome.map_err(|error| anyhow::anyhow!(error))?;
-                let acknowledgement = self.take(&message).await;
-                message
-                    .ack_with(acknowledgement)
-                    .await
-                    .map_err(|error| anyhow::anyhow!(error))?;
-            }
+            outcomes
+                .map_err(|error| anyhow::anyhow!(error))
+                .try_for_each_concurrent(CHECKED_AT_ONCE, async |message| {
+                    let acknowledgement = self.take(&message).await;
+                    let acknowledged = message.ack_with(acknowledgement).await;
+                    acknowledged.map_err(|error| anyhow::anyhow!(error))
+                })
+                .await?;
         }
         Ok(())
     }
 
     /// Stores what came of an order.
     async fn take(&self, message: &jetstream::Message) -> AckKind {
-        let worker = names::worker_of(&message.subject).unwrap_or("?").to_owned();
-        let outcome: RemoteOutcome = match serde_json::from_slice(&message.payload) {
+        let Some(worker) = names::worker_of(&message.subject) else {
+            tracing::error!(subject = %message.subject, "an outcome of no worker; it is left out");
+            return AckKind::Term;
+        };
+        let mut outcome: RemoteOutcome = match serde_json::from_slice(&message.payload) {
             Ok(outcome) => outcome,
             Err(error) => {
-                tracing::error!(worker, %error, "what a worker sent as an outcome is none; it is left out");
+                tracing::error!(%worker, %error, "what a worker sent as an outcome is none; it is left out");
                 return AckKind::Term;
             }
         };
-        let (server, key) = (self.server.clone(), self.remote.key.clone());
         let unit = outcome.lease.unit;
-        let told = worker.clone();
-        let stored = tokio::task::spawn_blocking(move || store(&server, &key, &told, outcome));
-        match stored.await.map_err(anyhow::Error::from).flatten() {
-            Ok(Holding::Held) => {
-                self.server.store.workers().ended(unit);
-                tracing::info!(%unit, worker, "taken in");
+        let Some(grant) = of_its_order(&outcome, &self.remote.key) else {
+            tracing::error!(%unit, %worker, "a worker sent an outcome without the order that it is of; it is left out");
+            return AckKind::Ack;
+        };
+        if !outcome.lease.slot.starts_with(&names::slot(&worker, "")) {
+            outcome.lease.slot = names::slot(&worker, "?");
+        }
+        let workers = self.server.store.workers();
+        if workers.ban_of(worker.as_str()).is_some() {
+            tracing::warn!(%unit, %worker, "the worker is banned: what came of it is left out");
+            return AckKind::Ack;
+        }
+        let nonce = outcome.lease.nonce;
+        let acknowledgement = match self.stored(message, grant, outcome).await {
+            Ok(Taken::Held) => {
+                workers.ended(unit);
+                tracing::info!(%unit, %worker, "taken in");
                 AckKind::Ack
             }
-            Ok(Holding::Lost) => {
-                tracing::info!(%unit, worker, "no longer this worker's; what came of it is left out");
+            Ok(Taken::Lost) => {
+                tracing::info!(%unit, %worker, "no longer this worker's; what came of it is left out");
                 AckKind::Ack
             }
+            Ok(Taken::Disbelieved(difference)) => self.ban(&worker, &difference).await,
+            Ok(Taken::StillComing) => return AckKind::Nak(Some(SOON)),
             Err(error) => {
-                tracing::error!(%unit, worker, cause = format!("{error:#}"), "what came of a unit cannot be stored; trying again");
+                tracing::error!(%unit, %worker, cause = format!("{error:#}"), "what came of a unit cannot be stored; trying again");
+                return AckKind::Nak(Some(AGAIN));
+            }
+        };
+        workers.forget_files(nonce);
+        acknowledgement
+    }
+
+    /// Checks and stores an outcome. Meanwhile its unit is held, since its worker has done its part, and NATS hears that it is worked at.
+    async fn stored(
+        &self,
+        message: &jetstream::Message,
+        grant: Grant,
+        outcome: RemoteOutcome,
+    ) -> anyhow::Result<Taken> {
+        let (server, checks, lease) = (
+            self.server.clone(),
+            self.remote.checks(),
+            outcome.lease.clone(),
+        );
+        let done = grant.episodes();
+        let mut storing =
+            tokio::task::spawn_blocking(move || store(&server, &checks, &grant, outcome));
+        let every = self.server.renews_every(&lease);
+        loop {
+            tokio::select! {
+                stored = &mut storing => return stored.map_err(anyhow::Error::from).flatten(),
+                () = tokio::time::sleep(every) => {}
+            }
+            let server = self.server.clone();
+            let held = lease.clone();
+            let renewed = tokio::task::spawn_blocking(move || server.renew(&held, done)).await;
+            if let Err(error) = renewed.map_err(anyhow::Error::from).flatten() {
+                tracing::warn!(unit = %lease.unit, cause = format!("{error:#}"), "what is being checked could not be renewed");
+            }
+            // Who is not told so in time delivers it once more, which changes nothing.
+            let _ = message.ack_with(AckKind::Progress).await;
+        }
+    }
+
+    /// Nothing is taken of a worker any more; what it had is given to others.
+    async fn ban(&self, worker: &WorkerName, difference: &str) -> AckKind {
+        let reason = format!("what it recorded is not what the simulator gives: {difference}");
+        let (store, now) = (&self.server.store, self.server.clock.now());
+        match store.ban_worker(Actor::Server, worker, &reason, now).await {
+            Ok(again) => {
+                tracing::error!(
+                    %worker,
+                    difference,
+                    again,
+                    "a worker is banned: what it recorded is not what the simulator gives"
+                );
+                AckKind::Ack
+            }
+            // Two of its outcomes at once.
+            Err(StoreError::Conflict(_)) => AckKind::Ack,
+            Err(error) => {
+                tracing::error!(%worker, %error, difference, "a worker that is not to be believed cannot be banned; trying again");
                 AckKind::Nak(Some(AGAIN))
             }
         }

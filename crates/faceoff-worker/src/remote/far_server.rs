@@ -13,6 +13,7 @@ use async_nats::{
     Client, HeaderMap,
     jetstream::{self, consumer::PullConsumer},
 };
+use faceoff_store::WorkerName;
 use faceoff_types::{BundleRef, GameId};
 use faceoff_wire::{
     remote::{Answer, Ask, Introduction, Outcome, RemoteOrder, RemoteOutcome, RemoteShow, Shown},
@@ -36,6 +37,8 @@ const HEARTBEAT: Duration = Duration::from_secs(2);
 const REST: Duration = Duration::from_secs(2);
 /// How long a file of the server's is asked for again and again: it may be starting anew.
 const FILES_WITHIN: Duration = Duration::from_secs(60);
+/// So long a worker goes on without asking whether it may.
+const MAY_WORK_FOR: Duration = Duration::from_secs(5);
 /// Nobody waits longer to show a position.
 const SHOWS_WITHIN: Duration = Duration::from_millis(20);
 
@@ -44,7 +47,7 @@ pub(super) struct Link {
     pub(super) runtime: Handle,
     pub(super) client: Client,
     pub(super) names: Names,
-    pub(super) worker: String,
+    pub(super) worker: WorkerName,
     pub(super) own: Introduction,
     pub(super) http: reqwest::Client,
     pub(super) shutdown: CancellationToken,
@@ -52,6 +55,8 @@ pub(super) struct Link {
     pub(super) refused: Mutex<Option<String>>,
     /// When a slot last had something to do.
     pub(super) busy_at: Mutex<Instant>,
+    /// When the server last said that it may work.
+    pub(super) may_work_at: Mutex<Option<Instant>>,
 }
 
 impl Link {
@@ -71,6 +76,8 @@ impl Link {
 pub(super) struct FarServer {
     link: Arc<Link>,
     jetstream: jetstream::Context,
+    /// What orders are asked of, while it answers.
+    consumer: Mutex<Option<PullConsumer>>,
     current: Mutex<Current>,
 }
 
@@ -88,6 +95,7 @@ impl FarServer {
         Self {
             jetstream: jetstream::new(link.client.clone()),
             link,
+            consumer: Mutex::default(),
             current: Mutex::default(),
         }
     }
@@ -105,14 +113,22 @@ impl FarServer {
 
     async fn ask(&self, ask: &Ask) -> anyhow::Result<Answer> {
         let question = serde_json::to_vec(ask)?;
-        let subject = self.link.names.asks(&self.link.worker);
+        let subject = self.link.names.asks(self.link.worker.as_str());
         let answer = self.link.client.request(subject, question.into());
         let answer = answer.await.context("asking the server")?;
         serde_json::from_slice(&answer.payload).context("the server's answer")
     }
 
-    /// May this worker work? The log is told when that changes.
+    /// May this worker work? The log is told when that changes. What was answered a moment ago holds: an order says by itself of which
+    /// program it is, and whether it is this worker's the server says when it begins.
     async fn may_work(&self) -> anyhow::Result<bool> {
+        let asked_at = || {
+            let at = self.link.may_work_at.lock();
+            at.unwrap_or_else(PoisonError::into_inner)
+        };
+        if asked_at().is_some_and(|at| at.elapsed() < MAY_WORK_FOR) {
+            return Ok(true);
+        }
         let answer = self.ask(&Ask::MayWork(self.link.own.clone())).await?;
         let reason = match answer {
             Answer::Yes => None,
@@ -131,19 +147,31 @@ impl FarServer {
             }
             refused.clone_from(&reason);
         }
+        *asked_at() = reason.is_none().then(Instant::now);
         Ok(reason.is_none())
+    }
+
+    /// What orders are asked of. It is asked for anew after a failure: the stream may have been made anew.
+    async fn consumer(&self) -> anyhow::Result<PullConsumer> {
+        let known = || self.consumer.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(consumer) = known().clone() {
+            return Ok(consumer);
+        }
+        let stream = self.link.names.orders_stream();
+        let found = self
+            .jetstream
+            .get_consumer_from_stream(ORDERS_CONSUMER, stream);
+        let found: PullConsumer = found
+            .await
+            .map_err(|error| anyhow::anyhow!("asking for orders: {error}"))?;
+        *known() = Some(found.clone());
+        Ok(found)
     }
 
     /// Waits for an order.
     async fn order(&self, slot: &str) -> anyhow::Result<Option<RemoteOrder>> {
         let link = &self.link;
-        let stream = link.names.orders_stream();
-        let consumer = self
-            .jetstream
-            .get_consumer_from_stream(ORDERS_CONSUMER, stream);
-        let consumer: PullConsumer = consumer
-            .await
-            .map_err(|error| anyhow::anyhow!("asking for orders: {error}"))?;
+        let consumer = self.consumer().await?;
         let mut orders = consumer
             .batch()
             .max_messages(1)
@@ -152,7 +180,7 @@ impl FarServer {
             .messages()
             .await
             .context("asking for an order")?;
-        let free = link.names.free(&link.worker);
+        let free = link.names.free(link.worker.as_str());
         link.client.publish(free, Default::default()).await?;
         let order = tokio::select! {
             // What comes now is not begun, and taken back.
@@ -170,6 +198,14 @@ impl FarServer {
             .map_err(|error| anyhow::anyhow!("acknowledging an order: {error}"))?;
         let mut order: RemoteOrder =
             serde_json::from_slice(&message.payload).context("an order")?;
+        if order.program != link.own.program {
+            // Nobody begins it, so it is given out again; the next answer says what is wrong.
+            *link
+                .may_work_at
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner) = None;
+            return Ok(None);
+        }
         let begin = Ask::Begin {
             lease: order.order.lease.clone(),
             slot: slot.to_owned(),
@@ -201,7 +237,7 @@ impl FarServer {
         );
         let began = Instant::now();
         let within = Duration::from_secs(lease.duration_s.into());
-        let subject = self.link.names.outcomes(&self.link.worker);
+        let subject = self.link.names.outcomes(self.link.worker.as_str());
         loop {
             let sent = async {
                 let sent = self.jetstream.publish_with_headers(
@@ -326,6 +362,7 @@ impl WorkServer for FarServer {
             let order = match self.order(slot).await {
                 Ok(order) => order,
                 Err(error) => {
+                    *self.consumer.lock().unwrap_or_else(PoisonError::into_inner) = None;
                     self.rest().await;
                     return Err(error);
                 }
@@ -334,6 +371,7 @@ impl WorkServer for FarServer {
                 order,
                 grant,
                 files,
+                ..
             }) = order
             else {
                 return Ok(Claimed::Nothing { queue });
@@ -401,7 +439,7 @@ impl WorkServer for FarServer {
         let Ok(words) = serde_json::to_vec(&show) else {
             return;
         };
-        let subject = self.link.names.shows(&self.link.worker);
+        let subject = self.link.names.shows(self.link.worker.as_str());
         self.link.runtime.block_on(async {
             let published = self.link.client.publish(subject, words.into());
             // What is not shown in time is not shown.

@@ -1,7 +1,6 @@
 //! What streams and subjects are called. Each begins with the server's own name, so that several share one NATS.
 
-/// How long a worker's name may be.
-const LONGEST_WORKER: usize = 64;
+use faceoff_store::WorkerName;
 
 /// The names of one server's streams and subjects.
 #[derive(Debug, Clone)]
@@ -14,7 +13,7 @@ impl Names {
     pub(super) fn of(server: &str) -> anyhow::Result<Self> {
         anyhow::ensure!(
             is_word(server),
-            "nats.name: expected 1 to {LONGEST_WORKER} of a-z, A-Z, 0-9, - and _, got {server:?}"
+            "nats.name: expected 1 to 64 of a-z, A-Z, 0-9, - and _, got {server:?}"
         );
         Ok(Self {
             server: server.to_owned(),
@@ -69,20 +68,19 @@ pub(super) const ALL: &str = "*";
 pub(super) const WAITING: &str = "given out";
 
 /// What the queue calls a slot of a worker elsewhere.
-pub(super) fn slot(worker: &str, slot: &str) -> String {
-    format!("remote/{worker}/{slot}")
+pub(super) fn slot(worker: &WorkerName, slot: &str) -> String {
+    format!("{}/{slot}", worker.holder())
 }
 
 /// Can it be a token of a subject, and a part of a stream's name?
 pub(super) fn is_word(text: &str) -> bool {
-    let allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
-    (1..=LONGEST_WORKER).contains(&text.len()) && text.chars().all(allowed)
+    text.parse::<WorkerName>().is_ok()
 }
 
 /// The worker that a subject of its own names.
-pub(super) fn worker_of(subject: &str) -> Option<&str> {
+pub(super) fn worker_of(subject: &str) -> Option<WorkerName> {
     let (_, worker) = subject.rsplit_once('.')?;
-    is_word(worker).then_some(worker)
+    worker.parse().ok()
 }
 
 #[cfg(test)]
@@ -93,7 +91,7 @@ mod tests {
     fn subjects_name_server_and_worker() {
         let names = Names::of("faceoff").unwrap();
         assert_eq!(names.asks("gpu-1"), "faceoff.asks.gpu-1");
-        assert_eq!(worker_of(&names.asks("gpu-1")), Some("gpu-1"));
+        assert_eq!(worker_of(&names.asks("gpu-1")), "gpu-1".parse().ok());
         assert_eq!(worker_of(&names.asks(ALL)), None);
         for bad in ["", "a.b", "a b", "*", ">", &"x".repeat(65)] {
             assert!(Names::of(bad).is_err(), "{bad:?}");

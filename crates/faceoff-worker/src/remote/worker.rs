@@ -11,6 +11,7 @@ use crate::{
     service::{Intervals, SlotServer, SlotsConfig, run_slots},
 };
 use anyhow::Context as _;
+use faceoff_store::WorkerName;
 use faceoff_wire::remote::Introduction;
 use std::{
     sync::{Arc, Mutex},
@@ -45,11 +46,14 @@ const LOOK: Duration = Duration::from_secs(1);
 /// If a name is none, the scratch folder cannot be had, or a slot dies.
 pub async fn work(config: RemoteWorker, shutdown: CancellationToken) -> anyhow::Result<()> {
     let names = Names::of(&config.nats.name)?;
-    anyhow::ensure!(
-        names::is_word(&config.name) && config.name != names::SERVER,
-        "the worker's name: expected 1 to 64 of a-z, A-Z, 0-9, - and _, and not “server”, got {:?}; choose one with --name",
-        config.name
-    );
+    let name = config.name.parse::<WorkerName>().ok();
+    let name = name.filter(|name| name.as_str() != names::SERVER);
+    let name = name.with_context(|| {
+        format!(
+            "the worker's name: expected 1 to 64 of a-z, A-Z, 0-9, - and _, and not “server”, got {:?}; choose one with --name",
+            config.name
+        )
+    })?;
     let client = config.nats.connect(&config.name).await?;
     let folder = config.slots.scratch_dir.clone();
     let scratch = tokio::task::spawn_blocking(move || Scratch::take(&folder)).await??;
@@ -57,12 +61,13 @@ pub async fn work(config: RemoteWorker, shutdown: CancellationToken) -> anyhow::
         runtime: Handle::current(),
         client,
         names,
-        worker: config.name,
+        worker: name,
         own: config.own,
         http: config.http,
         shutdown: shutdown.clone(),
         refused: Mutex::default(),
         busy_at: Mutex::new(Instant::now()),
+        may_work_at: Mutex::default(),
     });
     if let Some(ends_after) = config.ends_after {
         let (link, shutdown) = (Arc::clone(&link), shutdown.clone());

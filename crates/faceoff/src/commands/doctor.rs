@@ -1,6 +1,7 @@
 //! `faceoff doctor`: what this host offers to agents and their sandbox, what is missing, and the cure.
 
 mod checked;
+mod elsewhere;
 mod permissions;
 mod times;
 
@@ -24,6 +25,12 @@ pub struct DoctorCommand {
     /// Configuration file [default: faceoff.toml in the working folder, if there is one]
     #[arg(long, value_name = "FILE", env = "FACEOFF_CONFIG")]
     config: Option<PathBuf>,
+    /// Where NATS is, to ask whether a worker of this host would get work; replaces nats.url of the configuration
+    #[arg(long, value_name = "URL")]
+    nats: Option<String>,
+    /// What that worker would be called [default: the host's name]
+    #[arg(long)]
+    name: Option<String>,
     /// Print one JSON object instead of a table
     #[arg(long)]
     json: bool,
@@ -44,6 +51,9 @@ struct Findings {
     descriptors: DescriptorsFound,
     disks: Vec<DiskFound>,
     host: Vec<Checked>,
+    /// Would a worker of this host get work? Empty where no NATS is named.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    nats: Vec<Checked>,
 }
 
 /// The disk of a folder that `serve` writes to.
@@ -119,8 +129,10 @@ impl DoctorCommand {
     /// If a layer of the sandbox is missing that the configuration does not give up; if the
     /// configuration cannot be read.
     pub fn run(self) -> anyhow::Result<()> {
-        let config = Config::load(self.config.as_deref())?;
-        let findings = Findings::gather(&config);
+        let mut config = Config::load(self.config.as_deref())?;
+        config.reach_nats(self.nats)?;
+        let mut findings = Findings::gather(&config);
+        findings.nats = elsewhere::ask(&config, self.name)?;
         let mut out = std::io::stdout().lock();
         if self.json {
             serde_json::to_writer_pretty(&mut out, &findings).context("standard output")?;
@@ -160,6 +172,7 @@ impl Findings {
             descriptors: descriptors(config),
             disks: disks(config),
             host: host(config),
+            nats: Vec::new(),
         }
     }
 
@@ -210,6 +223,13 @@ impl Findings {
         }
         writeln!(out, "Host")?;
         for checked in &self.host {
+            writeln!(out, "  {}: {}", checked.name, checked.found)?;
+            print_cure(out, checked.cure.as_deref())?;
+        }
+        if !self.nats.is_empty() {
+            writeln!(out, "Work for a server elsewhere")?;
+        }
+        for checked in &self.nats {
             writeln!(out, "  {}: {}", checked.name, checked.found)?;
             print_cure(out, checked.cure.as_deref())?;
         }
@@ -448,6 +468,7 @@ mod tests {
             descriptors: descriptors(&Config::default()),
             disks: disks(&Config::default()),
             host: Vec::new(),
+            nats: Vec::new(),
         }
     }
 

@@ -19,5 +19,6 @@ pub fn introduction(runtimes: Vec<String>, slots: usize) -> anyhow::Result<Intro
         version: env!("CARGO_PKG_VERSION").to_owned(),
         runtimes,
         slots: u32::try_from(slots).unwrap_or(u32::MAX),
+        labels: Vec::new(),
     })
 }

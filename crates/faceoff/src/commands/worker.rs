@@ -9,6 +9,8 @@ use anyhow::{Context as _, anyhow};
 use clap::Args;
 use faceoff_metrics::Metrics;
 use faceoff_sandbox::probe_host;
+use faceoff_types::is_harmless;
+use faceoff_wire::remote::Introduction;
 use faceoff_worker::{CpuLayout, RemoteWorker, SlotThreads, SlotsConfig};
 use jiff::SignedDuration;
 use std::{
@@ -44,6 +46,9 @@ pub struct WorkerCommand {
     /// Units of work at the same time; replaces workers.slots of the configuration
     #[arg(long, value_name = "N")]
     slots: Option<usize>,
+    /// What organisers see beside its name, as "lab 3"; may be given up to 8 times
+    #[arg(long = "label", value_name = "TEXT", value_parser = label)]
+    labels: Vec<String>,
     /// Folder for what is under way, of this worker alone; replaces workers.scratch_dir of the configuration
     #[arg(long, value_name = "FOLDER")]
     scratch_dir: Option<PathBuf>,
@@ -87,7 +92,14 @@ impl WorkerCommand {
         check_sandbox(&probe_host(), &config.sandbox.given_up)?;
         config.check_runtimes()?;
         let mut agent = config.agent_environment();
-        let own = introduction(agent.runtimes.keys().cloned().collect(), config.slots())?;
+        let mut own = introduction(agent.runtimes.keys().cloned().collect(), config.slots())?;
+        anyhow::ensure!(
+            self.labels.len() <= Introduction::MOST_LABELS,
+            "--label: expected at most {}, got {}",
+            Introduction::MOST_LABELS,
+            self.labels.len()
+        );
+        own.labels = self.labels;
         let http = reqwest::Client::builder()
             .tls_backend_preconfigured(client::trusting_tls(config.nats.ca_file.as_deref())?)
             .connect_timeout(CONNECTS_WITHIN)
@@ -165,8 +177,20 @@ fn make_key(file: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// A label that a page shows as it is.
+fn label(text: &str) -> Result<String, String> {
+    let chars = text.chars().count();
+    let most = Introduction::LONGEST_LABEL;
+    if (1..=most).contains(&chars) && text.chars().all(is_harmless) {
+        return Ok(text.to_owned());
+    }
+    Err(format!(
+        "expected 1 to {most} characters, none of them invisible"
+    ))
+}
+
 /// This host's name, as subjects can have it.
-fn host_name() -> anyhow::Result<String> {
+pub(super) fn host_name() -> anyhow::Result<String> {
     let name = rustix::system::uname();
     let name = name.nodename().to_string_lossy();
     let word: String = name

@@ -94,6 +94,14 @@ async fn of_server(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Problem
             links: vec![("/organiser/storage".into(), "Storage".into())],
         }),
     }
+    for ban in app.store.worker_bans().await? {
+        items.push(Item {
+            class: "bad",
+            title: format!("The worker {} is banned", ban.worker),
+            detail: format!("Since {}: {}.", minute(ban.at), ban.reason),
+            links: vec![("/organiser/workers".into(), "Workers".into())],
+        });
+    }
     for trouble in WorkersView::now(app).troubles {
         items.push(Item {
             class: "bad",

@@ -6,6 +6,7 @@ mod sheet;
 mod stage;
 mod team;
 mod turn;
+mod worker;
 
 pub(super) use sheet::Sheet;
 
@@ -17,15 +18,17 @@ use stage::StageOrder;
 use std::{fmt, str::FromStr};
 use team::TeamOrder;
 use turn::TurnOrder;
+use worker::WorkerOrder;
 
 /// A decision, as its page's path names it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) enum Order {
     Day(DayOrder),
     Queue(QueueOrder),
     Turn(TurnOrder),
     Team(TeamOrder),
     Stage(StageOrder),
+    Worker(WorkerOrder),
 }
 
 /// A path that names no decision.
@@ -49,25 +52,27 @@ impl FromStr for Order {
             .or_else(|| TurnOrder::named(kind, of).map(Self::Turn))
             .or_else(|| TeamOrder::named(kind, of).map(Self::Team))
             .or_else(|| StageOrder::named(kind, of).map(Self::Stage))
+            .or_else(|| WorkerOrder::named(kind, of).map(Self::Worker))
             .ok_or(NoOrder)
     }
 }
 
 impl Order {
     /// What it would do.
-    pub(super) async fn sheet(self, app: &AppState) -> Result<Sheet, Problem> {
+    pub(super) async fn sheet(&self, app: &AppState) -> Result<Sheet, Problem> {
         match self {
             Self::Day(order) => order.sheet(app).await,
             Self::Queue(order) => order.sheet(app).await,
             Self::Turn(order) => order.sheet(app).await,
             Self::Team(order) => order.sheet(app).await,
             Self::Stage(order) => order.sheet(app).await,
+            Self::Worker(order) => Ok(order.sheet()),
         }
     }
 
     /// Does it, as the API's requests do, and says by which words that is told.
     pub(super) async fn carry_out(
-        self,
+        &self,
         app: &AppState,
         actor: Actor,
         decision: Decision,
@@ -78,6 +83,7 @@ impl Order {
             Self::Turn(order) => order.carry_out(app, actor, decision).await,
             Self::Team(order) => order.carry_out(app, actor, decision).await,
             Self::Stage(order) => order.carry_out(app, actor, decision).await,
+            Self::Worker(order) => order.carry_out(app, actor, decision).await,
         }
     }
 }

@@ -3,7 +3,7 @@
 use crate::{
     app::App,
     pages::{
-        desk_frame::{Head, Said},
+        desk_frame::{Done, Head, Said},
         frame::{Frame, PageProblem, render},
         signed_in::Organising,
     },
@@ -13,7 +13,10 @@ use crate::{
     },
 };
 use askama::Template;
-use axum::{extract::State, response::Response};
+use axum::{
+    extract::{Query, State},
+    response::Response,
+};
 use jiff::Timestamp;
 
 #[derive(Template)]
@@ -43,12 +46,13 @@ impl Page {
 pub(super) async fn page(
     organising: Organising,
     State(app): State<App>,
+    Query(done): Query<Done>,
 ) -> Result<Response, PageProblem> {
     let season = SeasonHead::now(&app).await?.name;
     let path = "/organiser/workers";
     render(&Page {
         frame: Frame::of(&app, season, path),
-        head: Head::of(&organising.caller, path, Said::Nothing),
-        of: WorkersView::now(&app),
+        head: Head::of(&organising.caller, path, Said::Done(&done)),
+        of: WorkersView::with_bans(&app).await?,
     })
 }

@@ -214,6 +214,7 @@ fn a_dataset_is_read_or_refused() {
             Err(VerifyError::Dataset(DatasetError::Altered(_))) => "altered",
             Err(VerifyError::Dataset(DatasetError::Absent(_))) => "absent",
             Err(VerifyError::Workers(error)) => panic!("{error}"),
+            Err(VerifyError::Recording(error)) => panic!("{error}"),
         };
         fs::remove_dir_all(&dir).unwrap();
         label.to_owned()

@@ -93,6 +93,7 @@ fn changed(valid: &Valid, dir: &Path, draws: &mut Draws) -> &'static str {
         Err(VerifyError::Dataset(DatasetError::Altered(_))) => "altered",
         Err(VerifyError::Dataset(DatasetError::Absent(_))) => "absent",
         Err(VerifyError::Workers(error)) => panic!("{error}"),
+        Err(VerifyError::Recording(error)) => panic!("{error}"),
     }
 }
 

@@ -25,6 +25,7 @@ pub(super) fn config(
         nats,
         files: files.unwrap_or_else(|| format!("http://{listens_on}")),
         key: link_key.of_grants(),
+        checked_episodes: config.workers.checked_episodes,
         like: introduction(runtimes.to_vec(), config.slots())?,
     }))
 }

@@ -1,0 +1,58 @@
+//! Who is not believed, and what they had a part in.
+
+use crate::{
+    error::Result,
+    store::Store,
+    tables::worker_bans::{self, WorkerBan},
+    workers::WorkerName,
+};
+use faceoff_types::{EvaluationId, GameId};
+use sqlx::types::Text;
+
+/// What is over and has a part that a worker played.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct PlayedBy {
+    /// Finished evaluations that were not voided, the newest first.
+    pub evaluations: Vec<EvaluationId>,
+    /// Games whose result counts, the newest first.
+    pub games: Vec<GameId>,
+}
+
+impl Store {
+    /// All of whom nothing is taken, by name.
+    pub async fn worker_bans(&self) -> Result<Vec<WorkerBan>> {
+        worker_bans::all(&mut *self.database.read.acquire().await?).await
+    }
+
+    /// What counts of what a worker elsewhere has played, `most` of each kind.
+    pub async fn played_by(&self, worker: &WorkerName, most: u32) -> Result<PlayedBy> {
+        let holder = worker.holder();
+        let mut connection = self.database.read.acquire().await?;
+        let evaluations = sqlx::query_scalar!(
+            r#"SELECT e.id AS "id!: Text<EvaluationId>"
+               FROM units u JOIN shards s ON s.unit_id = u.id JOIN evaluations e ON e.run_id = s.run_id
+               WHERE u.state = 'done' AND u.worker >= 'remote/' AND u.worker < 'remote0'
+                 AND u.worker >= ?1 || '/' AND u.worker < ?1 || '0'
+                 AND e.state = 'finished' AND e.voided_at IS NULL
+               GROUP BY e.id ORDER BY MAX(e.finished_at) DESC LIMIT ?2"#,
+            holder,
+            most,
+        )
+        .fetch_all(&mut *connection)
+        .await?;
+        let games = sqlx::query_scalar!(
+            r#"SELECT g.id AS "id!: Text<GameId>" FROM games g
+               JOIN game_attempts a ON a.game_id = g.id AND a.number = g.attempt
+               WHERE a.worker >= ?1 || '/' AND a.worker < ?1 || '0'
+               ORDER BY a.ended_at DESC LIMIT ?2"#,
+            holder,
+            most,
+        )
+        .fetch_all(&mut *connection)
+        .await?;
+        Ok(PlayedBy {
+            evaluations: evaluations.into_iter().map(|id| id.0).collect(),
+            games: games.into_iter().map(|id| id.0).collect(),
+        })
+    }
+}

@@ -1,0 +1,65 @@
+//! Workers on other machines of which nothing is taken.
+
+use crate::{column::Instant, error::Result};
+use jiff::Timestamp;
+use sqlx::SqliteConnection;
+
+/// A worker of which nothing is taken.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WorkerBan {
+    /// What it is called.
+    pub worker: String,
+    /// Since when.
+    pub at: Timestamp,
+    /// Why, as organisers read it.
+    pub reason: String,
+}
+
+struct BanRow {
+    worker: String,
+    at: Instant,
+    reason: String,
+}
+
+impl From<BanRow> for WorkerBan {
+    fn from(row: BanRow) -> Self {
+        Self {
+            worker: row.worker,
+            at: row.at.0,
+            reason: row.reason,
+        }
+    }
+}
+
+/// False if it is banned already.
+pub(crate) async fn insert(connection: &mut SqliteConnection, ban: &WorkerBan) -> Result<bool> {
+    let at = Instant(ban.at);
+    let inserted = sqlx::query!(
+        "INSERT INTO worker_bans (worker, banned_at, reason) VALUES (?, ?, ?) ON CONFLICT DO NOTHING",
+        ban.worker,
+        at,
+        ban.reason,
+    )
+    .execute(connection)
+    .await?;
+    Ok(inserted.rows_affected() == 1)
+}
+
+/// False if it is not banned.
+pub(crate) async fn delete(connection: &mut SqliteConnection, worker: &str) -> Result<bool> {
+    let deleted = sqlx::query!("DELETE FROM worker_bans WHERE worker = ?", worker)
+        .execute(connection)
+        .await?;
+    Ok(deleted.rows_affected() == 1)
+}
+
+/// By name.
+pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<WorkerBan>> {
+    let rows = sqlx::query_as!(
+        BanRow,
+        r#"SELECT worker, banned_at AS "at: Instant", reason FROM worker_bans ORDER BY worker"#,
+    )
+    .fetch_all(connection)
+    .await?;
+    Ok(rows.into_iter().map(WorkerBan::from).collect())
+}

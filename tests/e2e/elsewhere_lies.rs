@@ -1,0 +1,150 @@
+//! A worker that lies: it takes an order as any other, and reports what it never played.
+
+use crate::{
+    elsewhere::{EPISODES, alone, giving, queued, resume, taking},
+    kills::{assert_same, copy_folder, outcome},
+};
+use async_nats::{
+    Client, HeaderMap,
+    jetstream::{self, consumer::PullConsumer},
+};
+use faceoff_tests::{nats::Nats, relay::Relay, server::Server, worker::Worker};
+use futures::StreamExt as _;
+use serde_json::{Value, json};
+
+/// Somebody who speaks as workers do, and is none.
+struct Liar {
+    client: Client,
+}
+
+impl Liar {
+    async fn asks(&self, question: &Value) -> Value {
+        let words = serde_json::to_vec(question).expect("it is JSON");
+        let answer = self.client.request("faceoff.asks.liar", words.into()).await;
+        let answer = answer.expect("the server answers");
+        serde_json::from_slice(&answer.payload).expect("an answer is JSON")
+    }
+
+    /// Takes an order and makes it its own.
+    async fn begins(&self) -> Value {
+        let jetstream = jetstream::new(self.client.clone());
+        loop {
+            let consumer: Result<PullConsumer, _> = jetstream
+                .get_consumer_from_stream("workers", "faceoff-orders")
+                .await;
+            let Ok(consumer) = consumer else {
+                // The server has not made it yet.
+                tokio::time::sleep(std::time::Duration::from_millis(100)).await;
+                continue;
+            };
+            let orders = consumer.batch().max_messages(1).messages().await;
+            let Some(Ok(order)) = orders.expect("NATS is there").next().await else {
+                continue;
+            };
+            order.ack().await.expect("NATS is there");
+            let order: Value = serde_json::from_slice(&order.payload).expect("an order is JSON");
+            let begin =
+                json!({ "kind": "begin", "lease": order["order"]["lease"], "slot": "slot-0" });
+            if self.asks(&begin).await["kind"] == "yes" {
+                return order;
+            }
+        }
+    }
+
+    /// Reports a success that nobody has played.
+    async fn reports(&self, order: &Value) {
+        let assignment = &order["order"]["assignment"];
+        let (spec, lease) = (&assignment["spec"], &order["order"]["lease"]);
+        let outcome = json!({
+            "task": spec["task"], "episode": spec["episodes"]["start"], "steps": 20, "end": "horizon", "success": true,
+            "violations": { "ee": false, "link": false, "joint_pos": false, "joint_vel": false },
+            "computation_time": { "mean_s": 0.001, "max_s": 0.002 }, "fault": null
+        });
+        let report = json!({
+            "kind": "play", "outcomes": [outcome], "log": "", "stopped_by_faults": false,
+            "recording": assignment["keeps"]["recording"],
+        });
+        let told = json!({
+            "lease": lease, "grant": order["grant"], "outcome": { "kind": "done", "report": report },
+        });
+        let mut headers = HeaderMap::new();
+        let id = [&lease["unit"], &lease["nonce"]].map(|id| id.as_str().expect("an id is a text"));
+        headers.insert("Nats-Msg-Id", id.join("/"));
+        let words = serde_json::to_vec(&told).expect("it is JSON");
+        let sent = jetstream::new(self.client.clone())
+            .publish_with_headers("faceoff.outcomes.liar", headers, words.into())
+            .await;
+        sent.expect("NATS is there")
+            .await
+            .expect("NATS takes outcomes");
+    }
+}
+
+#[test]
+fn a_worker_that_lies_is_banned_by_name_and_others_play_what_it_had() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let data = scratch.path().join("data");
+    let (evaluation, team) = queued(&data, scratch.path());
+    let calm = scratch.path().join("calm");
+    copy_folder(&data, &calm);
+    let undisturbed = Server::start(&calm, &alone());
+    resume(&undisturbed);
+    let expected = outcome(&undisturbed, &team, &evaluation);
+    undisturbed.kill();
+
+    let nats = Nats::start(&scratch.path().join("nats"));
+    let files = Relay::start();
+    let config = giving(&nats, files.address());
+    let server = Server::start(&data, &config);
+    files.lead_to(server.address().into());
+    resume(&server);
+    let runtime = tokio::runtime::Runtime::new().expect("a runtime starts");
+    let may_work = json!({
+        "kind": "may_work", "program": "0".repeat(64), "version": "1", "runtimes": [], "slots": 1,
+    });
+    let liar = runtime.block_on(async {
+        let client = async_nats::connect(nats.url()).await;
+        let liar = Liar {
+            client: client.expect("NATS is there"),
+        };
+        let (lied, kept) = (liar.begins().await, liar.begins().await);
+        liar.reports(&lied).await;
+        server.wait_for_log("a worker is banned", 1);
+        // What else it has is no longer its own, and it gets nothing more.
+        let lease = &kept["order"]["lease"];
+        let renew = json!({ "kind": "renew", "lease": lease, "episodes_done": 0 });
+        assert_eq!(liar.asks(&renew).await["kind"], "no");
+        let told = liar.asks(&may_work).await;
+        let why = told["reason"].as_str().expect("a refusal has a reason");
+        assert!(why.contains("takes nothing of this worker"), "{told:#}");
+        liar
+    });
+    let told = server.get("/api/v1/workers", Some(&server.admin_token));
+    let banned: Value = told.json().expect("the API speaks JSON");
+    assert_eq!(banned["bans"][0]["worker"], "liar", "{banned:#}");
+    let reason = banned["bans"][0]["reason"].as_str().unwrap_or_default();
+    assert!(
+        reason.contains("not what the simulator gives") && reason.contains("damaged or incomplete"),
+        "{reason}"
+    );
+
+    // Not even a restart makes it forgotten.
+    server.kill();
+    let server = Server::start(&data, &config);
+    files.lead_to(server.address().into());
+    let honest = Worker::start(scratch.path(), "honest", &taking(nats.address(), 1));
+    let found = outcome(&server, &team, &evaluation);
+    assert_eq!(assert_same(found, expected), 3 * EPISODES as usize);
+    let told = runtime.block_on(liar.asks(&may_work));
+    assert_eq!(told["kind"], "no", "{told:#}");
+    let readmitted = server.post(
+        "/api/v1/workers/liar/readmit",
+        &server.admin_token,
+        &json!({}),
+    );
+    assert_eq!(readmitted.status(), 204);
+    let told = runtime.block_on(liar.asks(&may_work));
+    let why = told["reason"].as_str().unwrap_or_default();
+    assert!(why.contains("another program"), "as any other: {told:#}");
+    honest.end();
+}
