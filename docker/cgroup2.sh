@@ -171,6 +171,14 @@ case_is "image: doctor in a busy cgroup without a namespace of its own, as in pr
 mkdir $top/pod
 expect image-pod sh -c "echo 0 >$top/pod/cgroup.procs; exec $repository/docker/entrypoint.sh sh $0 run doctor"
 
+case_is "partial: doctor in a busy cgroup that is offered pids and cpu, and no memory"
+mkdir $top/partial
+echo '+pids +cpu' >$top/partial/cgroup.subtree_control
+mkdir $top/partial/service
+# What is missing there is memory alone.
+expect partial sh -c "echo 0 >$top/partial/service/cgroup.procs; cd /tmp; '$program' doctor >/tmp/partial; cat /tmp/partial
+    [ \"\$(grep -c 'cgroup v2, limits accepted' /tmp/partial)\" = 2 ]"
+
 case_is "what is left"
 find $top -type d -name 'agent-*' | grep . && failed="$failed left-behind"
 [ -z "$failed" ] && echo "everything passed" || echo "failed:$failed"

@@ -132,29 +132,45 @@ impl Home {
         if missing.is_empty() {
             return Ok(());
         }
-        match fs::write(&control, missing.join(" ")) {
-            Err(error) if error.kind() == io::ErrorKind::ResourceBusy => {
-                // A cgroup with processes cannot distribute controllers: whatever lives in the service's
-                // own cgroup moves into a leaf beside the agents'.
-                let leaf = dir.join(SERVICE_LEAF);
-                match fs::create_dir(&leaf) {
-                    Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
-                        return Err(error);
-                    }
-                    _ => {}
-                }
-                for pid in files::processes(dir) {
-                    match fs::write(leaf.join("cgroup.procs"), pid.to_string()) {
-                        // It has ended meanwhile.
-                        Err(error) if error.raw_os_error() == Some(libc::ESRCH) => {}
-                        result => result?,
-                    }
-                }
-                fs::write(&control, missing.join(" "))
+        // A cgroup with processes cannot distribute memory (EBUSY), and one that distributes only pids and cpu becomes a threaded one,
+        // below which no agent can be put (EOPNOTSUPP). Only the hierarchy's real top, which has no type, may have both.
+        if dir.join("cgroup.type").exists() {
+            make_room(dir)?;
+        }
+        let give_out = || fs::write(&control, missing.join(" "));
+        match give_out() {
+            // One more has been born there meanwhile.
+            Err(error)
+                if error.kind() == io::ErrorKind::ResourceBusy
+                    || error.raw_os_error() == Some(libc::EOPNOTSUPP) =>
+            {
+                make_room(dir)?;
+                give_out()
             }
             result => result,
         }
     }
+}
+
+/// v2: moves whatever lives in the service's own cgroup into a leaf beside the agents'.
+fn make_room(dir: &Path) -> io::Result<()> {
+    let processes = files::processes(dir);
+    if processes.is_empty() {
+        return Ok(());
+    }
+    let leaf = dir.join(SERVICE_LEAF);
+    match fs::create_dir(&leaf) {
+        Err(error) if error.kind() != io::ErrorKind::AlreadyExists => return Err(error),
+        _ => {}
+    }
+    for pid in processes {
+        match fs::write(leaf.join("cgroup.procs"), pid.to_string()) {
+            // It has ended meanwhile.
+            Err(error) if error.raw_os_error() == Some(libc::ESRCH) => {}
+            result => result?,
+        }
+    }
+    Ok(())
 }
 
 /// The host's hierarchies, read once per agent.
