@@ -6,12 +6,15 @@ SERVE    ?= 1
 LISTEN   ?= 127.0.0.1:8080
 DEMO_DIR ?= demo-data
 MINUTES  ?= 60
+SHARDS   ?= 10000
+WORKERS  ?= 200
+SLEEP_S  ?= 10
 
 CARGO      ?= cargo
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
 
-.PHONY: demo test web wheel pictures test-api test-python test-learning fuzz busy load elsewhere soak steady frames test-cgroup2 test-box lint format fidelity setup setup-test agents dist clean-demo help
+.PHONY: demo test web wheel pictures test-api test-python test-learning fuzz busy load elsewhere crowd soak steady frames test-cgroup2 test-box lint format fidelity setup setup-test agents dist clean-demo help
 
 help:
 	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
@@ -29,6 +32,7 @@ help:
 	@echo "make busy   play beside hogs, floods and bursts of processes"
 	@echo "make load   how much looking on a server bears, and that agents notice nothing of it"
 	@echo "make elsewhere   what it costs to play on another machine"
+	@echo "make crowd   what one server carries when many machines work for it: SHARDS=$(SHARDS) WORKERS=$(WORKERS) SLEEP_S=$(SLEEP_S)"
 	@echo "make soak   upload, play, read, fill the disk and kill the server, all at once: MINUTES=$(MINUTES)"
 	@echo "make steady run the tests ten times, and three times on a busy machine"
 	@echo "make frames   how much CPU time a frame of a replay takes its script"
@@ -138,6 +142,11 @@ load:
 elsewhere: setup-test
 	$(CARGO) build --release --locked --package faceoff
 	python3 tests/load/elsewhere.py $(RELEASE)/faceoff
+
+# Many workers that sleep in place of playing, for one server; nothing else should run. TMPDIR=FOLDER: on that disk.
+crowd: setup-test
+	$(CARGO) build --release --locked --package faceoff --package faceoff-tests --bin faceoff --example crowd
+	SHARDS=$(SHARDS) WORKERS=$(WORKERS) SLEEP_S=$(SLEEP_S) RECORDING_BYTES=$(RECORDING_BYTES) $(RELEASE)/examples/crowd
 
 # All disturbances at once; SOAK_SEED=N for other moments than last time.
 soak: setup-test
