@@ -76,6 +76,7 @@ demo: setup
 test: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
 	docker/runtime.sh $(TARGET_DIR)/runtimes/python3-ml
+	TARGET_DIR=$(TARGET_DIR) tests/s3/setup.sh
 	python3 agents/test_agents.py
 	web/client/build.sh test
 	TARGET_DIR=$(TARGET_DIR) tests/api/test.sh

@@ -12,6 +12,7 @@ mod cut;
 mod demo;
 mod desks;
 mod elsewhere;
+mod elsewhere_bucket;
 mod elsewhere_lies;
 mod fair_shares;
 mod full_disk;

@@ -2,6 +2,7 @@
 //! and an HTTP client that knows nothing of the server's types.
 
 pub mod browser;
+pub mod bucket;
 pub mod bundle;
 pub mod nats;
 pub mod packages;

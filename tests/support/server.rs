@@ -72,6 +72,21 @@ impl Server {
         Self::answering(command(data_dir, config), |_| data_dir.to_owned())
     }
 
+    /// Starts it with these variables in its environment.
+    ///
+    /// # Panics
+    /// As [`start`](Self::start).
+    #[must_use]
+    pub fn start_with_environment(
+        data_dir: &Path,
+        config: &str,
+        variables: &[(&str, String)],
+    ) -> Self {
+        let mut server = command(data_dir, config);
+        server.envs(variables.iter().map(|(name, value)| (*name, value)));
+        Self::answering(server, |_| data_dir.to_owned())
+    }
+
     /// Starts it on a host that allows it so many file descriptors and no more.
     ///
     /// # Panics

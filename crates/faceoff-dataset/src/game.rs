@@ -12,7 +12,7 @@ mod table;
 mod verify;
 
 pub use archive::{GameArchives, RecordedGame, clear_game};
-pub use files::{GAME_FILE, side_file};
+pub use files::{GAME_FILE, GAME_FILES, side_file};
 pub use recorder::GameRecorder;
 pub use recording::GameRecording;
 pub use verify::{VerifiedGame, verify_game};

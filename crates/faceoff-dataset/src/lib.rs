@@ -28,5 +28,5 @@ pub use error::{DatasetError, RecordingError};
 pub use files::{ARCHIVE_FILE, CLIPS_FILE};
 pub use recorder::Recorder;
 pub use shard::ShardReport;
-pub use shard_folder::ShardFolder;
+pub use shard_folder::{SHARD_FILES, ShardFolder};
 pub use simulator::has_robot;

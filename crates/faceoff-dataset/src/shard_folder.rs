@@ -31,6 +31,16 @@ const WITHOUT_CLIPS_SCHEMA: &str = "faceoff-shard/4";
 /// such shards.
 const OLD_SHARD_SCHEMAS: [&str; 2] = ["faceoff-shard/2", "faceoff-shard/3"];
 
+/// The files of a recorded shard.
+pub const SHARD_FILES: [&str; 6] = [
+    STEPS_FILE,
+    EPISODES_FILE,
+    LOG_FILE,
+    REPORT_FILE,
+    CLIPS_FILE,
+    SHARD_FILE,
+];
+
 /// The files that `shard.json` lists.
 const FILES: [&str; 5] = [STEPS_FILE, EPISODES_FILE, LOG_FILE, REPORT_FILE, CLIPS_FILE];
 

@@ -3,6 +3,7 @@
 use crate::work::{Lease, WorkOrder, WorkReport};
 use faceoff_types::{GameId, LiveHappening, LivePosition};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// An order, and what it opens.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -15,6 +16,18 @@ pub struct RemoteOrder {
     pub files: String,
     /// BLAKE3 of the server's program, 64 hexadecimal digits: a worker that runs another declines.
     pub program: String,
+    /// Where bundles and recordings are instead, if not with the server.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub objects: Option<Objects>,
+}
+
+/// Links to files of an order, good for a while and for nothing else.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Objects {
+    /// By BLAKE3: to fetch.
+    pub bundles: BTreeMap<String, String>,
+    /// By name: to store.
+    pub files: BTreeMap<String, String>,
 }
 
 /// What a worker is: its orders depend on it.

@@ -31,7 +31,9 @@ mod tests;
 mod tidying;
 
 pub use cpus::{CpuLayout, SlotCpus};
-pub use remote::{Examined, NatsConfig, RemoteConfig, RemoteWorker, dispatch, examine, work};
+pub use remote::{
+    BucketConfig, Examined, NatsConfig, RemoteConfig, RemoteWorker, dispatch, examine, work,
+};
 pub use schedule::{run_schedule, start_due};
 pub use service::{SlotsConfig, WorkerConfig, run};
 pub use slot_threads::{SlotStarter, SlotThreads};

@@ -7,6 +7,7 @@
 //! a worker's slots see it, `worker.rs` the process that they run in; `checked.rs` is why the server believes what comes back.
 
 mod answers;
+mod bucket;
 mod checked;
 mod connection;
 mod dispatch;
@@ -17,6 +18,7 @@ mod names;
 mod taken_back;
 mod worker;
 
+pub use bucket::BucketConfig;
 pub use connection::NatsConfig;
 pub use dispatch::{RemoteConfig, dispatch};
 pub use examine::{Examined, examine};

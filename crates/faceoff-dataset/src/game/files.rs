@@ -24,6 +24,9 @@ pub const fn side_file(side: Side) -> &'static str {
     }
 }
 
+/// The files of a recorded game.
+pub const GAME_FILES: [&str; 3] = [GAME_FILE, side_file(Side::First), side_file(Side::Second)];
+
 /// What a side saw and did.
 pub(super) const fn steps_file(side: Side) -> &'static str {
     match side {

@@ -35,19 +35,25 @@ pub(super) struct Answers {
 /// So many are answered at the same time.
 const AT_ONCE: usize = 64;
 
+/// How often progress is written: each time is a transaction that waits for the disk.
+const PROGRESS_EVERY: Duration = Duration::from_secs(2);
+
 /// When leases were last written as renewed, and how far the work was: workers ask more often than the database needs to know.
 #[derive(Debug, Default)]
 struct Renewals(Mutex<HashMap<Uuid, (Instant, u32)>>);
 
 impl Renewals {
-    /// Is it to be written, because it is new, has progressed, or was written so long ago?
+    /// Is it to be written, because it is new, has progressed since a while, or was written so long ago?
     fn is_due(&self, nonce: Uuid, done: u32, every: Duration, now: Instant) -> bool {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         // What nobody asks about any more is forgotten.
         all.retain(|_, (at, _)| now.duration_since(*at) < 100 * every);
         let is_due = all
             .get(&nonce)
-            .is_none_or(|(at, before)| *before != done || now.duration_since(*at) >= every);
+            .is_none_or(|(at, before)| {
+                let ago = now.duration_since(*at);
+                ago >= every || (*before != done && ago >= PROGRESS_EVERY)
+            });
         if is_due {
             all.insert(nonce, (now, done));
         }
@@ -307,6 +313,7 @@ mod tests {
         };
         assert!(is_due(0, 0));
         assert!(!is_due(0, 1));
+        assert!(!is_due(1, 1), "an episode more, but soon after");
         assert!(is_due(1, 2), "an episode more");
         assert!(!is_due(1, 11));
         assert!(is_due(1, 12));

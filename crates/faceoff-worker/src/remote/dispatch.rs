@@ -2,6 +2,7 @@
 
 use super::{
     answers::Answers,
+    bucket::{Bucket, BucketConfig},
     checked::Checks,
     connection::NatsConfig,
     granted::{Taken, grant_of, of_its_order, store},
@@ -26,7 +27,7 @@ use faceoff_store::{Actor, Lot, Store, StoreError, WorkerName, Workers};
 use faceoff_types::Clock;
 use faceoff_wire::{
     grant::{Grant, GrantKey},
-    remote::{Introduction, RemoteOrder, RemoteOutcome},
+    remote::{Introduction, Outcome, RemoteOrder, RemoteOutcome},
     work::{Lease, WorkOrder},
 };
 use futures::{StreamExt as _, TryStreamExt as _};
@@ -69,6 +70,8 @@ pub struct RemoteConfig {
     pub like: Introduction,
     /// Episodes of each shard that are simulated again before it counts; 0: nothing is.
     pub checked_episodes: u32,
+    /// Where bundles and recordings pass, if not by this server's HTTP.
+    pub bucket: Option<BucketConfig>,
 }
 
 impl RemoteConfig {
@@ -100,7 +103,15 @@ pub async fn dispatch(
     server.end_leases_of(WAITING).await?;
     let season = server.store.season().await?.commitment;
     let client = remote.nats.connect(SERVER).await?;
+    let bucket = match &remote.bucket {
+        Some(bucket) => {
+            bucket.make_folder()?;
+            Some(Arc::new(Bucket::open(bucket.clone())?))
+        }
+        None => None,
+    };
     let hub = Arc::new(Hub {
+        bucket,
         jetstream: jetstream::new(client.clone()),
         given_out: Arc::default(),
         owner: format!("Faceoff, season {season}"),
@@ -186,6 +197,7 @@ struct Hub {
     names: Names,
     server: LocalServer,
     remote: RemoteConfig,
+    bucket: Option<Arc<Bucket>>,
     given_out: Arc<AllGivenOut>,
     /// Whose streams these are.
     owner: String,
@@ -241,13 +253,22 @@ impl Hub {
 
     /// Its place in the stream.
     async fn publish(&self, order: WorkOrder) -> anyhow::Result<u64> {
-        let grant = grant_of(&order).sealed(&self.remote.key)?;
+        let grant = grant_of(&order);
+        let objects = match &self.bucket {
+            Some(bucket) => {
+                let artifacts = self.server.store.artifacts();
+                Some(bucket.opens(&grant, artifacts).await?)
+            }
+            None => None,
+        };
+        let grant = grant.sealed(&self.remote.key)?;
         let files = self.remote.files.clone();
         let order = serde_json::to_vec(&RemoteOrder {
             order,
             grant,
             files,
             program: self.remote.like.program.clone(),
+            objects,
         })?;
         let published = self.jetstream.publish(self.names.orders(), order.into());
         let acknowledged = published.await.context("publishing an order")?;
@@ -362,9 +383,22 @@ impl Hub {
             self.remote.checks(),
             outcome.lease.clone(),
         );
-        let done = grant.episodes();
-        let mut storing =
-            tokio::task::spawn_blocking(move || store(&server, &checks, &grant, outcome));
+        let (done, bucket) = (grant.episodes(), self.bucket.clone());
+        let mut storing = tokio::spawn(async move {
+            let bucket = bucket.filter(|_| matches!(outcome.outcome, Outcome::Done { .. }));
+            if let Some(bucket) = &bucket
+                && server.store.is_held(grant.unit, grant.nonce).await?
+            {
+                bucket.take(&grant, server.store.artifacts()).await?;
+            }
+            let of = grant.clone();
+            let stored = tokio::task::spawn_blocking(move || store(&server, &checks, &of, outcome))
+                .await??;
+            if let Some(bucket) = &bucket {
+                bucket.forget(&grant).await;
+            }
+            anyhow::Ok(stored)
+        });
         let every = self.server.renews_every(&lease);
         loop {
             tokio::select! {

@@ -13,10 +13,13 @@ use async_nats::{
     Client, HeaderMap,
     jetstream::{self, consumer::PullConsumer},
 };
+use faceoff_dataset::CLIPS_FILE;
 use faceoff_store::WorkerName;
 use faceoff_types::{BundleRef, GameId};
 use faceoff_wire::{
-    remote::{Answer, Ask, Introduction, Outcome, RemoteOrder, RemoteOutcome, RemoteShow, Shown},
+    remote::{
+        Answer, Ask, Introduction, Objects, Outcome, RemoteOrder, RemoteOutcome, RemoteShow, Shown,
+    },
     work::{Lease, WorkReport},
 };
 use futures::{StreamExt as _, TryStreamExt as _};
@@ -86,8 +89,43 @@ pub(super) struct FarServer {
 struct Current {
     grant: String,
     files: String,
+    objects: Option<Objects>,
     /// When the server last said that it is this slot's.
     held_at: Option<Instant>,
+}
+
+/// A file of an order's.
+enum Place<'a> {
+    /// By BLAKE3: to fetch.
+    Bundle(&'a str),
+    /// By name: to store.
+    File(&'a str),
+}
+
+impl Place<'_> {
+    /// How it is asked for and where, and with which word.
+    fn of(&self, current: &Current) -> anyhow::Result<(Method, String, Option<String>)> {
+        let (method, path, link) = match self {
+            Self::Bundle(blake3) => {
+                let links = current.objects.as_ref().map(|objects| &objects.bundles);
+                let path = format!("bundles/{blake3}");
+                (Method::GET, path, links.map(|links| links.get(*blake3)))
+            }
+            Self::File(name) => {
+                let links = current.objects.as_ref().map(|objects| &objects.files);
+                let path = format!("files/{name}");
+                (Method::PUT, path, links.map(|links| links.get(*name)))
+            }
+        };
+        match link {
+            Some(Some(link)) => Ok((method, link.clone(), None)),
+            Some(None) => anyhow::bail!("the order has no link to {path}"),
+            None => {
+                let url = format!("{}/work/{path}", current.files);
+                Ok((method, url, Some(format!("Grant {}", current.grant))))
+            }
+        }
+    }
 }
 
 impl FarServer {
@@ -260,30 +298,28 @@ impl FarServer {
         }
     }
 
-    /// Asks for a file of the server's, or sends one, again while the server is away.
+    /// Asks for a file of the order's, or sends one, again while whoever has it is away.
     async fn files<T>(
         &self,
         what: &str,
         mut once: impl AsyncFnMut(reqwest::RequestBuilder) -> anyhow::Result<T>,
-        (method, path): (Method, String),
+        place: Place<'_>,
     ) -> anyhow::Result<T> {
-        let (grant, url) = {
-            let current = self.current();
-            (
-                format!("Grant {}", current.grant),
-                format!("{}/work/{path}", current.files),
-            )
-        };
+        let (method, url, grant) = place.of(&self.current())?;
+        // A link of a bucket opens by itself what it leads to, so it is not told.
+        let shown = url.split('?').next().unwrap_or_default().to_owned();
         let began = Instant::now();
         loop {
-            let request = self.link.http.request(method.clone(), &url);
-            let request = request.header(header::AUTHORIZATION, &grant);
+            let mut request = self.link.http.request(method.clone(), &url);
+            if let Some(grant) = &grant {
+                request = request.header(header::AUTHORIZATION, grant);
+            }
             let error = match once(request).await {
                 Ok(done) => return Ok(done),
                 Err(error) => error,
             };
             if !is_away(&error) || began.elapsed() >= FILES_WITHIN {
-                return Err(error).with_context(|| format!("{what} {url}"));
+                return Err(error).with_context(|| format!("{what} {shown}"));
             }
             tokio::time::sleep(REST).await;
         }
@@ -301,8 +337,8 @@ impl FarServer {
             let _ = good(answer).await?;
             Ok(())
         };
-        let to = (Method::PUT, format!("files/{name}"));
-        self.files("storing a file at", send, to).await
+        self.files("storing a file at", send, Place::File(name))
+            .await
     }
 }
 
@@ -371,6 +407,7 @@ impl WorkServer for FarServer {
                 order,
                 grant,
                 files,
+                objects,
                 ..
             }) = order
             else {
@@ -380,6 +417,7 @@ impl WorkServer for FarServer {
             *self.current() = Current {
                 grant,
                 files,
+                objects,
                 held_at: Some(Instant::now()),
             };
             Ok(Claimed::Order(Box::new(order)))
@@ -497,7 +535,7 @@ impl WorkServer for FarServer {
             file.flush().await?;
             Ok(())
         };
-        let from = (Method::GET, format!("bundles/{}", bundle.blake3));
+        let from = Place::Bundle(&bundle.blake3);
         let fetched = self.files("fetching the bundle", fetch, from);
         self.link.runtime.block_on(fetched)
     }
@@ -519,7 +557,7 @@ impl WorkServer for FarServer {
     }
 
     fn store_clips(&self, _: &str, clips: &Path) -> anyhow::Result<()> {
-        self.link.runtime.block_on(self.store("clips", clips))
+        self.link.runtime.block_on(self.store(CLIPS_FILE, clips))
     }
 
     fn store_dataset(&self, key: &str, _: &Path, _: Option<&Path>) -> anyhow::Result<()> {

@@ -5,6 +5,7 @@ use crate::{
     local::LocalServer,
     server::{GivenBack, Holding, WorkServer},
 };
+use faceoff_dataset::{CLIPS_FILE, SHARD_FILES, game::GAME_FILES};
 use faceoff_wire::{
     grant::{Grant, GrantKey, Plays, Writes},
     remote::{Outcome, RemoteOutcome},
@@ -47,6 +48,16 @@ pub(super) fn grant_of(order: &WorkOrder) -> Grant {
         bundles,
         writes,
         plays,
+    }
+}
+
+/// The files that may be stored under an order, by name.
+pub(super) fn file_names(grant: &Grant) -> &'static [&'static str] {
+    match (&grant.writes, &grant.plays) {
+        (Writes::Folder(_), Plays::Shard(_)) => &SHARD_FILES,
+        (Writes::Folder(_), Plays::Game(_)) => &GAME_FILES,
+        (Writes::File(_), _) => &[CLIPS_FILE],
+        (Writes::Folder(_), Plays::Nothing) | (Writes::Nothing, _) => &[],
     }
 }
 

@@ -100,12 +100,7 @@ impl WorkerCommand {
             self.labels.len()
         );
         own.labels = self.labels;
-        let http = reqwest::Client::builder()
-            .tls_backend_preconfigured(client::trusting_tls(config.nats.ca_file.as_deref())?)
-            .connect_timeout(CONNECTS_WITHIN)
-            .read_timeout(READS_WITHIN)
-            .build()
-            .context("setting up the client that fetches files")?;
+        let http = files_client(config.nats.ca_file.as_deref())?;
         // For as long as agents run.
         let _image = in_memory(&mut agent.runtimes, config.sandbox.resident_bytes);
         let scratch_dir = config.scratch_dir();
@@ -137,6 +132,16 @@ impl WorkerCommand {
             .context("starting the async runtime")?
             .block_on(work(worker))
     }
+}
+
+/// What fetches and stores files on other machines.
+pub(super) fn files_client(ca_file: Option<&Path>) -> anyhow::Result<reqwest::Client> {
+    reqwest::Client::builder()
+        .tls_backend_preconfigured(client::trusting_tls(ca_file)?)
+        .connect_timeout(CONNECTS_WITHIN)
+        .read_timeout(READS_WITHIN)
+        .build()
+        .context("setting up the client that fetches files")
 }
 
 async fn work(worker: RemoteWorker) -> anyhow::Result<()> {

@@ -21,6 +21,10 @@ pub struct NatsSection {
     /// Where workers reach this server's files; left out, `server.public_url`, or else the address that it listens on.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub files_url: Option<String>,
+    /// Where bundles and recordings pass instead: a bucket of S3, or of what speaks as it does. Keys, region and endpoint are the
+    /// environment's (`AWS_ACCESS_KEY_ID` …).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bucket: Option<String>,
 }
 
 impl Default for NatsSection {
@@ -31,6 +35,7 @@ impl Default for NatsSection {
             nkey_file: None,
             ca_file: None,
             files_url: None,
+            bucket: None,
         }
     }
 }
@@ -66,6 +71,11 @@ impl NatsSection {
             begins(&self.files_url, &["http://", "https://"]),
             "nats.files_url: expected http://HOST:PORT or https://HOST without a slash at its end, got {:?}",
             self.files_url.as_deref().unwrap_or_default()
+        );
+        ensure!(
+            begins(&self.bucket, &["s3://"]),
+            "nats.bucket: expected s3://BUCKET or s3://BUCKET/PREFIX without a slash at its end, got {:?}",
+            self.bucket.as_deref().unwrap_or_default()
         );
         Ok(())
     }

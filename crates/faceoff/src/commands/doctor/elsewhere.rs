@@ -8,7 +8,7 @@ use crate::{
 use anyhow::Context as _;
 use faceoff_worker::examine;
 
-/// The first version of nats-server whose makers still mend it; Debian has an older one, with which everything works.
+/// The first version of nats-server that is recommended; Debian has an older one, with which everything works.
 const MAINTAINED: (u32, u32) = (2, 12);
 
 /// Nothing where no NATS is named.
@@ -28,7 +28,7 @@ pub(super) fn ask(config: &Config, name: Option<String>) -> anyhow::Result<Vec<C
         Ok(version) => Checked {
             name: "NATS",
             cure: is_old(&version).then(|| {
-                "it works; its makers mend 2.12 and later ones: see docs/operating.md, Work on other machines".to_owned()
+                "it works; for operation 2.12 or later is recommended: see docs/operating.md, Work on other machines".to_owned()
             }),
             found: format!("nats-server {version} at {}", nats.url),
         },

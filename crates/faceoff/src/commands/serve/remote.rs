@@ -2,7 +2,7 @@
 
 use crate::{commands::introduction::introduction, config::Config};
 use faceoff_http::LinkKey;
-use faceoff_worker::RemoteConfig;
+use faceoff_worker::{BucketConfig, RemoteConfig};
 use std::net::SocketAddr;
 
 /// How work is given to other machines, if it is.
@@ -19,12 +19,21 @@ pub(super) fn config(
         );
         return Ok(None);
     };
+    let bucket = match &config.nats.bucket {
+        Some(url) => Some(BucketConfig {
+            url: url.clone(),
+            http: super::super::worker::files_client(config.nats.ca_file.as_deref())?,
+            folder: config.server.data_dir.join("from-bucket"),
+        }),
+        None => None,
+    };
     let files = config.nats.files_url.clone();
     let files = files.or_else(|| config.server.public_url.clone());
     Ok(Some(RemoteConfig {
         nats,
         files: files.unwrap_or_else(|| format!("http://{listens_on}")),
         key: link_key.of_grants(),
+        bucket,
         checked_episodes: config.workers.checked_episodes,
         like: introduction(runtimes.to_vec(), config.slots())?,
     }))

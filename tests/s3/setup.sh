@@ -1,0 +1,12 @@
+#!/bin/sh
+# Makes TARGET_DIR/s3-test, a virtual environment with what the tests need to have a bucket; again if its requirements have changed.
+set -eu
+here=$(dirname "$(realpath "$0")")
+: "${TARGET_DIR:=target}"
+environment=$TARGET_DIR/s3-test
+if ! cmp --silent "$here/requirements.txt" "$environment/requirements.txt"; then
+    rm -rf "$environment"
+    "${PYTHON:-python3}" -m venv "$environment"
+    "$environment/bin/pip" install --quiet --disable-pip-version-check -r "$here/requirements.txt"
+    cp "$here/requirements.txt" "$environment/requirements.txt"
+fi

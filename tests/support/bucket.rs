@@ -1,0 +1,114 @@
+//! A bucket that speaks as S3 does, on this machine.
+
+use crate::{
+    repository,
+    server::{Process, http},
+};
+use std::{
+    io::{BufRead as _, BufReader},
+    net::SocketAddr,
+    process::{ChildStdin, Command, Stdio},
+};
+
+/// It, until this is dropped.
+#[derive(Debug)]
+pub struct Bucket {
+    _process: Process,
+    /// It ends with its input.
+    _input: ChildStdin,
+    endpoint: String,
+}
+
+/// What the bucket is called.
+const NAME: &str = "matches";
+
+impl Bucket {
+    /// An empty one.
+    ///
+    /// # Panics
+    /// If its server is not installed, or does not start.
+    #[must_use]
+    pub fn start() -> Self {
+        let test = std::env::current_exe().expect("a running test has a path");
+        // <target>/<profile>/deps/<test>
+        let target = test.ancestors().nth(3).expect("a target folder");
+        let python = target.join("s3-test/bin/python");
+        let started = Command::new(&python)
+            .arg(repository().join("tests/s3/server.py"))
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn();
+        let mut process = Process(started.unwrap_or_else(|error| {
+            panic!(
+                "{}: {error}; TARGET_DIR={} tests/s3/setup.sh makes it",
+                python.display(),
+                target.display()
+            )
+        }));
+        let input = process.0.stdin.take().expect("its input is piped");
+        let told = process.0.stdout.take().expect("its output is piped");
+        let mut endpoint = String::new();
+        BufReader::new(told)
+            .read_line(&mut endpoint)
+            .expect("it tells its address");
+        let endpoint = endpoint.trim().to_owned();
+        let made = http()
+            .build()
+            .expect("a client needs nothing")
+            .put(format!("{endpoint}/{NAME}"))
+            .send()
+            .expect("it answers");
+        assert!(made.status().is_success(), "{}", made.status());
+        Self {
+            _process: process,
+            _input: input,
+            endpoint,
+        }
+    }
+
+    /// `s3://…`, for a configuration.
+    #[must_use]
+    pub fn url(&self) -> String {
+        format!("s3://{NAME}/of/ours")
+    }
+
+    /// Where it listens.
+    ///
+    /// # Panics
+    /// If it told no address.
+    #[must_use]
+    pub fn address(&self) -> SocketAddr {
+        let address = self.endpoint.strip_prefix("http://").unwrap_or_default();
+        address.parse().expect("it tells its address")
+    }
+
+    /// By which a server finds it at `address`, and says who it is.
+    #[must_use]
+    pub fn environment(address: SocketAddr) -> Vec<(&'static str, String)> {
+        let endpoint = format!("http://{address}");
+        let words = [
+            ("AWS_ENDPOINT", &*endpoint),
+            ("AWS_ALLOW_HTTP", "true"),
+            ("AWS_REGION", "us-east-1"),
+            ("AWS_ACCESS_KEY_ID", "server"),
+            ("AWS_SECRET_ACCESS_KEY", "nobody's"),
+        ];
+        words.map(|(name, value)| (name, value.to_owned())).into()
+    }
+
+    /// The keys of all that is in it.
+    ///
+    /// # Panics
+    /// If it does not answer.
+    #[must_use]
+    pub fn keys(&self) -> Vec<String> {
+        let client = http().build().expect("a client needs nothing");
+        let asked = client.get(format!("{}/{NAME}?list-type=2", self.endpoint));
+        let listed = asked.send().and_then(|answer| answer.text());
+        let listed = listed.expect("it answers");
+        let keys = listed.split("<Key>").skip(1);
+        keys.filter_map(|rest| Some(rest.split_once("</Key>")?.0.to_owned()))
+            .collect()
+    }
+}
