@@ -17,4 +17,5 @@ mod worker;
 
 pub use connection::NatsConfig;
 pub use dispatch::{RemoteConfig, dispatch};
+pub(crate) use far_server::TooLarge;
 pub use worker::{RemoteWorker, work};
