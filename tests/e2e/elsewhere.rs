@@ -13,7 +13,7 @@ use serde_json::json;
 use std::{fs, net::SocketAddr, path::Path, process::Command, sync::mpsc, time::Duration};
 
 /// Of each task.
-const EPISODES: u32 = 10;
+pub(crate) const EPISODES: u32 = 10;
 
 const COMMON: &str = concat!(
     include_str!("../patient.toml"),
@@ -27,12 +27,12 @@ resident_bytes = 0
 );
 
 /// Of a server whose own slots play.
-fn alone() -> String {
+pub(crate) fn alone() -> String {
     format!("{COMMON}[workers]\nslots = 1\n")
 }
 
 /// Of a server for which others play, and which they reach at `files`.
-fn giving(nats: &Nats, files: SocketAddr) -> String {
+pub(crate) fn giving(nats: &Nats, files: SocketAddr) -> String {
     format!(
         "{COMMON}[workers]\nslots = 1\nplay = false\nlease_s = 10\n[nats]\nurl = \"{}\"\nfiles_url = \"http://{files}\"\n",
         nats.url()
@@ -40,12 +40,12 @@ fn giving(nats: &Nats, files: SocketAddr) -> String {
 }
 
 /// Of a worker that reaches NATS there.
-fn taking(nats: SocketAddr, slots: usize) -> String {
+pub(crate) fn taking(nats: SocketAddr, slots: usize) -> String {
     format!("{COMMON}[workers]\nslots = {slots}\n[nats]\nurl = \"nats://{nats}\"\n")
 }
 
 /// An evaluation of striker that is queued and that nobody has begun, in a data folder: its path, and the team.
-fn queued(data: &Path, scratch: &Path) -> (String, Team) {
+pub(crate) fn queued(data: &Path, scratch: &Path) -> (String, Team) {
     let server = Server::start(data, &alone());
     let team = Team::create(&server, "Phoenix");
     let submission = team.submit(&server, &bundle::reference("striker", scratch));
@@ -57,7 +57,7 @@ fn queued(data: &Path, scratch: &Path) -> (String, Team) {
     (path, team)
 }
 
-fn resume(server: &Server) {
+pub(crate) fn resume(server: &Server) {
     let resumed = server.post("/api/v1/queue/resume", &server.admin_token, &json!({}));
     assert!(resumed.status().is_success(), "{}", resumed.status());
 }

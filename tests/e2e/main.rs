@@ -12,6 +12,7 @@ mod cut;
 mod demo;
 mod desks;
 mod elsewhere;
+mod elsewhere_trouble;
 mod fair_shares;
 mod full_disk;
 mod growth;
