@@ -37,6 +37,8 @@ if [ "$purpose" = test ] || [ "$purpose" = steady ]; then
     need npm npm
     # Workers on other machines are given work by it.
     need nats-server nats-server
+    # A worker gets a clock that is wrong.
+    ls /usr/lib/*/faketime/libfaketime.so.1 >/dev/null 2>&1 || missing="$missing libfaketime"
     # Databases are given what no version of ours writes.
     need sqlite3 sqlite3
     # The examples for organisers are tried: systemd's own judgement of the unit, and the proxies.

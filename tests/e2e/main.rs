@@ -14,6 +14,7 @@ mod desks;
 mod elsewhere;
 mod elsewhere_bucket;
 mod elsewhere_lies;
+mod elsewhere_trouble;
 mod fair_shares;
 mod full_disk;
 mod growth;

@@ -45,7 +45,8 @@ impl Nats {
         let address = wait_for(|| {
             let told: serde_json::Value = serde_json::from_slice(&fs::read(&told).ok()?).ok()?;
             let url = told["nats"][0].as_str()?;
-            url.trim_start_matches("nats://").parse().ok()
+            let (_, address) = url.split_once("://")?;
+            address.parse().ok()
         });
         Self {
             process,
@@ -70,6 +71,14 @@ impl Nats {
     #[must_use]
     pub fn url(&self) -> String {
         format!("nats://{}", self.address)
+    }
+
+    /// From its next start on it has this configuration.
+    ///
+    /// # Panics
+    /// If that cannot be written.
+    pub fn configure(&self, config: &str) {
+        fs::write(self.folder.join(CONFIG), config).expect("a scratch file can be written");
     }
 
     /// Ends it as a power cut would, and starts it again where it was.

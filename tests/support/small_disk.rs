@@ -50,21 +50,23 @@ pub struct SmallDisk {
     disk: Disk,
 }
 
-/// The disk, and how a server on it is started.
+/// A small disk, for whoever is started in its sight.
 #[derive(Debug)]
-struct Disk {
+pub struct Mounted {
     holder: Process,
-    mount: PathBuf,
-    config_file: PathBuf,
-    log: LogTo,
+    /// Where those that are started in its sight see it.
+    pub mount: PathBuf,
 }
 
-impl Disk {
-    fn mount(folder: &Path, bytes: u64, config: &str, log: LogTo) -> Self {
-        let mount = folder.join("disk");
+impl Mounted {
+    /// A disk of `bytes` at `folder`.
+    ///
+    /// # Panics
+    /// If it cannot be mounted: this needs root, as the sandbox does.
+    #[must_use]
+    pub fn at(folder: &Path, bytes: u64) -> Self {
+        let mount = folder.to_owned();
         fs::create_dir_all(&mount).expect("a scratch folder can be made");
-        let config_file = folder.join("faceoff.toml");
-        fs::write(&config_file, config).expect("a scratch file can be written");
         let child = Command::new("unshare")
             .args(["--mount", "sh", "-c", MOUNT_AND_HOLD])
             .arg(bytes.to_string())
@@ -82,9 +84,44 @@ impl Disk {
             "mounted",
             "this needs root, as the sandbox does"
         );
+        Self { holder, mount }
+    }
+
+    /// It, as this process sees it.
+    ///
+    /// # Panics
+    /// If the folder has gone.
+    #[must_use]
+    pub fn seen_from_here(&self) -> PathBuf {
+        let absolute = self.mount.canonicalize().expect("the folder was made");
+        let below_root = absolute.strip_prefix("/").expect("it is absolute");
+        PathBuf::from(format!("/proc/{}/root", self.holder.0.id())).join(below_root)
+    }
+
+    /// What becomes the program that its next word names, in the sight of the disk. The id stays.
+    #[must_use]
+    pub fn in_sight(&self) -> Command {
+        let mut command = Command::new("nsenter");
+        command.args(["--mount", "--target", &self.holder.0.id().to_string()]);
+        command
+    }
+}
+
+/// The disk, and how a server on it is started.
+#[derive(Debug)]
+struct Disk {
+    disk: Mounted,
+    config_file: PathBuf,
+    log: LogTo,
+}
+
+impl Disk {
+    fn mount(folder: &Path, bytes: u64, config: &str, log: LogTo) -> Self {
+        let config_file = folder.join("faceoff.toml");
+        fs::create_dir_all(folder).expect("a scratch folder can be made");
+        fs::write(&config_file, config).expect("a scratch file can be written");
         Self {
-            holder,
-            mount,
+            disk: Mounted::at(&folder.join("disk"), bytes),
             config_file,
             log,
         }
@@ -92,22 +129,19 @@ impl Disk {
 
     /// The data folder, as this process sees it.
     fn data_dir(&self) -> PathBuf {
-        let absolute = self.mount.canonicalize().expect("the folder was made");
-        let below_root = absolute.strip_prefix("/").expect("it is absolute");
-        PathBuf::from(format!("/proc/{}/root", self.holder.0.id())).join(below_root)
+        self.disk.seen_from_here()
     }
 
     fn start_server(&self) -> Server {
-        let mut command = Command::new("nsenter");
+        let mut command = self.disk.in_sight();
         command
-            .args(["--mount", "--target", &self.holder.0.id().to_string()])
             .args(["sh", "-c", LOG_AND_RUN])
             .arg(match self.log {
                 LogTo::Test => PathBuf::new(),
-                LogTo::Disk => self.mount.join("log"),
+                LogTo::Disk => self.disk.mount.join("log"),
             })
             .arg(program("faceoff"));
-        serve(&mut command, &self.mount, &self.config_file);
+        serve(&mut command, &self.disk.mount, &self.config_file);
         // Every program on the way becomes the next one: the id stays.
         Server::answering(command, |_| self.data_dir())
     }

@@ -33,11 +33,27 @@ impl Worker {
     /// As [`start`](Self::start).
     #[must_use]
     pub fn start_with(scratch: &Path, name: &str, config: &str, words: &[&str]) -> Self {
+        let command = Command::new(program("faceoff"));
+        Self::start_by(command, scratch, name, config, words)
+    }
+
+    /// Likewise, by a command that becomes the program when it is given the program's words.
+    ///
+    /// # Panics
+    /// As [`start`](Self::start).
+    #[must_use]
+    pub fn start_by(
+        mut command: Command,
+        scratch: &Path,
+        name: &str,
+        config: &str,
+        words: &[&str],
+    ) -> Self {
         let folder = scratch.join(name);
         fs::create_dir_all(&folder).expect("a scratch folder can be made");
         let file = folder.join("faceoff.toml");
         fs::write(&file, config).expect("a scratch file can be written");
-        let child = Command::new(program("faceoff"))
+        let child = command
             .args(["worker", "--name", name, "--config"])
             .arg(&file)
             .arg("--scratch-dir")

@@ -22,4 +22,5 @@ pub use bucket::BucketConfig;
 pub use connection::NatsConfig;
 pub use dispatch::{RemoteConfig, dispatch};
 pub use examine::{Examined, examine};
+pub(crate) use far_server::TooLarge;
 pub use worker::{RemoteWorker, work};

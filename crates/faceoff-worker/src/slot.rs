@@ -1,6 +1,7 @@
 use crate::{
     executor::Executor,
     lease::{LeaseKeeper, Progress},
+    remote::TooLarge,
     server::{Claimed, GivenBack, Holding, WorkServer},
 };
 use faceoff_metrics::{Metrics, UnitEnd};
@@ -209,6 +210,9 @@ const fn kind(work: &Assignment) -> &'static str {
 
 /// What a team may know of a fault of ours.
 fn outside(error: &anyhow::Error) -> &'static str {
+    if error.is::<TooLarge>() {
+        return "what came of it is larger than NATS takes: its max_payload is to be raised";
+    }
     match error.downcast_ref::<PlatformFault>() {
         Some(PlatformFault::Sandbox(_)) => "the sandbox could not be set up",
         Some(PlatformFault::Io { .. }) => "a file could not be read or written",

@@ -107,12 +107,12 @@ fn main() -> anyhow::Result<()> {
 
     let runtime = Runtime::new()?;
     let evaluations = Arc::new(Evaluations::of_shards(SHARDS));
-    let own = introduction(&server)?;
+    let (own, url) = (introduction(&server)?, nats.url());
     let mut stubs = Vec::new();
     for number in 0..settings.workers.max(FEW[FEW.len() - 1]) {
         let connecting = Stub::connect(
             number,
-            &nats.url(),
+            &url,
             own.clone(),
             settings.recording_bytes,
             Arc::clone(&evaluations),

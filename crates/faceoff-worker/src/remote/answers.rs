@@ -48,12 +48,10 @@ impl Renewals {
         let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         // What nobody asks about any more is forgotten.
         all.retain(|_, (at, _)| now.duration_since(*at) < 100 * every);
-        let is_due = all
-            .get(&nonce)
-            .is_none_or(|(at, before)| {
-                let ago = now.duration_since(*at);
-                ago >= every || (*before != done && ago >= PROGRESS_EVERY)
-            });
+        let is_due = all.get(&nonce).is_none_or(|(at, before)| {
+            let ago = now.duration_since(*at);
+            ago >= every || (*before != done && ago >= PROGRESS_EVERY)
+        });
         if is_due {
             all.insert(nonce, (now, done));
         }

@@ -2,7 +2,11 @@
 
 use anyhow::Context as _;
 use async_nats::{Client, ConnectOptions, Event};
-use std::{path::PathBuf, time::Duration};
+use std::{
+    path::PathBuf,
+    sync::{Arc, Mutex, PoisonError},
+    time::Duration,
+};
 
 /// How long a question may go unanswered before it counts as lost.
 pub(super) const ANSWER: Duration = Duration::from_secs(5);
@@ -18,14 +22,18 @@ pub struct NatsConfig {
     pub name: String,
     /// A file with the seed of an nkey, by which NATS knows who connects.
     pub nkey_file: Option<PathBuf>,
-    /// A file with the certificates (PEM) by which NATS is known, beside those of this host.
+    /// A file with the certificates (PEM) of the authorities by which NATS is known, instead of those of this host.
     pub ca_file: Option<PathBuf>,
 }
 
 impl NatsConfig {
     /// Connects as `who`, now or as soon as NATS is there.
     pub(super) async fn connect(&self, who: &str) -> anyhow::Result<Client> {
-        let told = self.url.clone();
+        let told = Arc::new(Told {
+            url: self.url.clone(),
+            cause: Mutex::default(),
+        });
+        let asked = Arc::clone(&told);
         let options = self
             .options(who)
             .await?
@@ -34,9 +42,17 @@ impl NatsConfig {
             .reconnect_delay_callback(|tries| {
                 LONGEST_PAUSE.min(Duration::from_millis(100 << tries.min(6)))
             })
+            // Asked for the next server to try, it knows why the last try failed, which events leave out; the choice stays the client's.
+            .reconnect_to_server_callback(move |servers, _| {
+                let cause = servers.into_iter().find_map(|server| server.last_error);
+                if let Some(cause) = cause {
+                    asked.unreachable(&cause);
+                }
+                std::future::ready(None)
+            })
             .event_callback(move |event| {
-                let url = told.clone();
-                async move { tell(&url, &event) }
+                let told = Arc::clone(&told);
+                async move { told.tell(&event) }
             });
         let connected = options.connect(&self.url).await;
         connected.with_context(|| format!("connecting to NATS at {}", self.url))
@@ -61,19 +77,66 @@ impl NatsConfig {
     }
 }
 
-fn tell(url: &str, event: &Event) {
-    match event {
-        Event::Connected => tracing::info!(url, "connected to NATS"),
-        Event::Disconnected => {
+/// What the log was told of a connection.
+struct Told {
+    url: String,
+    /// Why it could not be had, as it was told last: the log is told of a change, not of every try.
+    cause: Mutex<String>,
+}
+
+impl Told {
+    fn tell(&self, event: &Event) {
+        let url = &self.url;
+        match event {
+            Event::Connected => {
+                self.cause_is("");
+                tracing::info!(url, "connected to NATS");
+            }
+            Event::Disconnected => {
+                tracing::warn!(
+                    url,
+                    "no connection to NATS; trying again until there is one"
+                );
+            }
+            // In more detail before the next try, if more is known.
+            Event::ClientError(error) if self.is_well() => self.unreachable(&error.to_string()),
+            Event::ClientError(error) => tracing::debug!(url, %error, "NATS cannot be reached"),
+            Event::ServerError(error) => tracing::error!(url, %error, "NATS refuses"),
+            other => tracing::info!(url, event = %other, "NATS"),
+        }
+    }
+
+    fn unreachable(&self, cause: &str) {
+        if !self.cause_is(cause) {
+            return;
+        }
+        let url = &self.url;
+        if cause.contains("certificate") {
+            tracing::error!(
+                url,
+                cause,
+                "NATS cannot be reached: its certificate is not believed; nats.ca_file names the authority that signed it"
+            );
+        } else {
             tracing::warn!(
                 url,
-                "no connection to NATS; trying again until there is one"
+                cause,
+                "NATS cannot be reached; trying again until it can"
             );
         }
-        Event::ClientError(error) => {
-            tracing::warn!(url, %error, "NATS cannot be reached; trying again until it can");
-        }
-        Event::ServerError(error) => tracing::error!(url, %error, "NATS refuses"),
-        other => tracing::info!(url, event = %other, "NATS"),
+    }
+
+    /// Was the log told of no cause since there was last a connection?
+    fn is_well(&self) -> bool {
+        let told = self.cause.lock().unwrap_or_else(PoisonError::into_inner);
+        told.is_empty()
+    }
+
+    /// Is this another cause than before?
+    fn cause_is(&self, cause: &str) -> bool {
+        let mut told = self.cause.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_new = *told != cause;
+        cause.clone_into(&mut told);
+        is_new
     }
 }

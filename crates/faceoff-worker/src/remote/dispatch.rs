@@ -458,7 +458,12 @@ impl Hub {
             self.jetstream
                 .update_stream(&wanted)
                 .await
-                .with_context(doing)?;
+                .with_context(|| {
+                    format!(
+                        "the stream {name} was made otherwise than this server needs it, and NATS does not change it: delete it \
+                         (`nats stream rm {name}`), and this server makes it anew; what it held is played again"
+                    )
+                })?;
             let found = &stream.info().await.with_context(doing)?.config;
             anyhow::ensure!(
                 is_like(found, &wanted),

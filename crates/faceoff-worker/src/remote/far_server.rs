@@ -38,10 +38,14 @@ const OPEN_FOR: Duration = Duration::from_secs(5);
 const HEARTBEAT: Duration = Duration::from_secs(2);
 /// After a refusal or a failure, until it is asked again.
 const REST: Duration = Duration::from_secs(2);
+/// A worker without room leaves the queue to others for so long; what it gives back rests there, and it would make all of it rest.
+const FULL_DISK_REST: Duration = Duration::from_secs(10);
 /// How long a file of the server's is asked for again and again: it may be starting anew.
 const FILES_WITHIN: Duration = Duration::from_secs(60);
 /// So long a worker goes on without asking whether it may.
 const MAY_WORK_FOR: Duration = Duration::from_secs(5);
+/// More than the headers of an outcome have; they count as part of the message.
+const HEADERS_AT_MOST: usize = 256;
 /// Nobody waits longer to show a position.
 const SHOWS_WITHIN: Duration = Duration::from_millis(20);
 
@@ -82,6 +86,8 @@ pub(super) struct FarServer {
     /// What orders are asked of, while it answers.
     consumer: Mutex<Option<PullConsumer>>,
     current: Mutex<Current>,
+    /// When there was last no room for something.
+    full_at: Mutex<Option<Instant>>,
 }
 
 /// What the slot works at.
@@ -135,7 +141,14 @@ impl FarServer {
             link,
             consumer: Mutex::default(),
             current: Mutex::default(),
+            full_at: Mutex::default(),
         }
+    }
+
+    /// Had this slot no room just now?
+    fn is_without_room(&self) -> bool {
+        let full_at = self.full_at.lock().unwrap_or_else(PoisonError::into_inner);
+        full_at.is_some_and(|at| at.elapsed() < FULL_DISK_REST)
     }
 
     fn current(&self) -> MutexGuard<'_, Current> {
@@ -267,17 +280,21 @@ impl FarServer {
         let mut headers = HeaderMap::new();
         headers.insert("Nats-Msg-Id", outcome.id());
         let payload = serde_json::to_vec(&outcome)?;
-        let largest = self.link.client.max_payload();
-        anyhow::ensure!(
-            payload.len() <= largest,
-            "what came of the order has {} bytes, and NATS takes {largest}: raise its max_payload",
-            payload.len()
-        );
         let began = Instant::now();
         let within = Duration::from_secs(lease.duration_s.into());
         let subject = self.link.names.outcomes(self.link.worker.as_str());
+        // The log is told of a change, not of every try.
+        let mut told = String::new();
         loop {
             let sent = async {
+                // It may be another after NATS was started anew.
+                let largest = self.link.client.max_payload();
+                if payload.len() + HEADERS_AT_MOST > largest {
+                    return Err(anyhow::Error::from(TooLarge {
+                        bytes: payload.len(),
+                        largest,
+                    }));
+                }
                 let sent = self.jetstream.publish_with_headers(
                     subject.clone(),
                     headers.clone(),
@@ -291,7 +308,11 @@ impl FarServer {
                     return Err(error).context("sending what came of the order");
                 }
                 Err(error) => {
-                    tracing::warn!(unit = %lease.unit, %error, "what came of the order is not stored by NATS yet; trying again");
+                    let cause = format!("{error:#}");
+                    if cause != told {
+                        tracing::warn!(unit = %lease.unit, cause, "what came of the order is not stored by NATS yet; trying again");
+                        told = cause;
+                    }
                     tokio::time::sleep(REST).await;
                 }
             }
@@ -342,6 +363,16 @@ impl FarServer {
     }
 }
 
+/// NATS takes no message of this size.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "what came of the order has {bytes} bytes, and NATS takes messages of {largest} at most: raise its max_payload"
+)]
+pub(crate) struct TooLarge {
+    bytes: usize,
+    largest: usize,
+}
+
 /// The server, or the proxy before it, has no time now.
 #[derive(Debug, thiserror::Error)]
 #[error("the server answered {0}")]
@@ -351,9 +382,11 @@ struct Busy(StatusCode);
 fn is_away(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause.is::<Busy>()
-            || cause
-                .downcast_ref::<reqwest::Error>()
-                .is_some_and(|error| error.is_connect() || error.is_timeout() || error.is_request())
+            || cause.downcast_ref::<reqwest::Error>().is_some_and(|error| {
+                let before = error.is_connect() || error.is_timeout() || error.is_request();
+                // In the middle of what it answers.
+                before || error.is_body() || error.is_decode()
+            })
     })
 }
 
@@ -384,6 +417,10 @@ impl WorkServer for FarServer {
         // NATS wakes who waits here: there is no queue to look at.
         let queue = QueueMark(0);
         self.link.runtime.block_on(async {
+            if self.is_without_room() {
+                self.rest().await;
+                return Ok(Claimed::Nothing { queue });
+            }
             match self.may_work().await {
                 Ok(true) => {}
                 Ok(false) => {
@@ -496,7 +533,11 @@ impl WorkServer for FarServer {
     fn give_back(&self, lease: &Lease, why: GivenBack<'_>) -> anyhow::Result<()> {
         let outcome = match why {
             GivenBack::Shutdown => Outcome::Shutdown,
-            GivenBack::FullDisk => Outcome::FullDisk,
+            GivenBack::FullDisk => {
+                let mut full_at = self.full_at.lock().unwrap_or_else(PoisonError::into_inner);
+                *full_at = Some(Instant::now());
+                Outcome::FullDisk
+            }
             GivenBack::PlatformFault(reason) => Outcome::PlatformFault {
                 reason: reason.to_owned(),
             },

@@ -1,7 +1,7 @@
 //! A process whose slots work for a server on another machine.
 
 use super::{
-    connection::NatsConfig,
+    connection::{ANSWER, NatsConfig},
     far_server::{FarServer, Link},
     names::{self, Names},
 };
@@ -93,7 +93,7 @@ pub async fn work(config: RemoteWorker, shutdown: CancellationToken) -> anyhow::
         shutdown,
     );
     ended.await.context("the worker's slots")?;
-    // What was said last is to arrive.
-    let _ = link.client.flush().await;
+    // What was said last is to arrive, if NATS is there.
+    let _ = tokio::time::timeout(ANSWER, link.client.flush()).await;
     Ok(())
 }

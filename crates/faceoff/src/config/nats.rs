@@ -15,7 +15,7 @@ pub struct NatsSection {
     /// A file with the seed of the nkey by which NATS knows who connects.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nkey_file: Option<PathBuf>,
-    /// Certificates (PEM) by which NATS is known, beside those of the host.
+    /// Certificates (PEM) of the authorities by which NATS is known, instead of those of the host; a worker fetches files by either.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ca_file: Option<PathBuf>,
     /// Where workers reach this server's files; left out, `server.public_url`, or else the address that it listens on.
