@@ -13,6 +13,8 @@ mod fuzz;
 mod game;
 mod host_noise;
 mod host_share;
+mod image;
+mod image_archives;
 mod misbehaviour;
 mod recording;
 mod shard;
