@@ -13,6 +13,8 @@ pub struct AgentEnvironment {
     pub isolation: Isolation,
     /// The runtimes that `agent.toml` may name.
     pub runtimes: BTreeMap<String, Runtime>,
+    /// Are agents run that are container images (runtime `image`)?
+    pub images: bool,
     /// CPUs for the agent; the thread that simulates keeps off them. Empty: no pinning.
     pub agent_cpus: Vec<usize>,
 }
