@@ -1,5 +1,5 @@
 use faceoff_sandbox::{Isolation, Limits, Runtime};
-use faceoff_types::TimeLimits;
+use faceoff_types::{IMAGE_RUNTIME, TimeLimits};
 use std::collections::BTreeMap;
 
 /// How agents are run on this machine.
@@ -17,4 +17,13 @@ pub struct AgentEnvironment {
     pub images: bool,
     /// CPUs for the agent; the thread that simulates keeps off them. Empty: no pinning.
     pub agent_cpus: Vec<usize>,
+}
+
+impl AgentEnvironment {
+    /// What `agent.toml` may name as its runtime here.
+    #[must_use]
+    pub fn offered(&self) -> Vec<String> {
+        let image = self.images.then(|| IMAGE_RUNTIME.to_owned());
+        self.runtimes.keys().cloned().chain(image).collect()
+    }
 }

@@ -11,7 +11,7 @@ use crate::{
 use faceoff_sandbox::{
     AgentProcess, CpuReading, Layer, ReadLine, Runtime, SpawnError, SpawnSpec, WriteError, affinity,
 };
-use faceoff_types::{AgentFaultKind, IMAGE_RUNTIME, Phase, TimeLimits};
+use faceoff_types::{AgentFaultKind, Phase, TimeLimits};
 use faceoff_wire::{MAX_LINE_BYTES, Message, answer, quote_line};
 use std::{
     sync::Arc,
@@ -331,13 +331,9 @@ fn runtime_of(bundle: &Bundle, env: &AgentEnvironment) -> Result<Runtime, String
     } else if let Some(runtime) = env.runtimes.get(name) {
         return Ok(runtime.clone());
     }
-    let mut offered: Vec<&str> = env.runtimes.keys().map(String::as_str).collect();
-    if env.images {
-        offered.push(IMAGE_RUNTIME);
-    }
     Err(format!(
         "the runtime {name:?} of agent.toml is not offered here; offered: {}",
-        offered.join(", ")
+        env.offered().join(", ")
     ))
 }
 

@@ -87,7 +87,7 @@ impl WorkerCommand {
         check_sandbox(&probe_host(), &config.sandbox.given_up)?;
         config.check_runtimes()?;
         let mut agent = config.agent_environment();
-        let own = introduction(agent.runtimes.keys().cloned().collect(), config.slots())?;
+        let own = introduction(agent.offered(), config.slots())?;
         let http = reqwest::Client::builder()
             .tls_backend_preconfigured(client::trusting_tls(config.nats.ca_file.as_deref())?)
             .connect_timeout(CONNECTS_WITHIN)
