@@ -169,3 +169,49 @@ pub fn agent_layer() -> Tar {
         .file("agent/agent.toml", 0o644, IMAGE_MANIFEST.as_bytes())
         .file("agent/agent", 0o755, b"program")
 }
+
+/// An image with a shell, of which `script` is the agent; nothing else of a system is in it. Its `ENV` says
+/// `POSE` and `MODE=image`.
+pub fn shell_agent(agent_toml: &str, script: &str) -> TestImage {
+    let shell = std::fs::canonicalize("/bin/sh").unwrap();
+    let said = std::process::Command::new("ldd").arg(&shell).output();
+    let said = String::from_utf8(said.unwrap().stdout).unwrap();
+    let system = said
+        .split_whitespace()
+        .filter(|word| word.starts_with('/'))
+        .fold(
+            Tar::new()
+                .file("opt/bin/sh", 0o755, &std::fs::read(&shell).unwrap())
+                .symlink("bin", "/opt/bin"),
+            |tar, library| tar.file(&library[1..], 0o755, &std::fs::read(library).unwrap()),
+        );
+    let agent = Tar::new()
+        .file("agent/agent.toml", 0o644, agent_toml.as_bytes())
+        .file("agent/agent.sh", 0o755, script.as_bytes());
+    TestImage::of([system, agent])
+        .packed(Packing::Gzip)
+        .config(|config| {
+            config["config"]["Env"] = json!([
+                "PATH=/opt/bin",
+                "MODE=image",
+                "POSE=[0,-0.196,0,-1.843,0,0.970,0]"
+            ]);
+        })
+}
+
+/// An agent that holds a pose, and says at its end what it was told by variables.
+pub const HOLDS_A_POSE: &str = r#"#!/bin/sh
+number() { n=${line#*"\"$1\":"}; n=${n%%[,\}]*}; }
+while read -r line; do
+    case $line in
+        *'"type":"hello"'*) echo '{"type":"ready","protocol":1,"interpolation":3}' ;;
+        *'"type":"reset"'*) number episode; echo "{\"type\":\"ready\",\"episode\":$n}" ;;
+        *'"type":"step"'*) number step; echo "{\"type\":\"act\",\"step\":$n,\"action\":[$POSE,[0,0,0,0,0,0,0]]}" ;;
+        *'"type":"bye"'*) echo "$MODE $PATH $OWN" >&2; exit ;;
+    esac
+done
+"#;
+
+/// Its `agent.toml`, which changes one of the image's variables and adds one.
+pub const HOLDS_A_POSE_TOML: &str = "name = \"boxed\"\ncommand = [\"./agent.sh\"]\nruntime = \"image\"\n\
+                                     interpolation = 3\n[env]\nMODE = \"toml\"\nOWN = \"own\"\n";

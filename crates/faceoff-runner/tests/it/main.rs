@@ -14,6 +14,7 @@ mod game;
 mod host_noise;
 mod host_share;
 mod image;
+mod image_agent;
 mod image_archives;
 mod misbehaviour;
 mod recording;
