@@ -426,7 +426,7 @@ impl Config {
                 given_up: self.sandbox.given_up.clone(),
             },
             runtimes,
-            images: self.sandbox.images && !self.sandbox.given_up.contains(&Layer::Namespaces),
+            images: self.sandbox.images,
             agent_cpus: self.workers.agent_cpus.clone(),
         }
     }
