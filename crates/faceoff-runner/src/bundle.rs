@@ -3,6 +3,7 @@
 
 mod budget;
 mod error;
+mod image;
 mod links;
 mod node;
 mod tar_archive;
@@ -11,9 +12,10 @@ mod zip_archive;
 
 pub use error::BundleError;
 pub use faceoff_types::BundleLimits;
+pub use image::Image;
 
 use budget::{Budget, Members, Watched};
-use faceoff_types::ArchiveFormat;
+use faceoff_types::{ArchiveFormat, IMAGE_RUNTIME};
 use faceoff_wire::{MANIFEST_MAX_BYTES, Manifest};
 use fs_err::File;
 use std::{
@@ -33,22 +35,26 @@ pub struct Bundle {
     pub dir: PathBuf,
     /// What `agent.toml` says.
     pub manifest: Manifest,
+    /// The container image that the bundle is; `dir` is its `/agent`. A developer's folder is none.
+    pub image: Option<Image>,
 }
 
 /// Unpacks a `.tar.gz`, `.tar.zst` or `.zip`, told apart by its first bytes, into the folder
-/// `into`, which is created and must be empty.
+/// `into`, which is created and must be empty. A tar, plain or compressed, that has no `agent.toml` but is a
+/// container image, as `docker save` or an OCI layout has it, becomes the image's root.
 ///
 /// Files become 0644, or 0755 where the archive has an executable bit; symbolic links stay links
 /// if they lead to a place inside the bundle. Limits hold while bytes stream, so that a
 /// decompression bomb is stopped at the limit whatever its headers claim, and count all that an
 /// archive is made of: headers, long names, padding, directories and streams one after another as well as
-/// the files. `cancelled` is asked for every piece. After an error `into` holds a part of the archive;
+/// the files. Of an image they hold for its layers as they come and, once more, for what they hold; layers
+/// take twice [`BundleLimits::unpacked_bytes`] of the disk at most. `cancelled` is asked for every piece. After an error `into` holds a part of the archive;
 /// the caller removes it.
 ///
 /// # Errors
 /// [`BundleError::Invalid`] with the entry's name for links that leave the bundle, absolute or
 /// `..` paths, devices, set-id bits, duplicate names, a broken archive, a limit met, a missing or
-/// wrong `agent.toml`; [`BundleError::Io`] where reading or writing the disk fails, or takes longer
+/// wrong `agent.toml`, an image that is none, is for another machine, or differs from its digests; [`BundleError::Io`] where reading or writing the disk fails, or takes longer
 /// than [`BundleLimits::unpack_s`]; [`BundleError::Cancelled`] when `cancelled` said so.
 pub fn unpack(
     archive: &Path,
@@ -85,7 +91,8 @@ fn unpack_within<'a>(
     let buffered = 64 << 10;
     let watched =
         |file: File| BufReader::with_capacity(buffered, Watched::new(file.into_file(), budget));
-    match ArchiveFormat::detect(&head) {
+    let format = ArchiveFormat::detect(&head);
+    match format {
         Some(ArchiveFormat::TarGz) => {
             let streams: Members<'_, _, flate2::bufread::GzDecoder<_>> =
                 Members::new(watched(file), budget).map_err(BundleError::reading(""))?;
@@ -100,16 +107,34 @@ fn unpack_within<'a>(
             let file = BufReader::with_capacity(buffered, file.into_file());
             zip_archive::unpack(file, packed, &mut tree, budget)?;
         }
+        Some(ArchiveFormat::Tar) => tar_archive::unpack(watched(file), &mut tree, budget)?,
         None => {
             return Err(BundleError::Invalid(
-                "the bundle is no archive that is accepted: expected .tar.gz, .tar.zst or .zip"
+                "the bundle is no archive that is accepted: expected .tar.gz, .tar.zst or .zip, or the .tar of a \
+                 container image"
                     .to_owned(),
             ));
         }
     }
-    let root = tree.bundle_root(MANIFEST_NAME).ok_or_else(no_manifest)?;
-    tree.finish(&root)?;
-    open_dir(&into.join(root))
+    match (tree.bundle_root(MANIFEST_NAME), format) {
+        (Some(_), Some(ArchiveFormat::Tar)) => Err(BundleError::Invalid(
+            "a plain .tar is accepted of a container image only: compress the bundle to .tar.gz"
+                .to_owned(),
+        )),
+        (Some(root), _) => {
+            tree.finish(&root)?;
+            open_dir(&into.join(root))
+        }
+        (None, Some(ArchiveFormat::Zip)) => Err(no_manifest()),
+        (None, _) => {
+            let archive = tree.into_archive();
+            if !archive.is_image() {
+                return Err(no_manifest());
+            }
+            let (image, agent) = image::unpack(archive, budget)?;
+            open_image(&agent, image)
+        }
+    }
 }
 
 /// Opens a developer's own folder in place, or unpacks an archive into a new folder `bundle` of
@@ -131,7 +156,35 @@ pub fn open(path: &Path, scratch: &Path, limits: &BundleLimits) -> Result<Bundle
     }
 }
 
+/// A folder of files, which brings no runtime of its own.
 fn open_dir(path: &Path) -> Result<Bundle, BundleError> {
+    let bundle = read_manifest(path)?;
+    if bundle.manifest.runtime == IMAGE_RUNTIME {
+        return Err(BundleError::Invalid(format!(
+            "{MANIFEST_NAME}: runtime is {IMAGE_RUNTIME:?}, and the bundle is no container image: build one and send \
+             what `docker save` writes, or name a runtime that the server offers"
+        )));
+    }
+    Ok(bundle)
+}
+
+/// The folder of an agent in its image.
+fn open_image(agent: &Path, image: Image) -> Result<Bundle, BundleError> {
+    let bundle = read_manifest(agent)?;
+    if bundle.manifest.runtime != IMAGE_RUNTIME {
+        return Err(BundleError::Invalid(format!(
+            "{MANIFEST_NAME}: runtime is {:?}, and the bundle is a container image, which brings its own: expected \
+             {IMAGE_RUNTIME:?}",
+            bundle.manifest.runtime
+        )));
+    }
+    Ok(Bundle {
+        image: Some(image),
+        ..bundle
+    })
+}
+
+fn read_manifest(path: &Path) -> Result<Bundle, BundleError> {
     let dir = fs_err::canonicalize(path)?;
     let place = dir.join(MANIFEST_NAME);
     let teams_own = |error: io::Error| match error.kind() {
@@ -166,7 +219,11 @@ fn open_dir(path: &Path) -> Result<Bundle, BundleError> {
         .map_err(|_| BundleError::Invalid(format!("{MANIFEST_NAME}: not UTF-8")))?;
     let manifest =
         Manifest::parse(&text).map_err(|error| BundleError::Invalid(error.to_string()))?;
-    Ok(Bundle { dir, manifest })
+    Ok(Bundle {
+        dir,
+        manifest,
+        image: None,
+    })
 }
 
 fn no_manifest() -> BundleError {

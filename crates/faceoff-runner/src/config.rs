@@ -1,5 +1,5 @@
-use faceoff_sandbox::{Isolation, Limits, Runtime};
-use faceoff_types::TimeLimits;
+use faceoff_sandbox::{Isolation, Layer, Limits, Runtime};
+use faceoff_types::{IMAGE_RUNTIME, TimeLimits};
 use std::collections::BTreeMap;
 
 /// How agents are run on this machine.
@@ -13,6 +13,23 @@ pub struct AgentEnvironment {
     pub isolation: Isolation,
     /// The runtimes that `agent.toml` may name.
     pub runtimes: BTreeMap<String, Runtime>,
+    /// May agents be container images (runtime `image`)?
+    pub images: bool,
     /// CPUs for the agent; the thread that simulates keeps off them. Empty: no pinning.
     pub agent_cpus: Vec<usize>,
+}
+
+impl AgentEnvironment {
+    /// Are container images run here? They need the sandbox's namespaces.
+    #[must_use]
+    pub fn runs_images(&self) -> bool {
+        self.images && self.isolation.enforces(Layer::Namespaces)
+    }
+
+    /// What `agent.toml` may name as its runtime here.
+    #[must_use]
+    pub fn offered(&self) -> Vec<String> {
+        let image = self.runs_images().then(|| IMAGE_RUNTIME.to_owned());
+        self.runtimes.keys().cloned().chain(image).collect()
+    }
 }

@@ -9,7 +9,7 @@ use crate::{
     waited::Waited,
 };
 use faceoff_sandbox::{
-    AgentProcess, CpuReading, ReadLine, SpawnError, SpawnSpec, WriteError, affinity,
+    AgentProcess, CpuReading, Layer, ReadLine, Runtime, SpawnError, SpawnSpec, WriteError, affinity,
 };
 use faceoff_types::{AgentFaultKind, Phase, TimeLimits};
 use faceoff_wire::{MAX_LINE_BYTES, Message, answer, quote_line};
@@ -84,20 +84,19 @@ impl<'w> Exchange<'w> {
         watch: &'w dyn HostWatch,
     ) -> Result<Self, Trouble> {
         let manifest = &bundle.manifest;
-        let Some(runtime) = env.runtimes.get(&manifest.runtime) else {
-            let offered: Vec<&str> = env.runtimes.keys().map(String::as_str).collect();
-            let detail = format!(
-                "the runtime {:?} of agent.toml is not offered here; offered: {}",
-                manifest.runtime,
-                offered.join(", ")
-            );
-            return Err(AgentFaultKind::CannotStart { detail }.into());
-        };
+        let runtime =
+            runtime_of(bundle, env).map_err(|detail| AgentFaultKind::CannotStart { detail })?;
+        let mut variables = bundle
+            .image
+            .as_ref()
+            .map(|image| image.env.clone())
+            .unwrap_or_default();
+        variables.extend(manifest.env.clone());
         let process = AgentProcess::spawn(&SpawnSpec {
             bundle_dir: bundle.dir.clone(),
             command: manifest.command.clone(),
-            env: manifest.env.clone(),
-            runtime: runtime.clone(),
+            env: variables,
+            runtime,
             limits: env.limits.clone(),
             isolation: env.isolation.clone(),
             cpus: env.agent_cpus.clone(),
@@ -314,6 +313,28 @@ impl<'w> Exchange<'w> {
             Err(ours) => ours.into(),
         }
     }
+}
+
+/// What the agent sees beside its bundle: its image, or the runtime that it names; or why it cannot be had.
+fn runtime_of(bundle: &Bundle, env: &AgentEnvironment) -> Result<Runtime, String> {
+    let name = &bundle.manifest.runtime;
+    if let Some(image) = &bundle.image {
+        if !env.isolation.enforces(Layer::Namespaces) {
+            return Err(
+                "the agent is a container image, which runs in the sandbox only: its namespaces are given up here"
+                    .to_owned(),
+            );
+        }
+        if env.images {
+            return Ok(Runtime::of_image(&image.root, image.path()));
+        }
+    } else if let Some(runtime) = env.runtimes.get(name) {
+        return Ok(runtime.clone());
+    }
+    Err(format!(
+        "the runtime {name:?} of agent.toml is not offered here; offered: {}",
+        env.offered().join(", ")
+    ))
 }
 
 fn too_long(head: &[u8]) -> Trouble {

@@ -2,7 +2,7 @@
 
 use crate::config::AgentEnvironment;
 use faceoff_sandbox::{AgentProcess, Isolation, ReadLine, Runtime, SpawnSpec};
-use faceoff_types::{PythonInventory, RuntimeContent, RuntimeInventory};
+use faceoff_types::{IMAGE_RUNTIME, PythonInventory, RuntimeContent, RuntimeInventory};
 use serde::Deserialize;
 use std::{
     collections::BTreeMap,
@@ -23,14 +23,18 @@ const LOADERS: [&str; 2] = ["/lib64/ld-linux-x86-64.so.2", "/lib/ld-linux-aarch6
 const QUESTION: &str = include_str!("inventory.py");
 
 /// Asks each runtime of `env`, one after another, on the CPUs and within the limits of an agent. One that does not
-/// answer is [`RuntimeContent::Broken`] and says why.
+/// answer is [`RuntimeContent::Broken`] and says why. Container images come last, where they are run.
 #[must_use]
 pub fn inventory(env: &AgentEnvironment) -> Vec<RuntimeInventory> {
     let ask = |(name, runtime): (&String, &Runtime)| RuntimeInventory {
         name: name.clone(),
         content: look_into(env, runtime).unwrap_or_else(|why| RuntimeContent::Broken { why }),
     };
-    env.runtimes.iter().map(ask).collect()
+    let image = env.runs_images().then(|| RuntimeInventory {
+        name: IMAGE_RUNTIME.to_owned(),
+        content: RuntimeContent::Image,
+    });
+    env.runtimes.iter().map(ask).chain(image).collect()
 }
 
 /// What one runtime holds, or why that cannot be told.

@@ -169,6 +169,11 @@ impl Bubblewrap {
             "--clearenv",
         ]);
         line.fd("--json-status-fd", status);
+        let root = spec.runtime.root();
+        if let Some(root) = root {
+            check_own_places(root)?;
+            line.read_only(root, Path::new("/"))?;
+        }
         for path in mount_order(&spec.runtime.read_only_paths) {
             line.read_only(&spec.runtime.source(&path), &path)?;
         }
@@ -176,15 +181,27 @@ impl Bubblewrap {
         line.hide_counters();
         let cpus = CpuView::of(&spec.cpus, &spec.limits);
         line.freeze_counters(&cpus)?;
+        // Nothing can be made in a root of the agent's own.
+        if root.is_some() {
+            line.args(["--perms", "0755", "--size", "65536", "--tmpfs", "/sys"]);
+        }
         for (path, list) in cpus.lists() {
             line.file(path, &list)?;
+        }
+        if root.is_some() {
+            line.args(["--remount-ro", "/sys"]);
         }
         let scratch = spec.limits.scratch_bytes.max(4096).to_string();
         for folder in ["/dev/shm", "/tmp"] {
             line.args(["--perms", "0700", "--size", &scratch, "--tmpfs", folder]);
         }
-        line.file("/etc/passwd", PASSWD.as_bytes())?;
-        line.file("/etc/group", GROUP.as_bytes())?;
+        for (path, content) in [("/etc/passwd", PASSWD), ("/etc/group", GROUP)] {
+            if root.is_some() {
+                line.cover(path, content.as_bytes())?;
+            } else {
+                line.file(path, content.as_bytes())?;
+            }
+        }
         line.read_only(&spec.bundle_dir, Path::new("/agent"))?;
         line.args([
             "--chdir",
@@ -276,11 +293,17 @@ impl CommandLine {
             FROZEN_FILES.into_iter().filter_map(read).collect()
         });
         for (path, content) in frozen {
-            let fd = memory_file(&cpus.of_file(path, content))?;
-            self.args(["--perms", "0444"]);
-            self.fd("--ro-bind-data", fd);
-            self.args([*path]);
+            self.cover(path, &cpus.of_file(path, content))?;
         }
+        Ok(())
+    }
+
+    /// Has a file that is there say something else.
+    fn cover(&mut self, inside: &str, content: &[u8]) -> Result<(), SandboxError> {
+        let fd = memory_file(content)?;
+        self.args(["--perms", "0444"]);
+        self.fd("--ro-bind-data", fd);
+        self.args([inside]);
         Ok(())
     }
 
@@ -311,6 +334,27 @@ impl CommandLine {
         self.args.push(inside.into());
         Ok(())
     }
+}
+
+/// What a root of the agent's own must have, for the sandbox covers it. bubblewrap follows a link where it
+/// mounts, and would do so on the host: whoever made the root has taken care that none is one, and it is looked
+/// at again here.
+fn check_own_places(root: &Path) -> Result<(), SandboxError> {
+    let check = |place: &str, kind: &str, is_right: fn(&fs::Metadata) -> bool| {
+        let what = format!("the agent's root has no {kind} /{place}");
+        let meta = fs::symlink_metadata(root.join(place)).context(&what)?;
+        if is_right(&meta) {
+            return Ok(());
+        }
+        Err(SandboxError::other(what, "it is something else"))
+    };
+    for folder in ["agent", "dev", "etc", "proc", "sys", "tmp"] {
+        check(folder, "folder", fs::Metadata::is_dir)?;
+    }
+    for file in ["etc/group", "etc/passwd"] {
+        check(file, "file", fs::Metadata::is_file)?;
+    }
+    Ok(())
 }
 
 fn is_there(path: &str) -> bool {

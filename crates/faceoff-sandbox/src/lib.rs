@@ -50,6 +50,6 @@ pub use line_pipe::ReadLine;
 pub use memory_image::{MemoryImage, NoImage};
 pub use probe::{HostFeature, probe_host};
 pub use process::{AgentProcess, Usage};
-pub use runtime::Runtime;
+pub use runtime::{Runtime, RuntimeFiles};
 pub use spawn_spec::SpawnSpec;
 pub use sweep::sweep_stale;

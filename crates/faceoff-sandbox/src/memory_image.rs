@@ -5,7 +5,8 @@
 //! file system in memory all pages and all names are there at all times.
 
 use crate::{
-    Runtime, SandboxError, bubblewrap::mount_order, error::IoContext, owner::Owner, runtime::inside,
+    Runtime, RuntimeFiles, SandboxError, bubblewrap::mount_order, error::IoContext, owner::Owner,
+    runtime::inside,
 };
 use rustix::fs::{StatVfs, statvfs};
 use std::{
@@ -73,7 +74,9 @@ impl MemoryImage {
             copied.context(format_args!("cannot copy {} into memory", path.display()))?;
         }
         for runtime in runtimes.values_mut() {
-            runtime.image = Some(folder.path().to_owned());
+            if runtime.root().is_none() {
+                runtime.files = RuntimeFiles::Copy(folder.path().to_owned());
+            }
         }
         Ok(Self { folder, bytes })
     }
@@ -186,7 +189,7 @@ mod tests {
         let runtime = |paths: &[&str]| Runtime {
             read_only_paths: paths.iter().map(|path| at(path)).collect(),
             path: String::new(),
-            image: None,
+            files: RuntimeFiles::Host,
         };
         let mut runtimes = BTreeMap::from([
             ("one".to_owned(), runtime(&["lib", "absent"])),
@@ -194,12 +197,12 @@ mod tests {
         ]);
         let refused = MemoryImage::make(&mut runtimes, 8000).unwrap_err();
         assert!(matches!(refused, NoImage::TooLarge { limit_bytes: 8000 }));
-        assert_eq!(runtimes["one"].image, None);
+        assert_eq!(runtimes["one"].files, RuntimeFiles::Host);
 
         let image = MemoryImage::make(&mut runtimes, 1 << 20).unwrap();
         assert!((12_000..100_000).contains(&image.bytes), "{}", image.bytes);
         let folder = image.folder().to_owned();
-        assert_eq!(runtimes["two"].image.as_deref(), Some(&*folder));
+        assert_eq!(runtimes["two"].files, RuntimeFiles::Copy(folder.clone()));
         let copied = |name: &str| inside(&folder, &at(name));
         assert_eq!(fs::read_to_string(copied("lib/link")).unwrap(), "content");
         assert_eq!(

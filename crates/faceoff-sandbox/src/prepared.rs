@@ -52,6 +52,14 @@ pub(crate) struct Prepared {
 impl Prepared {
     /// Makes the cgroup, the filters and the command line.
     pub(crate) fn new(spec: &SpawnSpec) -> Result<Self, SandboxError> {
+        if spec.runtime.root().is_some() && !spec.isolation.enforces(Layer::Namespaces) {
+            return Err(SandboxError::Unavailable {
+                layer: Layer::Namespaces,
+                why: "it is given up, and the agent is a container image, whose files are a root of their own, \
+                      which this layer alone can give; keep the layer"
+                    .to_owned(),
+            });
+        }
         if spec.isolation == Isolation::None {
             return Self::unsandboxed(spec);
         }

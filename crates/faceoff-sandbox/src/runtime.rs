@@ -46,9 +46,21 @@ pub struct Runtime {
     pub read_only_paths: Vec<PathBuf>,
     /// The agent's `PATH`.
     pub path: String,
-    /// Where a copy of the paths lies in memory, if one was made.
+    /// Where the files that agents see really are.
     #[serde(skip)]
-    pub image: Option<PathBuf>,
+    pub files: RuntimeFiles,
+}
+
+/// Where a runtime's files are.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum RuntimeFiles {
+    /// On the host, under the names by which agents see them.
+    #[default]
+    Host,
+    /// In a folder that holds a copy of them, in memory.
+    Copy(PathBuf),
+    /// They are all of this folder, which becomes the agent's root: nothing of the host is shown beside it.
+    Root(PathBuf),
 }
 
 impl Runtime {
@@ -57,7 +69,7 @@ impl Runtime {
         Self {
             read_only_paths: existing(&LIBRARY_PATHS),
             path: "/usr/bin:/bin".into(),
-            image: None,
+            files: RuntimeFiles::Host,
         }
     }
 
@@ -98,20 +110,43 @@ impl Runtime {
         Ok(Self {
             read_only_paths: paths,
             path,
-            image: None,
+            files: RuntimeFiles::Host,
         })
+    }
+
+    /// A container image's own: `root` holds its merged layers, and `path` is its `PATH`. It must have real
+    /// folders `agent`, `dev`, `etc`, `proc`, `sys` and `tmp`, and files `etc/passwd` and `etc/group`, over which the
+    /// sandbox shows its own; links may lead anywhere. Needs [`Layer::Namespaces`](crate::Layer::Namespaces).
+    pub fn of_image(root: &Path, path: &str) -> Self {
+        Self {
+            read_only_paths: Vec::new(),
+            path: path.to_owned(),
+            files: RuntimeFiles::Root(root.to_owned()),
+        }
+    }
+
+    /// The folder that is the agent's root, if it has one of its own.
+    pub(crate) fn root(&self) -> Option<&Path> {
+        match &self.files {
+            RuntimeFiles::Root(root) => Some(root),
+            RuntimeFiles::Host | RuntimeFiles::Copy(_) => None,
+        }
     }
 
     /// Where the files of one of its paths are. A symbolic link is shown as the same link.
     pub(crate) fn source(&self, path: &Path) -> PathBuf {
-        match &self.image {
-            Some(image) if !path.is_symlink() => inside(image, path),
+        match &self.files {
+            RuntimeFiles::Copy(copy) if !path.is_symlink() => inside(copy, path),
             _ => path.to_owned(),
         }
     }
 
-    /// The host path of the first `python3` this runtime's PATH leads to, for messages.
+    /// The host path of the first `python3` this runtime's PATH leads to, for messages. A root of its own is not
+    /// looked into.
     pub fn interpreter(&self) -> Option<PathBuf> {
+        if self.root().is_some() {
+            return None;
+        }
         self.path
             .split(':')
             .map(|folder| Path::new(folder).join("python3"))

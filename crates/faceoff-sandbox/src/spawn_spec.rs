@@ -13,7 +13,7 @@ pub struct SpawnSpec {
     pub command: Vec<String>,
     /// Environment variables of the bundle; they come last and may replace `HOME`, `PATH` and the like.
     pub env: BTreeMap<String, String>,
-    /// What of the host is visible.
+    /// What of the host is visible; of a container image, its root, whose `agent` is then the bundle.
     pub runtime: Runtime,
     /// What the tree may use.
     pub limits: Limits,

@@ -86,7 +86,7 @@ pub use ruleset::{
     ACTION_LIMIT, FOULS_PER_POINT, GAME_WINDOWS, RULESET, Ruleset, UnknownRuleset, WINDOW_STEPS,
 };
 pub use runtime_inventory::{AgentMachine, PythonInventory, RuntimeContent, RuntimeInventory};
-pub use runtimes::{InvalidRuntimes, RuntimeNotTaken, Runtimes, StageRuntimes};
+pub use runtimes::{IMAGE_RUNTIME, InvalidRuntimes, RuntimeNotTaken, Runtimes, StageRuntimes};
 pub use schedule::{InvalidSchedule, Schedule};
 pub use seed::{ParseSeedError, Seed};
 pub use seed_label::{ParseSeedLabelError, SeedLabel};

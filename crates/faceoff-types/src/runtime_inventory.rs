@@ -26,6 +26,8 @@ pub enum RuntimeContent {
         #[cfg_attr(feature = "openapi", schema(example = "2.36"))]
         libc: Option<String>,
     },
+    /// Whatever a container image brings.
+    Image,
     /// It does not work; `why` is for the organiser, who finds it in `faceoff doctor`.
     Broken {
         /// What went wrong.

@@ -5,6 +5,9 @@ use std::{collections::BTreeSet, fmt};
 /// The longest name of a runtime.
 const MAX_NAME_CHARS: usize = 40;
 
+/// The runtime of an agent that comes as a container image and brings its own; no server's runtime has this name.
+pub const IMAGE_RUNTIME: &str = "image";
+
 /// Some of the runtimes that a server offers, by the names that `agent.toml` gives them.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]

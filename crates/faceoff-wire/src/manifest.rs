@@ -59,6 +59,20 @@ impl Manifest {
         Ok(manifest)
     }
 
+    /// Can an agent's environment have a variable of this name?
+    #[must_use]
+    pub fn is_variable_name(name: &str) -> bool {
+        name.len() <= 128
+            && name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
+            && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_')
+    }
+
+    /// Can a variable of an agent's environment have this value: at most 4096 bytes, none of them NUL?
+    #[must_use]
+    pub fn is_variable_value(value: &str) -> bool {
+        value.len() <= 4096 && !value.contains('\0')
+    }
+
     fn check(&self) -> Result<(), ManifestError> {
         let chars = self.name.chars().count();
         require(
@@ -113,17 +127,14 @@ impl Manifest {
             "must have at most 64 variables",
         )?;
         for (name, value) in &self.env {
-            let name_ok = name.len() <= 128
-                && name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
-                && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_');
             let key: String = format!("env.{}", harmless(name)).chars().take(80).collect();
             require(
-                name_ok,
+                Self::is_variable_name(name),
                 &key,
                 "must be a name of letters, digits and underscores",
             )?;
             require(
-                value.len() <= 4096 && !value.contains('\0'),
+                Self::is_variable_value(value),
                 &key,
                 "must have at most 4096 bytes and no NUL characters",
             )?;

@@ -40,6 +40,7 @@ pub(crate) struct Executor {
 pub(crate) struct AgentHost {
     pub(crate) isolation: Isolation,
     pub(crate) runtimes: BTreeMap<String, Runtime>,
+    pub(crate) images: bool,
     pub(crate) cpus: SlotCpus,
 }
 
@@ -55,6 +56,7 @@ impl AgentHost {
             time: limits.time.clone(),
             isolation: self.isolation.clone(),
             runtimes: self.runtimes.clone(),
+            images: self.images,
             agent_cpus,
         }
     }

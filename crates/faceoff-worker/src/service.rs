@@ -192,6 +192,7 @@ pub(crate) async fn run_slots(
                 host: AgentHost {
                     isolation: config.agent.isolation.clone(),
                     runtimes: config.agent.runtimes.clone(),
+                    images: config.agent.images,
                     cpus,
                 },
                 bundles: BundleCache::new(&folder),

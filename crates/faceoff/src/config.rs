@@ -313,6 +313,8 @@ pub struct SandboxConfig {
     pub given_up: Vec<Layer>,
     /// The runtimes' files are copied into memory if they have no more bytes than this; 0: never.
     pub resident_bytes: u64,
+    /// May agents be container images? They need the namespaces, so none can where those are given up.
+    pub images: bool,
 }
 
 impl Default for SandboxConfig {
@@ -320,6 +322,7 @@ impl Default for SandboxConfig {
         Self {
             given_up: Vec::new(),
             resident_bytes: 1 << 30,
+            images: true,
         }
     }
 }
@@ -426,6 +429,7 @@ impl Config {
                 given_up: self.sandbox.given_up.clone(),
             },
             runtimes,
+            images: self.sandbox.images,
             agent_cpus: self.workers.agent_cpus.clone(),
         }
     }

@@ -17,6 +17,9 @@ use tokio::{io::AsyncWriteExt, time::Instant};
 /// the answer instead of a broken connection.
 const DRAIN_BYTES: u64 = 64 * 1024 * 1024;
 
+/// So much of what is no archive is shown: a plain tar alone is told by more.
+const SHOWN_BYTES: usize = 4;
+
 /// A bundle on disk; the file goes when this is dropped.
 #[derive(Debug)]
 pub(crate) struct Uploaded {
@@ -90,7 +93,7 @@ pub(crate) async fn receive(
     if bytes == 0 {
         return Err(Problem::new(
             ProblemKind::InvalidRequest,
-            "what came is empty; send the archive itself (.tar.gz, .tar.zst or .zip)",
+            "what came is empty; send the archive itself (.tar.gz, .tar.zst, .zip, or .tar of a container image)",
         ));
     }
     let format = format.ok_or_else(|| not_an_archive(&head))?;
@@ -213,9 +216,9 @@ fn not_an_archive(head: &[u8]) -> Problem {
     Problem::new(
         ProblemKind::UnsupportedMediaType,
         format!(
-            "expected a .tar.gz, .tar.zst or .zip archive; what came begins with the bytes {}. Send the archive itself, \
-             and nothing around it",
-            hex::encode(head)
+            "expected a .tar.gz, .tar.zst or .zip archive, or the .tar of a container image; what came begins with the \
+             bytes {}. Send the archive itself, and nothing around it",
+            hex::encode(&head[..head.len().min(SHOWN_BYTES)])
         ),
     )
 }

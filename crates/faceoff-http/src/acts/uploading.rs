@@ -209,6 +209,7 @@ mod tests {
         assert_eq!(gz(""), "agent.tar.gz");
         assert_eq!(gz(".."), "agent.tar.gz");
         assert_eq!(file_name("x", ArchiveFormat::Zip), "x.zip");
+        assert_eq!(file_name("ours.tar", ArchiveFormat::Tar), "ours.tar");
         assert!(gz(&"a".repeat(500)).len() < 100);
     }
 }

@@ -43,7 +43,7 @@ const ARCHIVE_TYPES: [&str; 8] = [
     "application/x-zip-compressed",
 ];
 
-/// Uploads a bundle: the request's body is the archive itself (.tar.gz, .tar.zst or .zip).
+/// Uploads a bundle: the request's body is the archive itself (.tar.gz, .tar.zst, .zip, or .tar of a container image).
 ///
 /// It is unpacked and started in a smoke run; follow the submission until it is `valid` or `invalid`.
 #[utoipa::path(

@@ -59,7 +59,7 @@ kinds! {
         "The request is well-formed, but a field has a value that cannot be used. The detail names it."
     UnsupportedMediaType "unsupported-media-type" UNSUPPORTED_MEDIA_TYPE
         "Unsupported media type"
-        "A bundle is a .tar.gz, .tar.zst or .zip sent as the body itself; everything else is JSON."
+        "A bundle is a .tar.gz, .tar.zst, .zip, or the .tar of a container image, sent as the body itself; everything else is JSON."
     TooLarge "too-large" PAYLOAD_TOO_LARGE
         "The body is too large"
         "The detail and “limit_bytes” state the limit. Leave data out of the bundle that the agent does not need."

@@ -70,6 +70,7 @@ impl InstantAgent {
         let bundle = Bundle {
             dir: Path::new(dir.path()).to_owned(),
             manifest,
+            image: None,
         };
         Self { _dir: dir, bundle }
     }
@@ -82,6 +83,7 @@ pub fn environment(isolation: Isolation) -> AgentEnvironment {
         time: TimeLimits::default(),
         isolation,
         runtimes: BTreeMap::from([("native".to_owned(), Runtime::native())]),
+        images: false,
         agent_cpus: Vec::new(),
     }
 }

@@ -23,6 +23,11 @@ const SEEK_BYTES: u64 = 64;
 const MEMBERS: u64 = 1 << 16;
 /// How much of names may be compared to follow all links, in bytes.
 const LINK_BYTES: u64 = 64 << 20;
+/// How much of names may be looked up to place the entries of an image's layers, in bytes. A hundred thousand
+/// entries of ordinary paths come to a tenth of it.
+const LOOKED_UP_BYTES: u64 = 256 << 20;
+/// A name costs as much as so many bytes, however short it is.
+const LOOKED_UP_AT_LEAST: u64 = 16;
 
 /// Tells the time; given from outside so that a test turns it.
 pub(super) type Now<'a> = &'a dyn Fn() -> Instant;
@@ -49,6 +54,7 @@ pub(super) struct Budget<'a> {
     entries: Cell<u64>,
     members: Cell<u64>,
     link_bytes: Cell<u64>,
+    looked_up: Cell<u64>,
     ended: RefCell<Option<BundleError>>,
 }
 
@@ -71,6 +77,7 @@ impl<'a> Budget<'a> {
             entries: Cell::new(0),
             members: Cell::new(0),
             link_bytes: Cell::new(0),
+            looked_up: Cell::new(0),
             ended: RefCell::new(None),
         }
     }
@@ -149,6 +156,23 @@ impl<'a> Budget<'a> {
             ));
         }
         Ok(())
+    }
+
+    /// The layers of an image have been unpacked as files, and are now unpacked themselves: their content has the
+    /// limit for itself. All else is counted on.
+    pub(super) fn begin_root(&self) {
+        self.content.set(0);
+    }
+
+    /// A name that is looked up in an image's root, or a path that is looked at there.
+    pub(super) fn looked_up(&self, bytes: usize) -> Result<(), BundleError> {
+        let looked_up = self.looked_up.get() + bytes as u64 + LOOKED_UP_AT_LEAST;
+        self.looked_up.set(looked_up);
+        if looked_up > LOOKED_UP_BYTES {
+            return self
+                .refuse("the image's paths lead through too many folders and links".to_owned());
+        }
+        self.check()
     }
 
     /// Names compared to follow a link.

@@ -1,14 +1,37 @@
 use super::{
     budget::{Budget, Metered},
     error::BundleError,
-    tree::Tree,
+    tree::unusable,
 };
-use std::io::Read;
+use std::io::{self, Read};
 use tar::{Archive, EntryType, Header, PaxExtensions};
 
 /// Longest header that only describes the next entry (long names, extended attributes). Larger
 /// ones would have to be held in memory, and no honest bundle has one.
 const EXTENSION_MAX_BYTES: u64 = 1 << 20;
+
+/// What an archive's entries become.
+pub(super) trait Sink {
+    /// A folder.
+    fn folder(&mut self, entry: &str, mode: u32) -> Result<(), BundleError>;
+    /// A file, its content streamed.
+    fn file(&mut self, entry: &str, mode: u32, content: &mut dyn Read) -> Result<(), BundleError>;
+    /// A symbolic link.
+    fn link(&mut self, entry: &str, target: &str) -> Result<(), BundleError>;
+    /// Another name of a file.
+    fn hard_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError>;
+    /// What is none of these.
+    fn special(&mut self, entry: &str, special: Special) -> Result<(), BundleError>;
+}
+
+/// What has no content.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Special {
+    /// The device 0/0, which overlayfs has for what it hides.
+    NullDevice,
+    Device,
+    Pipe,
+}
 
 /// What extension headers say about the entry that follows.
 #[derive(Default)]
@@ -23,7 +46,7 @@ struct Extensions {
 /// memory. What follows the archive's end is not read.
 pub(super) fn unpack<'a>(
     reader: impl Read,
-    tree: &mut Tree<'a>,
+    sink: &mut impl Sink,
     budget: &'a Budget<'a>,
 ) -> Result<(), BundleError> {
     let mut archive = Archive::new(Metered::new(reader, budget));
@@ -57,21 +80,32 @@ pub(super) fn unpack<'a>(
                 match kind {
                     EntryType::Regular | EntryType::Continuous if name.ends_with('/') => {
                         // Old archives mark a folder by its name only.
-                        tree.folder(&name, mode)?;
+                        sink.folder(&name, mode)?;
                     }
                     EntryType::Regular | EntryType::Continuous => {
                         budget.allow(entry.size());
-                        tree.file(&name, mode, &mut entry)?;
+                        sink.file(&name, mode, &mut entry)?;
                     }
-                    EntryType::Directory => tree.folder(&name, mode)?,
-                    EntryType::Symlink => tree.link(&name, &text(link.unwrap_or_default())?)?,
-                    EntryType::Link => tree.hard_link(&name, &text(link.unwrap_or_default())?)?,
+                    EntryType::Directory => sink.folder(&name, mode)?,
+                    EntryType::Symlink => sink.link(&name, &text(link.unwrap_or_default())?)?,
+                    EntryType::Link => sink.hard_link(&name, &text(link.unwrap_or_default())?)?,
                     EntryType::Char | EntryType::Block => {
-                        return Err(tree.refuse(&name, "a device"));
+                        // An empty field is 0.
+                        let is =
+                            |part: io::Result<Option<u32>>| part.ok().flatten().unwrap_or(0) == 0;
+                        let is_null = kind == EntryType::Char
+                            && is(header.device_major())
+                            && is(header.device_minor());
+                        let special = if is_null {
+                            Special::NullDevice
+                        } else {
+                            Special::Device
+                        };
+                        sink.special(&name, special)?;
                     }
-                    EntryType::Fifo => return Err(tree.refuse(&name, "a named pipe")),
-                    EntryType::GNUSparse => return Err(tree.refuse(&name, "a sparse file")),
-                    _ => return Err(tree.refuse(&name, "of an unknown kind")),
+                    EntryType::Fifo => sink.special(&name, Special::Pipe)?,
+                    EntryType::GNUSparse => return Err(unusable(&name, "a sparse file")),
+                    _ => return Err(unusable(&name, "of an unknown kind")),
                 }
             }
         }

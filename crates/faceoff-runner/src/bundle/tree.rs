@@ -1,4 +1,10 @@
-use super::{budget::Budget, error::BundleError, links, node::Node};
+use super::{
+    budget::Budget,
+    error::BundleError,
+    image, links,
+    node::Node,
+    tar_archive::{Sink, Special},
+};
 use fs_err::{self as fs, OpenOptions, os::unix::fs::symlink};
 use std::{
     collections::BTreeMap,
@@ -19,15 +25,88 @@ pub(super) struct Tree<'a> {
 }
 
 /// Set whatever the service's umask: agents run as another user when the service is root.
-const FOLDER_MODE: u32 = 0o755;
+pub(super) const FOLDER_MODE: u32 = 0o755;
 /// Longest path in an archive, in bytes; with the folder it is unpacked to it must stay below the
 /// system's 4096.
-const PATH_MAX_BYTES: usize = 1024;
+pub(super) const PATH_MAX_BYTES: usize = 1024;
 const NAME_MAX_BYTES: usize = 255;
 
-fn invalid(entry: &str, problem: impl std::fmt::Display) -> BundleError {
+/// What is wrong with an entry.
+pub(super) fn invalid(entry: &str, problem: impl std::fmt::Display) -> BundleError {
     let shown: String = entry.chars().take(200).collect();
     BundleError::Invalid(format!("entry {shown:?} {problem}"))
+}
+
+/// The entry's path without `.` parts; empty for the archive's own root.
+pub(super) fn normalise(entry: &str) -> Result<String, BundleError> {
+    if entry.is_empty() {
+        return Err(invalid(entry, "has no name"));
+    }
+    if entry.contains('\0') {
+        return Err(invalid(entry, "has a NUL character in its name"));
+    }
+    if entry.starts_with('/') {
+        return Err(invalid(entry, "has an absolute path"));
+    }
+    let parts: Vec<&str> = entry
+        .split('/')
+        .filter(|part| !matches!(*part, "" | "."))
+        .collect();
+    if parts.contains(&"..") {
+        return Err(invalid(entry, "has '..' in its path"));
+    }
+    if entry.len() > PATH_MAX_BYTES || parts.iter().any(|part| part.len() > NAME_MAX_BYTES) {
+        return Err(invalid(
+            entry,
+            format_args!(
+                "has too long a path: at most {PATH_MAX_BYTES} bytes, {NAME_MAX_BYTES} per name"
+            ),
+        ));
+    }
+    Ok(parts.join("/"))
+}
+
+/// Anything that neither a bundle nor a layer can hold.
+pub(super) fn unusable(entry: &str, what: &str) -> BundleError {
+    invalid(
+        entry,
+        format_args!("is {what}; a bundle holds files, folders and links"),
+    )
+}
+
+/// Could a symbolic link lead there?
+pub(super) fn check_target(entry: &str, target: &str) -> Result<(), BundleError> {
+    if target.is_empty() || target.contains('\0') || target.len() > PATH_MAX_BYTES {
+        return Err(invalid(entry, "is a link to no possible path"));
+    }
+    Ok(())
+}
+
+/// Writes a file that is not there yet, its content streamed and counted.
+pub(super) fn write_new(
+    entry: &str,
+    place: &Path,
+    mode: u32,
+    content: &mut dyn Read,
+    budget: &Budget<'_>,
+) -> Result<(), BundleError> {
+    let file_mode = if mode & 0o111 == 0 { 0o644 } else { 0o755 };
+    let mut file = OpenOptions::new()
+        .write(true)
+        .create_new(true)
+        .open(place)?;
+    file.set_permissions(Permissions::from_mode(file_mode))?;
+    let mut buffer = vec![0; 64 << 10];
+    loop {
+        let read = match content.read(&mut buffer) {
+            Ok(0) => return Ok(()),
+            Ok(read) => read,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+            Err(error) => return Err(BundleError::reading(entry)(error)),
+        };
+        budget.content(entry, read)?;
+        file.write_all(&buffer[..read])?;
+    }
 }
 
 impl<'a> Tree<'a> {
@@ -48,35 +127,6 @@ impl<'a> Tree<'a> {
         })
     }
 
-    /// The entry's path without `.` parts; empty for the archive's own root.
-    fn normalise(entry: &str) -> Result<String, BundleError> {
-        if entry.is_empty() {
-            return Err(invalid(entry, "has no name"));
-        }
-        if entry.contains('\0') {
-            return Err(invalid(entry, "has a NUL character in its name"));
-        }
-        if entry.starts_with('/') {
-            return Err(invalid(entry, "has an absolute path"));
-        }
-        let parts: Vec<&str> = entry
-            .split('/')
-            .filter(|part| !matches!(*part, "" | "."))
-            .collect();
-        if parts.contains(&"..") {
-            return Err(invalid(entry, "has '..' in its path"));
-        }
-        if entry.len() > PATH_MAX_BYTES || parts.iter().any(|part| part.len() > NAME_MAX_BYTES) {
-            return Err(invalid(
-                entry,
-                format_args!(
-                    "has too long a path: at most {PATH_MAX_BYTES} bytes, {NAME_MAX_BYTES} per name"
-                ),
-            ));
-        }
-        Ok(parts.join("/"))
-    }
-
     fn check_mode(entry: &str, mode: u32) -> Result<(), BundleError> {
         match mode & 0o6000 {
             0 => Ok(()),
@@ -86,7 +136,7 @@ impl<'a> Tree<'a> {
 
     /// Takes a place in the tree for something that is no folder.
     fn place(&mut self, entry: &str, node: Node) -> Result<PathBuf, BundleError> {
-        let path = Self::normalise(entry)?;
+        let path = normalise(entry)?;
         if path.is_empty() {
             return Err(invalid(entry, "is the root, but not a folder"));
         }
@@ -148,79 +198,9 @@ impl<'a> Tree<'a> {
         Ok(())
     }
 
-    /// A folder of the archive.
-    pub fn folder(&mut self, entry: &str, mode: u32) -> Result<(), BundleError> {
-        Self::check_mode(entry, mode)?;
-        let path = Self::normalise(entry)?;
-        if path.is_empty() {
-            return Ok(());
-        }
-        self.make_folder(entry, &path, true)
-    }
-
-    /// A file of the archive, its content streamed and counted.
-    pub fn file(
-        &mut self,
-        entry: &str,
-        mode: u32,
-        content: &mut dyn Read,
-    ) -> Result<(), BundleError> {
-        Self::check_mode(entry, mode)?;
-        let target = self.place(entry, Node::File)?;
-        let file_mode = if mode & 0o111 == 0 { 0o644 } else { 0o755 };
-        let mut file = OpenOptions::new()
-            .write(true)
-            .create_new(true)
-            .open(target)?;
-        file.set_permissions(Permissions::from_mode(file_mode))?;
-        let mut buffer = vec![0; 64 << 10];
-        loop {
-            let read = match content.read(&mut buffer) {
-                Ok(0) => return Ok(()),
-                Ok(read) => read,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-                Err(error) => return Err(BundleError::reading(entry)(error)),
-            };
-            self.budget.content(entry, read)?;
-            file.write_all(&buffer[..read])?;
-        }
-    }
-
-    /// A symbolic link; checked and made by [`Tree::finish`].
-    pub fn link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
-        if target.is_empty() || target.contains('\0') || target.len() > PATH_MAX_BYTES {
-            return Err(invalid(entry, "is a link to no possible path"));
-        }
-        self.place(
-            entry,
-            Node::Link {
-                target: target.to_owned(),
-            },
-        )?;
-        Ok(())
-    }
-
-    /// Another name of a file that the archive has brought already.
-    pub fn hard_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
-        let existing = Self::normalise(target)?;
-        if self.nodes.get(&existing) != Some(&Node::File) {
-            return Err(invalid(
-                entry,
-                format_args!(
-                    "is a hard link to {target:?}, which is no earlier file of the archive"
-                ),
-            ));
-        }
-        let place = self.place(entry, Node::File)?;
-        Ok(fs::hard_link(self.into.join(existing), place)?)
-    }
-
-    /// Anything that a bundle cannot hold.
-    pub fn refuse(&self, entry: &str, what: &str) -> BundleError {
-        invalid(
-            entry,
-            format_args!("is {what}; a bundle holds files, folders and links"),
-        )
+    /// The archive, if its files are to be looked at as those of an image; then no links are made.
+    pub fn into_archive(self) -> image::Archive<'a> {
+        image::Archive::new(self.into, self.nodes, self.budget)
     }
 
     /// The folder that holds `manifest`: the root (an empty path) or the single top folder.
@@ -255,5 +235,59 @@ impl<'a> Tree<'a> {
             }
         }
         Ok(())
+    }
+}
+
+impl Sink for Tree<'_> {
+    fn folder(&mut self, entry: &str, mode: u32) -> Result<(), BundleError> {
+        Self::check_mode(entry, mode)?;
+        let path = normalise(entry)?;
+        if path.is_empty() {
+            return Ok(());
+        }
+        self.make_folder(entry, &path, true)
+    }
+
+    fn file(&mut self, entry: &str, mode: u32, content: &mut dyn Read) -> Result<(), BundleError> {
+        Self::check_mode(entry, mode)?;
+        let target = self.place(entry, Node::File)?;
+        write_new(entry, &target, mode, content, self.budget)
+    }
+
+    /// Checked and made by [`Tree::finish`].
+    fn link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
+        check_target(entry, target)?;
+        self.place(
+            entry,
+            Node::Link {
+                target: target.to_owned(),
+            },
+        )?;
+        Ok(())
+    }
+
+    /// Of a file that the archive has brought already.
+    fn hard_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
+        let existing = normalise(target)?;
+        if self.nodes.get(&existing) != Some(&Node::File) {
+            return Err(invalid(
+                entry,
+                format_args!(
+                    "is a hard link to {target:?}, which is no earlier file of the archive"
+                ),
+            ));
+        }
+        let place = self.place(entry, Node::File)?;
+        Ok(fs::hard_link(self.into.join(existing), place)?)
+    }
+
+    fn special(&mut self, entry: &str, special: Special) -> Result<(), BundleError> {
+        Err(unusable(
+            entry,
+            match special {
+                Special::NullDevice | Special::Device => "a device",
+                Special::Pipe => "a named pipe",
+            },
+        ))
     }
 }

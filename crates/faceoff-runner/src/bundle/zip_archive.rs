@@ -1,7 +1,8 @@
 use super::{
     budget::{Budget, Metered},
     error::BundleError,
-    tree::Tree,
+    tar_archive::Sink,
+    tree::{Tree, unusable},
 };
 use std::{
     fs::File,
@@ -51,16 +52,16 @@ pub(super) fn unpack<'a>(
             })?
             .to_owned();
         if name.contains('\\') {
-            return Err(tree.refuse(&name, "named with a backslash"));
+            return Err(unusable(&name, "named with a backslash"));
         }
         if entry.encrypted() {
-            return Err(tree.refuse(&name, "encrypted"));
+            return Err(unusable(&name, "encrypted"));
         }
         if !matches!(
             entry.compression(),
             CompressionMethod::Stored | CompressionMethod::Deflated
         ) {
-            return Err(tree.refuse(&name, "compressed by another method than deflate"));
+            return Err(unusable(&name, "compressed by another method than deflate"));
         }
         // The library's own translation hides set-id bits, which are to be refused.
         let mode = match (entry.system(), entry.external_attributes() >> 16) {
@@ -86,10 +87,10 @@ pub(super) fn unpack<'a>(
                     .read_to_end(&mut target)
                     .map_err(BundleError::reading(&name))?;
                 let target = String::from_utf8(target)
-                    .map_err(|_| tree.refuse(&name, "a link to a name that is not UTF-8"))?;
+                    .map_err(|_| unusable(&name, "a link to a name that is not UTF-8"))?;
                 tree.link(&name, &target)?;
             }
-            _ => return Err(tree.refuse(&name, "a device, pipe or socket")),
+            _ => return Err(unusable(&name, "a device, pipe or socket")),
         }
     }
     Ok(())

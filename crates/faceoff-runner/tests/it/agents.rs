@@ -1,7 +1,7 @@
 //! Agents in Python, behaving and not, each a real process.
 
 use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::Bundle};
-use faceoff_sandbox::{Isolation, Limits, Runtime};
+use faceoff_sandbox::{Isolation, Limits, Runtime, RuntimeFiles};
 use faceoff_wire::Manifest;
 use std::{collections::BTreeMap, fs, os::unix::fs::PermissionsExt};
 use tempfile::TempDir;
@@ -74,6 +74,7 @@ impl Agent {
         let bundle = Bundle {
             dir: dir.path().to_owned(),
             manifest,
+            image: None,
         };
         Self { _dir: dir, bundle }
     }
@@ -114,6 +115,7 @@ pub fn sandboxed() -> AgentEnvironment {
                 Runtime::python3().expect("a python3 for the tests"),
             ),
         ]),
+        images: true,
         agent_cpus: Vec::new(),
     }
 }
@@ -134,7 +136,7 @@ pub fn unconfined() -> AgentEnvironment {
         Runtime {
             read_only_paths: Vec::new(),
             path: std::env::var("PATH").unwrap(),
-            image: None,
+            files: RuntimeFiles::Host,
         },
     );
     env

@@ -13,6 +13,7 @@ pub const MANIFEST: &str =
     "name = \"test\"\ncommand = [\"python3\", \"agent.py\"]\nruntime = \"python3\"\n";
 
 /// A tar archive under construction; names and modes are taken as they are.
+#[derive(Clone)]
 pub struct Tar(Vec<u8>);
 
 impl Tar {

@@ -157,6 +157,7 @@ impl Evaluator for Scripted {
         Ok(Bundle {
             dir: into.to_owned(),
             manifest,
+            image: None,
         })
     }
 
@@ -440,6 +441,7 @@ impl Server {
                     },
                     isolation: Isolation::None,
                     runtimes: BTreeMap::new(),
+                    images: false,
                     agent_cpus: Vec::new(),
                 },
                 metrics: Metrics::new("0.0.0"),

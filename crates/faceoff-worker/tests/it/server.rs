@@ -84,6 +84,7 @@ impl Server {
                         given_up: Vec::new(),
                     },
                     runtimes,
+                    images: false,
                     agent_cpus: Vec::new(),
                 },
                 metrics: Metrics::new("0.0.0"),

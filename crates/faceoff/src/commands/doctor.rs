@@ -326,6 +326,7 @@ fn describe(content: &RuntimeContent, runtime: Option<&Runtime>) -> String {
             runtime.map_or(0, |runtime| runtime.read_only_paths.len()),
             libc.as_deref().unwrap_or("of no known version")
         ),
+        RuntimeContent::Image => "container images, which bring their own files".to_owned(),
         RuntimeContent::Broken { why } => why.clone(),
     }
 }

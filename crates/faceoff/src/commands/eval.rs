@@ -32,7 +32,7 @@ use std::{fs, path::PathBuf};
 /// `results.json` and `dataset.zip` to a folder. Exit status 0 only if there is a result, and the agent had no fault.
 #[derive(Debug, Args)]
 pub struct EvalCommand {
-    /// The agent: a folder with agent.toml, or a .tar.gz, .tar.zst or .zip
+    /// The agent: a folder with agent.toml, a .tar.gz, .tar.zst or .zip, or a container image as docker save writes it
     bundle: PathBuf,
     /// Tasks to play [default: hit,defend,prepare, or the stage's with --like-server]
     #[arg(long = "task", value_name = "TASKS", value_delimiter = ',')]

@@ -6,7 +6,7 @@ use faceoff_runner::{
     AgentEnvironment,
     bundle::{self, Bundle, BundleLimits},
 };
-use faceoff_sandbox::{Isolation, Runtime};
+use faceoff_sandbox::{Isolation, Runtime, RuntimeFiles};
 use std::{
     fs::{self, File},
     path::Path,
@@ -54,7 +54,7 @@ pub(super) fn environment(config: &Config, runtime: &str, no_sandbox: bool) -> A
             Runtime {
                 read_only_paths: Vec::new(),
                 path,
-                image: None,
+                files: RuntimeFiles::Host,
             },
         );
     }

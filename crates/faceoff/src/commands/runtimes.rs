@@ -83,6 +83,7 @@ fn runtime(runtime: &RuntimeInventory) -> String {
         RuntimeContent::Native { libc: version } => {
             format!("programs and shared libraries; {}", libc(version))
         }
+        RuntimeContent::Image => "container images, which bring their own files".to_owned(),
         RuntimeContent::Broken { why } => why.clone(),
     };
     format!("{:<12} {found}", runtime.name)

@@ -220,7 +220,7 @@ async fn serve(
             false => 0,
         },
         time: config.time.clone(),
-        runtimes: agent.runtimes.keys().cloned().collect(),
+        runtimes: agent.offered(),
     };
     let watch = CapacityWatch::new(store.clone(), clock.clone(), capacity.clone());
     let metrics = Metrics::new(env!("CARGO_PKG_VERSION"));

@@ -19,7 +19,7 @@ const POLL: Duration = Duration::from_millis(500);
 /// .faceoffignore names, in the syntax of .gitignore; a line `!NAME` there has something go in all the same.
 #[derive(Debug, Args)]
 pub struct SubmitCommand {
-    /// The agent: a .tar.gz, .tar.zst or .zip, or a folder with agent.toml, which is packed
+    /// The agent: a .tar.gz, .tar.zst or .zip, a container image as docker save writes it, or a folder with agent.toml, which is packed
     bundle: PathBuf,
     /// List what of a folder would go in and what would not, and upload nothing
     #[arg(long)]

@@ -4,7 +4,7 @@ use super::Config;
 use anyhow::{Context as _, bail, ensure};
 use faceoff_dataset::has_robot;
 use faceoff_types::{
-    DayDeadline, LONGEST_DEADLINE_H, MAX_EPISODES_PER_TASK, MismatchSettings, Seed,
+    DayDeadline, IMAGE_RUNTIME, LONGEST_DEADLINE_H, MAX_EPISODES_PER_TASK, MismatchSettings, Seed,
 };
 use std::collections::BTreeSet;
 
@@ -84,6 +84,10 @@ impl Config {
                  end, got {url:?}"
             );
         }
+        ensure!(
+            !self.runtimes.contains_key(IMAGE_RUNTIME),
+            "runtimes.{IMAGE_RUNTIME}: agents that are container images have this name; call the runtime otherwise"
+        );
         let evaluation = &self.evaluation;
         if evaluation.at.is_some() && evaluation.cron.is_some() {
             bail!("evaluation.cron: there is evaluation.at, too; leave one of them out");

@@ -1,7 +1,7 @@
 //! `[runtimes.NAME]`: a folder that holds a Python, or paths of the host.
 
 use anyhow::{Context as _, bail};
-use faceoff_sandbox::Runtime;
+use faceoff_sandbox::{Runtime, RuntimeFiles};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -120,7 +120,7 @@ impl RuntimeConfig {
                 Runtime::python3_at(&python).unwrap_or_else(|_| Runtime {
                     read_only_paths: vec![python],
                     path: folder.join("bin").display().to_string(),
-                    image: None,
+                    files: RuntimeFiles::Host,
                 })
             }
             Self::Paths {
@@ -129,7 +129,7 @@ impl RuntimeConfig {
             } => Runtime {
                 read_only_paths: read_only_paths.clone(),
                 path: path.clone(),
-                image: None,
+                files: RuntimeFiles::Host,
             },
         }
     }

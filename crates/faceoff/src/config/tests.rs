@@ -363,6 +363,8 @@ fn a_runtime_is_a_folder_or_paths_and_a_folder_must_hold_a_python() {
     );
     let written = toml::to_string(&config).unwrap();
     assert_eq!(Config::parse(&written).unwrap(), config);
+    let taken = error("[runtimes.image]\nfolder = \"/a\"");
+    assert!(taken.contains("call the runtime otherwise"), "{taken}");
     for (text, words) in [
         ("folder = \"here\"", "absolute path"),
         ("folder = \"/a\"\npath = \"/b\"", "either `folder`"),

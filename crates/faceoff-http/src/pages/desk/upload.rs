@@ -26,7 +26,7 @@ async fn taken(
     if file.name.is_empty() {
         return Err(Problem::new(
             ProblemKind::InvalidRequest,
-            "no file was chosen; choose the agent's archive (.tar.gz, .tar.zst or .zip)",
+            "no file was chosen; choose the agent's archive (.tar.gz, .tar.zst, .zip, or .tar of a container image)",
         ));
     }
     let incoming = Incoming {

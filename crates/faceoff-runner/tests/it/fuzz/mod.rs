@@ -7,6 +7,7 @@ mod archives;
 mod datasets;
 mod draws;
 mod games;
+mod images;
 mod manifests;
 mod mutation;
 

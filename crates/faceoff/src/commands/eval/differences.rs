@@ -17,11 +17,17 @@ pub(super) fn of_runtimes(here: &RuntimeInventory, there: &RuntimeInventory) -> 
                 .into_iter()
                 .collect()
         }
+        (RuntimeContent::Image, RuntimeContent::Image) => Vec::new(),
         (RuntimeContent::Broken { why }, _) => {
             vec![format!("{name} does not work on this machine: {why}")]
         }
         (_, RuntimeContent::Broken { .. }) => {
             vec![format!("{name} does not work on the server at the moment")]
+        }
+        (_, RuntimeContent::Image) => {
+            vec![format!(
+                "{name} is a runtime of this machine, and of the server whatever a container image brings"
+            )]
         }
         (_, RuntimeContent::Python(_)) => {
             vec![format!("{name} has a Python on the server, and none here")]

@@ -8,7 +8,7 @@ use faceoff_http::views::{
     stage::{PhaseView, StageView},
 };
 use faceoff_runner::{AgentEnvironment, inventory};
-use faceoff_types::{RULESET, Ruleset};
+use faceoff_types::{IMAGE_RUNTIME, RULESET, Ruleset};
 use std::path::Path;
 
 /// A stage of a server, as it plays.
@@ -100,7 +100,12 @@ impl LikeServer {
             );
         }
         ensure!(
-            env.runtimes.contains_key(runtime),
+            runtime != IMAGE_RUNTIME || env.runs_images(),
+            "the agent is a container image, and this machine runs none: its configuration says so (sandbox.images), or \
+             gives the namespaces up"
+        );
+        ensure!(
+            env.offered().iter().any(|name| name == runtime),
             "agent.toml names the runtime {runtime}, which the server offers and this machine does not: make it \
              (docker/runtime.sh FOLDER) and name it in a configuration (--config): [runtimes.{runtime}] folder = \"FOLDER\""
         );
@@ -132,6 +137,7 @@ impl LikeServer {
                 .filter(|(name, _)| *name == runtime)
                 .map(|(name, runtime)| (name.clone(), runtime.clone()))
                 .collect(),
+            images: env.images && runtime == IMAGE_RUNTIME,
             ..env.clone()
         };
         let there = self.server.runtimes.iter().find(|one| one.name == runtime);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(super) struct PlayOptions {
-    /// The first side's agent: a folder with agent.toml, or a .tar.gz, .tar.zst or .zip
+    /// The first side's agent: a folder with agent.toml, a .tar.gz, .tar.zst or .zip, or a container image as docker save writes it
     pub(super) bundle_a: PathBuf,
     /// The second side's agent; it may be the same
     pub(super) bundle_b: PathBuf,

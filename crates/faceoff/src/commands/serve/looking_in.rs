@@ -43,6 +43,9 @@ pub fn offer(config: &Config, cpus: &CpuLayout) -> anyhow::Result<Offer> {
                     RuntimeContent::Native { libc } => {
                         tracing::info!(runtime = runtime.name, libc, "a runtime is offered");
                     }
+                    RuntimeContent::Image => {
+                        tracing::info!(runtime = runtime.name, "container images are run");
+                    }
                     RuntimeContent::Broken { why } => tracing::warn!(
                         runtime = runtime.name,
                         why,

@@ -1,0 +1,875 @@
+//! Bundles that are container images: what is accepted, and what a hostile one cannot do.
+
+use crate::{
+    archives::{MANIFEST, Tar, write, zip},
+    image_archives::{
+        IMAGE_MANIFEST, Packing, TestImage, agent_layer, digest, index, layout, list,
+    },
+};
+use faceoff_runner::bundle::{Bundle, BundleError, BundleLimits, Image, open, unpack};
+use serde_json::json;
+use std::{
+    fs,
+    os::unix::fs::{MetadataExt, PermissionsExt, symlink},
+    path::Path,
+};
+use tar::EntryType;
+use tempfile::TempDir;
+
+fn try_unpack(bytes: &[u8], limits: BundleLimits) -> (TempDir, Result<Bundle, BundleError>) {
+    let dir = tempfile::tempdir().unwrap();
+    fs::write(dir.path().join("secret"), "secret").unwrap();
+    let archive = write(dir.path(), "upload", bytes);
+    let result = unpack(&archive, &dir.path().join("out"), &limits, &|| false);
+    // Whatever came of it, nothing beside the folder has changed.
+    let secret = fs::read_to_string(dir.path().join("secret")).unwrap();
+    assert_eq!(secret, "secret");
+    assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 3);
+    (dir, result)
+}
+
+#[track_caller]
+fn accepted(bytes: &[u8]) -> (TempDir, Bundle, Image) {
+    let (dir, result) = try_unpack(bytes, BundleLimits::default());
+    let bundle = result.unwrap();
+    let image = bundle.image.clone().unwrap();
+    assert_eq!(
+        bundle.dir,
+        fs::canonicalize(&image.root).unwrap().join("agent")
+    );
+    (dir, bundle, image)
+}
+
+#[track_caller]
+fn told(bytes: &[u8], limits: BundleLimits) -> String {
+    match try_unpack(bytes, limits).1 {
+        Err(BundleError::Invalid(told)) => told,
+        other => panic!("expected a refusal, got {other:?}"),
+    }
+}
+
+#[track_caller]
+fn refused(bytes: &[u8], expected: &str) {
+    assert_eq!(told(bytes, BundleLimits::default()), expected);
+}
+
+#[track_caller]
+fn refused_near(bytes: &[u8], needle: &str) {
+    let told = told(bytes, BundleLimits::default());
+    assert!(told.contains(needle), "{told:?} lacks {needle:?}");
+}
+
+/// An image with these layers on an agent's: the last of them is refused.
+#[track_caller]
+fn layer_refused(layers: impl IntoIterator<Item = Tar>, expected: &str) {
+    let layers: Vec<Tar> = layers.into_iter().collect();
+    let count = layers.len() + 1;
+    refused(
+        &TestImage::agent(layers).docker().bytes(),
+        &format!("layer {count} of the image's {count}: {expected}"),
+    );
+}
+
+/// The root of an image of these layers on an agent's.
+#[track_caller]
+fn root_of(layers: impl IntoIterator<Item = Tar>) -> (TempDir, Image) {
+    let (dir, _, image) = accepted(&TestImage::agent(layers).docker().bytes());
+    (dir, image)
+}
+
+impl Look for Image {
+    fn at(&self, path: &str) -> std::path::PathBuf {
+        self.root.join(path)
+    }
+}
+
+trait Look {
+    fn at(&self, path: &str) -> std::path::PathBuf;
+
+    fn text(&self, path: &str) -> String {
+        assert!(
+            self.at(path).symlink_metadata().unwrap().is_file(),
+            "{path}"
+        );
+        fs::read_to_string(self.at(path)).unwrap()
+    }
+
+    fn link(&self, path: &str) -> String {
+        let target = fs::read_link(self.at(path)).unwrap();
+        target.to_str().unwrap().to_owned()
+    }
+
+    fn is_there(&self, path: &str) -> bool {
+        self.at(path).symlink_metadata().is_ok()
+    }
+
+    fn mode(&self, path: &str) -> u32 {
+        mode(&self.at(path))
+    }
+}
+
+fn mode(path: &Path) -> u32 {
+    path.symlink_metadata().unwrap().permissions().mode() & 0o7777
+}
+
+fn base() -> Tar {
+    Tar::new()
+        .folder("./")
+        .folder("usr/bin/")
+        .file("usr/bin/tool", 0o4755, b"tool")
+        .symlink("bin", "usr/bin")
+        .file("lib/deep/one", 0o600, b"one")
+        .file("lib/deep/two", 0o644, b"two")
+}
+
+#[test]
+fn an_image_is_accepted_as_engines_save_it() {
+    for packing in [Packing::Plain, Packing::Gzip, Packing::Zstd] {
+        let image = || TestImage::of([base(), agent_layer()]).packed(packing);
+        for tar in [TestImage::docker, TestImage::layout] {
+            for bytes in [
+                tar(&image()).bytes(),
+                tar(&image()).gz(),
+                tar(&image()).zst(),
+            ] {
+                let (dir, bundle, image) = accepted(&bytes);
+                assert_eq!(bundle.manifest.name, "boxed");
+                assert_eq!(image.env["MODE"], "fast");
+                assert_eq!(image.path(), "/opt/bin:/bin");
+                assert_eq!(image.text("agent/agent"), "program");
+                assert_eq!(image.link("bin"), "usr/bin");
+                // Nothing is left of what it came in.
+                let left: Vec<_> = fs::read_dir(dir.path().join("out")).unwrap().collect();
+                assert_eq!(left.len(), 1, "{left:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn both_descriptions_at_once_are_one_image() {
+    let image = TestImage::of([base(), agent_layer()]).packed(Packing::Gzip);
+    let (tar, descriptor) = image.blobs(layout());
+    let names: Vec<String> = image
+        .packed_layers()
+        .iter()
+        .map(|layer| format!("blobs/{}", digest(layer).replace(':', "/")))
+        .collect();
+    let config = format!("blobs/{}", digest(&image.config_bytes()).replace(':', "/"));
+    let docker = json!([{"Config": config, "Layers": names, "RepoTags": null}]);
+    let tar = index(tar, &[descriptor]).file("manifest.json", 0o644, &list(&docker));
+    let (_dir, _, image) = accepted(&tar.gz());
+    assert_eq!(image.text("lib/deep/two"), "two");
+}
+
+#[test]
+fn modes_are_the_sandboxs_and_set_id_bits_go() {
+    let (_dir, image) = root_of([base()
+        .entry(EntryType::Directory, "closed/", 0o2700, "", b"")
+        .file("closed/secret", 0o400, b"x")]);
+    assert_eq!(image.mode("usr/bin/tool"), 0o755);
+    assert_eq!(image.mode("lib/deep/one"), 0o644);
+    assert_eq!(image.mode("closed"), 0o755);
+    assert_eq!(image.mode("closed/secret"), 0o644);
+    assert_eq!(mode(&image.root), 0o755);
+}
+
+#[test]
+fn what_the_sandbox_needs_is_there_and_nothing_of_its_folders() {
+    let (_dir, image) = root_of([Tar::new()
+        .file("tmp/x", 0o644, b"x")
+        .symlink("dev", "/somewhere")
+        .file("proc", 0o644, b"x")
+        .file("run/lock/x", 0o644, b"x")
+        .symlink("var/run", "/run")
+        .file("var/run/y", 0o644, b"y")
+        .symlink("etc/resolv.conf", "../run/x")
+        .folder("etc/passwd/")
+        .file("etc/passwd/x", 0o644, b"x")
+        .file("etc/hosts", 0o600, b"1.2.3.4 elsewhere\n")
+        .file("etc/group", 0o644, b"root:x:0:\n")
+        .file("etc/own.conf", 0o644, b"own")]);
+    for folder in ["dev", "proc", "run", "sys", "tmp"] {
+        let entries = fs::read_dir(image.at(folder)).unwrap().count();
+        assert!(image.at(folder).symlink_metadata().unwrap().is_dir());
+        assert_eq!(entries, 0, "{folder}");
+    }
+    assert_eq!(image.text("etc/own.conf"), "own");
+    assert_eq!(image.text("etc/resolv.conf"), "");
+    assert_eq!(image.text("etc/passwd"), "");
+    assert_eq!(image.text("etc/group"), "");
+    assert_eq!(image.text("etc/hostname"), "agent\n");
+    assert!(image.text("etc/hosts").starts_with("127.0.0.1 localhost"));
+    let (_dir, image) = root_of([]);
+    assert_eq!(
+        image.text("etc/passwd"),
+        "",
+        "an image without /etc has one"
+    );
+}
+
+#[test]
+fn whiteouts_hide_what_is_below_and_nothing_else() {
+    let (_dir, image) = root_of([
+        base(),
+        Tar::new()
+            .file("lib/deep/.wh.one", 0o644, b"")
+            .file("usr/bin/.wh.none", 0o644, b"")
+            .file("gone/.wh.x", 0o644, b"")
+            .file(".wh.bin", 0o644, b"")
+            .file(".wh.tmp", 0o644, b"")
+            .file("lib/.wh..wh.plnk", 0o644, b""),
+    ]);
+    assert!(!image.is_there("lib/deep/one"));
+    assert!(!image.is_there("bin"));
+    assert!(!image.is_there("gone"));
+    assert!(!image.is_there("lib/.wh..wh.plnk"));
+    assert_eq!(image.text("lib/deep/two"), "two");
+    assert_eq!(image.text("usr/bin/tool"), "tool");
+    assert!(image.is_there("tmp"));
+    let whole = |layer: Tar| {
+        let (_dir, image) = root_of([base(), layer]);
+        assert!(!image.is_there("lib/deep/one"));
+        assert_eq!(image.text("lib/new"), "new");
+        assert_eq!(image.text("usr/bin/tool"), "tool");
+    };
+    // Before and after what the same layer brings.
+    let new = || Tar::new().folder("lib/").file("lib/new", 0o644, b"new");
+    whole(
+        Tar::new()
+            .file(".wh.lib", 0o644, b"")
+            .folder("lib/")
+            .file("lib/new", 0o644, b"new"),
+    );
+    whole(new().file(".wh.lib", 0o644, b""));
+    whole(new().file("lib/.wh..wh..opq", 0o644, b""));
+    whole(
+        Tar::new()
+            .file("lib/.wh..wh..opq", 0o644, b"")
+            .file("lib/new", 0o644, b"new"),
+    );
+    whole(
+        Tar::new()
+            .file("lib/new", 0o644, b"new")
+            .file(".wh.lib", 0o644, b""),
+    );
+}
+
+#[test]
+fn an_opaque_root_hides_all_that_is_below() {
+    let (_dir, image) = root_of([
+        base(),
+        Tar::new()
+            .file("agent/agent.toml", 0o644, IMAGE_MANIFEST.as_bytes())
+            .file(".wh..wh..opq", 0o644, b""),
+    ]);
+    assert!(!image.is_there("usr") && !image.is_there("agent/agent"));
+}
+
+#[test]
+fn whiteouts_of_no_name_are_refused() {
+    for name in [".wh.", "lib/.wh..", "lib/.wh..."] {
+        layer_refused(
+            [base(), Tar::new().file(name, 0o644, b"")],
+            &format!("entry {name:?} is a whiteout of no possible name"),
+        );
+    }
+}
+
+#[test]
+fn later_layers_replace_what_is_there() {
+    let (_dir, image) = root_of([
+        base(),
+        Tar::new()
+            .file("lib", 0o644, b"a file now")
+            .symlink("usr/bin/tool", "/elsewhere")
+            .folder("bin/")
+            .file("bin/own", 0o755, b"own"),
+        Tar::new().folder("usr/bin/tool/").folder("bin/"),
+        Tar::new()
+            .file("usr/bin/tool/x", 0o644, b"x")
+            .file("bin/own", 0o755, b"newer"),
+    ]);
+    assert_eq!(image.text("lib"), "a file now");
+    assert_eq!(image.text("usr/bin/tool/x"), "x");
+    assert_eq!(
+        image.text("bin/own"),
+        "newer",
+        "a folder again is the same folder"
+    );
+    assert!(
+        !image.is_there("usr/bin/own"),
+        "the link was replaced, not followed"
+    );
+}
+
+#[test]
+fn hard_links_keep_a_file_that_is_replaced() {
+    let hard =
+        |tar: Tar, name: &str, target: &str| tar.entry(EntryType::Link, name, 0o644, target, b"");
+    let (_dir, image) = root_of([
+        base(),
+        // Through a link of the image, to a file below and to a link, which is not followed.
+        hard(hard(Tar::new(), "kept", "bin/tool"), "alias", "bin"),
+        Tar::new().file("usr/bin/tool", 0o755, b"newer"),
+        Tar::new().file("usr/bin/.wh.tool", 0o644, b""),
+    ]);
+    assert_eq!(image.text("kept"), "tool");
+    assert_eq!(image.link("alias"), "usr/bin");
+    assert!(!image.is_there("usr/bin/tool"));
+    let (_dir, image) = root_of([base(), hard(Tar::new(), "same", "lib/deep/two")]);
+    let inode = |path: &str| image.at(path).metadata().unwrap().ino();
+    assert_eq!(inode("same"), inode("lib/deep/two"));
+    for (layers, name, target, problem) in [
+        (
+            vec![base(), Tar::new().file("lib/deep/.wh.one", 0o644, b"")],
+            "x",
+            "lib/deep/one",
+            "is a hard link to \"lib/deep/one\", which is no file of this layer or one below",
+        ),
+        (
+            vec![base()],
+            "x",
+            "lib/deep",
+            "is a hard link to \"lib/deep\", which is no file of this layer or one below",
+        ),
+        (
+            vec![Tar::new().symlink("host", "/etc")],
+            "x",
+            "host/passwd",
+            "is a hard link to \"host/passwd\", which is no file of this layer or one below",
+        ),
+        (
+            vec![base()],
+            "lib/deep/one",
+            "lib/deep/one",
+            "is a hard link to itself, or to what it replaces: \"lib/deep/one\"",
+        ),
+        (
+            vec![base()],
+            "lib",
+            "lib/deep/one",
+            "is a hard link to itself, or to what it replaces: \"lib/deep/one\"",
+        ),
+    ] {
+        let last = hard(Tar::new(), name, target);
+        layer_refused(
+            layers.into_iter().chain([last]),
+            &format!("entry {name:?} {problem}"),
+        );
+    }
+    layer_refused(
+        [hard(Tar::new(), "x", "../../secret")],
+        "entry \"../../secret\" has '..' in its path",
+    );
+}
+
+#[test]
+fn links_of_the_image_never_lead_to_the_host() {
+    // Not in /tmp, of which an image has nothing.
+    let host = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
+    fs::write(host.path().join("mine"), "mine").unwrap();
+    let there = host.path().to_str().unwrap();
+    let up = format!("../../../../../../../../..{there}");
+    for target in [there, &up] {
+        let (_dir, image) = root_of([
+            Tar::new().symlink("a", target).symlink("b", "a"),
+            Tar::new()
+                .file("a/mine", 0o755, b"theirs")
+                .file("b/new", 0o644, b"new"),
+            Tar::new()
+                .file("a/.wh.mine", 0o644, b"")
+                .file("b/kept", 0o644, b"kept"),
+            Tar::new()
+                .folder("a/folder/")
+                .file("b/.wh..wh..opq", 0o644, b""),
+        ]);
+        // They led into the root, as in the sandbox.
+        let inside = |name: &str| image.root.join(&there[1..]).join(name);
+        assert!(inside("folder").is_dir());
+        assert!(!inside("kept").exists() && !inside("mine").exists());
+        assert_eq!(image.link("a"), target);
+        let left: Vec<_> = fs::read_dir(host.path()).unwrap().collect();
+        assert_eq!(left.len(), 1, "{left:?}");
+        assert_eq!(
+            fs::read_to_string(host.path().join("mine")).unwrap(),
+            "mine"
+        );
+    }
+}
+
+#[test]
+fn links_in_circles_and_endless_paths_end() {
+    layer_refused(
+        [Tar::new()
+            .symlink("a", "b")
+            .symlink("b", "a")
+            .file("a/x", 0o644, b"")],
+        "entry \"a/x\" goes through more than 40 links",
+    );
+    let deep = "d/".repeat(45);
+    let far = (0..30).fold(Tar::new().symlink("l0", &deep), |tar, index| {
+        tar.symlink(&format!("l{}", index + 1), &format!("l{index}/{deep}"))
+    });
+    layer_refused(
+        [far.file("l30/x", 0o644, b"")],
+        "entry \"l30/x\" leads to too long a path: at most 1024 bytes",
+    );
+    layer_refused(
+        [Tar::new().file("a", 0o644, b"").file("a/b", 0o644, b"")],
+        "entry \"a/b\" needs \"a\" to be a folder, but it is a file",
+    );
+    // Far more names than an honest image has, in a small archive.
+    let detour = "a/../".repeat(17);
+    let links = (0..38).fold(Tar::new().folder("a/").symlink("l0", "a"), |tar, index| {
+        tar.symlink(&format!("l{}", index + 1), &format!("{detour}l{index}"))
+    });
+    let walks = (0..20_000).fold(links, |tar, _| tar.folder("l38/x/"));
+    refused(
+        &TestImage::agent([walks]).docker().gz(),
+        "the image's paths lead through too many folders and links",
+    );
+}
+
+#[test]
+fn names_that_lead_out_are_refused() {
+    for (name, problem) in [
+        ("/etc/passwd", "has an absolute path"),
+        ("../x", "has '..' in its path"),
+        ("a/../../x", "has '..' in its path"),
+        ("", "has no name"),
+    ] {
+        layer_refused(
+            [Tar::new().file(name, 0o644, b"x")],
+            &format!("entry {name:?} {problem}"),
+        );
+        if !name.is_empty() {
+            refused(
+                &TestImage::agent([])
+                    .docker()
+                    .file(name, 0o644, b"x")
+                    .bytes(),
+                &format!("entry {name:?} {problem}"),
+            );
+        }
+    }
+}
+
+#[test]
+fn devices_are_left_out_and_overlays_own_whiteouts_refused() {
+    let mut device = Tar::new();
+    for (kind, name) in [
+        (EntryType::Block, "disk"),
+        (EntryType::Fifo, "pipe"),
+        (EntryType::Char, "dev/null"),
+    ] {
+        device = device.entry(kind, name, 0o666, "", b"");
+    }
+    let (_dir, image) = root_of([device]);
+    assert!(!image.is_there("disk") && !image.is_there("pipe"));
+    layer_refused(
+        [Tar::new().entry(EntryType::Char, "lib/gone", 0o666, "", b"")],
+        "entry \"lib/gone\" is a whiteout of overlayfs (a device 0/0), which layers do not have: expected what \
+         `docker save` writes",
+    );
+}
+
+#[test]
+fn an_agent_is_a_real_folder_with_a_real_file() {
+    const HINT: &str = "an image holds the agent's folder as /agent, with its agent.toml (runtime = \"image\"): put \
+                        `COPY . /agent` into the Dockerfile that lies in that folder";
+    let host = tempfile::tempdir().unwrap();
+    fs::write(host.path().join("agent.toml"), IMAGE_MANIFEST).unwrap();
+    let there = host.path().to_str().unwrap();
+    let of = |layer: Tar| TestImage::of([layer]).docker().bytes();
+    refused(
+        &of(base()),
+        &format!("the container image has no /agent; {HINT}"),
+    );
+    refused(
+        &of(Tar::new().folder("agent/")),
+        &format!("the container image has no /agent/agent.toml; {HINT}"),
+    );
+    refused(
+        &of(Tar::new().symlink("agent", there)),
+        &format!("the container image has something else than a folder as /agent; {HINT}"),
+    );
+    for layer in [
+        Tar::new().symlink("agent/agent.toml", &format!("{there}/agent.toml")),
+        Tar::new().folder("agent/agent.toml/"),
+    ] {
+        refused(
+            &of(layer),
+            "the container image has a folder or a link as /agent/agent.toml: expected a file",
+        );
+    }
+    for etc in [
+        Tar::new().symlink("etc", there),
+        Tar::new().file("etc", 0o644, b""),
+    ] {
+        refused(
+            &TestImage::agent([etc]).docker().bytes(),
+            "the container image has something else than a folder as /etc",
+        );
+    }
+    assert_eq!(fs::read_dir(host.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn runtime_and_bundle_agree() {
+    let plain = Tar::new().file("agent/agent.toml", 0o644, MANIFEST.as_bytes());
+    refused(
+        &TestImage::of([plain]).docker().bytes(),
+        "agent.toml: runtime is \"python3\", and the bundle is a container image, which brings its own: expected \
+         \"image\"",
+    );
+    let no_image = "agent.toml: runtime is \"image\", and the bundle is no container image: build one and send what \
+                    `docker save` writes, or name a runtime that the server offers";
+    let tar = || Tar::new().file("agent.toml", 0o644, IMAGE_MANIFEST.as_bytes());
+    refused(&tar().gz(), no_image);
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("agent.toml"), IMAGE_MANIFEST).unwrap();
+    match open(folder.path(), folder.path(), &BundleLimits::default()) {
+        Err(BundleError::Invalid(told)) => assert_eq!(told, no_image),
+        other => panic!("{other:?}"),
+    }
+    // An agent.toml at the archive's root makes it a bundle, whatever else is there.
+    let (_dir, result) = try_unpack(
+        &Tar::with_manifest()
+            .file("manifest.json", 0o644, b"{}")
+            .gz(),
+        BundleLimits::default(),
+    );
+    assert_eq!(result.unwrap().image, None);
+}
+
+#[test]
+fn a_plain_tar_is_an_image_or_refused() {
+    refused(
+        &Tar::with_manifest().bytes(),
+        "a plain .tar is accepted of a container image only: compress the bundle to .tar.gz",
+    );
+    refused_near(
+        &Tar::new().file("x", 0o644, b"").bytes(),
+        "there is no agent.toml",
+    );
+    let image = zip(&[("manifest.json", 0o644, b"[]")]);
+    refused_near(&image, "there is no agent.toml");
+}
+
+#[test]
+fn an_archive_holds_one_image() {
+    let one = TestImage::agent([]);
+    let entry = json!({"Config": "config.json", "Layers": ["layer0/layer.tar"]});
+    let other = json!({"Config": "other.json", "Layers": ["layer0/layer.tar"]});
+    let docker = |list_of: &serde_json::Value| {
+        let layer = &one.packed_layers()[0];
+        Tar::new()
+            .file("manifest.json", 0o644, &list(list_of))
+            .file("config.json", 0o644, &one.config_bytes())
+            .file("layer0/layer.tar", 0o644, layer)
+            .bytes()
+    };
+    accepted(&docker(&json!([entry])));
+    accepted(&docker(&json!([entry, entry])));
+    let several =
+        "the archive holds 2 container images: expected one; save the agent's alone, by its name";
+    refused(&docker(&json!([entry, other])), several);
+    refused_near(&docker(&json!([])), "is missing: manifest.json names none");
+    let (tar, first) = TestImage::agent([]).blobs(layout());
+    let (tar, second) = TestImage::of([base()]).blobs(tar);
+    refused(&index(tar, &[first, second]).bytes(), several);
+}
+
+#[test]
+fn of_several_platforms_the_hosts_is_taken() {
+    let of = |architecture: &str, os: &str| json!({"architecture": architecture, "os": os});
+    let ours = TestImage::agent([base()]);
+    let host = if cfg!(target_arch = "x86_64") {
+        "amd64"
+    } else {
+        "arm64"
+    };
+    let (tar, mut here) = ours.blobs(layout());
+    here["platform"] = of(host, "linux");
+    let (tar, mut there) = TestImage::of([Tar::new()]).blobs(tar);
+    there["platform"] = of("riscv64", "linux");
+    let told_of = json!({
+        "mediaType": "application/vnd.oci.image.manifest.v1+json",
+        "digest": digest(b"attestation"),
+        "platform": of("unknown", "unknown"),
+        "annotations": {"vnd.docker.reference.type": "attestation-manifest"},
+    });
+    let nested = |tar: Tar, images: serde_json::Value| {
+        let inner = list(&json!({"schemaVersion": 2, "manifests": images}));
+        let name = digest(&inner);
+        let tar = tar.file(&format!("blobs/{}", name.replace(':', "/")), 0o644, &inner);
+        let entry = json!({"mediaType": "application/vnd.oci.image.index.v1+json", "digest": name});
+        index(tar, &[entry]).bytes()
+    };
+    let (_dir, _, image) = accepted(&nested(tar.clone(), json!([there, here, told_of])));
+    assert_eq!(image.text("usr/bin/tool"), "tool");
+    let mut elsewhere = here.clone();
+    elsewhere["platform"] = of(host, "windows");
+    refused(
+        &nested(tar.clone(), json!([there, elsewhere])),
+        &format!(
+            "the container image is for linux/riscv64, windows/{host}, and this server runs linux/{host}: build it \
+             with --platform linux/{host}"
+        ),
+    );
+    for (key, value) in [("architecture", "riscv64"), ("os", "windows")] {
+        let image = TestImage::agent([]).config(|config| config[key] = value.into());
+        refused_near(
+            &image.docker().bytes(),
+            &format!("and this server runs linux/{host}"),
+        );
+        refused_near(&image.docker().bytes(), value);
+    }
+    let none =
+        TestImage::agent([]).config(|config| drop(config.as_object_mut().unwrap().remove("os")));
+    refused_near(
+        &none.docker().bytes(),
+        "cannot be read: config.json: missing field `os`",
+    );
+}
+
+#[test]
+fn documents_that_make_no_sense_are_told_by_name() {
+    let docker = |text: &[u8]| {
+        Tar::new()
+            .file("config.json", 0o644, &TestImage::agent([]).config_bytes())
+            .file("manifest.json", 0o644, text)
+            .bytes()
+    };
+    for text in [
+        &b"{}"[..],
+        b"",
+        b"[1]",
+        b"[{}]",
+        b"\xff",
+        b"[{\"Config\":\"a\",\"Config\":\"b\",\"Layers\":[]}]",
+    ] {
+        refused_near(
+            &docker(text),
+            "the container image cannot be read: manifest.json: ",
+        );
+        refused_near(
+            &docker(text),
+            "there is no agent.toml at the archive's root",
+        );
+    }
+    refused_near(&docker(&[b'['; 200_000]), "cannot be read: manifest.json");
+    refused_near(
+        &docker(&vec![b' '; (1 << 20) + 1]),
+        "has the document \"manifest.json\" of more than 1048576 bytes",
+    );
+    for outside in ["../secret", "/etc/passwd", "missing", "", "config.json/x"] {
+        let named = list(&json!([{"Config": "config.json", "Layers": [outside]}]));
+        let one = TestImage::of([Tar::new()]);
+        let tar = Tar::new().file("config.json", 0o644, &one.config_bytes());
+        refused(
+            &tar.file("manifest.json", 0o644, &named).bytes(),
+            &format!(
+                "layer 1 of the image's 1: the container image names {outside:?}, which is no file of the archive"
+            ),
+        );
+    }
+    let linked = |target: &str| {
+        let one = TestImage::agent([]);
+        Tar::new()
+            .file("config.json", 0o644, &one.config_bytes())
+            .file("real/layer.tar", 0o644, &one.packed_layers()[0])
+            .symlink("linked/layer.tar", target)
+            .file(
+                "manifest.json",
+                0o644,
+                &list(&json!([{"Config": "config.json", "Layers": ["linked/layer.tar"]}])),
+            )
+            .bytes()
+    };
+    accepted(&linked("../real/layer.tar"));
+    for target in ["../../secret", "/etc/passwd", "layer.tar", "nothing"] {
+        refused_near(
+            &linked(target),
+            "names \"linked/layer.tar\", which is no file of the archive",
+        );
+    }
+    let sha512 = index(layout(), &[json!({"digest": "sha512:00"})]).bytes();
+    refused(
+        &sha512,
+        "the container image names something by the digest \"sha512:00\": expected sha256: and 64 digits of 0-9a-f",
+    );
+    let wrong = TestImage::agent([]).config(|config| config["rootfs"]["diff_ids"] = json!([]));
+    refused(
+        &wrong.docker().bytes(),
+        "the container image has 1 layers, and its configuration knows of 0",
+    );
+    let wrong = TestImage::agent([]).config(|config| config["config"]["Env"] = json!(["a-b=c"]));
+    refused(
+        &wrong.docker().bytes(),
+        "the container image sets the variable \"a-b\" (ENV): expected NAME=VALUE with a name of letters, digits and \
+         underscores",
+    );
+    let none = TestImage::agent([]).config(|config| config["config"] = json!(null));
+    let (_dir, _, image) = accepted(&none.docker().bytes());
+    assert!(image.env.is_empty() && image.path().ends_with("/bin"));
+}
+
+#[test]
+fn lists_that_name_lists_end() {
+    let mut tar = layout();
+    let mut entry = json!({"digest": digest(b"nothing")});
+    for _ in 0..70 {
+        let inner = list(&json!({"manifests": [entry]}));
+        entry = json!({"mediaType": "application/vnd.oci.image.index.v1+json", "digest": digest(&inner)});
+        tar = tar.file(
+            &format!("blobs/{}", digest(&inner).replace(':', "/")),
+            0o644,
+            &inner,
+        );
+    }
+    refused(
+        &index(tar, &[entry]).bytes(),
+        "the container image is described by more than 64 documents",
+    );
+}
+
+#[test]
+fn content_that_differs_from_its_digest_is_refused() {
+    let image = TestImage::agent([base()]);
+    let one = digest(b"else");
+    let other = image.config(|config| config["rootfs"]["diff_ids"][1] = one.clone().into());
+    refused_near(
+        &other.docker().bytes(),
+        "layer 2 of the image's 2: its uncompressed content is not what the image says: expected SHA-256",
+    );
+    // A blob of a layout that is not what it is named after.
+    let image = TestImage::agent([]).packed(Packing::Gzip);
+    let real = image.packed_layers().remove(0);
+    let (tar, descriptor) = image.blobs(layout());
+    let mut bytes = index(tar, &[descriptor]).bytes();
+    let at = bytes
+        .windows(real.len())
+        .position(|window| window == real)
+        .unwrap();
+    bytes[at + real.len() - 1] ^= 1;
+    refused_near(
+        &bytes,
+        &format!(
+            "blobs/{} is not what the image says",
+            digest(&real).replace(':', "/")
+        ),
+    );
+}
+
+#[test]
+fn a_layer_may_come_twice_and_be_empty() {
+    let image = TestImage::agent([base(), Tar::new(), base(), Tar::new()]);
+    let (_dir, _, image) = accepted(&image.layout().bytes());
+    assert_eq!(image.text("usr/bin/tool"), "tool");
+    // Named twice in Docker's list, it is one file.
+    let one = TestImage::of([agent_layer(), agent_layer()]);
+    let twice = Tar::new()
+        .file("config.json", 0o644, &one.config_bytes())
+        .file("layer.tar", 0o644, &one.packed_layers()[0])
+        .file(
+            "manifest.json",
+            0o644,
+            &list(&json!([{"Config": "config.json", "Layers": ["layer.tar", "layer.tar"]}])),
+        );
+    accepted(&twice.bytes());
+}
+
+#[test]
+fn limits_hold_over_all_layers() {
+    let many = TestImage::agent((0..127).map(|_| Tar::new()));
+    refused(
+        &many.docker().bytes(),
+        "the container image has 128 layers; at most 127 are allowed: build it with fewer steps",
+    );
+    let limits = BundleLimits {
+        packed_bytes: 1 << 20,
+        unpacked_bytes: 100_000,
+        files: 20,
+        ..BundleLimits::default()
+    };
+    let of = |layers: Vec<Tar>| TestImage::agent(layers).packed(Packing::Gzip).docker().gz();
+    // The same file again and again is written each time, and counts each time.
+    let big = || Tar::new().file("big", 0o644, &[0; 40_000]);
+    assert!(try_unpack(&of(vec![big(), big()]), limits).1.is_ok());
+    assert_eq!(
+        told(&of(vec![big(), big(), big()]), limits),
+        "the archive unpacks to more than 100000 bytes (stopped at entry \"big\")"
+    );
+    // A bomb in a layer is stopped at the limit.
+    let bomb = Tar::new().file("bomb", 0o644, &vec![0; 30 << 20]);
+    let bomb = TestImage::agent([bomb]).packed(Packing::Zstd).docker();
+    assert_eq!(
+        told(&bomb.gz(), limits),
+        "the archive unpacks to more than 100000 bytes (stopped at entry \"bomb\")"
+    );
+    let padded = Tar::new().entry(EntryType::Directory, "x", 0o755, "", &vec![0; 30 << 20]);
+    let padded = TestImage::agent([padded]).packed(Packing::Zstd).docker();
+    let told_of = told(&padded.gz(), limits);
+    assert!(told_of.contains("more than its files explain"), "{told_of}");
+    let files = |count: usize, of_layer: usize| {
+        (0..count).fold(Tar::new(), |tar, index| {
+            tar.file(&format!("f{of_layer}-{index}"), 0o644, b"")
+        })
+    };
+    assert_eq!(
+        told(&of(vec![files(10, 1), files(10, 2)]), limits),
+        "layer 3 of the image's 3: the container image has more than 20 files in all layers"
+    );
+    let folders = (0..21).fold(Tar::new(), |tar, index| tar.folder(&format!("d{index}/")));
+    assert_eq!(
+        told(&of(vec![folders]), limits),
+        "layer 2 of the image's 2: the container image has more than 20 folders in all layers"
+    );
+    let again = (0..100).fold(Tar::new(), |tar, _| tar.folder("d/"));
+    assert_eq!(
+        told(&of(vec![again]), limits),
+        "the archive has more than 80 entries of all kinds"
+    );
+}
+
+#[test]
+fn a_cancelled_image_stops() {
+    let dir = tempfile::tempdir().unwrap();
+    let archive = write(
+        dir.path(),
+        "upload",
+        &TestImage::agent([base()]).docker().gz(),
+    );
+    // At each of the moments at which it may be asked for.
+    for moment in 0..200 {
+        let into = dir.path().join(format!("out{moment}"));
+        let asked = std::cell::Cell::new(0);
+        let cancelled = || {
+            asked.set(asked.get() + 1);
+            asked.get() > moment
+        };
+        match unpack(&archive, &into, &BundleLimits::default(), &cancelled) {
+            Err(BundleError::Cancelled) => {}
+            Ok(_) => return assert!(moment > 20, "it was asked {moment} times only"),
+            other => panic!("{other:?}"),
+        }
+    }
+    panic!("it never ends");
+}
+
+#[test]
+fn the_folder_may_lie_behind_a_link_of_the_hosts() {
+    let dir = tempfile::tempdir().unwrap();
+    fs::create_dir(dir.path().join("real")).unwrap();
+    symlink("real", dir.path().join("way")).unwrap();
+    let archive = write(dir.path(), "upload", &TestImage::agent([]).docker().gz());
+    let into = dir.path().join("way/out");
+    let bundle = unpack(&archive, &into, &BundleLimits::default(), &|| false).unwrap();
+    assert!(
+        bundle
+            .dir
+            .starts_with(fs::canonicalize(dir.path()).unwrap().join("real"))
+    );
+}

@@ -1,0 +1,347 @@
+//! Agents that are container images: a root of their own, as a bundle's unpacked image has it.
+
+use crate::harness::{PATIENCE, Subject, expect_echo, expect_line};
+use faceoff_sandbox::{AgentProcess, Isolation, Layer, Runtime, SpawnError};
+use faceoff_types::AgentFaultKind;
+use std::{
+    collections::BTreeMap,
+    fs,
+    os::unix::fs::{PermissionsExt, symlink},
+    path::Path,
+};
+
+/// A root with a shell and what it is linked with.
+struct Root(tempfile::TempDir);
+
+impl Root {
+    fn new() -> Self {
+        let folder = tempfile::Builder::new()
+            .prefix("image-")
+            .permissions(fs::Permissions::from_mode(0o755))
+            .tempdir()
+            .unwrap();
+        let root = Self(folder);
+        for folder in ["agent", "dev", "etc", "opt/bin", "proc", "sys", "tmp"] {
+            fs::create_dir_all(root.at(folder)).unwrap();
+        }
+        for file in ["passwd", "group", "own"] {
+            root.write(&format!("etc/{file}"), "the image's", 0o644);
+        }
+        let shell = fs::canonicalize("/bin/sh").unwrap();
+        let said = std::process::Command::new("ldd").arg(&shell).output();
+        let said = String::from_utf8(said.unwrap().stdout).unwrap();
+        let libraries = said.split_whitespace().filter(|word| word.starts_with('/'));
+        for library in libraries {
+            let place = root.at(&library[1..]);
+            fs::create_dir_all(place.parent().unwrap()).unwrap();
+            fs::copy(library, place).unwrap();
+        }
+        fs::copy(shell, root.at("opt/bin/the-shell")).unwrap();
+        // Links are the root's, whatever the host has there.
+        symlink("opt/bin", root.at("bin")).unwrap();
+        symlink("/bin/the-shell", root.at("opt/bin/sh")).unwrap();
+        root
+    }
+
+    fn at(&self, path: &str) -> std::path::PathBuf {
+        self.0.path().join(path)
+    }
+
+    fn write(&self, path: &str, content: &str, mode: u32) {
+        fs::write(self.at(path), content).unwrap();
+        fs::set_permissions(self.at(path), fs::Permissions::from_mode(mode)).unwrap();
+    }
+
+    /// An agent of this image that runs `command`, with `PATH` as an image's `ENV` may have it.
+    fn subject(&self, command: &[&str]) -> Subject {
+        let mut subject = Subject::new("echo", &[]);
+        subject.spec.bundle_dir = self.at("agent");
+        subject.spec.runtime = Runtime::of_image(self.0.path(), "/opt/bin");
+        subject.spec.command = command.iter().map(|&word| word.to_owned()).collect();
+        subject.spec.command.push(subject.mark.clone());
+        subject
+    }
+
+    /// What a script of the shell's own commands prints.
+    fn told(&self, script: &str) -> Vec<String> {
+        let subject = self.subject(&["sh", "-c", &format!("{script}\necho end")]);
+        let mut agent = subject.spawn();
+        let mut lines = Vec::new();
+        loop {
+            match expect_line(&mut agent) {
+                line if line == "end" => break,
+                line => lines.push(line),
+            }
+        }
+        let usage = agent.finish(PATIENCE).unwrap();
+        assert_eq!(usage.exit, None, "{}", usage.stderr_tail);
+        subject.assert_nothing_left();
+        lines
+    }
+}
+
+fn refusal(spawned: Result<AgentProcess, SpawnError>) -> String {
+    match spawned {
+        Err(SpawnError::Platform(error)) => error.to_string(),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn an_image_starts_and_speaks() {
+    let root = Root::new();
+    root.write(
+        "agent/run",
+        "#!/bin/sh\nwhile read -r line; do echo \"$line\"; done\n",
+        0o755,
+    );
+    for program in ["./run", "/agent/run"] {
+        let subject = root.subject(&[program]);
+        let mut agent = subject.spawn();
+        expect_echo(&mut agent, "hello");
+        subject.finish(agent);
+    }
+}
+
+#[test]
+fn it_sees_its_own_files_and_nothing_of_the_hosts() {
+    let root = Root::new();
+    let hidden = tempfile::tempdir().unwrap();
+    let host = [
+        hidden.path().to_str().unwrap(),
+        env!("CARGO_MANIFEST_DIR"),
+        root.0.path().to_str().unwrap(),
+        "/usr",
+        "/home",
+        "/var",
+        "/oldroot",
+        "/newroot",
+        "/etc/shadow",
+        "/sys/kernel",
+        "/sys/fs",
+        "/proc/sys/kernel",
+    ];
+    let script = format!(
+        "echo $PWD\necho $PATH\nfor f in {}; do [ -e $f ] && echo host $f; done\n\
+         while read -r l; do echo $l; done < /etc/passwd\n\
+         while read -r l; do echo $l; done < /etc/group\n\
+         read -r l < /etc/own; echo $l\n\
+         while read -r a b c; do [ $a = Uid: ] && echo $b; done < /proc/self/status\n\
+         read -r l < /sys/devices/system/cpu/online; echo cpus $l\n\
+         [ -L /bin ] && echo link\necho /dev/shm/* /tmp/*",
+        host.join(" ")
+    );
+    let told = root.told(&script);
+    assert_eq!(
+        told[..7],
+        [
+            "/agent",
+            "/opt/bin",
+            "agent:x:1000:1000:agent:/tmp:/bin/sh",
+            "agent:x:1000:",
+            "the image's",
+            "1000",
+            told[6].as_str(),
+        ]
+    );
+    assert!(told[6].starts_with("cpus ") && told[6].len() > 5);
+    assert_eq!(told[7..], ["link", "/dev/shm/* /tmp/*"]);
+}
+
+#[test]
+fn it_writes_to_its_scratch_folders_only() {
+    let root = Root::new();
+    root.write("open", "", 0o666);
+    fs::set_permissions(root.at("opt"), fs::Permissions::from_mode(0o777)).unwrap();
+    let places = [
+        "/x",
+        "/open",
+        "/opt/x",
+        "/etc/x",
+        "/etc/passwd",
+        "/etc/own",
+        "/agent/x",
+        "/sys/x",
+        "/sys/devices/system/cpu/online",
+        "/dev/x",
+        "/proc/x",
+        "/tmp/x",
+        "/dev/shm/x",
+    ];
+    let script = format!(
+        "for f in {}; do (echo x > $f) 2>/tmp/null && echo $f; done; true",
+        places.join(" ")
+    );
+    assert_eq!(root.told(&script), ["/tmp/x", "/dev/shm/x"]);
+    assert_eq!(
+        fs::read_to_string(root.at("etc/own")).unwrap(),
+        "the image's"
+    );
+    assert_eq!(fs::read_dir(root.at("tmp")).unwrap().count(), 0);
+}
+
+#[test]
+fn variables_of_the_spec_come_last() {
+    let root = Root::new();
+    let mut subject = root.subject(&["sh", "-c", "echo $PATH $MODE $HOME"]);
+    subject.spec.env = BTreeMap::from([
+        ("PATH".to_owned(), "/bin:/opt".to_owned()),
+        ("MODE".to_owned(), "fast".to_owned()),
+    ]);
+    let mut agent = subject.spawn();
+    assert_eq!(expect_line(&mut agent), "/bin:/opt fast /tmp");
+    subject.finish(agent);
+}
+
+#[test]
+fn its_limits_are_those_of_any_agent() {
+    let root = Root::new();
+    let mut subject = root.subject(&[
+        "sh",
+        "-c",
+        "exec 3>&1; i=0; while [ $i -lt 20000 ]; do \
+         echo 0123456789012345678901234567890123456789012345678901234567890123 || { echo full >&3; exit; }; \
+         i=$((i+1)); done > /tmp/big; echo written",
+    ]);
+    subject.spec.limits.scratch_bytes = 1 << 20;
+    let mut agent = subject.spawn();
+    assert_eq!(expect_line(&mut agent), "full");
+    subject.finish(agent);
+    // Alone, as the first process, without network or rights.
+    let told = root.told(
+        "echo $$; echo /proc/[0-9]*; while read -r a b; do case $a in CapEff:|CapBnd:|NoNewPrivs:|Seccomp:) \
+         echo $a $b;; esac; done < /proc/self/status\n\
+         while read -r a b; do case $a in *:) echo $a;; esac; done < /proc/net/dev",
+    );
+    let last = &told[told.len() - 5..];
+    assert_eq!(told[0], "1");
+    assert_eq!(told[1], "/proc/1");
+    assert!(
+        last.contains(&"CapEff: 0000000000000000".to_owned()),
+        "{told:?}"
+    );
+    assert!(
+        last.contains(&"CapBnd: 0000000000000000".to_owned()),
+        "{told:?}"
+    );
+    assert!(last.contains(&"NoNewPrivs: 1".to_owned()), "{told:?}");
+    assert!(last.contains(&"Seccomp: 2".to_owned()), "{told:?}");
+    assert_eq!(told.last().unwrap(), "lo:");
+}
+
+#[test]
+fn links_in_place_of_what_the_sandbox_covers_are_refused() {
+    let host = tempfile::tempdir().unwrap();
+    fs::write(host.path().join("passwd"), "host").unwrap();
+    fs::set_permissions(host.path(), fs::Permissions::from_mode(0o777)).unwrap();
+    for (place, kind) in [
+        ("dev", "folder"),
+        ("proc", "folder"),
+        ("sys", "folder"),
+        ("tmp", "folder"),
+        ("etc", "folder"),
+        ("etc/passwd", "file"),
+        ("etc/group", "file"),
+    ] {
+        let root = Root::new();
+        let at = root.at(place);
+        if kind == "folder" {
+            fs::remove_dir_all(&at).unwrap();
+            symlink(host.path(), &at).unwrap();
+        } else {
+            fs::remove_file(&at).unwrap();
+            symlink(host.path().join("passwd"), &at).unwrap();
+        }
+        let told = refusal(AgentProcess::spawn(&root.subject(&["sh"]).spec));
+        assert_eq!(
+            told,
+            format!("the agent's root has no {kind} /{place}: it is something else")
+        );
+    }
+    let root = Root::new();
+    fs::remove_dir(root.at("tmp")).unwrap();
+    let told = refusal(AgentProcess::spawn(&root.subject(&["sh"]).spec));
+    assert!(
+        told.starts_with("the agent's root has no folder /tmp: "),
+        "{told}"
+    );
+    assert_eq!(
+        fs::read_to_string(host.path().join("passwd")).unwrap(),
+        "host"
+    );
+    assert_eq!(fs::read_dir(host.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn without_namespaces_there_is_no_root_of_its_own() {
+    let root = Root::new();
+    for isolation in [
+        Isolation::None,
+        Isolation::Sandboxed {
+            given_up: vec![Layer::Namespaces],
+        },
+    ] {
+        let mut subject = root.subject(&["sh"]);
+        subject.spec.isolation = isolation;
+        let told = refusal(AgentProcess::spawn(&subject.spec));
+        assert!(
+            told.contains("namespaces") && told.contains("container image"),
+            "{told}"
+        );
+    }
+}
+
+#[test]
+fn a_command_is_looked_up_in_the_image_and_never_on_the_host() {
+    let root = Root::new();
+    let host = tempfile::tempdir().unwrap();
+    fs::write(host.path().join("secret"), "").unwrap();
+    symlink(host.path(), root.at("agent/host")).unwrap();
+    symlink("/opt/bin/sh", root.at("agent/shell")).unwrap();
+    root.write("agent/data", "", 0o644);
+    let detail = |program: &str| {
+        let subject = root.subject(&[program, "-c", "echo started"]);
+        let mut agent = match AgentProcess::spawn(&subject.spec) {
+            Ok(agent) => agent,
+            Err(SpawnError::Agent(AgentFaultKind::CannotStart { detail })) => return detail,
+            Err(other) => panic!("{other:?}"),
+        };
+        let AgentFaultKind::CannotStart { detail } = subject.end(&mut agent) else {
+            panic!("{program} started");
+        };
+        detail
+    };
+    assert_eq!(detail("./missing"), "`./missing` is not in the bundle");
+    assert_eq!(detail("./data"), "`./data` is not executable (mode 644)");
+    // What is there on the host is told like what is not.
+    let told =
+        ["secret", "none"].map(|name| detail(&format!("./host/{name}")).replace(name, "NAME"));
+    assert_eq!(told[0], told[1]);
+    let subject = root.subject(&["./shell", "-c", "echo started"]);
+    let mut agent = subject.spawn();
+    assert_eq!(expect_line(&mut agent), "started");
+    subject.finish(agent);
+}
+
+#[test]
+fn an_agent_of_another_user_reaches_a_root_in_a_closed_folder() {
+    let root = Root::new();
+    let closed = tempfile::tempdir().unwrap();
+    let inside = closed.path().join("root");
+    let moved = std::process::Command::new("cp")
+        .args([
+            "-a",
+            root.0.path().to_str().unwrap(),
+            inside.to_str().unwrap(),
+        ])
+        .status();
+    assert!(moved.unwrap().success());
+    fs::set_permissions(closed.path(), fs::Permissions::from_mode(0o700)).unwrap();
+    let mut subject = root.subject(&["sh", "-c", "echo started"]);
+    subject.spec.bundle_dir = inside.join("agent");
+    subject.spec.runtime = Runtime::of_image(&inside, "/opt/bin");
+    let mut agent = subject.spawn();
+    assert_eq!(expect_line(&mut agent), "started");
+    subject.finish(agent);
+    assert!(Path::new(&inside).exists());
+}
