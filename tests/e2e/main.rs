@@ -19,6 +19,7 @@ mod fair_shares;
 mod full_disk;
 mod growth;
 mod house;
+mod images;
 mod installed;
 mod kills;
 mod large_uploads;

@@ -75,7 +75,7 @@ mod tests {
 
     #[test]
     fn a_plain_tar_is_told_by_its_first_header() {
-        for magic in [b"ustar  \0", b"ustar\00\x30"] {
+        for magic in [b"ustar  \0", b"ustar\x0000"] {
             let mut head = vec![0; 512];
             head[..13].copy_from_slice(b"manifest.json");
             head[257..265].copy_from_slice(magic);

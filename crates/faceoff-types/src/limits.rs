@@ -24,7 +24,8 @@ pub struct AgentLimits {
 pub struct BundleLimits {
     /// Largest archive, in bytes.
     pub packed_bytes: u64,
-    /// Largest sum of its files, in bytes.
+    /// Largest sum of its files, in bytes; of a container image, of its layers' files as they come, and once more of
+    /// what all layers hold.
     pub unpacked_bytes: u64,
     /// Most files and links; folders are counted separately, against the same number.
     pub files: u64,

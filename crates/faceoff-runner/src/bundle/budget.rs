@@ -55,6 +55,8 @@ pub(super) struct Budget<'a> {
     members: Cell<u64>,
     link_bytes: Cell<u64>,
     looked_up: Cell<u64>,
+    /// Of an image's files, in bytes.
+    of_image: Cell<u64>,
     ended: RefCell<Option<BundleError>>,
 }
 
@@ -78,6 +80,7 @@ impl<'a> Budget<'a> {
             members: Cell::new(0),
             link_bytes: Cell::new(0),
             looked_up: Cell::new(0),
+            of_image: Cell::new(0),
             ended: RefCell::new(None),
         }
     }
@@ -162,6 +165,20 @@ impl<'a> Budget<'a> {
     /// limit for itself. All else is counted on.
     pub(super) fn begin_root(&self) {
         self.content.set(0);
+    }
+
+    /// What is read of an image's files, as they came. Each is needed once, and all of them have the limit of the
+    /// unpacked bytes; one that is named again and again is read as often.
+    pub(super) fn of_image(&self, bytes: usize) -> io::Result<()> {
+        self.of_image.set(self.of_image.get() + bytes as u64);
+        let most = self.limits.unpacked_bytes;
+        if self.of_image.get() > most {
+            self.refuse(format!(
+                "the image's layers have more than {most} bytes, those that it names twice counted twice"
+            ))
+            .map_err(as_io)?;
+        }
+        Ok(())
     }
 
     /// A name that is looked up in an image's root, or a path that is looked at there.

@@ -55,7 +55,7 @@ pub(super) fn unpack<'a>(
             .iter()
             .any(|later| later.name == part.name);
         root.begin_layer();
-        layer::apply(&archive, part, &mut root, budget)
+        layer::apply(&mut archive, part, &mut root, budget)
             .map_err(|error| in_layer(error, index + 1, count))?;
         if !is_needed_again {
             archive.remove(&part.name)?;

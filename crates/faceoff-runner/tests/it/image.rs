@@ -7,9 +7,11 @@ use crate::{
     },
 };
 use faceoff_runner::bundle::{Bundle, BundleError, BundleLimits, Image, open, unpack};
+use flate2::{Compression, write::GzEncoder};
 use serde_json::json;
 use std::{
     fs,
+    io::Write,
     os::unix::fs::{MetadataExt, PermissionsExt, symlink},
     path::Path,
 };
@@ -760,6 +762,52 @@ fn content_that_differs_from_its_digest_is_refused() {
             "blobs/{} is not what the image says",
             digest(&real).replace(':', "/")
         ),
+    );
+}
+
+#[test]
+fn what_follows_a_layers_end_is_part_of_its_digest() {
+    let image = TestImage::agent([]);
+    let layer = image.packed_layers().remove(0);
+    let mut bytes = image.layout().bytes();
+    let at = bytes
+        .windows(layer.len())
+        .position(|window| window == layer)
+        .unwrap();
+    bytes[at + layer.len() - 1] = 1;
+    refused_near(
+        &bytes,
+        "layer 1 of the image's 1: its uncompressed content is not what the image says: expected SHA-256",
+    );
+}
+
+#[test]
+fn a_layer_that_is_named_again_and_again_counts_as_often() {
+    // It holds nothing, and takes long to find that out.
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(&Tar::new().bytes()).unwrap();
+    let mut layer = encoder.finish().unwrap();
+    // An empty stream after another, which are one to a reader.
+    let empty = GzEncoder::new(Vec::new(), Compression::fast());
+    let empty = empty.finish().unwrap();
+    layer.extend(empty.repeat(20_000 / empty.len()));
+    let again = 50;
+    let one = TestImage::of((0..again).map(|_| Tar::new()));
+    let archive = |names: Vec<&str>| {
+        let named = json!([{"Config": "config.json", "Layers": names}]);
+        Tar::new()
+            .file("config.json", 0o644, &one.config_bytes())
+            .file("layer", 0o644, &layer)
+            .file("manifest.json", 0o644, &list(&named))
+            .gz()
+    };
+    let limits = BundleLimits {
+        unpacked_bytes: 200_000,
+        ..BundleLimits::default()
+    };
+    assert_eq!(
+        told(&archive(vec!["layer"; again]), limits),
+        "the image's layers have more than 200000 bytes, those that it names twice counted twice"
     );
 }
 

@@ -11,7 +11,7 @@ use faceoff_types::harmless;
 use fs_err::{self as fs, File};
 use serde::de::DeserializeOwned;
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     io::{self, Read},
     path::{Path, PathBuf},
 };
@@ -35,10 +35,12 @@ pub(in crate::bundle) struct Archive<'a> {
     nodes: BTreeMap<String, Node>,
     budget: &'a Budget<'a>,
     documents: u32,
+    /// Whose digests have been compared.
+    verified: BTreeSet<Digest>,
 }
 
 impl<'a> Archive<'a> {
-    pub(in crate::bundle) const fn new(
+    pub(in crate::bundle) fn new(
         into: PathBuf,
         nodes: BTreeMap<String, Node>,
         budget: &'a Budget<'a>,
@@ -48,6 +50,7 @@ impl<'a> Archive<'a> {
             nodes,
             budget,
             documents: 0,
+            verified: BTreeSet::new(),
         }
     }
 
@@ -80,15 +83,28 @@ impl<'a> Archive<'a> {
         )))
     }
 
-    /// Opens the file `name`; one that is named by its digest is read before, and must have it.
-    pub(super) fn open(&self, name: &str) -> Result<Watched<'a, std::fs::File>, BundleError> {
+    /// Opens the file `name`. What is read of it counts, since an image may name it as often as it likes.
+    pub(super) fn open(&self, name: &str) -> Result<Blob<'a>, BundleError> {
         let place = self.place(name)?;
-        if let Some(digest) = Digest::of_blob(name) {
-            let mut hashed = Hashed::new(self.watched(&place)?);
-            io::copy(&mut hashed, &mut io::sink()).map_err(BundleError::reading(name))?;
-            digest.check(name, hashed.into_hash())?;
+        Ok(Blob {
+            inner: self.watched(&place)?,
+            budget: self.budget,
+        })
+    }
+
+    /// Reads the file `name`, once, if it is named by its digest: it must have it.
+    pub(super) fn verify(&mut self, name: &str) -> Result<(), BundleError> {
+        let Some(digest) = Digest::of_blob(name) else {
+            return Ok(());
+        };
+        if self.verified.contains(&digest) {
+            return Ok(());
         }
-        self.watched(&place)
+        let mut hashed = Hashed::new(self.watched(&self.place(name)?)?);
+        io::copy(&mut hashed, &mut io::sink()).map_err(BundleError::reading(name))?;
+        digest.check(name, hashed.into_hash())?;
+        self.verified.insert(digest);
+        Ok(())
     }
 
     fn watched(&self, place: &Path) -> Result<Watched<'a, std::fs::File>, BundleError> {
@@ -109,6 +125,7 @@ impl<'a> Archive<'a> {
                 "has the document {name:?} of more than {DOCUMENT_MAX_BYTES} bytes"
             )));
         }
+        self.verify(name)?;
         let mut bytes = Vec::new();
         self.open(name)?
             .take(DOCUMENT_MAX_BYTES)
@@ -155,6 +172,20 @@ impl<'a> Archive<'a> {
     fn tops(&self) -> impl Iterator<Item = &str> {
         let names = self.nodes.keys().map(String::as_str);
         names.filter(|name| !name.contains('/'))
+    }
+}
+
+/// A file of the archive that is read as a part of an image.
+pub(super) struct Blob<'a> {
+    inner: Watched<'a, std::fs::File>,
+    budget: &'a Budget<'a>,
+}
+
+impl Read for Blob<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let read = self.inner.read(buffer)?;
+        self.budget.of_image(read)?;
+        Ok(read)
     }
 }
 

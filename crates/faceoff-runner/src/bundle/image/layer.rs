@@ -5,7 +5,7 @@ use super::{
     root::Root,
 };
 use crate::bundle::{
-    budget::{Budget, Members, Metered, Watched},
+    budget::{Budget, Members, Metered},
     error::BundleError,
     tar_archive,
 };
@@ -15,16 +15,20 @@ use std::io::{self, BufRead, BufReader, Read};
 /// Applies one layer to the root: a tar, plain or compressed by gzip or Zstandard, told by its first bytes. Its
 /// uncompressed bytes must have the digest that the image states of them.
 pub(super) fn apply<'a>(
-    archive: &Archive<'a>,
+    archive: &mut Archive<'a>,
     part: &LayerPart,
     root: &mut Root<'a>,
     budget: &'a Budget<'a>,
 ) -> Result<(), BundleError> {
-    let file = archive.open(&part.name)?;
-    let mut packed: BufReader<Watched<'a, std::fs::File>> =
-        BufReader::with_capacity(64 << 10, file);
+    let mut packed = BufReader::with_capacity(64 << 10, archive.open(&part.name)?);
     let head = packed.fill_buf().map_err(BundleError::reading(""))?;
-    match ArchiveFormat::detect(head) {
+    let format = ArchiveFormat::detect(head);
+    let is_compressed = matches!(format, Some(ArchiveFormat::TarGz | ArchiveFormat::TarZst));
+    // One that is not has the same digest twice, and is hashed as it is applied.
+    if is_compressed || Digest::of_blob(&part.name).as_ref() != Some(&part.diff_id) {
+        archive.verify(&part.name)?;
+    }
+    match format {
         Some(ArchiveFormat::TarGz) => {
             let streams: Members<'_, _, flate2::bufread::GzDecoder<_>> =
                 Members::new(packed, budget).map_err(BundleError::reading(""))?;
