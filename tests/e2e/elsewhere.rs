@@ -246,7 +246,7 @@ fn a_worker_that_is_not_like_the_server_is_told_so_and_gets_nothing() {
         scratch.path(),
         "like",
         &(taking(nats.address(), 1) + runtime),
-        &["--label", "lab 3", "--label", "rack"],
+        &["--labels", "lab 3,rack"],
     );
     let finished = team.finished(&server, &evaluation);
     assert_eq!(finished["state"], "finished", "{finished:#}");

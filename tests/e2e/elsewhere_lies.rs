@@ -1,6 +1,8 @@
 //! A worker that lies: it takes an order as any other, and reports what it never played.
 
 use crate::{
+    Team,
+    commands::admin,
     elsewhere::{EPISODES, alone, giving, queued, resume, taking},
     kills::{assert_same, copy_folder, outcome},
 };
@@ -8,7 +10,7 @@ use async_nats::{
     Client, HeaderMap,
     jetstream::{self, consumer::PullConsumer},
 };
-use faceoff_tests::{nats::Nats, relay::Relay, server::Server, worker::Worker};
+use faceoff_tests::{nats::Nats, relay::Relay, repository, server::Server, worker::Worker};
 use futures::StreamExt as _;
 use serde_json::{Value, json};
 
@@ -54,7 +56,7 @@ impl Liar {
     /// Reports a success that nobody has played.
     async fn reports(&self, order: &Value) {
         let assignment = &order["order"]["assignment"];
-        let (spec, lease) = (&assignment["spec"], &order["order"]["lease"]);
+        let spec = &assignment["spec"];
         let outcome = json!({
             "task": spec["task"], "episode": spec["episodes"]["start"], "steps": 20, "end": "horizon", "success": true,
             "violations": { "ee": false, "link": false, "joint_pos": false, "joint_vel": false },
@@ -64,6 +66,23 @@ impl Liar {
             "kind": "play", "outcomes": [outcome], "log": "", "stopped_by_faults": false,
             "recording": assignment["keeps"]["recording"],
         });
+        self.tells(order, report).await;
+    }
+
+    /// Reports the result of a game that nobody has played.
+    async fn reports_a_game(&self, order: &Value) {
+        let hash = "0".repeat(64);
+        let report = json!({
+            "kind": "game", "score": { "winner": "first" }, "logs": ["", ""],
+            "recording": {
+                "key": order["order"]["assignment"]["recording"], "game_blake3": hash, "side_blake3": [hash, hash],
+            },
+        });
+        self.tells(order, report).await;
+    }
+
+    async fn tells(&self, order: &Value, report: Value) {
+        let lease = &order["order"]["lease"];
         let told = json!({
             "lease": lease, "grant": order["grant"], "outcome": { "kind": "done", "report": report },
         });
@@ -146,5 +165,62 @@ fn a_worker_that_lies_is_banned_by_name_and_others_play_what_it_had() {
     let told = runtime.block_on(liar.asks(&may_work));
     let why = told["reason"].as_str().unwrap_or_default();
     assert!(why.contains("another program"), "as any other: {told:#}");
+    honest.end();
+}
+
+#[test]
+fn a_game_that_nobody_has_played_is_not_believed_and_one_that_was_played_elsewhere_is() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let nats = Nats::start(&scratch.path().join("nats"));
+    let files = Relay::start();
+    let server = Server::start(
+        &scratch.path().join("data"),
+        &giving(&nats, files.address()),
+    );
+    files.lead_to(server.address().into());
+    for name in ["Ada", "Bob"] {
+        let team = Team::create(&server, name);
+        let submission = team.submit(&server, &repository().join("agents/hold"));
+        assert_eq!(submission["state"], "valid", "{submission:#}");
+    }
+    let rules = [
+        "--format",
+        "round-robin",
+        "--rounds",
+        "1",
+        "--steps",
+        "1500",
+    ];
+    let open = ["tournament", "open", "Cup", "--teams", "Ada,Bob", "--json"];
+    let cup = admin(&server, &[&open[..], &rules].concat()).json();
+    let round = admin(&server, &["tournament", "start-round", "Cup"]);
+    let _ = round.done();
+
+    let runtime = tokio::runtime::Runtime::new().expect("a runtime starts");
+    runtime.block_on(async {
+        let client = async_nats::connect(nats.url()).await;
+        let liar = Liar {
+            client: client.expect("NATS is there"),
+        };
+        let order = liar.begins().await;
+        assert_eq!(order["order"]["assignment"]["kind"], "game", "{order:#}");
+        liar.reports_a_game(&order).await;
+        server.wait_for_log("a worker is banned", 1);
+    });
+    let told = server.get("/api/v1/workers", Some(&server.admin_token));
+    let told: Value = told.json().expect("the API speaks JSON");
+    let reason = told["bans"][0]["reason"].as_str().unwrap_or_default();
+    assert!(reason.contains("game.zip was not stored"), "{told:#}");
+
+    let honest = Worker::start(scratch.path(), "honest", &taking(nats.address(), 1));
+    let path = cup["id"].as_str().expect("a tournament has an id");
+    let path = format!("/api/v1/tournaments/{path}");
+    let _ = server.poll(&path, &server.admin_token, |told| told["phase"] == "played");
+    let games = server.get(&format!("{path}/games"), Some(&server.admin_token));
+    let games: Value = games.json().expect("the API speaks JSON");
+    assert!(games.to_string().contains("\"steps\":1500"), "{games:#}");
+    let told = server.get("/api/v1/workers", Some(&server.admin_token));
+    let told: Value = told.json().expect("the API speaks JSON");
+    assert_eq!(told["bans"].as_array().map(Vec::len), Some(1), "{told:#}");
     honest.end();
 }

@@ -171,6 +171,27 @@ fn four_workers_play_what_one_slot_plays() {
 }
 
 #[test]
+fn who_is_cut_off_for_longer_than_a_lease_stops_and_another_plays_its_work() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let contest = Contest::prepare(scratch.path());
+    let nats = Nats::start(&scratch.path().join("nats"));
+    let (files, link) = (Relay::start(), Relay::start());
+    link.lead_to(nats.address());
+    let server = serving(&contest, &giving(&nats, files.address()), &files);
+    let cut = Worker::start(scratch.path(), "cut", &taking(link.address(), 1));
+    resume(&server);
+    cut.wait_for_log("committed", 1);
+    cut.wait_for_log("begun", 2);
+    // Whatever it is at now, what comes of it cannot be told in time.
+    link.cut();
+    let other = Worker::start(scratch.path(), "other", &taking(nats.address(), 1));
+    contest.ends_alike(&server);
+    link.lead_to(nats.address());
+    other.end();
+    cut.end();
+}
+
+#[test]
 fn links_that_are_slow_and_break_lose_nothing() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let contest = Contest::prepare(scratch.path());

@@ -4,11 +4,13 @@
 
 In turns, so that what else the machine does falls on both alike: a season of its own, one team with the agent hold, nine shards of
 50 episodes, played by the server's own slot or by one of a worker, who gets them by a nats-server on this machine. Measured is the time from
-the first shard's beginning to the last one's commit, by the log of whoever plays. Prints each round's times and the median of
-their ratios. Nothing is asserted: how fast a machine is, is the machine's.
+the first shard's beginning to the last one's commit, by the log of whoever plays. A third season is like the second, but nothing of its
+recordings is simulated again: what its server takes less is what checking costs. Prints each round's times, the median of
+their ratios, and the server's CPU time. Nothing is asserted: how fast a machine is, is the machine's.
 """
 
 import json
+import os
 import shutil
 import statistics
 import subprocess
@@ -34,11 +36,12 @@ slots = 1
 class Season:
     """A server, and a worker beside it if others are to play."""
 
-    def __init__(self, program: Path, folder: Path, nats: str | None):
+    def __init__(self, program: Path, folder: Path, nats: str | None, checks: bool = True):
         folder.mkdir()
         self.folder, self.processes = folder, []
         config = folder / "faceoff.toml"
-        config.write_text(CONFIG + (f'play = false\n[nats]\nurl = "{nats}"\nname = "{folder.name}"\n' if nats else ""))
+        own = CONFIG if checks else CONFIG + "checked_episodes = 0\n"
+        config.write_text(own + (f'play = false\n[nats]\nurl = "{nats}"\nname = "{folder.name}"\n' if nats else ""))
         self.log = folder / ("worker.log" if nats else "server.log")
         serve = [program, "serve", "--config", config, "--data-dir", folder / "data", "--log-format", "json"]
         self.server = self.start(serve, folder / "server.log")
@@ -92,6 +95,11 @@ class Season:
         assert len(begun) == len(committed) == SHARDS, (len(begun), len(committed))
         return max(committed) - min(begun)
 
+    def cpu_s(self) -> float:
+        """CPU time of the server and of what it has waited for, in seconds."""
+        fields = Path(f"/proc/{self.server.pid}/stat").read_text().rsplit(")", 1)[1].split()
+        return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
+
     def end(self):
         for process in reversed(self.processes):
             process.terminate()
@@ -110,18 +118,25 @@ def main() -> None:
             while not told.exists():
                 time.sleep(0.05)
             url = json.loads(told.read_text())["nats"][0]
-            ratios = []
+            ratios, checking = [], []
+            kinds = ["own", "elsewhere", "unchecked"]
             for number in range(rounds):
-                times = {}
-                for who in ("own", "elsewhere") if number % 2 == 0 else ("elsewhere", "own"):
-                    season = Season(program, folder / f"{who}-{number}", url if who == "elsewhere" else None)
+                times, cpu = {}, {}
+                for who in kinds if number % 2 == 0 else reversed(kinds):
+                    season = Season(program, folder / f"{who}-{number}", url if who != "own" else None, who != "unchecked")
                     try:
-                        times[who] = season.play()
+                        times[who], cpu[who] = season.play(), season.cpu_s()
                     finally:
                         season.end()
                 ratios.append(times["elsewhere"] / times["own"])
-                print(f"own slot {times['own']:.2f} s, elsewhere {times['elsewhere']:.2f} s, ratio {ratios[-1]:.4f}", flush=True)
+                checking.append((cpu["elsewhere"] - cpu["unchecked"]) / SHARDS)
+                print(
+                    f"own slot {times['own']:.2f} s, elsewhere {times['elsewhere']:.2f} s, ratio {ratios[-1]:.4f}, "
+                    f"unchecked {times['unchecked']:.2f} s, checking takes {1000 * checking[-1]:.0f} ms of the server's CPU for a shard",
+                    flush=True,
+                )
             print(f"median of {rounds} ratios: {statistics.median(ratios):.4f}")
+            print(f"median of what checking takes of the server's CPU: {1000 * statistics.median(checking):.0f} ms for a shard")
         finally:
             nats.terminate()
             nats.wait()

@@ -46,8 +46,8 @@ pub struct WorkerCommand {
     /// Units of work at the same time; replaces workers.slots of the configuration
     #[arg(long, value_name = "N")]
     slots: Option<usize>,
-    /// What organisers see beside its name, as "lab 3"; may be given up to 8 times
-    #[arg(long = "label", value_name = "TEXT", value_parser = label)]
+    /// What organisers see beside its name, as "lab 3,borrowed"; up to 8
+    #[arg(long, value_name = "TEXT,…", value_delimiter = ',', value_parser = label)]
     labels: Vec<String>,
     /// Folder for what is under way, of this worker alone; replaces workers.scratch_dir of the configuration
     #[arg(long, value_name = "FOLDER")]
@@ -95,7 +95,7 @@ impl WorkerCommand {
         let mut own = introduction(agent.offered(), config.slots())?;
         anyhow::ensure!(
             self.labels.len() <= Introduction::MOST_LABELS,
-            "--label: expected at most {}, got {}",
+            "--labels: expected at most {}, got {}",
             Introduction::MOST_LABELS,
             self.labels.len()
         );
