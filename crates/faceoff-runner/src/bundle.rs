@@ -2,10 +2,12 @@
 //! opened as it is.
 
 mod budget;
+mod entry;
 mod error;
 mod image;
 mod links;
 mod node;
+mod sink;
 mod tar_archive;
 mod tree;
 mod zip_archive;
@@ -127,11 +129,12 @@ fn unpack_within<'a>(
         }
         (None, Some(ArchiveFormat::Zip)) => Err(no_manifest()),
         (None, _) => {
-            let archive = tree.into_archive();
+            let (files, nodes) = tree.into_parts();
+            let archive = image::Archive::new(files, nodes, budget);
             if !archive.is_image() {
                 return Err(no_manifest());
             }
-            let (image, agent) = image::unpack(archive, budget)?;
+            let (image, agent) = image::unpack(archive, MANIFEST_NAME, budget)?;
             open_image(&agent, image)
         }
     }

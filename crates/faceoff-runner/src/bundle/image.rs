@@ -6,12 +6,12 @@ mod documents;
 mod env;
 mod layer;
 mod root;
+mod words;
 
 pub(super) use archive::Archive;
 
 use super::{budget::Budget, error::BundleError};
 use documents::Parts;
-use faceoff_types::IMAGE_RUNTIME;
 use root::Root;
 use std::{collections::BTreeMap, path::PathBuf};
 
@@ -43,6 +43,7 @@ impl Image {
 /// the end. Entries, streams and time are counted over all of it.
 pub(super) fn unpack<'a>(
     mut archive: Archive<'a>,
+    manifest: &str,
     budget: &'a Budget<'a>,
 ) -> Result<(Image, PathBuf), BundleError> {
     let Parts { env, layers } = documents::read(&mut archive)?;
@@ -62,7 +63,7 @@ pub(super) fn unpack<'a>(
         }
     }
     archive.clear()?;
-    let agent = root.finish()?;
+    let agent = root.finish(manifest)?;
     Ok((Image { root: place, env }, agent))
 }
 
@@ -73,17 +74,4 @@ fn in_layer(error: BundleError, number: usize, count: usize) -> BundleError {
         }
         ours => ours,
     }
-}
-
-/// What is said of an archive that is an image, as far as can be told, and holds none that can run.
-fn invalid(problem: impl std::fmt::Display) -> BundleError {
-    BundleError::Invalid(format!("the container image {problem}"))
-}
-
-/// What must be in a Dockerfile, for those who write their first one.
-fn what_to_write() -> String {
-    format!(
-        "an image holds the agent's folder as /agent, with its agent.toml (runtime = {IMAGE_RUNTIME:?}): put \
-         `COPY . /agent` into the Dockerfile that lies in that folder"
-    )
 }

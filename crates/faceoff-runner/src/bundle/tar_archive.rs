@@ -1,7 +1,8 @@
 use super::{
     budget::{Budget, Metered},
+    entry::unusable,
     error::BundleError,
-    tree::unusable,
+    sink::{Sink, Special},
 };
 use std::io::{self, Read};
 use tar::{Archive, EntryType, Header, PaxExtensions};
@@ -9,29 +10,6 @@ use tar::{Archive, EntryType, Header, PaxExtensions};
 /// Longest header that only describes the next entry (long names, extended attributes). Larger
 /// ones would have to be held in memory, and no honest bundle has one.
 const EXTENSION_MAX_BYTES: u64 = 1 << 20;
-
-/// What an archive's entries become.
-pub(super) trait Sink {
-    /// A folder.
-    fn folder(&mut self, entry: &str, mode: u32) -> Result<(), BundleError>;
-    /// A file, its content streamed.
-    fn file(&mut self, entry: &str, mode: u32, content: &mut dyn Read) -> Result<(), BundleError>;
-    /// A symbolic link.
-    fn link(&mut self, entry: &str, target: &str) -> Result<(), BundleError>;
-    /// Another name of a file.
-    fn hard_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError>;
-    /// What is none of these.
-    fn special(&mut self, entry: &str, special: Special) -> Result<(), BundleError>;
-}
-
-/// What has no content.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Special {
-    /// The device 0/0, which overlayfs has for what it hides.
-    NullDevice,
-    Device,
-    Pipe,
-}
 
 /// What extension headers say about the entry that follows.
 #[derive(Default)]

@@ -1,8 +1,9 @@
 use super::{
     budget::{Budget, Metered},
+    entry::unusable,
     error::BundleError,
-    tar_archive::Sink,
-    tree::{Tree, unusable},
+    sink::Sink,
+    tree::Tree,
 };
 use std::{
     fs::File,

@@ -1,6 +1,6 @@
 use super::{
     digest::{Digest, Hashed},
-    invalid,
+    words::invalid,
 };
 use crate::bundle::{
     budget::{Budget, Watched},

@@ -1,4 +1,4 @@
-use super::invalid;
+use super::words::invalid;
 use crate::bundle::error::BundleError;
 use sha2::{Digest as _, Sha256};
 use std::io::{self, Read};

@@ -3,7 +3,8 @@
 use super::{
     archive::{Archive, DOCKER_LIST, OCI_INDEX},
     digest::Digest,
-    env, invalid, what_to_write,
+    env,
+    words::{invalid, what_to_write},
 };
 use crate::bundle::error::BundleError;
 use serde::Deserialize;

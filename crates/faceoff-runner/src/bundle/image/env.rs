@@ -1,4 +1,4 @@
-use super::invalid;
+use super::words::invalid;
 use crate::bundle::error::BundleError;
 use faceoff_types::harmless;
 use faceoff_wire::Manifest;

@@ -1,12 +1,11 @@
-use super::{invalid, what_to_write};
+use super::words::{invalid, what_to_write};
 use crate::bundle::{
-    MANIFEST_NAME,
     budget::Budget,
-    error::BundleError,
-    tar_archive::{Sink, Special},
-    tree::{
+    entry::{
         FOLDER_MODE, PATH_MAX_BYTES, check_target, invalid as invalid_entry, normalise, write_new,
     },
+    error::BundleError,
+    sink::{Sink, Special},
 };
 use fs_err::{self as fs, os::unix::fs::symlink};
 use std::{
@@ -354,8 +353,8 @@ impl<'a> Root<'a> {
     }
 
     /// Completes the root when all layers are applied: what the sandbox needs, and the links. Returns the
-    /// agent's folder, which is one, with a file `agent.toml`: no link leads to either.
-    pub(super) fn finish(mut self) -> Result<PathBuf, BundleError> {
+    /// agent's folder, which is one, with a file `manifest`: no link leads to either.
+    pub(super) fn finish(mut self, manifest: &str) -> Result<PathBuf, BundleError> {
         self.begin_layer();
         let agent = match self.top.children.get(AGENT).map(|node| &node.kind) {
             Some(Kind::Folder(agent)) => agent,
@@ -372,16 +371,16 @@ impl<'a> Root<'a> {
                 )));
             }
         };
-        match agent.children.get(MANIFEST_NAME).map(|node| &node.kind) {
+        match agent.children.get(manifest).map(|node| &node.kind) {
             Some(Kind::File) => {}
             Some(Kind::Folder(_) | Kind::Link(_)) => {
                 return Err(invalid(format_args!(
-                    "has a folder or a link as /{AGENT}/{MANIFEST_NAME}: expected a file"
+                    "has a folder or a link as /{AGENT}/{manifest}: expected a file"
                 )));
             }
             None => {
                 return Err(invalid(format_args!(
-                    "has no /{AGENT}/{MANIFEST_NAME}; {}",
+                    "has no /{AGENT}/{manifest}; {}",
                     what_to_write()
                 )));
             }

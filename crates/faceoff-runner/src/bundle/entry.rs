@@ -1,0 +1,95 @@
+//! What holds for an entry of any archive, wherever it is placed.
+
+use super::{budget::Budget, error::BundleError};
+use fs_err::OpenOptions;
+use std::{
+    fs::Permissions,
+    io::{self, Read, Write},
+    os::unix::fs::PermissionsExt,
+    path::Path,
+};
+
+/// Set whatever the service's umask: agents run as another user when the service is root.
+pub(super) const FOLDER_MODE: u32 = 0o755;
+/// Longest path in an archive, in bytes; with the folder it is unpacked to it must stay below the
+/// system's 4096.
+pub(super) const PATH_MAX_BYTES: usize = 1024;
+const NAME_MAX_BYTES: usize = 255;
+
+/// What is wrong with an entry.
+pub(super) fn invalid(entry: &str, problem: impl std::fmt::Display) -> BundleError {
+    let shown: String = entry.chars().take(200).collect();
+    BundleError::Invalid(format!("entry {shown:?} {problem}"))
+}
+
+/// The entry's path without `.` parts; empty for the archive's own root.
+pub(super) fn normalise(entry: &str) -> Result<String, BundleError> {
+    if entry.is_empty() {
+        return Err(invalid(entry, "has no name"));
+    }
+    if entry.contains('\0') {
+        return Err(invalid(entry, "has a NUL character in its name"));
+    }
+    if entry.starts_with('/') {
+        return Err(invalid(entry, "has an absolute path"));
+    }
+    let parts: Vec<&str> = entry
+        .split('/')
+        .filter(|part| !matches!(*part, "" | "."))
+        .collect();
+    if parts.contains(&"..") {
+        return Err(invalid(entry, "has '..' in its path"));
+    }
+    if entry.len() > PATH_MAX_BYTES || parts.iter().any(|part| part.len() > NAME_MAX_BYTES) {
+        return Err(invalid(
+            entry,
+            format_args!(
+                "has too long a path: at most {PATH_MAX_BYTES} bytes, {NAME_MAX_BYTES} per name"
+            ),
+        ));
+    }
+    Ok(parts.join("/"))
+}
+
+/// Anything that neither a bundle nor a layer can hold.
+pub(super) fn unusable(entry: &str, what: &str) -> BundleError {
+    invalid(
+        entry,
+        format_args!("is {what}; a bundle holds files, folders and links"),
+    )
+}
+
+/// Could a symbolic link lead there?
+pub(super) fn check_target(entry: &str, target: &str) -> Result<(), BundleError> {
+    if target.is_empty() || target.contains('\0') || target.len() > PATH_MAX_BYTES {
+        return Err(invalid(entry, "is a link to no possible path"));
+    }
+    Ok(())
+}
+
+/// Writes a file that is not there yet, its content streamed and counted.
+pub(super) fn write_new(
+    entry: &str,
+    place: &Path,
+    mode: u32,
+    content: &mut dyn Read,
+    budget: &Budget<'_>,
+) -> Result<(), BundleError> {
+    let file_mode = if mode & 0o111 == 0 { 0o644 } else { 0o755 };
+    let mut file = OpenOptions::new()
+        .write(true)
+        .create_new(true)
+        .open(place)?;
+    file.set_permissions(Permissions::from_mode(file_mode))?;
+    let mut buffer = vec![0; 64 << 10];
+    loop {
+        let read = match content.read(&mut buffer) {
+            Ok(0) => return Ok(()),
+            Ok(read) => read,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+            Err(error) => return Err(BundleError::reading(entry)(error)),
+        };
+        budget.content(entry, read)?;
+        file.write_all(&buffer[..read])?;
+    }
+}
