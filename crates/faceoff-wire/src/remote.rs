@@ -1,7 +1,7 @@
 //! What passes between the server and workers on other machines, as JSON: orders, what is asked meanwhile, and what came of them.
 
 use crate::work::{Lease, WorkOrder, WorkReport};
-use faceoff_types::{GameId, LiveHappening, LivePosition};
+use faceoff_types::{GameId, LiveHappening, LivePosition, RuntimeInventory};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -37,8 +37,8 @@ pub struct Introduction {
     pub program: String,
     /// The program's version, for people.
     pub version: String,
-    /// The runtimes that it offers to agents.
-    pub runtimes: Vec<String>,
+    /// What it offers to agents, and what is in it.
+    pub runtimes: Vec<RuntimeInventory>,
     /// Units that it works at at the same time.
     pub slots: u32,
     /// What its owner calls it by beside its name, for people.

@@ -227,15 +227,13 @@ fn text(value: &Value) -> anyhow::Result<String> {
 /// As a worker with the server's program and runtimes tells of itself.
 fn introduction(server: &Server) -> anyhow::Result<Introduction> {
     let found = answer(server.get("/api/v1/runtimes", None))?;
-    let found = found["runtimes"].as_array().context("the runtimes")?;
-    let runtimes: Vec<&Value> = found.iter().map(|runtime| &runtime["name"]).collect();
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(fs::File::open(program("faceoff"))?)?;
     // As text, so that what a worker need not say can be left out.
     Ok(serde_json::from_value(json!({
         "program": hasher.finalize().to_string(),
         "version": env!("CARGO_PKG_VERSION"),
-        "runtimes": runtimes,
+        "runtimes": found["runtimes"],
         "slots": 1,
     }))?)
 }

@@ -1,6 +1,7 @@
 //! What this program tells of itself to another of its kind.
 
 use anyhow::Context as _;
+use faceoff_runner::{AgentEnvironment, inventory};
 use faceoff_wire::remote::Introduction;
 use std::fs;
 
@@ -8,7 +9,7 @@ use std::fs;
 ///
 /// # Errors
 /// If it cannot read its own file.
-pub fn introduction(runtimes: Vec<String>, slots: usize) -> anyhow::Result<Introduction> {
+pub fn introduction(agent: &AgentEnvironment, slots: usize) -> anyhow::Result<Introduction> {
     let program = std::env::current_exe().context("finding this program's file")?;
     let mut hasher = blake3::Hasher::new();
     fs::File::open(&program)
@@ -17,7 +18,7 @@ pub fn introduction(runtimes: Vec<String>, slots: usize) -> anyhow::Result<Intro
     Ok(Introduction {
         program: hasher.finalize().to_string(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        runtimes,
+        runtimes: inventory(agent),
         slots: u32::try_from(slots).unwrap_or(u32::MAX),
         labels: Vec::new(),
     })

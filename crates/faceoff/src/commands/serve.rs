@@ -225,7 +225,7 @@ async fn serve(
     let watch = CapacityWatch::new(store.clone(), clock.clone(), capacity.clone());
     let metrics = Metrics::new(env!("CARGO_PKG_VERSION"));
     let link_key = link_key(&data_dir)?;
-    let given_elsewhere = remote::config(&config, address, &link_key, &capacity.runtimes)?;
+    let given_elsewhere = remote::config(&config, address, &link_key, &agent)?;
     let site = HttpConfig {
         max_bundle_bytes: config.bundle.packed_bytes,
         public_url: config.server.public_url.clone(),

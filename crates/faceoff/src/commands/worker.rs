@@ -92,7 +92,7 @@ impl WorkerCommand {
         check_sandbox(&probe_host(), &config.sandbox.given_up)?;
         config.check_runtimes()?;
         let mut agent = config.agent_environment();
-        let mut own = introduction(agent.offered(), config.slots())?;
+        let mut own = introduction(&agent, config.slots())?;
         anyhow::ensure!(
             self.labels.len() <= Introduction::MOST_LABELS,
             "--labels: expected at most {}, got {}",

@@ -17,7 +17,7 @@ pub(super) fn ask(config: &Config, name: Option<String>) -> anyhow::Result<Vec<C
         return Ok(Vec::new());
     };
     let name = name.map_or_else(host_name, Ok)?;
-    let own = introduction(config.agent_environment().offered(), config.slots())?;
+    let own = introduction(&config.agent_environment(), config.slots())?;
     let examined = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()

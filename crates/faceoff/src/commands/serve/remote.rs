@@ -2,6 +2,7 @@
 
 use crate::{commands::introduction::introduction, config::Config};
 use faceoff_http::LinkKey;
+use faceoff_runner::AgentEnvironment;
 use faceoff_worker::{BucketConfig, RemoteConfig};
 use std::net::SocketAddr;
 
@@ -10,7 +11,7 @@ pub(super) fn config(
     config: &Config,
     listens_on: SocketAddr,
     link_key: &LinkKey,
-    runtimes: &[String],
+    agent: &AgentEnvironment,
 ) -> anyhow::Result<Option<RemoteConfig>> {
     let Some(nats) = config.nats.connection() else {
         anyhow::ensure!(
@@ -35,6 +36,6 @@ pub(super) fn config(
         key: link_key.of_grants(),
         bucket,
         checked_episodes: config.workers.checked_episodes,
-        like: introduction(runtimes.to_vec(), config.slots())?,
+        like: introduction(agent, config.slots())?,
     }))
 }
