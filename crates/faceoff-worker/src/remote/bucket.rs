@@ -16,12 +16,12 @@ use object_store::{
 };
 use reqwest::Method;
 use std::{
-    collections::{BTreeMap, HashSet},
+    collections::{BTreeMap, HashMap},
     fmt, fs, io,
     io::Write as _,
     path::PathBuf,
     sync::{Mutex, PoisonError},
-    time::Duration,
+    time::{Duration, Instant},
 };
 use tokio::io::AsyncReadExt as _;
 use uuid::Uuid;
@@ -30,6 +30,8 @@ use uuid::Uuid;
 const LINKS_FOR: Duration = Duration::from_secs(24 * 3600);
 /// What fails is tried again by whoever gives out and takes in, who also says so.
 const ANSWERS_WITHIN: Duration = Duration::from_secs(10);
+/// After this it is looked whether a bundle is still there: a bucket may end what it holds.
+const SEEN_FOR: Duration = Duration::from_secs(600);
 /// Bytes in memory per piece of a copy.
 const PIECE_BYTES: usize = 8 << 20;
 /// The largest file of a recording, in bytes: far more than any shard has.
@@ -51,8 +53,8 @@ pub(super) struct Bucket {
     objects: AmazonS3,
     prefix: Key,
     folder: PathBuf,
-    /// BLAKE3 of bundles that are there, as far as this process knows.
-    bundles: Mutex<HashSet<String>>,
+    /// BLAKE3 of bundles, and when they were last seen to be there.
+    bundles: Mutex<HashMap<String, Instant>>,
 }
 
 /// The client is the program's own: there is one way in it to trust others.
@@ -130,7 +132,10 @@ impl Bucket {
         artifacts: &Artifacts,
     ) -> anyhow::Result<()> {
         let known = || self.bundles.lock().unwrap_or_else(PoisonError::into_inner);
-        if known().contains(&bundle.blake3) {
+        if known()
+            .get(&bundle.blake3)
+            .is_some_and(|seen| seen.elapsed() < SEEN_FOR)
+        {
             return Ok(());
         }
         match self.objects.head(key).await {
@@ -152,7 +157,7 @@ impl Bucket {
             }
             Err(error) => return Err(error.into()),
         }
-        known().insert(bundle.blake3.clone());
+        known().insert(bundle.blake3.clone(), Instant::now());
         Ok(())
     }
 

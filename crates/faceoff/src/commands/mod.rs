@@ -14,6 +14,7 @@ pub mod doctor;
 pub mod eval;
 pub mod evaluation;
 mod evaluation_text;
+mod files_client;
 mod find_stage;
 pub mod game;
 pub mod health;

@@ -1,10 +1,11 @@
 //! `faceoff worker`: slots that work for a server on another machine.
 
 use super::{
+    files_client::files_client,
     introduction::introduction,
     serve::{check_sandbox, in_memory},
 };
-use crate::{client, config::Config, log::LogFormat};
+use crate::{config::Config, log::LogFormat};
 use anyhow::{Context as _, anyhow};
 use clap::Args;
 use faceoff_metrics::Metrics;
@@ -18,14 +19,8 @@ use std::{
     io::{self, Write as _},
     os::unix::fs::OpenOptionsExt as _,
     path::{Path, PathBuf},
-    time::Duration,
 };
 use tokio_util::sync::CancellationToken;
-
-/// How long connecting to the server may take.
-const CONNECTS_WITHIN: Duration = Duration::from_secs(10);
-/// How long nothing may come of what is being fetched.
-const READS_WITHIN: Duration = Duration::from_secs(60);
 
 /// Plays for a server on another machine.
 ///
@@ -132,16 +127,6 @@ impl WorkerCommand {
             .context("starting the async runtime")?
             .block_on(work(worker))
     }
-}
-
-/// What fetches and stores files on other machines.
-pub(super) fn files_client(ca_file: Option<&Path>) -> anyhow::Result<reqwest::Client> {
-    reqwest::Client::builder()
-        .tls_backend_preconfigured(client::trusting_tls(ca_file)?)
-        .connect_timeout(CONNECTS_WITHIN)
-        .read_timeout(READS_WITHIN)
-        .build()
-        .context("setting up the client that fetches files")
 }
 
 async fn work(worker: RemoteWorker) -> anyhow::Result<()> {

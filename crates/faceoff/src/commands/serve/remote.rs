@@ -1,6 +1,9 @@
 //! What other machines are given.
 
-use crate::{commands::introduction::introduction, config::Config};
+use crate::{
+    commands::{files_client::files_client, introduction::introduction},
+    config::Config,
+};
 use faceoff_http::LinkKey;
 use faceoff_runner::AgentEnvironment;
 use faceoff_worker::{BucketConfig, RemoteConfig};
@@ -23,7 +26,7 @@ pub(super) fn config(
     let bucket = match &config.nats.bucket {
         Some(url) => Some(BucketConfig {
             url: url.clone(),
-            http: super::super::worker::files_client(config.nats.ca_file.as_deref())?,
+            http: files_client(config.nats.ca_file.as_deref())?,
             folder: config.server.data_dir.join("from-bucket"),
         }),
         None => None,
