@@ -73,6 +73,24 @@ pub(crate) async fn give_up(tx: &mut Tx, unit: Uuid, label: &str, reason: &str) 
     }
 }
 
+/// Puts a held unit back into the queue; the attempt does not count.
+async fn give_back(
+    tx: &mut Tx,
+    claim: &Claim,
+    kind: &str,
+    rest_s: u32,
+    without_room: bool,
+) -> Result<()> {
+    queue::release(tx, claim, rest_s, without_room).await?;
+    let purpose = purpose::of_unit(tx, claim.unit, kind).await?;
+    if let Purpose::Game(id) = purpose {
+        play::give_back(tx, id, AttemptOutcome::GivenBack, None).await?;
+    }
+    let subject = subject(tx, &purpose).await?;
+    tx.advanced(subject);
+    Ok(())
+}
+
 impl Store {
     /// Our fault: the unit goes back to the queue after a growing pause. After [`MAX_ATTEMPTS`]
     /// failures the evaluation ends as
@@ -111,6 +129,23 @@ impl Store {
         self.release_resting(claim, 0, false, now).await
     }
 
+    /// Gives a unit back that was given out and that nobody has begun: it is still `claim.worker`'s. False if it is another's, or
+    /// nobody's any more; the attempt does not count.
+    pub async fn take_back(&self, claim: &Claim, now: Timestamp) -> Result<bool> {
+        let actor = Actor::Worker(claim.worker.clone());
+        self.write(actor, now, async |tx| {
+            let Hold::Held { kind } = queue::hold(tx, claim).await? else {
+                return Ok(false);
+            };
+            if !queue::is_holder(tx, claim).await? {
+                return Ok(false);
+            }
+            give_back(tx, claim, &kind, 0, false).await?;
+            Ok(true)
+        })
+        .await
+    }
+
     /// A full disk: the unit goes back to the queue to rest for a while. That is nobody's failure: the
     /// attempt does not count. Of a lost lease nothing is recorded. What finds no room again and again on a
     /// disk that is not short of it is told by [`health`](Self::health).
@@ -138,17 +173,10 @@ impl Store {
     ) -> Result<()> {
         let actor = Actor::Worker(claim.worker.clone());
         self.write(actor, now, async |tx| {
-            let Hold::Held { kind } = queue::hold(tx, claim).await? else {
-                return Ok(());
-            };
-            queue::release(tx, claim, rest_s, without_room).await?;
-            let purpose = purpose::of_unit(tx, claim.unit, &kind).await?;
-            if let Purpose::Game(id) = purpose {
-                play::give_back(tx, id, AttemptOutcome::GivenBack, None).await?;
+            match queue::hold(tx, claim).await? {
+                Hold::Held { kind } => give_back(tx, claim, &kind, rest_s, without_room).await,
+                Hold::DoneBefore | Hold::Lost => Ok(()),
             }
-            let subject = subject(tx, &purpose).await?;
-            tx.advanced(subject);
-            Ok(())
         })
         .await
     }

@@ -93,6 +93,20 @@ pub(crate) async fn is_leased(
     Ok(held.unwrap_or_default())
 }
 
+/// Is the lease `claim.worker`'s, and nobody's whom it was handed to?
+pub(crate) async fn is_holder(connection: &mut SqliteConnection, claim: &Claim) -> Result<bool> {
+    let (id, nonce) = (Text(claim.unit), Text(claim.nonce));
+    let found = sqlx::query_scalar!(
+        r#"SELECT worker = ? AS "is_holder!: bool" FROM units WHERE id = ? AND nonce = ? AND state = 'leased'"#,
+        claim.worker,
+        id,
+        nonce,
+    )
+    .fetch_optional(connection)
+    .await?;
+    Ok(found.unwrap_or_default())
+}
+
 /// Names another as the lease's holder; false if it is not `claim.worker`'s any more.
 pub(crate) async fn hand_over(
     connection: &mut SqliteConnection,

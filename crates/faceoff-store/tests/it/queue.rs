@@ -120,6 +120,17 @@ async fn of_those_who_are_given_the_same_order_one_begins() {
         0,
         "it is another's now"
     );
+    // Whoever gave it out is too late to take it back; what nobody has begun goes to the next.
+    let take_back = async |claim: &Claim| f.store.take_back(claim, f.now).await.unwrap();
+    assert!(!take_back(&claim).await);
+    assert!(is_held().await);
+    let given = f.store.claim("given out", LEASE_S, f.now).await;
+    let unbegun = given.unwrap().unwrap().claim;
+    assert!(take_back(&unbegun).await);
+    assert!(!take_back(&unbegun).await, "once");
+    let next = f.claim().await.unwrap().claim;
+    assert_eq!(next.unit, unbegun.unit);
+    f.store.release(&next, f.now).await.unwrap();
     // With the lease's time anew.
     f.later(i64::from(LEASE_S) - 1);
     let mut others = Vec::new();

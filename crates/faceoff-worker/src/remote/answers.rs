@@ -213,7 +213,7 @@ impl Answers {
     }
 }
 
-fn claim(lease: &Lease, holder: &str) -> Claim {
+pub(super) fn claim(lease: &Lease, holder: &str) -> Claim {
     Claim {
         unit: lease.unit,
         nonce: lease.nonce,

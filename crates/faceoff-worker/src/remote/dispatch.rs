@@ -1,7 +1,7 @@
 //! The server's side: claims what free slots elsewhere ask for, and takes in what came of it.
 
 use super::{
-    answers::Answers,
+    answers::{Answers, claim},
     bucket::{Bucket, BucketConfig},
     checked::Checks,
     connection::NatsConfig,
@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     local::LocalServer,
-    server::{Claimed, GivenBack, WorkServer},
+    server::{Claimed, WorkServer},
     service::WorkerConfig,
 };
 use anyhow::Context as _;
@@ -238,13 +238,15 @@ impl Hub {
             return Ok(false);
         };
         let (lease, what) = (order.lease.clone(), order.assignment.to_string());
+        self.given_out.add(lease.clone(), what, Instant::now());
         match self.publish(*order).await {
             Ok(sequence) => {
-                self.given_out.add(lease, what, sequence, Instant::now());
+                self.given_out.is_published(lease.nonce, sequence);
                 Ok(true)
             }
-            // It may have gone out all the same: then nobody can begin it.
+            // It may have gone out all the same: then nobody can begin it, or somebody has.
             Err(error) => {
+                let _ = self.given_out.take(lease.nonce);
                 self.release(lease).await;
                 Err(error)
             }
@@ -281,8 +283,8 @@ impl Hub {
         for order in orders {
             self.release(order.lease).await;
             // Whoever gets it yet is told that it is nobody's.
-            if let Some(stream) = stream
-                && let Err(error) = stream.delete_message(order.sequence).await
+            if let (Some(stream), Some(sequence)) = (stream, order.sequence)
+                && let Err(error) = stream.delete_message(sequence).await
             {
                 tracing::debug!(%error, "an order that was taken back stays in the stream");
             }
@@ -290,13 +292,14 @@ impl Hub {
     }
 
     async fn release(&self, lease: Lease) {
-        let server = self.server.clone();
-        let unit = lease.unit;
-        let released =
-            tokio::task::spawn_blocking(move || server.give_back(&lease, GivenBack::Shutdown));
-        let released = released.await.map_err(anyhow::Error::from).flatten();
-        if let Err(error) = released {
-            tracing::warn!(%unit, cause = format!("{error:#}"), "an order could not be taken back; its lease will end");
+        let (store, unit, now) = (&self.server.store, lease.unit, self.server.clock.now());
+        let claim = claim(&lease, WAITING);
+        match store.take_back(&claim, now).await {
+            Ok(true) => tracing::debug!(%unit, "taken back: nobody has begun it"),
+            Ok(false) => {}
+            Err(error) => {
+                tracing::warn!(%unit, %error, "an order could not be taken back; its lease will end");
+            }
         }
     }
 

@@ -17,8 +17,8 @@ pub(super) struct GivenOut {
     pub(super) lease: Lease,
     /// In words.
     pub(super) what: String,
-    /// Its place in the stream.
-    pub(super) sequence: u64,
+    /// Its place in the stream, once that is known.
+    pub(super) sequence: Option<u64>,
     at: Instant,
 }
 
@@ -27,14 +27,22 @@ pub(super) struct GivenOut {
 pub(super) struct AllGivenOut(Mutex<HashMap<Uuid, GivenOut>>);
 
 impl AllGivenOut {
-    pub(super) fn add(&self, lease: Lease, what: String, sequence: u64, now: Instant) {
+    /// Before it is published: a worker may begin it sooner than NATS says that it has it.
+    pub(super) fn add(&self, lease: Lease, what: String, now: Instant) {
         let given_out = GivenOut {
             lease,
             what,
-            sequence,
+            sequence: None,
             at: now,
         };
         self.all().insert(given_out.lease.nonce, given_out);
+    }
+
+    /// It is in the stream; nothing to be kept if it has been begun by then.
+    pub(super) fn is_published(&self, nonce: Uuid, sequence: u64) {
+        if let Some(of) = self.all().get_mut(&nonce) {
+            of.sequence = Some(sequence);
+        }
     }
 
     /// It is begun.
@@ -78,14 +86,20 @@ mod tests {
             expires_at: Timestamp::UNIX_EPOCH,
             duration_s: 30,
         };
-        let add = |nonce, sequence, at| all.add(lease(nonce), "hit".into(), sequence, at);
-        add(1, 11, start);
-        add(2, 12, start);
-        add(3, 13, start + Duration::from_secs(1));
+        let add = |nonce, at| all.add(lease(nonce), "hit".into(), at);
+        add(1, start);
+        add(2, start);
+        add(3, start + Duration::from_secs(1));
+        all.is_published(Uuid::from_u128(1), 11);
         assert!(all.take(Uuid::from_u128(2)).is_some());
+        // NATS may say so after it was begun.
+        all.is_published(Uuid::from_u128(2), 12);
         assert!(all.take_late(start + Duration::from_secs(4)).is_empty());
         let late = all.take_late(start + BEGINS_WITHIN);
-        assert_eq!(late.iter().map(|of| of.sequence).collect::<Vec<_>>(), [11]);
+        assert_eq!(
+            late.iter().map(|of| of.sequence).collect::<Vec<_>>(),
+            [Some(11)]
+        );
         assert_eq!(all.take_all().len(), 1);
         assert!(all.take_all().is_empty());
     }
