@@ -2,7 +2,7 @@
 
 use crate::{
     Team,
-    kills::{assert_same, copy_folder, outcome},
+    kills::{Archive, assert_same, copy_folder, outcome},
     path_of, start_day,
 };
 use async_nats::{ConnectOptions, Event};
@@ -10,10 +10,17 @@ use faceoff_tests::{
     bundle, nats::Nats, program, relay::Relay, repository, server::Server, worker::Worker,
 };
 use serde_json::{Value, json};
-use std::{fs, net::SocketAddr, path::Path, process::Command, sync::mpsc, time::Duration};
+use std::{
+    fs,
+    net::SocketAddr,
+    path::{Path, PathBuf},
+    process::Command,
+    sync::mpsc,
+    time::Duration,
+};
 
 /// Of each task.
-pub(crate) const EPISODES: u32 = 10;
+const EPISODES: u32 = 10;
 
 const COMMON: &str = concat!(
     include_str!("../patient.toml"),
@@ -27,7 +34,7 @@ resident_bytes = 0
 );
 
 /// Of a server whose own slots play.
-pub(crate) fn alone() -> String {
+fn alone() -> String {
     format!("{COMMON}[workers]\nslots = 1\n")
 }
 
@@ -45,7 +52,7 @@ pub(crate) fn taking(nats: SocketAddr, slots: usize) -> String {
 }
 
 /// An evaluation of striker that is queued and that nobody has begun, in a data folder: its path, and the team.
-pub(crate) fn queued(data: &Path, scratch: &Path) -> (String, Team) {
+fn queued(data: &Path, scratch: &Path) -> (String, Team) {
     let server = Server::start(data, &alone());
     let team = Team::create(&server, "Phoenix");
     let submission = team.submit(&server, &bundle::reference("striker", scratch));
@@ -60,6 +67,43 @@ pub(crate) fn queued(data: &Path, scratch: &Path) -> (String, Team) {
 pub(crate) fn resume(server: &Server) {
     let resumed = server.post("/api/v1/queue/resume", &server.admin_token, &json!({}));
     assert!(resumed.status().is_success(), "{}", resumed.status());
+}
+
+/// An evaluation that others are to play, and what a slot of the server's own made of it.
+pub(crate) struct Contest {
+    /// Of a server on which it is queued.
+    pub(crate) data: PathBuf,
+    pub(crate) evaluation: String,
+    pub(crate) team: Team,
+    pub(crate) expected: (Value, Archive),
+}
+
+impl Contest {
+    pub(crate) fn prepare(scratch: &Path) -> Self {
+        let [data, calm] = ["data", "calm"].map(|name| scratch.join(name));
+        let (evaluation, team) = queued(&data, scratch);
+        copy_folder(&data, &calm);
+        let undisturbed = Server::start(&calm, &alone());
+        resume(&undisturbed);
+        let expected = outcome(&undisturbed, &team, &evaluation);
+        undisturbed.kill();
+        Self {
+            data,
+            evaluation,
+            team,
+            expected,
+        }
+    }
+
+    /// Waits for the end, and compares.
+    pub(crate) fn ends_alike(self, server: &Server) {
+        let found = outcome(server, &self.team, &self.evaluation);
+        let evaluation = server.poll(&self.evaluation, &self.team.token, |_| true);
+        let submission = evaluation["submission"].as_str().expect("it names it");
+        let submission = self.team.verdict_so_far(server, submission);
+        assert_eq!(submission["state"], "valid", "{submission:#}");
+        assert_eq!(assert_same(found, self.expected), 3 * EPISODES as usize);
+    }
 }
 
 #[test]
@@ -112,20 +156,12 @@ fn what_others_play_is_what_one_slot_plays() {
 #[test]
 fn whoever_is_killed_or_cut_off_nothing_is_lost_and_nothing_done_twice() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let data = scratch.path().join("data");
-    let (evaluation, team) = queued(&data, scratch.path());
-    let calm = scratch.path().join("calm");
-    copy_folder(&data, &calm);
-    let undisturbed = Server::start(&calm, &alone());
-    resume(&undisturbed);
-    let expected = outcome(&undisturbed, &team, &evaluation);
-    undisturbed.kill();
-
+    let contest = Contest::prepare(scratch.path());
     let mut nats = Nats::start(&scratch.path().join("nats"));
     let (files, link) = (Relay::start(), Relay::start());
     link.lead_to(nats.address());
     let config = giving(&nats, files.address());
-    let server = Server::start(&data, &config);
+    let server = Server::start(&contest.data, &config);
     files.lead_to(server.address().into());
     let killed = Worker::start(scratch.path(), "killed", &taking(nats.address(), 1));
     let stays = Worker::start(scratch.path(), "stays", &taking(link.address(), 1));
@@ -137,7 +173,7 @@ fn whoever_is_killed_or_cut_off_nothing_is_lost_and_nothing_done_twice() {
     // The server, while others play; it comes back at another place, to which the same address leads.
     stays.wait_for_log("begun", 4);
     server.kill();
-    let server = Server::start(&data, &config);
+    let server = Server::start(&contest.data, &config);
     files.lead_to(server.address().into());
     // NATS itself.
     stays.wait_for_log("committed", 6);
@@ -149,8 +185,7 @@ fn whoever_is_killed_or_cut_off_nothing_is_lost_and_nothing_done_twice() {
     link.lead_to(nats.address());
     link.delay(Duration::from_millis(200));
 
-    let found = outcome(&server, &team, &evaluation);
-    assert_eq!(assert_same(found, expected), 3 * EPISODES as usize);
+    contest.ends_alike(&server);
 }
 
 #[test]

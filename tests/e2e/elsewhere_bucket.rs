@@ -1,37 +1,25 @@
 //! Bundles and recordings by a bucket of S3, in the place of the server's own HTTP.
 
-use crate::{
-    elsewhere::{EPISODES, alone, giving, queued, resume, taking},
-    kills::{assert_same, copy_folder, outcome},
-};
+use crate::elsewhere::{Contest, giving, resume, taking};
 use faceoff_tests::{bucket::Bucket, nats::Nats, relay::Relay, server::Server, worker::Worker};
 
 #[test]
 fn files_pass_by_a_bucket_and_a_worker_needs_no_way_to_the_server() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let data = scratch.path().join("data");
-    let (evaluation, team) = queued(&data, scratch.path());
-    let calm = scratch.path().join("calm");
-    copy_folder(&data, &calm);
-    let undisturbed = Server::start(&calm, &alone());
-    resume(&undisturbed);
-    let expected = outcome(&undisturbed, &team, &evaluation);
-    undisturbed.kill();
-
+    let contest = Contest::prepare(scratch.path());
     let (nats, bucket) = (Nats::start(&scratch.path().join("nats")), Bucket::start());
     // Nobody is where the server's files would be, and at first nobody is where the bucket is.
     let (files, link) = (Relay::start(), Relay::start());
     let config = giving(&nats, files.address()) + &format!("bucket = \"{}\"\n", bucket.url());
     let environment = Bucket::environment(link.address());
-    let server = Server::start_with_environment(&data, &config, &environment);
+    let server = Server::start_with_environment(&contest.data, &config, &environment);
     let worker = Worker::start(scratch.path(), "worker", &taking(nats.address(), 1));
     resume(&server);
     server.wait_for_log("putting a bundle into the bucket", 1);
     assert!(!worker.log().contains("begun"), "{}", worker.log());
     link.lead_to(bucket.address());
 
-    let found = outcome(&server, &team, &evaluation);
-    assert_eq!(assert_same(found, expected), 3 * EPISODES as usize);
+    contest.ends_alike(&server);
     // What was taken over is not left there; the bundle is, for the next order.
     let keys = bucket.keys();
     assert_eq!(keys.len(), 1, "{keys:?}");

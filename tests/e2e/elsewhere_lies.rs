@@ -3,8 +3,7 @@
 use crate::{
     Team,
     commands::admin,
-    elsewhere::{EPISODES, alone, giving, queued, resume, taking},
-    kills::{assert_same, copy_folder, outcome},
+    elsewhere::{Contest, giving, resume, taking},
 };
 use async_nats::{
     Client, HeaderMap,
@@ -102,19 +101,11 @@ impl Liar {
 #[test]
 fn a_worker_that_lies_is_banned_by_name_and_others_play_what_it_had() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let data = scratch.path().join("data");
-    let (evaluation, team) = queued(&data, scratch.path());
-    let calm = scratch.path().join("calm");
-    copy_folder(&data, &calm);
-    let undisturbed = Server::start(&calm, &alone());
-    resume(&undisturbed);
-    let expected = outcome(&undisturbed, &team, &evaluation);
-    undisturbed.kill();
-
+    let contest = Contest::prepare(scratch.path());
     let nats = Nats::start(&scratch.path().join("nats"));
     let files = Relay::start();
     let config = giving(&nats, files.address());
-    let server = Server::start(&data, &config);
+    let server = Server::start(&contest.data, &config);
     files.lead_to(server.address().into());
     resume(&server);
     let runtime = tokio::runtime::Runtime::new().expect("a runtime starts");
@@ -149,11 +140,10 @@ fn a_worker_that_lies_is_banned_by_name_and_others_play_what_it_had() {
 
     // Not even a restart makes it forgotten.
     server.kill();
-    let server = Server::start(&data, &config);
+    let server = Server::start(&contest.data, &config);
     files.lead_to(server.address().into());
     let honest = Worker::start(scratch.path(), "honest", &taking(nats.address(), 1));
-    let found = outcome(&server, &team, &evaluation);
-    assert_eq!(assert_same(found, expected), 3 * EPISODES as usize);
+    contest.ends_alike(&server);
     let told = runtime.block_on(liar.asks(&may_work));
     assert_eq!(told["kind"], "no", "{told:#}");
     let readmitted = server.post(

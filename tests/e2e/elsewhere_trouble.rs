@@ -3,9 +3,8 @@
 
 use crate::{
     Team, dataset,
-    elsewhere::{EPISODES, alone, giving, queued, resume, taking},
+    elsewhere::{Contest, giving, resume, taking},
     entry,
-    kills::{Archive, assert_same, copy_folder, outcome},
 };
 use async_nats::jetstream::{
     self,
@@ -22,7 +21,7 @@ use faceoff_tests::{
 };
 use jiff::Timestamp;
 use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, DnType, IsCa, KeyPair};
-use serde_json::{Value, json};
+use serde_json::json;
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -35,43 +34,6 @@ use tokio::runtime::Runtime;
 const SCRATCH_BYTES: u64 = 64 << 20;
 /// By this seed the first of the connections for files breaks within 300 kB: in the middle of a bundle of more than a megabyte.
 const CUT_IN_THE_BUNDLE: u64 = 65;
-
-/// An evaluation that others are to play, and what a slot of the server's own made of it.
-struct Contest {
-    /// Of a server on which it is queued.
-    data: PathBuf,
-    evaluation: String,
-    team: Team,
-    expected: (Value, Archive),
-}
-
-impl Contest {
-    fn prepare(scratch: &Path) -> Self {
-        let [data, calm] = ["data", "calm"].map(|name| scratch.join(name));
-        let (evaluation, team) = queued(&data, scratch);
-        copy_folder(&data, &calm);
-        let undisturbed = Server::start(&calm, &alone());
-        resume(&undisturbed);
-        let expected = outcome(&undisturbed, &team, &evaluation);
-        undisturbed.kill();
-        Self {
-            data,
-            evaluation,
-            team,
-            expected,
-        }
-    }
-
-    /// Waits for the end, and compares.
-    fn ends_alike(self, server: &Server) {
-        let found = outcome(server, &self.team, &self.evaluation);
-        let evaluation = server.poll(&self.evaluation, &self.team.token, |_| true);
-        let submission = evaluation["submission"].as_str().expect("it names it");
-        let submission = self.team.verdict_so_far(server, submission);
-        assert_eq!(submission["state"], "valid", "{submission:#}");
-        assert_eq!(assert_same(found, self.expected), 3 * EPISODES as usize);
-    }
-}
 
 /// Starts a server on a contest's data, to which `files` leads.
 fn serving(contest: &Contest, config: &str, files: &Relay) -> Server {
