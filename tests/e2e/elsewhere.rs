@@ -5,10 +5,13 @@ use crate::{
     kills::{Archive, assert_same, copy_folder, outcome},
     path_of, start_day,
 };
-use async_nats::{ConnectOptions, Event};
+use async_nats::{ConnectOptions, Event, Message};
+use bytes::Bytes;
 use faceoff_tests::{
     bundle, nats::Nats, program, relay::Relay, repository, server::Server, worker::Worker,
 };
+use faceoff_wire::remote::{Ask, RemoteOrder};
+use futures::StreamExt as _;
 use serde_json::{Value, json};
 use std::{
     fs,
@@ -16,6 +19,7 @@ use std::{
     path::{Path, PathBuf},
     process::Command,
     sync::mpsc,
+    thread,
     time::Duration,
 };
 
@@ -151,6 +155,60 @@ fn what_others_play_is_what_one_slot_plays() {
             worker.end();
         }
     }
+}
+
+#[test]
+fn a_worker_that_has_waited_begins_the_first_order_that_it_is_sent() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let nats = Nats::start(&scratch.path().join("nats"));
+    let files = Relay::start();
+    let server = Server::start(
+        &scratch.path().join("data"),
+        &giving(&nats, files.address()),
+    );
+    files.lead_to(server.address().into());
+    let team = Team::create(&server, "Alpha");
+    let submission = team.submit(&server, &repository().join("agents/hold"));
+    let runtime = tokio::runtime::Runtime::new().expect("a runtime starts");
+    let client = runtime.block_on(async_nats::connect(nats.url()));
+    let client = client.expect("NATS is there");
+    let heard = runtime.block_on(client.subscribe("faceoff.>"));
+    let mut heard = heard.expect("anyone may listen here");
+    let worker = Worker::start(scratch.path(), "worker", &taking(nats.address(), 1));
+    runtime.block_on(async {
+        let asks = |message: &Message| message.subject.starts_with("faceoff.free.");
+        while !heard.next().await.is_some_and(|message| asks(&message)) {}
+    });
+    // Most of the time that a request for work is open.
+    thread::sleep(Duration::from_secs(3));
+    let evaluation = team.evaluate(&server, &submission);
+    let finished = team.finished(&server, &evaluation);
+    assert_eq!(finished["state"], "finished", "{finished:#}");
+    worker.end();
+    let (mut orders, mut begun) = (Vec::new(), Vec::new());
+    runtime.block_on(async {
+        let over = client.publish("faceoff.over", Bytes::new());
+        over.await.expect("NATS is there");
+        while let Some(message) = heard.next().await {
+            match message.subject.as_str() {
+                "faceoff.over" => break,
+                "faceoff.orders" => {
+                    let order: RemoteOrder =
+                        serde_json::from_slice(&message.payload).expect("it is an order");
+                    orders.push(order.order.lease.nonce);
+                }
+                "faceoff.asks.worker" => {
+                    let ask = serde_json::from_slice(&message.payload);
+                    if let Ask::Begin { lease, .. } = ask.expect("it is a question") {
+                        begun.push(lease.nonce);
+                    }
+                }
+                _ => {}
+            }
+        }
+    });
+    assert!(orders.len() >= 3 * EPISODES as usize, "{}", orders.len());
+    assert_eq!(begun, orders);
 }
 
 #[test]

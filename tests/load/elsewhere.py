@@ -3,10 +3,13 @@
     python3 tests/load/elsewhere.py target/release/faceoff [ROUNDS]
 
 In turns, so that what else the machine does falls on both alike: a season of its own, one team with the agent hold, nine shards of
-50 episodes, played by the server's own slot or by one of a worker, who gets them by a nats-server on this machine. Measured is the time from
-the first shard's beginning to the last one's commit, by the log of whoever plays. A third season is like the second, but nothing of its
+50 episodes, played by the server's own slot or by one of a worker, who gets them by a nats-server on this machine. Measured are, by the log
+of whoever plays, the time from the first shard's beginning to the last one's commit, and of it what lies between two shards: from the end of
+one's last episode to the beginning of the next one, while the slot does not play. A third season is like the second, but nothing of its
 recordings is simulated again: what its server takes less is what checking costs. Prints each round's times, the median of
-their ratios, and the server's CPU time. Nothing is asserted: how fast a machine is, is the machine's.
+their ratios, what lies between two shards in either, and the server's CPU time. How fast the same episodes are played twice differs on most
+machines by more than what is asked here, so the ratio needs many rounds; what lies between needs few. Nothing is asserted: how fast a
+machine is, is the machine's.
 """
 
 import json
@@ -18,6 +21,7 @@ import sys
 import tempfile
 import time
 import urllib.request
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
@@ -31,6 +35,24 @@ episodes_per_shard = 50
 [workers]
 slots = 1
 """
+
+
+@dataclass
+class Played:
+    """When each shard of a season was begun, played to its end and committed, in seconds."""
+
+    begun: list[float]
+    played: list[float]
+    committed: list[float]
+
+    def took(self) -> float:
+        return self.committed[-1] - self.begun[0]
+
+    def plays(self) -> list[float]:
+        return [end - begin for begin, end in zip(self.begun, self.played)]
+
+    def between(self) -> list[float]:
+        return [begin - end for end, begin in zip(self.played, self.begun[1:])]
 
 
 class Season:
@@ -54,7 +76,8 @@ class Season:
             self.start([*words, "--log-format", "json"], self.log)
 
     def start(self, words: list, log: Path) -> subprocess.Popen:
-        process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=log.open("w"), text=True)
+        told = os.environ | {"RUST_LOG": "info,faceoff_worker::executor=debug"}
+        process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=log.open("w"), text=True, env=told)
         self.processes.append(process)
         return process
 
@@ -71,8 +94,7 @@ class Season:
             time.sleep(0.5)
         return answer
 
-    def play(self) -> float:
-        """Seconds that all shards took."""
+    def play(self) -> "Played":
         team = self.ask("POST", "/api/v1/teams", self.admin, {"name": "Alpha"})
         hold = Path(__file__).parents[2] / "agents/hold"
         archive = Path(shutil.make_archive(str(self.folder / "hold"), "gztar", hold)).read_bytes()
@@ -85,15 +107,15 @@ class Season:
         path = f"/api/v1/evaluations/{day['created'][0]['id']}"
         ended = self.until(path, self.admin, lambda one: one["state"] not in ("queued", "running", "finalising"))
         assert ended["state"] == "finished", ended
-        begun, committed = [], []
+        times = {"begun": [], "played": [], "committed": []}
         for line in self.log.read_text().splitlines():
             entry = json.loads(line)
             fields = entry["fields"]
-            if " episodes " in fields.get("work", ""):
+            if fields["message"] == "played" or " episodes " in fields.get("work", ""):
                 at = datetime.fromisoformat(entry["timestamp"].replace("Z", "+00:00")).timestamp()
-                {"begun": begun, "committed": committed}.get(fields["message"], []).append(at)
-        assert len(begun) == len(committed) == SHARDS, (len(begun), len(committed))
-        return max(committed) - min(begun)
+                times.get(fields["message"], []).append(at)
+        assert all(len(of) == SHARDS for of in times.values()), times
+        return Played(**times)
 
     def cpu_s(self) -> float:
         """CPU time of the server and of what it has waited for, in seconds."""
@@ -118,16 +140,21 @@ def main() -> None:
             while not told.exists():
                 time.sleep(0.05)
             url = json.loads(told.read_text())["nats"][0]
-            ratios, checking = [], []
+            ratios, checking, plays = [], [], []
+            between = {"own": [], "elsewhere": []}
             kinds = ["own", "elsewhere", "unchecked"]
             for number in range(rounds):
-                times, cpu = {}, {}
+                played, cpu = {}, {}
                 for who in kinds if number % 2 == 0 else reversed(kinds):
                     season = Season(program, folder / f"{who}-{number}", url if who != "own" else None, who != "unchecked")
                     try:
-                        times[who], cpu[who] = season.play(), season.cpu_s()
+                        played[who], cpu[who] = season.play(), season.cpu_s()
                     finally:
                         season.end()
+                times = {who: of.took() for who, of in played.items()}
+                for who, of_all in between.items():
+                    of_all += played[who].between()
+                    plays += played[who].plays()
                 ratios.append(times["elsewhere"] / times["own"])
                 checking.append((cpu["elsewhere"] - cpu["unchecked"]) / SHARDS)
                 print(
@@ -136,6 +163,11 @@ def main() -> None:
                     flush=True,
                 )
             print(f"median of {rounds} ratios: {statistics.median(ratios):.4f}")
+            own, elsewhere, shard = (1000 * statistics.median(of) for of in (between["own"], between["elsewhere"], plays))
+            print(
+                f"medians: a shard is played in {shard:.0f} ms; between two lie {own:.1f} ms of an own slot, {elsewhere:.1f} ms of one "
+                f"elsewhere: {100 * (elsewhere - own) / (shard + own):.2f} % of an own slot's time for a shard more"
+            )
             print(f"median of what checking takes of the server's CPU: {1000 * statistics.median(checking):.0f} ms for a shard")
         finally:
             nats.terminate()

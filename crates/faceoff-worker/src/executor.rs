@@ -196,6 +196,8 @@ impl Executor {
         let played = self
             .evaluator
             .play(spec, &bundle, &environment, out.path(), &mut progress)?;
+        // What follows is what depends on where the slot is.
+        tracing::debug!("played");
         let recording = match keeps {
             Keeps::Nothing => None,
             Keeps::Clips(key) => {

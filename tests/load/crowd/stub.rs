@@ -29,7 +29,6 @@ use uuid::Uuid;
 /// These are a worker's own (`remote/far_server.rs` and `remote/connection.rs` of `faceoff-worker`).
 const ANSWER: Duration = Duration::from_secs(5);
 const OPEN_FOR: Duration = Duration::from_secs(5);
-const HEARTBEAT: Duration = Duration::from_secs(2);
 const REST: Duration = Duration::from_secs(2);
 const RENEWS_EVERY: Duration = Duration::from_millis(500);
 const SLOT: &str = "slot-0";
@@ -269,7 +268,6 @@ impl Stub {
             .batch()
             .max_messages(1)
             .expires(OPEN_FOR)
-            .heartbeat(HEARTBEAT)
             .messages()
             .await
             .context("asking for an order")?;

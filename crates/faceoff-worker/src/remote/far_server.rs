@@ -32,10 +32,9 @@ use std::{
 use tokio::{io::AsyncWriteExt as _, runtime::Handle};
 use tokio_util::{io::ReaderStream, sync::CancellationToken};
 
-/// How long a request for an order stays open; it may die silently, and is made anew.
+/// How long a request for an order stays open; it may die silently, and is made anew. So short, it is its own heartbeat. NATS's are not
+/// asked for: a `Batch` of async-nats (0.51) that has read one is not woken by what comes next, and the order is lost.
 const OPEN_FOR: Duration = Duration::from_secs(5);
-/// How often NATS tells meanwhile that it is still there.
-const HEARTBEAT: Duration = Duration::from_secs(2);
 /// After a refusal or a failure, until it is asked again.
 const REST: Duration = Duration::from_secs(2);
 /// A worker without room leaves the queue to others for so long; what it gives back rests there, and it would make all of it rest.
@@ -227,7 +226,6 @@ impl FarServer {
             .batch()
             .max_messages(1)
             .expires(OPEN_FOR)
-            .heartbeat(HEARTBEAT)
             .messages()
             .await
             .context("asking for an order")?;
