@@ -146,12 +146,13 @@ fn a_worker_that_lies_is_banned_by_name_and_others_play_what_it_had() {
     contest.ends_alike(&server);
     let told = runtime.block_on(liar.asks(&may_work));
     assert_eq!(told["kind"], "no", "{told:#}");
-    let readmitted = server.post(
-        "/api/v1/workers/liar/readmit",
-        &server.admin_token,
-        &json!({}),
+    let listed = admin(&server, &["worker", "list"]).done();
+    assert!(
+        listed.contains("liar") && listed.contains("banned since") && listed.contains("honest"),
+        "{listed}"
     );
-    assert_eq!(readmitted.status(), 204);
+    let readmitted = admin(&server, &["worker", "readmit", "liar"]).done();
+    assert_eq!(readmitted.trim(), "liar is readmitted");
     let told = runtime.block_on(liar.asks(&may_work));
     let why = told["reason"].as_str().unwrap_or_default();
     assert!(why.contains("another program"), "as any other: {told:#}");

@@ -2,7 +2,9 @@
 //! times, and nobody blames the agent.
 
 use crate::{
-    Team, dataset,
+    Team,
+    commands::admin,
+    dataset,
     elsewhere::{Contest, giving, resume, taking},
     entry,
 };
@@ -235,8 +237,7 @@ fn what_came_of_work_waits_for_a_stream_that_is_full() {
     let contest = Contest::prepare(scratch.path());
     let nats = Nats::start(&scratch.path().join("nats"));
     let files = Relay::start();
-    // However slow the machine, it is not given up in this time.
-    let config = giving(&nats, files.address()).replace("lease_s = 10", "lease_s = 3600");
+    let config = giving(&nats, files.address());
     let server = serving(&contest, &config, &files);
     let worker = Worker::start(scratch.path(), "worker", &taking(nats.address(), 1));
     wait_for_workers(&server, 1);
@@ -250,33 +251,68 @@ fn what_came_of_work_waits_for_a_stream_that_is_full() {
     let waits = "what came of the order is not stored by NATS yet; trying again";
     worker.wait_for_log(waits, 1);
     assert!(worker.log().contains("maximum bytes"), "{}", worker.log());
+    // Longer than a lease: it is renewed meanwhile.
+    thread::sleep(Duration::from_secs(12));
     assert!(!worker.log().contains("committed"), "{}", worker.log());
     administrator.change(&as_it_was);
     contest.ends_alike(&server);
     let log = worker.log();
-    assert_eq!(log.matches(waits).count(), 1, "it is told once:\n{log}");
-    assert!(!log.contains("platform fault"), "{log}");
-    assert_eq!(
-        log.matches("begun").count(),
-        log.matches("committed").count(),
-        "nothing was played twice:\n{log}"
+    let times = |word: &str| log.matches(word).count();
+    assert!(times("platform fault") == 0, "{log}");
+    // A machine that is slow enough loses the lease, and is told so.
+    let lost = times("no longer this slot's");
+    assert!(
+        times(waits) <= 1 + lost,
+        "it is told once of each unit:\n{log}"
     );
+    assert_eq!(times("begun"), times("committed") + lost, "{log}");
+}
+
+/// So many episodes in one message, and none of the others so large.
+fn larger(config: &str) -> String {
+    config
+        .replace("episodes_per_task = 10", "episodes_per_task = 60")
+        .replace("episodes_per_shard = 1", "episodes_per_shard = 60")
+        .replace("[evaluation]", "[evaluation]\ntasks = [\"hit\"]")
+}
+
+#[test]
+fn what_stays_larger_than_nats_takes_is_a_fault_of_ours_that_is_told_and_run_again() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let mut nats = Nats::configured(&scratch.path().join("nats"), "max_payload: 8192\n");
+    let files = Relay::start();
+    let config = larger(&giving(&nats, files.address()));
+    let server = Server::start(&scratch.path().join("data"), &config);
+    files.lead_to(server.address().into());
+    let team = Team::create(&server, "Alpha");
+    let agent = bundle::reference("striker", scratch.path());
+    let submission = team.submit(&server, &agent);
+    let evaluation = team.evaluate(&server, &submission);
+    let _worker = Worker::start(scratch.path(), "worker", &taking(nats.address(), 1));
+    let failed = server.poll(&evaluation, &server.admin_token, |told| {
+        told["state"] == "platform_failed"
+    });
+    let reason = failed["reason"].as_str().unwrap_or_default();
+    assert!(
+        reason.contains("larger than NATS takes: its max_payload is to be raised"),
+        "{failed:#}"
+    );
+    nats.configure("");
+    nats.kill_and_start();
+    let failed = failed["id"].as_str().expect("it has an id");
+    let rerun = admin(&server, &["rerun", failed, "--json"]).json();
+    let rerun = rerun["id"].as_str().expect("it has an id");
+    let finished = team.finished(&server, &format!("/api/v1/evaluations/{rerun}"));
+    assert_eq!(finished["state"], "finished", "{finished:#}");
 }
 
 #[test]
 fn what_is_larger_than_nats_takes_waits_until_it_takes_it() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    // So many episodes in one message, and none of the others so large.
-    let larger = |config: String| {
-        config
-            .replace("episodes_per_task = 10", "episodes_per_task = 60")
-            .replace("episodes_per_shard = 1", "episodes_per_shard = 60")
-            .replace("[evaluation]", "[evaluation]\ntasks = [\"hit\"]")
-            .replace("lease_s = 10", "lease_s = 3600")
-    };
     let mut nats = Nats::configured(&scratch.path().join("nats"), "max_payload: 8192\n");
     let files = Relay::start();
-    let config = larger(giving(&nats, files.address()));
+    // However slow the machine, it is not given up in this time.
+    let config = larger(&giving(&nats, files.address())).replace("lease_s = 10", "lease_s = 3600");
     let server = Server::start(&scratch.path().join("data"), &config);
     files.lead_to(server.address().into());
     let team = Team::create(&server, "Alpha");

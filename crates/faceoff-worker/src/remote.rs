@@ -4,7 +4,7 @@
 //! begins, and committed once.
 //!
 //! `names.rs` is what both sides call things; `dispatch.rs`, `granted.rs` and `answers.rs` are the server's side; `far_server.rs` is the server as
-//! a worker's slots see it, `worker.rs` the process that they run in; `checked.rs` is why the server believes what comes back.
+//! a worker's slots see it, `order_files.rs` its files, `worker.rs` the process that they run in; `checked.rs` is why the server believes what comes back.
 
 mod answers;
 mod bucket;
@@ -15,6 +15,7 @@ mod examine;
 mod far_server;
 mod granted;
 mod names;
+mod order_files;
 mod taken_back;
 mod worker;
 

@@ -15,6 +15,7 @@ mod tls;
 mod tournament;
 mod uploads;
 mod webhooks;
+mod workers;
 
 use anyhow::{Context, anyhow, bail};
 pub use download::Downloaded;

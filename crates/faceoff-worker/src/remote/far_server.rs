@@ -3,6 +3,7 @@
 use super::{
     connection::ANSWER,
     names::{self, Names, ORDERS_CONSUMER},
+    order_files::OrderFiles,
 };
 use crate::{
     full_disk,
@@ -18,19 +19,18 @@ use faceoff_store::WorkerName;
 use faceoff_types::{BundleRef, GameId};
 use faceoff_wire::{
     remote::{
-        Answer, Ask, Introduction, Objects, Outcome, RemoteOrder, RemoteOutcome, RemoteShow, Shown,
+        Answer, Ask, Introduction, Outcome, RemoteOrder, RemoteOutcome, RemoteShow, Shown,
     },
     work::{Lease, WorkReport},
 };
-use futures::{StreamExt as _, TryStreamExt as _};
-use reqwest::{Method, StatusCode, header};
+use futures::StreamExt as _;
 use std::{
     path::Path,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
 };
-use tokio::{io::AsyncWriteExt as _, runtime::Handle};
-use tokio_util::{io::ReaderStream, sync::CancellationToken};
+use tokio::runtime::Handle;
+use tokio_util::sync::CancellationToken;
 
 /// How long a request for an order stays open; it may die silently, and is made anew. So short, it is its own heartbeat. NATS's are not
 /// asked for: a `Batch` of async-nats (0.51) that has read one is not woken by what comes next, and the order is lost.
@@ -39,8 +39,6 @@ const OPEN_FOR: Duration = Duration::from_secs(5);
 const REST: Duration = Duration::from_secs(2);
 /// A worker without room leaves the queue to others for so long; what it gives back rests there, and it would make all of it rest.
 const FULL_DISK_REST: Duration = Duration::from_secs(10);
-/// How long a file of the server's is asked for again and again: it may be starting anew.
-const FILES_WITHIN: Duration = Duration::from_secs(60);
 /// So long a worker goes on without asking whether it may.
 const MAY_WORK_FOR: Duration = Duration::from_secs(5);
 /// More than the headers of an outcome have; they count as part of the message.
@@ -92,45 +90,11 @@ pub(super) struct FarServer {
 /// What the slot works at.
 #[derive(Debug, Default)]
 struct Current {
-    grant: String,
-    files: String,
-    objects: Option<Objects>,
+    files: Arc<OrderFiles>,
     /// When the server last said that it is this slot's.
     held_at: Option<Instant>,
-}
-
-/// A file of an order's.
-enum Place<'a> {
-    /// By BLAKE3: to fetch.
-    Bundle(&'a str),
-    /// By name: to store.
-    File(&'a str),
-}
-
-impl Place<'_> {
-    /// How it is asked for and where, and with which word.
-    fn of(&self, current: &Current) -> anyhow::Result<(Method, String, Option<String>)> {
-        let (method, path, link) = match self {
-            Self::Bundle(blake3) => {
-                let links = current.objects.as_ref().map(|objects| &objects.bundles);
-                let path = format!("bundles/{blake3}");
-                (Method::GET, path, links.map(|links| links.get(*blake3)))
-            }
-            Self::File(name) => {
-                let links = current.objects.as_ref().map(|objects| &objects.files);
-                let path = format!("files/{name}");
-                (Method::PUT, path, links.map(|links| links.get(*name)))
-            }
-        };
-        match link {
-            Some(Some(link)) => Ok((method, link.clone(), None)),
-            Some(None) => anyhow::bail!("the order has no link to {path}"),
-            None => {
-                let url = format!("{}/work/{path}", current.files);
-                Ok((method, url, Some(format!("Grant {}", current.grant))))
-            }
-        }
-    }
+    /// It is no longer this slot's.
+    is_lost: bool,
 }
 
 impl FarServer {
@@ -152,6 +116,22 @@ impl FarServer {
 
     fn current(&self) -> MutexGuard<'_, Current> {
         self.current.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Is what it works at no longer its own? At the end of this worker it is given back.
+    fn has_ended(&self) -> bool {
+        self.current().is_lost || self.link.shutdown.is_cancelled()
+    }
+
+    /// Those of what it works at.
+    fn files(&self) -> Arc<OrderFiles> {
+        Arc::clone(&self.current().files)
+    }
+
+    async fn store(&self, name: &str, file: &Path) -> anyhow::Result<()> {
+        let http = &self.link.http;
+        let files = self.files();
+        files.store(http, name, file, || self.has_ended()).await
     }
 
     async fn rest(&self) {
@@ -268,11 +248,13 @@ impl FarServer {
         })
     }
 
-    /// Sends what came of an order, until NATS has stored it.
-    async fn send(&self, lease: &Lease, outcome: Outcome) -> anyhow::Result<()> {
+    /// Sends what came of an order, until NATS has stored it or, of what was played, until the order is no longer this slot's. What is too
+    /// large stays so until somebody helps: after a lease, the server is to know.
+    async fn send(&self, lease: &Lease, outcome: Outcome) -> anyhow::Result<Holding> {
+        let was_played = matches!(outcome, Outcome::Done { .. });
         let outcome = RemoteOutcome {
             lease: lease.clone(),
-            grant: self.current().grant.clone(),
+            grant: self.current().files.grant.clone(),
             outcome,
         };
         let mut headers = HeaderMap::new();
@@ -300,64 +282,22 @@ impl FarServer {
                 );
                 anyhow::Ok(sent.await?.await?)
             };
-            match sent.await {
-                Ok(_) => return Ok(()),
-                Err(error) if began.elapsed() >= within => {
-                    return Err(error).context("sending what came of the order");
-                }
-                Err(error) => {
-                    let cause = format!("{error:#}");
-                    if cause != told {
-                        tracing::warn!(unit = %lease.unit, cause, "what came of the order is not stored by NATS yet; trying again");
-                        told = cause;
-                    }
-                    tokio::time::sleep(REST).await;
-                }
-            }
-        }
-    }
-
-    /// Asks for a file of the order's, or sends one, again while whoever has it is away.
-    async fn files<T>(
-        &self,
-        what: &str,
-        mut once: impl AsyncFnMut(reqwest::RequestBuilder) -> anyhow::Result<T>,
-        place: Place<'_>,
-    ) -> anyhow::Result<T> {
-        let (method, url, grant) = place.of(&self.current())?;
-        // A link of a bucket opens by itself what it leads to, so it is not told.
-        let shown = url.split('?').next().unwrap_or_default().to_owned();
-        let began = Instant::now();
-        loop {
-            let mut request = self.link.http.request(method.clone(), &url);
-            if let Some(grant) = &grant {
-                request = request.header(header::AUTHORIZATION, grant);
-            }
-            let error = match once(request).await {
-                Ok(done) => return Ok(done),
-                Err(error) => error,
+            let Err(error) = sent.await else {
+                return Ok(Holding::Held);
             };
-            if !is_away(&error) || began.elapsed() >= FILES_WITHIN {
-                return Err(error).with_context(|| format!("{what} {shown}"));
+            if was_played && self.has_ended() {
+                return Ok(Holding::Lost);
+            }
+            if error.is::<TooLarge>() && began.elapsed() >= within {
+                return Err(error).context("sending what came of the order");
+            }
+            let cause = format!("{error:#}");
+            if cause != told {
+                tracing::warn!(unit = %lease.unit, cause, "what came of the order is not stored by NATS yet; trying again");
+                told = cause;
             }
             tokio::time::sleep(REST).await;
         }
-    }
-
-    async fn store(&self, name: &str, file: &Path) -> anyhow::Result<()> {
-        let send = async |request: reqwest::RequestBuilder| {
-            let body = tokio::fs::File::open(file).await?;
-            let bytes = body.metadata().await?.len();
-            let answer = request
-                .header(header::CONTENT_LENGTH, bytes)
-                .body(reqwest::Body::wrap_stream(ReaderStream::new(body)))
-                .send()
-                .await?;
-            let _ = good(answer).await?;
-            Ok(())
-        };
-        self.files("storing a file at", send, Place::File(name))
-            .await
     }
 }
 
@@ -369,45 +309,6 @@ impl FarServer {
 pub(crate) struct TooLarge {
     bytes: usize,
     largest: usize,
-}
-
-/// The server, or the proxy before it, has no time now.
-#[derive(Debug, thiserror::Error)]
-#[error("the server answered {0}")]
-struct Busy(StatusCode);
-
-/// Is it worth asking again?
-fn is_away(error: &anyhow::Error) -> bool {
-    error.chain().any(|cause| {
-        cause.is::<Busy>()
-            || cause.downcast_ref::<reqwest::Error>().is_some_and(|error| {
-                let before = error.is_connect() || error.is_timeout() || error.is_request();
-                // In the middle of what it answers.
-                before || error.is_body() || error.is_decode()
-            })
-    })
-}
-
-/// An answer that is no refusal.
-async fn good(answer: reqwest::Response) -> anyhow::Result<reqwest::Response> {
-    let status = answer.status();
-    if status.is_success() {
-        return Ok(answer);
-    }
-    let busy = [
-        StatusCode::TOO_MANY_REQUESTS,
-        StatusCode::BAD_GATEWAY,
-        StatusCode::SERVICE_UNAVAILABLE,
-        StatusCode::GATEWAY_TIMEOUT,
-    ];
-    if busy.contains(&status) {
-        return Err(Busy(status).into());
-    }
-    let told = answer.text().await.unwrap_or_default();
-    if status == StatusCode::INSUFFICIENT_STORAGE {
-        return Err(std::io::Error::from(std::io::ErrorKind::StorageFull).into());
-    }
-    anyhow::bail!("the server answered {status}: {told}")
 }
 
 impl WorkServer for FarServer {
@@ -450,10 +351,13 @@ impl WorkServer for FarServer {
             };
             self.link.is_busy();
             *self.current() = Current {
-                grant,
-                files,
-                objects,
+                files: Arc::new(OrderFiles {
+                    grant,
+                    server: files,
+                    objects,
+                }),
                 held_at: Some(Instant::now()),
+                is_lost: false,
             };
             Ok(Claimed::Order(Box::new(order)))
         })
@@ -471,12 +375,16 @@ impl WorkServer for FarServer {
                 self.current().held_at = Some(Instant::now());
                 Ok(Holding::Held)
             }
-            Ok(Answer::No { .. }) => Ok(Holding::Lost),
+            Ok(Answer::No { .. }) => {
+                self.current().is_lost = true;
+                Ok(Holding::Lost)
+            }
             Ok(Answer::Unknown) | Err(_) => {
                 let held_at = self.current().held_at;
                 let cut_off = Duration::from_secs(lease.duration_s.into());
                 if held_at.is_some_and(|at| at.elapsed() > cut_off) {
                     tracing::error!(unit = %lease.unit, "nothing was heard of the server for as long as the lease is: this worker stops");
+                    self.current().is_lost = true;
                     return Ok(Holding::Lost);
                 }
                 answer
@@ -523,9 +431,9 @@ impl WorkServer for FarServer {
     fn commit(&self, lease: &Lease, report: WorkReport) -> anyhow::Result<Holding> {
         let report = Box::new(report);
         let sent = self.send(lease, Outcome::Done { report });
-        self.link.runtime.block_on(sent)?;
+        let holding = self.link.runtime.block_on(sent)?;
         self.link.is_busy();
-        Ok(Holding::Held)
+        Ok(holding)
     }
 
     fn give_back(&self, lease: &Lease, why: GivenBack<'_>) -> anyhow::Result<()> {
@@ -542,7 +450,7 @@ impl WorkServer for FarServer {
         };
         self.link.runtime.block_on(async {
             let sent = tokio::time::timeout(ANSWER, self.send(lease, outcome));
-            sent.await.context("telling the server")?
+            sent.await.context("telling the server")?.map(drop)
         })
     }
 
@@ -564,18 +472,8 @@ impl WorkServer for FarServer {
     }
 
     fn fetch_bundle(&self, bundle: &BundleRef, archive: &Path) -> anyhow::Result<()> {
-        let fetch = async |request: reqwest::RequestBuilder| {
-            let answer = good(request.send().await?).await?;
-            let mut file = tokio::fs::File::create(archive).await?;
-            let mut bytes = answer.bytes_stream();
-            while let Some(piece) = bytes.try_next().await? {
-                file.write_all(&piece).await?;
-            }
-            file.flush().await?;
-            Ok(())
-        };
-        let from = Place::Bundle(&bundle.blake3);
-        let fetched = self.files("fetching the bundle", fetch, from);
+        let (files, http) = (self.files(), &self.link.http);
+        let fetched = files.fetch_bundle(http, bundle, archive, || self.has_ended());
         self.link.runtime.block_on(fetched)
     }
 

@@ -13,6 +13,7 @@ mod stage;
 mod storage;
 mod teams;
 mod tournament;
+mod workers;
 
 use super::{
     ca_file::CaFile,
@@ -83,6 +84,11 @@ enum Action {
     Webhook {
         #[command(subcommand)]
         action: WebhookAction,
+    },
+    /// List, ban and readmit those who play on other machines
+    Worker {
+        #[command(subcommand)]
+        action: workers::WorkerAction,
     },
     /// Tell everybody
     Announce {
@@ -254,6 +260,7 @@ impl AdminCommand {
             }
             Action::Token { action } => token::act(&client, self.json, action).await,
             Action::Webhook { action } => webhook::act(&client, self.json, action).await,
+            Action::Worker { action } => workers::act(&client, self.json, action).await,
             Action::Announce { title, text } => {
                 news::announce(&client, self.json, title, text).await
             }
