@@ -18,9 +18,7 @@ use faceoff_dataset::CLIPS_FILE;
 use faceoff_store::WorkerName;
 use faceoff_types::{BundleRef, GameId};
 use faceoff_wire::{
-    remote::{
-        Answer, Ask, Introduction, Outcome, RemoteOrder, RemoteOutcome, RemoteShow, Shown,
-    },
+    remote::{Answer, Ask, Introduction, Outcome, RemoteOrder, RemoteOutcome, RemoteShow, Shown},
     work::{Lease, WorkReport},
 };
 use futures::StreamExt as _;
