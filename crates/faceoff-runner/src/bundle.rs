@@ -90,36 +90,25 @@ fn unpack_within<'a>(
     file.seek(SeekFrom::Start(0))?;
 
     let mut tree = Tree::new(into, budget)?;
-    let buffered = 64 << 10;
-    let watched =
-        |file: File| BufReader::with_capacity(buffered, Watched::new(file.into_file(), budget));
-    let format = ArchiveFormat::detect(&head);
-    match format {
-        Some(ArchiveFormat::TarGz) => {
-            let streams: Members<'_, _, flate2::bufread::GzDecoder<_>> =
-                Members::new(watched(file), budget).map_err(BundleError::reading(""))?;
-            tar_archive::unpack(streams, &mut tree, budget)?;
-        }
-        Some(ArchiveFormat::TarZst) => {
-            let streams: Members<'_, _, zstd::Decoder<'static, _>> =
-                Members::new(watched(file), budget).map_err(BundleError::reading(""))?;
-            tar_archive::unpack(streams, &mut tree, budget)?;
-        }
-        Some(ArchiveFormat::Zip) => {
-            let file = BufReader::with_capacity(buffered, file.into_file());
-            zip_archive::unpack(file, packed, &mut tree, budget)?;
-        }
-        Some(ArchiveFormat::Tar) => tar_archive::unpack(watched(file), &mut tree, budget)?,
-        None => {
-            return Err(BundleError::Invalid(
-                "the bundle is no archive that is accepted: expected .tar.gz, .tar.zst or .zip, or the .tar of a \
-                 container image"
-                    .to_owned(),
-            ));
-        }
+    if head.starts_with(&[0xff, 0xfe]) {
+        return Err(BundleError::Invalid(
+            "the bundle is text in UTF-16, as PowerShell's `>` writes it: have the program write the file itself \
+             (`docker save -o ours.tar ours:latest`)"
+                .to_owned(),
+        ));
     }
+    let read = read_into(
+        &mut tree,
+        file,
+        packed,
+        ArchiveFormat::detect(&head),
+        budget,
+    );
+    let format = budget
+        .verdict(read)
+        .map_err(|error| tree.explain_refusal(error))?;
     match (tree.bundle_root(MANIFEST_NAME), format) {
-        (Some(_), Some(ArchiveFormat::Tar)) => Err(BundleError::Invalid(
+        (Some(_), ArchiveFormat::Tar) => Err(BundleError::Invalid(
             "a plain .tar is accepted of a container image only: compress the bundle to .tar.gz"
                 .to_owned(),
         )),
@@ -127,17 +116,56 @@ fn unpack_within<'a>(
             tree.finish(&root)?;
             open_dir(&into.join(root))
         }
-        (None, Some(ArchiveFormat::Zip)) => Err(no_manifest()),
+        (None, ArchiveFormat::Zip) => Err(tree.explain_refusal(no_manifest())),
         (None, _) => {
+            let refusal = tree.explain_refusal(no_manifest());
             let (files, nodes) = tree.into_parts();
             let archive = image::Archive::new(files, nodes, budget);
             if !archive.is_image() {
-                return Err(no_manifest());
+                return Err(refusal);
             }
             let (image, agent) = image::unpack(archive, MANIFEST_NAME, budget)?;
             open_image(&agent, image)
         }
     }
+}
+
+/// Reads the archive `file` of `packed` bytes into `tree`.
+fn read_into<'a>(
+    tree: &mut Tree<'a>,
+    file: File,
+    packed: u64,
+    format: Option<ArchiveFormat>,
+    budget: &'a Budget<'a>,
+) -> Result<ArchiveFormat, BundleError> {
+    let buffered = 64 << 10;
+    let watched =
+        |file: File| BufReader::with_capacity(buffered, Watched::new(file.into_file(), budget));
+    let format = format.ok_or_else(|| {
+        BundleError::Invalid(
+            "the bundle is no archive that is accepted: expected .tar.gz, .tar.zst or .zip, or the .tar of a \
+             container image"
+                .to_owned(),
+        )
+    })?;
+    match format {
+        ArchiveFormat::TarGz => {
+            let streams: Members<'_, _, flate2::bufread::GzDecoder<_>> =
+                Members::new(watched(file), budget).map_err(BundleError::reading(""))?;
+            tar_archive::unpack(streams, tree, budget)?;
+        }
+        ArchiveFormat::TarZst => {
+            let streams: Members<'_, _, zstd::Decoder<'static, _>> =
+                Members::new(watched(file), budget).map_err(BundleError::reading(""))?;
+            tar_archive::unpack(streams, tree, budget)?;
+        }
+        ArchiveFormat::Zip => {
+            let file = BufReader::with_capacity(buffered, file.into_file());
+            zip_archive::unpack(file, packed, tree, budget)?;
+        }
+        ArchiveFormat::Tar => tar_archive::unpack(watched(file), tree, budget)?,
+    }
+    Ok(format)
 }
 
 /// Opens a developer's own folder in place, or unpacks an archive into a new folder `bundle` of

@@ -21,7 +21,10 @@ impl ArchiveFormat {
     pub fn detect(head: &[u8]) -> Option<Self> {
         match head {
             [0x1f, 0x8b, ..] => Some(Self::TarGz),
-            [0x28, 0xb5, 0x2f, 0xfd, ..] => Some(Self::TarZst),
+            // Or a frame that is to be skipped, with which some compressors begin.
+            [0x28, 0xb5, 0x2f, 0xfd, ..] | [0x50..=0x5f, 0x2a, 0x4d, 0x18, ..] => {
+                Some(Self::TarZst)
+            }
             [b'P', b'K', 3, 4, ..] => Some(Self::Zip),
             _ => (head.get(TAR_MAGIC_AT..Self::LONGEST_MAGIC) == Some(TAR_MAGIC))
                 .then_some(Self::Tar),

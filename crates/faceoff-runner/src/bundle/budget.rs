@@ -19,8 +19,12 @@ const ENTRIES_PER_FILE: u64 = 4;
 /// A seek costs a call of the system and a buffer filled anew, so it counts as bytes, too.
 const SEEK_BYTES: u64 = 64;
 /// How often one stream may be followed by another one in the same file. `bgzip` begins anew every
-/// 64 KiB; no honest archive does so oftener.
+/// 64 KiB; layers that can be fetched piece by piece have a stream for each file, or some, so that there are
+/// as many of these as there may be entries, if that is more.
 const MEMBERS: u64 = 1 << 16;
+/// What compressors add to a stream, in bytes: its header, and what some note there. Beyond this and
+/// [`BESIDE_BYTES`] nothing that is compressed is larger than what it holds.
+const PACKED_BYTES_PER_MEMBER: u64 = 1 << 10;
 /// How much of names may be compared to follow all links, in bytes.
 const LINK_BYTES: u64 = 64 << 20;
 /// How much of names may be looked up to place the entries of an image's layers, in bytes. A hundred thousand
@@ -53,10 +57,16 @@ pub(super) struct Budget<'a> {
     content: Cell<u64>,
     entries: Cell<u64>,
     members: Cell<u64>,
+    /// Taken in by decompressors, in bytes …
+    packed: Cell<u64>,
+    /// … and what they made of it.
+    decompressed: Cell<u64>,
     link_bytes: Cell<u64>,
     looked_up: Cell<u64>,
     /// Of an image's files, in bytes.
     of_image: Cell<u64>,
+    /// What comes now is of an image's layers.
+    is_root: Cell<bool>,
     ended: RefCell<Option<BundleError>>,
 }
 
@@ -78,9 +88,12 @@ impl<'a> Budget<'a> {
             content: Cell::new(0),
             entries: Cell::new(0),
             members: Cell::new(0),
+            packed: Cell::new(0),
+            decompressed: Cell::new(0),
             link_bytes: Cell::new(0),
             looked_up: Cell::new(0),
             of_image: Cell::new(0),
+            is_root: Cell::new(false),
             ended: RefCell::new(None),
         }
     }
@@ -138,7 +151,7 @@ impl<'a> Budget<'a> {
 
     /// Another entry of the archive, whatever its kind: also one that only describes the next.
     pub(super) fn entry(&self) -> Result<(), BundleError> {
-        let most = self.limits.files.saturating_mul(ENTRIES_PER_FILE);
+        let most = self.most_entries();
         self.entries.set(self.entries.get() + 1);
         self.allow(BESIDE_BYTES_PER_ENTRY);
         if self.entries.get() > most {
@@ -149,14 +162,25 @@ impl<'a> Budget<'a> {
         self.check()
     }
 
-    /// What became part of a file.
+    fn most_entries(&self) -> u64 {
+        self.limits.files.saturating_mul(ENTRIES_PER_FILE)
+    }
+
+    /// What became part of a file, or was read as the content of one that is left out.
     pub(super) fn content(&self, entry: &str, bytes: usize) -> Result<(), BundleError> {
         self.content.set(self.content.get() + bytes as u64);
         let most = self.limits.unpacked_bytes;
         if self.content.get() > most {
-            return self.refuse(format!(
-                "the archive unpacks to more than {most} bytes (stopped at entry {entry:?})"
-            ));
+            return self.refuse(if self.is_root.get() {
+                format!(
+                    "what the image's layers hold comes to more than {most} bytes (stopped at entry {entry:?}): \
+                     begin with a smaller image, and install and clean up in one step"
+                )
+            } else {
+                format!(
+                    "the archive unpacks to more than {most} bytes (stopped at entry {entry:?})"
+                )
+            });
         }
         Ok(())
     }
@@ -165,6 +189,7 @@ impl<'a> Budget<'a> {
     /// limit for itself. All else is counted on.
     pub(super) fn begin_root(&self) {
         self.content.set(0);
+        self.is_root.set(true);
     }
 
     /// What is read of an image's files, as they came. Each is needed once, and all of them have the limit of the
@@ -209,9 +234,23 @@ impl<'a> Budget<'a> {
 
     fn member(&self) -> Result<(), BundleError> {
         self.members.set(self.members.get() + 1);
-        if self.members.get() > MEMBERS {
+        let most = MEMBERS.max(self.most_entries());
+        if self.members.get() > most {
             return self.refuse(format!(
-                "the archive is made of more than {MEMBERS} compressed streams"
+                "the archive is made of more than {most} compressed streams"
+            ));
+        }
+        self.check()
+    }
+
+    /// Blocks that decompress to nothing cost as much as any.
+    fn decompresses(&self) -> Result<(), BundleError> {
+        let explained = BESIDE_BYTES + (self.members.get() + 1) * PACKED_BYTES_PER_MEMBER;
+        if self.packed.get() > self.decompressed.get().saturating_add(explained) {
+            return self.refuse(format!(
+                "the archive is larger than what it holds: {} compressed bytes have brought {}",
+                self.packed.get(),
+                self.decompressed.get()
             ));
         }
         self.check()
@@ -298,6 +337,34 @@ impl<R: BufRead> Member<R> for zstd::Decoder<'static, R> {
     }
 }
 
+/// What a decompressor takes in, counted.
+pub(super) struct Packed<'a, R> {
+    inner: R,
+    budget: &'a Budget<'a>,
+}
+
+impl<R: BufRead> Read for Packed<'_, R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let read = self.fill_buf()?.read(buffer)?;
+        self.consume(read);
+        Ok(read)
+    }
+}
+
+impl<R: BufRead> BufRead for Packed<'_, R> {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        self.budget.decompresses().map_err(as_io)?;
+        self.inner.fill_buf()
+    }
+
+    fn consume(&mut self, bytes: usize) {
+        self.budget
+            .packed
+            .set(self.budget.packed.get() + bytes as u64);
+        self.inner.consume(bytes);
+    }
+}
+
 /// All streams of a file as one, each counted: one that holds nothing costs as much to begin as any.
 pub(super) struct Members<'a, R, M> {
     budget: &'a Budget<'a>,
@@ -306,8 +373,12 @@ pub(super) struct Members<'a, R, M> {
     packed: std::marker::PhantomData<R>,
 }
 
-impl<'a, R: BufRead, M: Member<R>> Members<'a, R, M> {
+impl<'a, R: BufRead, M: Member<Packed<'a, R>>> Members<'a, R, M> {
     pub(super) fn new(packed: R, budget: &'a Budget<'a>) -> io::Result<Self> {
+        let packed = Packed {
+            inner: packed,
+            budget,
+        };
         Ok(Self {
             budget,
             current: Some(M::begin(packed)?),
@@ -316,7 +387,7 @@ impl<'a, R: BufRead, M: Member<R>> Members<'a, R, M> {
     }
 }
 
-impl<R: BufRead, M: Member<R>> Read for Members<'_, R, M> {
+impl<'a, R: BufRead, M: Member<Packed<'a, R>>> Read for Members<'a, R, M> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         if buffer.is_empty() {
             return Ok(0);
@@ -324,17 +395,33 @@ impl<R: BufRead, M: Member<R>> Read for Members<'_, R, M> {
         while let Some(member) = &mut self.current {
             let read = member.read(buffer)?;
             if read > 0 {
+                let decompressed = &self.budget.decompressed;
+                decompressed.set(decompressed.get() + read as u64);
                 return Ok(read);
             }
             self.budget.member().map_err(as_io)?;
             let Some(mut packed) = self.current.take().map(Member::packed) else {
                 break;
             };
-            if !packed.fill_buf()?.is_empty() {
+            if follows(&mut packed)? {
                 self.current = Some(M::begin(packed)?);
             }
         }
         Ok(0)
+    }
+}
+
+/// Is there another stream? Zeros fill up blocks of tapes, and begin none.
+fn follows(packed: &mut impl BufRead) -> io::Result<bool> {
+    loop {
+        let ahead = packed.fill_buf()?;
+        let zeros = ahead.iter().take_while(|&&byte| byte == 0).count();
+        if zeros < ahead.len() || zeros == 0 {
+            let is_there = !ahead.is_empty();
+            packed.consume(zeros);
+            return Ok(is_there);
+        }
+        packed.consume(zeros);
     }
 }
 

@@ -67,6 +67,17 @@ pub(super) fn check_target(entry: &str, target: &str) -> Result<(), BundleError>
     Ok(())
 }
 
+/// Gives a file another name.
+pub(super) fn write_name(entry: &str, file: &Path, place: &Path) -> Result<(), BundleError> {
+    fs_err::hard_link(file, place).map_err(|error| match error.kind() {
+        io::ErrorKind::TooManyLinks => invalid(
+            entry,
+            "is one name more than a file can have on this server",
+        ),
+        _ => error.into(),
+    })
+}
+
 /// Writes a file that is not there yet, its content streamed and counted.
 pub(super) fn write_new(
     entry: &str,

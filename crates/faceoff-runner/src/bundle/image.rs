@@ -46,18 +46,24 @@ pub(super) fn unpack<'a>(
     manifest: &str,
     budget: &'a Budget<'a>,
 ) -> Result<(Image, PathBuf), BundleError> {
-    let Parts { env, layers } = documents::read(&mut archive)?;
+    let Parts { env, mut layers } = documents::read(&mut archive)?;
     let place = archive.free_place();
     budget.begin_root();
     let mut root = Root::new(&place, budget)?;
     let count = layers.len();
+    for (index, part) in layers.iter_mut().enumerate() {
+        part.name = archive
+            .real_name(&part.name)
+            .map_err(|error| part.in_it(error, index + 1, count))?;
+    }
     for (index, part) in layers.iter().enumerate() {
         let is_needed_again = layers[index + 1..]
             .iter()
             .any(|later| later.name == part.name);
         root.begin_layer();
-        layer::apply(&mut archive, part, &mut root, budget)
-            .map_err(|error| in_layer(error, index + 1, count))?;
+        // What the budget ended is told by it, and so with the layer.
+        let applied = budget.verdict(layer::apply(&mut archive, part, &mut root, budget));
+        applied.map_err(|error| part.in_it(error, index + 1, count))?;
         if !is_needed_again {
             archive.remove(&part.name)?;
         }
@@ -65,13 +71,4 @@ pub(super) fn unpack<'a>(
     archive.clear()?;
     let agent = root.finish(manifest)?;
     Ok((Image { root: place, env }, agent))
-}
-
-fn in_layer(error: BundleError, number: usize, count: usize) -> BundleError {
-    match error {
-        BundleError::Invalid(told) => {
-            BundleError::Invalid(format!("layer {number} of the image's {count}: {told}"))
-        }
-        ours => ours,
-    }
 }

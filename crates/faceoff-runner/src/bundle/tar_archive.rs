@@ -5,7 +5,7 @@ use super::{
     sink::{Sink, Special},
 };
 use std::io::{self, Read};
-use tar::{Archive, EntryType, Header, PaxExtensions};
+use tar::{Archive, EntryType, Header};
 
 /// Longest header that only describes the next entry (long names, extended attributes). Larger
 /// ones would have to be held in memory, and no honest bundle has one.
@@ -16,6 +16,8 @@ const EXTENSION_MAX_BYTES: u64 = 1 << 20;
 struct Extensions {
     path: Option<Vec<u8>>,
     link: Option<Vec<u8>>,
+    size: Option<u64>,
+    is_sparse: bool,
 }
 
 /// Unpacks a decompressed tar stream.
@@ -38,22 +40,35 @@ pub(super) fn unpack<'a>(
         budget.entry()?;
         let kind = entry.header().entry_type();
         match kind {
-            EntryType::GNULongName => extensions.path = Some(read_extension(&mut entry)?),
-            EntryType::GNULongLink => extensions.link = Some(read_extension(&mut entry)?),
+            EntryType::GNULongName => extensions.path = Some(read_name(&mut entry)?),
+            EntryType::GNULongLink => extensions.link = Some(read_name(&mut entry)?),
             EntryType::XHeader => {
                 let bytes = read_extension(&mut entry)?;
-                read_pax(&bytes, entry.header(), &mut extensions)?;
+                read_pax(&bytes, &mut extensions)?;
             }
             // Comments about the whole archive, as `git archive` writes them.
             EntryType::XGlobalHeader => {
                 read_extension(&mut entry)?;
             }
             _ => {
-                let Extensions { path, link } = std::mem::take(&mut extensions);
+                let told = std::mem::take(&mut extensions);
                 let header = entry.header();
-                let path = path.unwrap_or_else(|| header.path_bytes().into_owned());
+                let path = told
+                    .path
+                    .unwrap_or_else(|| header.path_bytes().into_owned());
                 let name = text(path)?;
-                let mode = header.mode().map_err(BundleError::reading(&name))?;
+                if told.is_sparse {
+                    return Err(sparse(&name));
+                }
+                // A size beyond the header's field is beyond every limit; another one would make readers
+                // disagree about where the next entry starts.
+                if told.size.is_some_and(|size| size != entry.size()) {
+                    return Err(BundleError::Invalid(format!(
+                        "the archive states a size outside of its header, near entry {name:?}"
+                    )));
+                }
+                let mode = mode(header).map_err(BundleError::reading(&name))?;
+                let link = told.link;
                 let link = link.or_else(|| header.link_name_bytes().map(|link| link.into_owned()));
                 match kind {
                     EntryType::Regular | EntryType::Continuous if name.ends_with('/') => {
@@ -63,6 +78,7 @@ pub(super) fn unpack<'a>(
                     EntryType::Regular | EntryType::Continuous => {
                         budget.allow(entry.size());
                         sink.file(&name, mode, &mut entry)?;
+                        count_rest(&name, &mut entry, budget)?;
                     }
                     EntryType::Directory => sink.folder(&name, mode)?,
                     EntryType::Symlink => sink.link(&name, &text(link.unwrap_or_default())?)?,
@@ -82,7 +98,7 @@ pub(super) fn unpack<'a>(
                         sink.special(&name, special)?;
                     }
                     EntryType::Fifo => sink.special(&name, Special::Pipe)?,
-                    EntryType::GNUSparse => return Err(unusable(&name, "a sparse file")),
+                    EntryType::GNUSparse => return Err(sparse(&name)),
                     _ => return Err(unusable(&name, "of an unknown kind")),
                 }
             }
@@ -102,35 +118,80 @@ fn read_extension(entry: &mut tar::Entry<'_, impl Read>) -> Result<Vec<u8>, Bund
     entry
         .read_to_end(&mut bytes)
         .map_err(BundleError::reading(""))?;
+    Ok(bytes)
+}
+
+/// A name that is too long for a header, which ends with a zero.
+fn read_name(entry: &mut tar::Entry<'_, impl Read>) -> Result<Vec<u8>, BundleError> {
+    let mut bytes = read_extension(entry)?;
     if bytes.last() == Some(&0) {
         bytes.pop();
     }
     Ok(bytes)
 }
 
-fn read_pax(bytes: &[u8], header: &Header, found: &mut Extensions) -> Result<(), BundleError> {
-    for extension in PaxExtensions::new(bytes) {
-        let extension = extension.map_err(BundleError::reading(""))?;
-        match extension.key_bytes() {
-            b"path" => found.path = Some(extension.value_bytes().to_vec()),
-            b"linkpath" => found.link = Some(extension.value_bytes().to_vec()),
-            // A size beyond the header's field is beyond every limit; another one would make
-            // readers disagree about where the next entry starts.
-            b"size" => {
-                return Err(BundleError::Invalid(format!(
-                    "the archive states a size outside of its header, near entry {:?}",
-                    String::from_utf8_lossy(&header.path_bytes())
-                )));
-            }
-            key if key.starts_with(b"GNU.sparse") => {
-                return Err(BundleError::Invalid(
-                    "the archive holds a sparse file; pack without --sparse".to_owned(),
-                ));
-            }
+/// What a sink leaves of a file's content is skipped by reading it, which costs as much as writing it.
+fn count_rest(name: &str, content: &mut impl Read, budget: &Budget<'_>) -> Result<(), BundleError> {
+    let mut buffer = [0; 8 << 10];
+    loop {
+        match content.read(&mut buffer) {
+            Ok(0) => return Ok(()),
+            Ok(read) => budget.content(name, read)?,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(BundleError::reading(name)(error)),
+        }
+    }
+}
+
+/// Who leaves the field empty says nothing of it.
+fn mode(header: &Header) -> io::Result<u32> {
+    let is_empty = |field: &[u8]| field.iter().all(|byte| matches!(byte, 0 | b' '));
+    if is_empty(&header.as_old().mode) {
+        return Ok(0o644);
+    }
+    header.mode()
+}
+
+fn sparse(name: &str) -> BundleError {
+    unusable(
+        name,
+        "a sparse file, whose holes are left out: write it whole (tar without --sparse)",
+    )
+}
+
+/// Each record is `LENGTH KEY=VALUE` and a line's end, the length being of all of it: values may hold lines, too.
+fn read_pax(mut bytes: &[u8], found: &mut Extensions) -> Result<(), BundleError> {
+    while !bytes.is_empty() {
+        let (key, value, rest) = pax_record(bytes).ok_or_else(|| {
+            BundleError::Invalid("the archive is damaged: a malformed pax extension".to_owned())
+        })?;
+        bytes = rest;
+        match key {
+            b"path" => found.path = Some(value.to_vec()),
+            b"linkpath" => found.link = Some(value.to_vec()),
+            // No number is a size that no header has.
+            b"size" => found.size = Some(number(value).unwrap_or(u64::MAX)),
+            key if key.starts_with(b"GNU.sparse") => found.is_sparse = true,
             _ => {}
         }
     }
     Ok(())
+}
+
+/// Key, value, and what follows.
+fn pax_record(bytes: &[u8]) -> Option<(&[u8], &[u8], &[u8])> {
+    let space = bytes.iter().position(|&byte| byte == b' ')?;
+    let length = usize::try_from(number(&bytes[..space])?).ok()?;
+    let (record, rest) = bytes.split_at_checked(length)?;
+    let (key_and_value, end) = record
+        .get(space + 1..)?
+        .split_at_checked((length - space).checked_sub(2)?)?;
+    let equals = key_and_value.iter().position(|&byte| byte == b'=')?;
+    (end == b"\n").then_some((&key_and_value[..equals], &key_and_value[equals + 1..], rest))
+}
+
+fn number(digits: &[u8]) -> Option<u64> {
+    std::str::from_utf8(digits).ok()?.parse().ok()
 }
 
 fn text(bytes: Vec<u8>) -> Result<String, BundleError> {

@@ -1,6 +1,6 @@
 use super::{
     budget::Budget,
-    entry::{FOLDER_MODE, check_target, invalid, normalise, unusable, write_new},
+    entry::{FOLDER_MODE, check_target, invalid, normalise, unusable, write_name, write_new},
     error::BundleError,
     links,
     node::Node,
@@ -135,6 +135,26 @@ impl<'a> Tree<'a> {
         }
     }
 
+    /// What is refused may be something else than a bundle, and then it helps to hear of it.
+    pub fn explain_refusal(&self, error: BundleError) -> BundleError {
+        let BundleError::Invalid(told) = error else {
+            return error;
+        };
+        let has = |path: &str| self.nodes.contains_key(path);
+        let mut tops = self.nodes.iter().filter(|(path, _)| !path.contains('/'));
+        let only_top = tops.next().filter(|_| tops.next().is_none());
+        BundleError::Invalid(match only_top {
+            _ if has(".dockerenv") || (has("etc") && has("usr") && !has("agent.toml")) => format!(
+                "{told}. This looks like the file system of a container (`docker export`): send its image, as \
+                 `docker save` writes it"
+            ),
+            Some((name, Node::File)) if name.ends_with(".tar") => format!(
+                "{told}. There is only {name:?}, itself an archive: if it is a container image, send that"
+            ),
+            _ => told,
+        })
+    }
+
     /// Checks that every link stays inside of the bundle's folder `root`, then makes the links.
     pub fn finish(self, root: &str) -> Result<(), BundleError> {
         for (path, node) in &self.nodes {
@@ -194,7 +214,7 @@ impl Sink for Tree<'_> {
             ));
         }
         let place = self.place(entry, Node::File)?;
-        Ok(fs::hard_link(self.into.join(existing), place)?)
+        write_name(entry, &self.into.join(existing), &place)
     }
 
     fn special(&mut self, entry: &str, special: Special) -> Result<(), BundleError> {

@@ -40,11 +40,22 @@ pub(in crate::bundle) struct Archive<'a> {
 }
 
 impl<'a> Archive<'a> {
+    /// The files in the folder `into`. What was packed with the folder around it is taken from there.
     pub(in crate::bundle) fn new(
         into: PathBuf,
         nodes: BTreeMap<String, Node>,
         budget: &'a Budget<'a>,
     ) -> Self {
+        let (into, nodes) = match only_folder(&nodes) {
+            Some(folder) => {
+                let inside = nodes.iter().filter_map(|(path, node)| {
+                    let path = path.strip_prefix(&folder)?.strip_prefix('/')?;
+                    Some((path.to_owned(), node.clone()))
+                });
+                (into.join(&folder), inside.collect())
+            }
+            None => (into, nodes),
+        };
         Self {
             into,
             nodes,
@@ -56,20 +67,25 @@ impl<'a> Archive<'a> {
 
     /// Does it hold what makes an archive an image?
     pub(in crate::bundle) fn is_image(&self) -> bool {
-        self.has(DOCKER_LIST) || (self.has(OCI_MARK) && self.has(OCI_INDEX))
+        self.has(DOCKER_LIST) || self.is_layout()
+    }
+
+    /// Does it hold the Open Container Initiative's layout?
+    pub(super) fn is_layout(&self) -> bool {
+        self.has(OCI_MARK) && self.has(OCI_INDEX)
     }
 
     pub(super) fn has(&self, name: &str) -> bool {
         self.nodes.get(name) == Some(&Node::File)
     }
 
-    /// The place of the file `name`. Links inside of the archive are followed in memory: earlier versions of
-    /// Docker write one where two images share a layer.
-    fn place(&self, name: &str) -> Result<PathBuf, BundleError> {
+    /// The file that `name` leads to. Links inside of the archive are followed in memory: earlier versions of
+    /// Docker write one where two layers are the same.
+    pub(super) fn real_name(&self, name: &str) -> Result<String, BundleError> {
         let mut at = name.to_owned();
         for _ in 0..MOST_LINKS {
             match self.nodes.get(&at) {
-                Some(Node::File) => return Ok(self.into.join(at)),
+                Some(Node::File) => return Ok(at),
                 Some(Node::Link { target }) => match join(&at, target) {
                     Some(next) => at = next,
                     None => break,
@@ -78,9 +94,18 @@ impl<'a> Archive<'a> {
             }
         }
         let shown: String = name.chars().take(200).collect();
+        // Engines write what they have, and some do not have all of an image.
+        let help = match Digest::of_blob(name) {
+            Some(_) => ": pull or build the image again, and save it anew",
+            None => "",
+        };
         Err(invalid(format_args!(
-            "names {shown:?}, which is no file of the archive"
+            "names {shown:?}, which is no file of the archive{help}"
         )))
+    }
+
+    fn place(&self, name: &str) -> Result<PathBuf, BundleError> {
+        Ok(self.into.join(self.real_name(name)?))
     }
 
     /// Opens the file `name`. What is read of it counts, since an image may name it as often as it likes.
@@ -140,15 +165,12 @@ impl<'a> Archive<'a> {
 
     /// Where nothing of the archive is.
     pub(super) fn free_place(&self) -> PathBuf {
-        let tops: Vec<&str> = self.tops().collect();
-        let mut name = "root".to_owned();
-        while tops.contains(&name.as_str()) {
-            name.push('_');
-        }
-        self.into.join(name)
+        let mut names = (0_u64..).map(|number| format!("root{number}"));
+        let free = names.find(|name| !self.nodes.contains_key(name));
+        self.into.join(free.unwrap_or_default())
     }
 
-    /// Removes a file that is not needed any more. Of one that is reached by a link only the link goes.
+    /// Removes a file that is not needed any more.
     pub(super) fn remove(&mut self, name: &str) -> Result<(), BundleError> {
         if self.nodes.remove(name) == Some(Node::File) {
             fs::remove_file(self.into.join(name))?;
@@ -172,6 +194,15 @@ impl<'a> Archive<'a> {
     fn tops(&self) -> impl Iterator<Item = &str> {
         let names = self.nodes.keys().map(String::as_str);
         names.filter(|name| !name.contains('/'))
+    }
+}
+
+/// The single folder at the top, if there is nothing beside it.
+fn only_folder(nodes: &BTreeMap<String, Node>) -> Option<String> {
+    let mut tops = nodes.iter().filter(|(path, _)| !path.contains('/'));
+    match (tops.next(), tops.next()) {
+        (Some((folder, Node::Folder { .. })), None) => Some(folder.clone()),
+        _ => None,
     }
 }
 

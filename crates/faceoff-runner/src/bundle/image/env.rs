@@ -9,7 +9,8 @@ const MOST_VARIABLES: usize = 128;
 /// Of all names and values, in bytes: with what `agent.toml` adds far below what a program can be passed.
 const MOST_BYTES: usize = 64 << 10;
 
-/// The variables of an image's `ENV`, each `NAME=VALUE`. Of two of one name the later one holds.
+/// The variables of an image's `ENV`, each `NAME=VALUE`. Of two of one name the later one holds. Names that no
+/// shell has are left out: an image has them from its base, and cannot be rid of them.
 pub(super) fn read(entries: &[String]) -> Result<BTreeMap<String, String>, BundleError> {
     if entries.len() > MOST_VARIABLES {
         return Err(invalid(format_args!(
@@ -23,23 +24,29 @@ pub(super) fn read(entries: &[String]) -> Result<BTreeMap<String, String>, Bundl
         )));
     }
     let read_one = |entry: &String| {
-        let (name, value) = entry.split_once('=').unwrap_or((entry, ""));
-        let shown: String = harmless(name).chars().take(80).collect();
-        if !entry.contains('=') || !Manifest::is_variable_name(name) {
+        let shown = |text: &str| harmless(text).chars().take(80).collect::<String>();
+        let Some((name, value)) = entry.split_once('=') else {
             return Err(invalid(format_args!(
-                "sets the variable {shown:?} (ENV): expected NAME=VALUE with a name of letters, digits and \
-                 underscores"
+                "sets the variable {:?} (ENV): expected NAME=VALUE",
+                shown(entry)
             )));
+        };
+        if !Manifest::is_variable_name(name) {
+            return Ok(None);
         }
         if !Manifest::is_variable_value(value) {
             return Err(invalid(format_args!(
-                "sets the variable {shown:?} (ENV) to a value that is too long or holds a NUL character: at \
-                 most 4096 bytes"
+                "sets the variable {:?} (ENV) to a value that is too long or holds a NUL character: at \
+                 most 4096 bytes",
+                shown(name)
             )));
         }
-        Ok((name.to_owned(), value.to_owned()))
+        Ok(Some((name.to_owned(), value.to_owned())))
     };
-    entries.iter().map(read_one).collect()
+    entries
+        .iter()
+        .filter_map(|entry| read_one(entry).transpose())
+        .collect()
 }
 
 #[cfg(test)]
@@ -57,8 +64,18 @@ mod tests {
     #[test]
     fn variables_are_those_that_a_program_can_be_given() {
         assert_eq!(told(&["A=b=c", "B=", "A=d"]), r#"{"A": "d", "B": ""}"#);
-        for wrong in ["", "=x", "A", "a-b=c", "1A=x", "A\u{202e}=x", "A\0=x"] {
+        for wrong in ["", "A"] {
             assert!(told(&[wrong]).contains("expected NAME=VALUE"), "{wrong:?}");
+        }
+        for odd in [
+            "=x",
+            "a-b=c",
+            "discovery.type=x",
+            "1A=x",
+            "A\u{202e}=x",
+            "A\0=x",
+        ] {
+            assert_eq!(told(&[odd, "A=b"]), r#"{"A": "b"}"#, "{odd:?}");
         }
         let long = format!("A={}", "x".repeat(4097));
         assert!(told(&[&long]).contains("too long"));

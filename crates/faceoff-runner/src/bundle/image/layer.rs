@@ -39,12 +39,18 @@ pub(super) fn apply<'a>(
                 Members::new(packed, budget).map_err(BundleError::reading(""))?;
             apply_tar(streams, &part.diff_id, root, budget)
         }
-        Some(ArchiveFormat::Zip) => Err(BundleError::Invalid(
-            "it is a .zip: expected a tar, plain or compressed by gzip or zstd".to_owned(),
-        )),
+        Some(ArchiveFormat::Zip) => Err(not_taken("a .zip")),
+        None if head.starts_with(b"\xfd7zXZ") => Err(not_taken("compressed by xz")),
+        None if head.starts_with(b"BZh") => Err(not_taken("compressed by bzip2")),
         // One that holds nothing has no header to be told by.
         Some(ArchiveFormat::Tar) | None => apply_tar(packed, &part.diff_id, root, budget),
     }
+}
+
+fn not_taken(what: &str) -> BundleError {
+    BundleError::Invalid(format!(
+        "it is {what}: expected a tar, plain or compressed by gzip or zstd"
+    ))
 }
 
 fn apply_tar<'a>(

@@ -2,7 +2,8 @@ use super::words::{invalid, what_to_write};
 use crate::bundle::{
     budget::Budget,
     entry::{
-        FOLDER_MODE, PATH_MAX_BYTES, check_target, invalid as invalid_entry, normalise, write_new,
+        FOLDER_MODE, PATH_MAX_BYTES, check_target, invalid as invalid_entry, normalise, write_name,
+        write_new,
     },
     error::BundleError,
     sink::{Sink, Special},
@@ -18,7 +19,8 @@ use std::{
 
 /// As many links as Linux follows on one path.
 const MOST_LINKS: usize = 40;
-/// The sandbox's own: empty folders in every image, in which it shows what belongs there.
+/// The sandbox's own: empty folders in every image, in which it shows what belongs there. What layers have in them
+/// is unpacked and counted as all else, since other names of it may lie elsewhere, and removed at the end.
 const SANDBOX_FOLDERS: [&str; 5] = ["dev", "proc", "run", "sys", "tmp"];
 /// Files that the sandbox covers, and what there is of the network: nothing but the agent itself.
 const SANDBOX_FILES: [(&str, &str); 5] = [
@@ -69,6 +71,8 @@ enum Kind {
     Folder(Folder),
     File,
     Link(String),
+    /// A device, pipe or socket: only its name is known, and nothing on the disk.
+    Special,
 }
 
 /// Where something is to be: in a folder of the root, by its parts, none of them a link.
@@ -155,7 +159,7 @@ impl Node {
                 fs::remove_file(place)?;
                 Ok(false)
             }
-            Kind::Link(_) => Ok(false),
+            Kind::Link(_) | Kind::Special => Ok(false),
         }
     }
 }
@@ -201,7 +205,7 @@ impl<'a> Root<'a> {
                 None => at.push((part, None)),
                 Some(node) => match &node.kind {
                     Kind::Folder(folder) => at.push((part, Some(folder))),
-                    Kind::File => {
+                    Kind::File | Kind::Special => {
                         let shown: String = part.chars().take(200).collect();
                         return Err(invalid_entry(
                             entry,
@@ -234,9 +238,13 @@ impl<'a> Root<'a> {
         Ok(path)
     }
 
-    /// Where a path of a layer is: its folders resolved, its last part taken as it is. `None` for the root.
+    /// Where a path of a layer is: its folders resolved, its last part taken as it is. `None` for the root. Some
+    /// builders write paths that begin with a slash, which is the root's.
     fn spot(&self, entry: &str, path: &str) -> Result<Option<Spot>, BundleError> {
-        let path = normalise(path)?;
+        let path = match path.trim_start_matches('/') {
+            "" if !path.is_empty() => return Ok(None),
+            path => normalise(path)?,
+        };
         if path.is_empty() {
             return Ok(None);
         }
@@ -248,15 +256,11 @@ impl<'a> Root<'a> {
     }
 
     /// Where an entry is to be placed. `None` if there is nothing to place: it is the root, or a whiteout,
-    /// which is carried out, or it belongs to a folder of the sandbox's own.
+    /// which is carried out.
     fn spot_for(&mut self, entry: &str) -> Result<Option<Spot>, BundleError> {
         let Some(spot) = self.spot(entry, entry)? else {
             return Ok(None);
         };
-        let top = spot.folder.first().unwrap_or(&spot.name);
-        if SANDBOX_FOLDERS.contains(&top.as_str()) {
-            return Ok(None);
-        }
         if let Some(hidden) = spot.name.strip_prefix(WHITEOUT) {
             self.white_out(entry, &spot, hidden)?;
             return Ok(None);
@@ -298,7 +302,7 @@ impl<'a> Root<'a> {
         match folder.children.remove(&spot.name).map(|node| node.kind) {
             Some(Kind::Folder(_)) => fs::remove_dir_all(place)?,
             Some(Kind::File) => fs::remove_file(place)?,
-            Some(Kind::Link(_)) | None => {}
+            Some(Kind::Link(_) | Kind::Special) | None => {}
         }
         Ok(folder)
     }
@@ -344,7 +348,7 @@ impl<'a> Root<'a> {
             };
             at = match &mut node.kind {
                 Kind::Folder(folder) => folder,
-                Kind::File | Kind::Link(_) => {
+                Kind::File | Kind::Link(_) | Kind::Special => {
                     return Err(invalid(format_args!("needs {name:?} to be a folder")));
                 }
             };
@@ -358,7 +362,7 @@ impl<'a> Root<'a> {
         self.begin_layer();
         let agent = match self.top.children.get(AGENT).map(|node| &node.kind) {
             Some(Kind::Folder(agent)) => agent,
-            Some(Kind::File | Kind::Link(_)) => {
+            Some(Kind::File | Kind::Link(_) | Kind::Special) => {
                 return Err(invalid(format_args!(
                     "has something else than a folder as /{AGENT}; {}",
                     what_to_write()
@@ -373,9 +377,9 @@ impl<'a> Root<'a> {
         };
         match agent.children.get(manifest).map(|node| &node.kind) {
             Some(Kind::File) => {}
-            Some(Kind::Folder(_) | Kind::Link(_)) => {
+            Some(Kind::Folder(_) | Kind::Link(_) | Kind::Special) => {
                 return Err(invalid(format_args!(
-                    "has a folder or a link as /{AGENT}/{manifest}: expected a file"
+                    "has something else than a file as /{AGENT}/{manifest}"
                 )));
             }
             None => {
@@ -385,7 +389,7 @@ impl<'a> Root<'a> {
                 )));
             }
         }
-        if let Some(Kind::File | Kind::Link(_)) =
+        if let Some(Kind::File | Kind::Link(_) | Kind::Special) =
             self.top.children.get("etc").map(|node| &node.kind)
         {
             return Err(invalid("has something else than a folder as /etc"));
@@ -399,6 +403,11 @@ impl<'a> Root<'a> {
             write_new(name, &place, 0o644, &mut content.as_bytes(), self.budget)?;
         }
         for name in SANDBOX_FOLDERS {
+            let spot = Spot {
+                folder: Vec::new(),
+                name: name.to_owned(),
+            };
+            self.clear(name, &spot)?;
             self.make_folders(&[name.to_owned()])?;
         }
         make_links(&self.top, &self.place)?;
@@ -465,20 +474,25 @@ impl Sink for Root<'_> {
         let kind = match folder.children.get(&existing.name).map(|node| &node.kind) {
             Some(Kind::File) => Kind::File,
             Some(Kind::Link(target)) => Kind::Link(target.clone()),
+            Some(Kind::Special) => Kind::Special,
             Some(Kind::Folder(_)) | None => return Err(no_file()),
         };
+        // Archivers that are told of a file twice write it so.
+        if existing.path() == spot.path() {
+            return Ok(());
+        }
         // What is at its own place would go first.
         if format!("{}/", existing.path()).starts_with(&format!("{}/", spot.path())) {
             return Err(invalid_entry(
                 entry,
-                format_args!("is a hard link to itself, or to what it replaces: {shown:?}"),
+                format_args!("is a hard link to what it replaces: {shown:?}"),
             ));
         }
         let is_file = matches!(kind, Kind::File);
         let place = self.put(entry, &spot, kind)?;
         if is_file {
             let existing = self.on_disk(&existing.folder).join(&existing.name);
-            fs::hard_link(existing, place)?;
+            write_name(entry, &existing, &place)?;
         }
         Ok(())
     }
@@ -486,15 +500,19 @@ impl Sink for Root<'_> {
     /// Devices, pipes and sockets are left out: in the sandbox none could be opened. What an overlay's own
     /// folder marks as hidden is no part of a layer as engines save it.
     fn special(&mut self, entry: &str, special: Special) -> Result<(), BundleError> {
-        let is_placed = self.spot_for(entry)?.is_some();
-        match special {
-            Special::NullDevice if is_placed => Err(invalid_entry(
+        let Some(spot) = self.spot_for(entry)? else {
+            return Ok(());
+        };
+        let top = spot.folder.first().unwrap_or(&spot.name);
+        if special == Special::NullDevice && !SANDBOX_FOLDERS.contains(&top.as_str()) {
+            return Err(invalid_entry(
                 entry,
                 "is a whiteout of overlayfs (a device 0/0), which layers do not have: expected \
                  what `docker save` writes",
-            )),
-            _ => Ok(()),
+            ));
         }
+        self.put(entry, &spot, Kind::Special)?;
+        Ok(())
     }
 }
 
@@ -517,7 +535,7 @@ fn make_links(folder: &Folder, place: &Path) -> Result<(), BundleError> {
         let place = place.join(name);
         match &node.kind {
             Kind::Folder(folder) => make_links(folder, &place)?,
-            Kind::File => {}
+            Kind::File | Kind::Special => {}
             Kind::Link(target) => symlink(target, place)?,
         }
     }
