@@ -149,7 +149,11 @@ impl ShardRecording {
         let unread = |name: &'static str| {
             move |error: &dyn std::fmt::Display| damaged(format!("{name}: {error}"))
         };
-        let text = fs::read(dir.join(SHARD_FILE)).map_err(|e| unread(SHARD_FILE)(&e))?;
+        let text = fs::read(dir.join(SHARD_FILE)).map_err(|error| match error.kind() {
+            ErrorKind::NotFound => unread(SHARD_FILE)(&error),
+            // What the disk does not give says nothing of what was recorded.
+            _ => error.into(),
+        })?;
         let shard: ShardFile = serde_json::from_slice(&text).map_err(|e| unread(SHARD_FILE)(&e))?;
         let part = match &*shard.schema {
             SHARD_SCHEMA | WITHOUT_CLIPS_SCHEMA => ShardTable::Ready,

@@ -15,6 +15,8 @@ use axum::{
     response::{IntoResponse, Response},
     routing::{get, put},
 };
+use faceoff_dataset::files_of;
+use faceoff_store::{Store, WorkerName};
 use faceoff_wire::grant::Grant;
 
 /// The largest file of a recording, in bytes: far more than any shard has.
@@ -40,10 +42,23 @@ impl FromRequestParts<App> for Holder {
         let grant = grant.ok_or_else(|| {
             refused("only workers of this server come here, with the grant of their order")
         })?;
-        if !app.store.is_held(grant.unit, grant.nonce).await? {
-            return Err(refused("the order is no longer this worker's"));
-        }
+        check_holder(&app.store, &grant).await?;
         Ok(Self(grant))
+    }
+}
+
+/// The order is to be a worker's who has begun it, and who is not banned: whoever merely received it reads and writes nothing.
+async fn check_holder(store: &Store, grant: &Grant) -> Result<(), Problem> {
+    let refused = |why: &str| Err(Problem::new(ProblemKind::Forbidden, why));
+    let Some(holder) = store.lease_holder(grant.unit, grant.nonce).await? else {
+        return refused("the order is no longer this worker's");
+    };
+    match WorkerName::of_holder(&holder) {
+        None => refused("the order is not begun by a worker"),
+        Some(worker) if store.workers().ban_of(worker.as_str()).is_some() => {
+            refused("the server takes nothing of this worker")
+        }
+        Some(_) => Ok(()),
     }
 }
 
@@ -65,7 +80,8 @@ async fn store(
     Path(name): Path<String>,
     body: Body,
 ) -> Result<StatusCode, Problem> {
-    let key = grant.key_of(&name);
+    let is_its = files_of(&grant).contains(&&*name);
+    let key = grant.key_of(&name).filter(|_| is_its);
     let key = key.ok_or_else(|| Problem::not_found("file that this order stores"))?;
     if let Err(refused) = room::check(&app) {
         bundle_stream::discard(body, app.config.limits.upload_rate).await;
@@ -73,14 +89,19 @@ async fn store(
     }
     let (dir, rate) = (&app.config.upload_dir, app.config.limits.upload_rate);
     let file = bundle_stream::receive_file(body, dir, LARGEST_BYTES, rate).await?;
-    let storing = app.store.workers().storing(grant.nonce);
-    let _storing = storing.ok_or_else(|| {
-        Problem::new(
-            ProblemKind::Forbidden,
-            "what came of the order is being looked at: its files stay what they are",
-        )
-    })?;
-    // It may have been taken from its holder meanwhile; then what was stored goes with the lease that was lost.
-    app.store.artifacts().put_file(&key, file.path()).await?;
-    Ok(StatusCode::NO_CONTENT)
+    // Bodies take their time: whose the order is, and whether its files may change yet, is asked when all of it is here. What then
+    // happens is not this connection's to interrupt.
+    let stored = tokio::spawn(async move {
+        let storing = app.store.workers().storing(grant.nonce);
+        let _storing = storing.ok_or_else(|| {
+            Problem::new(
+                ProblemKind::Forbidden,
+                "what came of the order is being looked at: its files stay what they are",
+            )
+        })?;
+        check_holder(&app.store, &grant).await?;
+        app.store.artifacts().put_file(&key, file.path()).await?;
+        Ok(StatusCode::NO_CONTENT)
+    });
+    stored.await.map_err(Problem::internal)?
 }

@@ -130,5 +130,6 @@ pub use tables::{
     worker_bans::WorkerBan,
 };
 pub use workers::{
-    NoWorkerName, Storing, WORKER_SILENT, WorkerAbout, WorkerBusy, WorkerHeard, WorkerName, Workers,
+    NoWorkerName, Storing, WORKER_SILENT, WorkTold, WorkerAbout, WorkerBusy, WorkerHeard,
+    WorkerName, Workers,
 };

@@ -2,7 +2,7 @@
 
 use jiff::{SignedDuration, Timestamp};
 use std::{
-    collections::{BTreeMap, HashMap},
+    collections::{BTreeMap, BTreeSet, HashMap},
     fmt,
     str::FromStr,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
@@ -15,6 +15,9 @@ pub const WORKER_SILENT: SignedDuration = SignedDuration::from_secs(30);
 const FORGOTTEN: SignedDuration = SignedDuration::from_hours(24);
 /// So many are remembered at most.
 const MOST: usize = 10_000;
+
+/// What the holders of leases elsewhere begin with.
+const ELSEWHERE: &str = "remote/";
 
 /// How long a worker's name may be.
 const LONGEST_NAME: usize = 64;
@@ -35,10 +38,17 @@ impl WorkerName {
         &self.0
     }
 
+    /// The worker whose slot holds a lease, if one elsewhere does.
+    #[must_use]
+    pub fn of_holder(holder: &str) -> Option<Self> {
+        let (worker, _) = holder.strip_prefix(ELSEWHERE)?.split_once('/')?;
+        worker.parse().ok()
+    }
+
     /// What its leases name, and below it its slots.
     #[must_use]
     pub fn holder(&self) -> String {
-        format!("remote/{}", self.0)
+        format!("{ELSEWHERE}{}", self.0)
     }
 }
 
@@ -71,8 +81,25 @@ struct Known {
     banned: BTreeMap<String, String>,
     /// Orders whose files are being stored, or must not change any more, by their nonces.
     files: HashMap<Uuid, Files>,
+    /// Workers that gave back what they could not play, by name.
+    failing: HashMap<String, Failing>,
     is_used: bool,
 }
+
+/// A worker whose units fail one after the other, as it is remembered.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+struct Failing {
+    /// Units in a row that it could not play; one that nobody can play is one, however often it comes back.
+    units: BTreeSet<Uuid>,
+    /// It gets nothing before this.
+    until: Option<Timestamp>,
+}
+
+/// After so many units in a row that a worker could not play it gets none for a while …
+const FAILS_IN_A_ROW: usize = 3;
+/// … and twice as long each time that it fails again, up to an hour.
+const RESTS: SignedDuration = SignedDuration::from_mins(1);
+const RESTS_AT_MOST: SignedDuration = SignedDuration::from_hours(1);
 
 /// How the files of an order stand.
 #[derive(Debug, Default)]
@@ -137,9 +164,37 @@ pub struct WorkerBusy {
     pub what: Option<String>,
     /// Since when, as far as this process knows.
     pub since: Timestamp,
+    /// What keeps the slot from handing in what came of it.
+    pub trouble: Option<String>,
+}
+
+/// What is told of a unit that is worked at.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct WorkTold<'a> {
+    /// What it is, in words, if that is known.
+    pub what: Option<&'a str>,
+    /// What keeps the slot from handing in what came of it.
+    pub trouble: Option<&'a str>,
 }
 
 impl WorkerHeard {
+    fn first(name: &str, now: Timestamp) -> Self {
+        Self {
+            name: name.to_owned(),
+            about: WorkerAbout::default(),
+            first_at: now,
+            last_at: now,
+            refused: None,
+            busy: BTreeMap::new(),
+        }
+    }
+
+    /// Units that it can work at, as far as is known: it may not have said so yet.
+    fn slots(&self) -> u32 {
+        let busy = u32::try_from(self.busy.len()).unwrap_or(u32::MAX);
+        self.about.slots.max(busy)
+    }
+
     /// Was it heard of a moment ago?
     #[must_use]
     pub fn is_there(&self, now: Timestamp) -> bool {
@@ -169,36 +224,74 @@ impl Workers {
         let worker = match known.workers.get_mut(name) {
             Some(worker) => worker,
             None if is_full => return,
-            None => known.workers.entry(name.to_owned()).or_insert(WorkerHeard {
-                name: name.to_owned(),
-                about: WorkerAbout::default(),
-                first_at: now,
-                last_at: now,
-                refused: None,
-                busy: BTreeMap::new(),
-            }),
+            None => {
+                let worker = known.workers.entry(name.to_owned());
+                worker.or_insert_with(|| WorkerHeard::first(name, now))
+            }
         };
         worker.about = about;
         worker.refused = refused.map(str::to_owned);
         worker.last_at = now;
     }
 
-    /// One of its slots works at a unit.
-    pub fn works(&self, name: &str, slot: &str, unit: Uuid, what: Option<&str>, now: Timestamp) {
+    /// One of its slots works at a unit, which the queue says, too. `trouble`: what keeps it from handing in what came of it. One that began
+    /// before this process is heard of by this first.
+    pub fn works(&self, name: &str, slot: &str, unit: Uuid, told: WorkTold<'_>, now: Timestamp) {
         let mut known = self.known();
-        let Some(worker) = known.workers.get_mut(name) else {
+        if !known.workers.contains_key(name) && known.workers.len() >= MOST {
             return;
-        };
+        }
+        let worker = known.workers.entry(name.to_owned());
+        let worker = worker.or_insert_with(|| WorkerHeard::first(name, now));
         worker.last_at = now;
         let begun = WorkerBusy {
             unit,
-            what: what.map(str::to_owned),
+            what: told.what.map(str::to_owned),
             since: now,
+            trouble: None,
         };
         let busy = worker.busy.entry(slot.to_owned()).or_insert(begun.clone());
         if busy.unit != unit {
             *busy = begun;
         }
+        busy.trouble = told.trouble.map(str::to_owned);
+    }
+
+    /// A unit came back that a worker could not play, by no fault of the agent's; how many in a row, and until when it gets nothing.
+    pub fn failed(&self, name: &str, unit: Uuid, now: Timestamp) -> Option<(usize, Timestamp)> {
+        let mut known = self.known();
+        if !known.failing.contains_key(name) && known.failing.len() >= MOST {
+            return None;
+        }
+        let failing = known.failing.entry(name.to_owned()).or_default();
+        if !failing.units.insert(unit) {
+            return None;
+        }
+        let units = failing.units.len();
+        let more = units.checked_sub(FAILS_IN_A_ROW)?;
+        let doubled = i32::try_from(more.min(6)).unwrap_or_default();
+        let rests = (RESTS * 2_i32.pow(doubled.unsigned_abs())).min(RESTS_AT_MOST);
+        let until = now.saturating_add(rests).unwrap_or(Timestamp::MAX);
+        failing.until = Some(until);
+        Some((units, until))
+    }
+
+    /// A worker has played a unit.
+    pub fn played(&self, name: &str) {
+        self.known().failing.remove(name);
+    }
+
+    /// Why a worker whose units fail gets nothing now, if so.
+    #[must_use]
+    pub fn rests(&self, name: &str, now: Timestamp) -> Option<String> {
+        let known = self.known();
+        let failing = known.failing.get(name)?;
+        let until = failing.until.filter(|until| *until > now)?;
+        Some(format!(
+            "it could not play the last {} units that it was given, and gets none before {}: look into its log, and run `faceoff doctor` there",
+            failing.units.len(),
+            until.strftime("%Y-%m-%d %H:%M:%S UTC")
+        ))
     }
 
     /// Whoever works at a unit does so no more.
@@ -222,7 +315,7 @@ impl Workers {
             .workers
             .values()
             .filter(|worker| worker.refused.is_none() && worker.is_there(now));
-        work.map(|worker| worker.about.slots).sum()
+        work.map(WorkerHeard::slots).sum()
     }
 
     /// What keeps the server from `what`; none: nothing any more.
@@ -232,6 +325,12 @@ impl Workers {
             Some(cause) => drop(known.troubles.insert(what.to_owned(), cause.to_owned())),
             None => drop(known.troubles.remove(what)),
         }
+    }
+
+    /// Does something keep the server from `what`?
+    #[must_use]
+    pub fn is_troubled(&self, what: &str) -> bool {
+        self.known().troubles.contains_key(what)
     }
 
     /// What the server cannot do for other machines, and why.
@@ -319,14 +418,28 @@ mod tests {
         assert_eq!(workers.slots(at(29)), 4);
         assert_eq!(workers.slots(at(30)), 0, "it is silent");
         let unit = Uuid::from_u128(1);
-        workers.works("a", "slot-0", unit, Some("hit"), at(40));
-        workers.works("a", "slot-0", unit, None, at(50));
-        workers.works("nobody", "slot-0", unit, None, at(50));
+        let hit = WorkTold {
+            what: Some("hit"),
+            trouble: None,
+        };
+        let stuck = WorkTold {
+            what: None,
+            trouble: Some("no room"),
+        };
+        workers.works("a", "slot-0", unit, hit, at(40));
+        workers.works("a", "slot-0", unit, stuck, at(50));
         let all = workers.all();
         assert_eq!(all.len(), 2);
         assert_eq!((all[0].first_at, all[0].last_at), (at(0), at(50)));
         let busy = &all[0].busy["slot-0"];
         assert_eq!((busy.what.as_deref(), busy.since), (Some("hit"), at(40)));
+        assert_eq!(busy.trouble.as_deref(), Some("no room"));
+        workers.works("a", "slot-0", unit, WorkTold::default(), at(51));
+        assert_eq!(workers.all()[0].busy["slot-0"].trouble, None);
+        // One that works since before this process counts as what it is seen to do.
+        workers.works("earlier", "slot-3", Uuid::from_u128(2), hit, at(50));
+        assert_eq!(workers.slots(at(50)), 5);
+        workers.ended(Uuid::from_u128(2));
         workers.ended(unit);
         assert!(workers.all()[0].busy.is_empty());
         // A day later it is as if it had never been.
@@ -337,6 +450,32 @@ mod tests {
         assert_eq!(workers.troubles().len(), 1);
         workers.trouble("give out work", None);
         assert!(workers.troubles().is_empty());
+    }
+
+    #[test]
+    fn who_can_play_nothing_rests_longer_each_time_until_it_plays() {
+        let workers = Workers::default();
+        let start: Timestamp = "2026-03-01T10:00:00Z".parse().expect("an instant");
+        let at = |s: i64| start + SignedDuration::from_secs(s);
+        let failed = |unit, s| workers.failed("a", Uuid::from_u128(unit), at(s));
+        assert_eq!(failed(1, 0), None);
+        assert_eq!(failed(1, 0), None);
+        assert_eq!(failed(1, 0), None, "one that nobody can play is one");
+        assert_eq!(failed(2, 0), None);
+        assert_eq!(workers.rests("a", at(0)), None);
+        assert_eq!(failed(3, 0), Some((3, at(60))));
+        let told = workers.rests("a", at(59)).expect("it rests");
+        assert!(told.contains("the last 3 units"), "{told}");
+        assert_eq!(workers.rests("a", at(60)), None, "it may try again");
+        assert_eq!(failed(4, 60), Some((4, at(180))));
+        for unit in 5..25 {
+            failed(unit, 180);
+        }
+        assert_eq!(failed(25, 180), Some((25, at(180 + 3600))));
+        assert_eq!(workers.rests("b", at(180)), None);
+        workers.played("a");
+        assert_eq!(workers.rests("a", at(180)), None);
+        assert_eq!(failed(26, 180), None);
     }
 
     #[test]

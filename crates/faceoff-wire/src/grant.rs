@@ -20,6 +20,9 @@ pub struct Grant {
     pub writes: Writes,
     /// What the recording must be of, if one is stored.
     pub plays: Plays,
+    /// BLAKE3 of the program that gave the order out: what another has played says nothing of this one.
+    #[serde(default)]
+    pub program: String,
 }
 
 /// What is played under an order.
@@ -155,6 +158,7 @@ mod tests {
             }],
             writes: Writes::Folder("runs/r/n".into()),
             plays: Plays::Nothing,
+            program: "cd".repeat(32),
         }
     }
 

@@ -74,6 +74,16 @@ pub enum Ask {
         lease: Lease,
         /// How far it is.
         episodes_done: u32,
+        /// What keeps it from handing in what came of it, in words for organisers.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        trouble: Option<String>,
+    },
+    /// What came of an order is stored by NATS, and waits for the server: until it is taken in, the order is nobody else's.
+    HandedIn {
+        /// As the order has it.
+        lease: Lease,
+        /// How far it is.
+        episodes_done: u32,
     },
 }
 

@@ -3,7 +3,9 @@
 //! lease, or is taken back before, and is given out again; what it delivers twice is begun once, by whoever says first that it
 //! begins, and committed once.
 //!
-//! `names.rs` is what both sides call things; `dispatch.rs`, `granted.rs` and `answers.rs` are the server's side; `far_server.rs` is the server as
+//! `names.rs` is what both sides call things and `connection.rs` how both reach NATS. The server's side: `streams.rs` are its streams,
+//! `dispatch.rs` gives out what `granted.rs` and `bucket.rs` open, and `taken_back.rs` knows what nobody has begun; `answers.rs` is what workers ask
+//! meanwhile, and `like.rs` which of them get work; `taken_in.rs` takes in what came of it, and `handed_in.rs` knows what waits for that. `examine.rs` asks as a worker would. `far_server.rs` is the server as
 //! a worker's slots see it, `order_files.rs` its files, `worker.rs` the process that they run in; `checked.rs` is why the server believes what comes back.
 
 mod answers;
@@ -14,9 +16,13 @@ mod dispatch;
 mod examine;
 mod far_server;
 mod granted;
+mod handed_in;
+mod like;
 mod names;
 mod order_files;
+mod streams;
 mod taken_back;
+mod taken_in;
 mod worker;
 
 pub use bucket::BucketConfig;

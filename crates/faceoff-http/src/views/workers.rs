@@ -1,7 +1,7 @@
 //! Who works for the server on other machines.
 
 use crate::{app::AppState, problem::Problem};
-use faceoff_store::WorkerHeard;
+use faceoff_store::{WorkerBusy, WorkerHeard};
 use faceoff_types::{EvaluationId, GameId};
 use jiff::{SignedDuration, Timestamp};
 use serde::{Deserialize, Serialize};
@@ -23,6 +23,10 @@ pub struct WorkersView {
     /// What the server cannot do for other machines, and why; empty if nothing is missing.
     #[schema(example = json!([]))]
     pub troubles: Vec<String>,
+    /// What takes so long that it is worth a look; empty if nothing does.
+    #[serde(default)]
+    #[schema(example = json!([]))]
+    pub alarms: Vec<String>,
     /// By name, as far as this process has heard of them.
     pub workers: Vec<WorkerView>,
     /// Of whom nothing is taken, by name.
@@ -107,6 +111,9 @@ pub struct BusyView {
     pub since: Timestamp,
     /// It takes longer than an hour.
     pub is_long: bool,
+    /// What keeps it from handing in what came of it; absent if nothing does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trouble: Option<String>,
 }
 
 impl WorkersView {
@@ -133,21 +140,52 @@ impl WorkersView {
     pub(crate) fn now(app: &AppState) -> Self {
         let (workers, now) = (app.store.workers(), app.config.clock.now());
         let troubles = workers.troubles().into_iter();
+        let troubles = troubles.map(|(what, why)| format!("The server cannot {what}: {why}"));
+        let all = workers.all();
+        let stuck = all.iter().flat_map(stuck);
+        let troubles = troubles.chain(stuck).collect();
+        let alarms = all.iter().flat_map(|worker| long(worker, now)).collect();
         Self {
             own_slots: app.config.capacity.slots,
             remote_slots: workers.slots(now),
             is_given: workers.are_used(),
-            troubles: troubles
-                .map(|(what, why)| format!("The server cannot {what}: {why}"))
-                .collect(),
-            workers: workers
-                .all()
+            troubles,
+            alarms,
+            workers: all
                 .into_iter()
                 .map(|worker| WorkerView::of(worker, now))
                 .collect(),
             bans: Vec::new(),
         }
     }
+}
+
+/// What a worker has played and cannot hand in.
+fn stuck(worker: &WorkerHeard) -> impl Iterator<Item = String> {
+    worker.busy.iter().filter_map(|(slot, busy)| {
+        let trouble = busy.trouble.as_ref()?;
+        let what = named(worker, slot, busy);
+        Some(format!(
+            "A worker cannot hand in what it has played: {what}: {trouble}"
+        ))
+    })
+}
+
+/// What a worker has worked at for very long.
+fn long(worker: &WorkerHeard, now: Timestamp) -> impl Iterator<Item = String> {
+    worker.busy.iter().filter_map(move |(slot, busy)| {
+        let what = named(worker, slot, busy);
+        is_long(busy, now).then(|| format!("A worker takes more than an hour: {what}"))
+    })
+}
+
+fn named(worker: &WorkerHeard, slot: &str, busy: &WorkerBusy) -> String {
+    let what = busy.what.as_deref().unwrap_or("begun before this server");
+    format!("{}/{slot}, unit {} ({what})", worker.name, busy.unit)
+}
+
+fn is_long(busy: &WorkerBusy, now: Timestamp) -> bool {
+    now.duration_since(busy.since) > LONG
 }
 
 impl WorkerView {
@@ -159,11 +197,12 @@ impl WorkerView {
             None => WorkerState::Working,
         };
         let busy = worker.busy.into_iter().map(|(slot, busy)| BusyView {
+            is_long: is_long(&busy, now),
             slot,
             unit: busy.unit,
             what: busy.what,
             since: busy.since,
-            is_long: now.duration_since(busy.since) > LONG,
+            trouble: busy.trouble,
         });
         Self {
             busy: busy.collect(),

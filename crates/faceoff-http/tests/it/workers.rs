@@ -6,7 +6,7 @@ use crate::{
     html::texts,
     site::{ADMIN, Site},
 };
-use faceoff_store::WorkerAbout;
+use faceoff_store::{WorkTold, WorkerAbout};
 use serde_json::{Value, json};
 use uuid::Uuid;
 
@@ -45,7 +45,10 @@ async fn organisers_see_who_plays_elsewhere_and_what_keeps_others_from_it() {
         "rack-1",
         "slot-2",
         unit,
-        Some("hit episodes 0 to 49"),
+        WorkTold {
+            what: Some("hit episodes 0 to 49"),
+            trouble: None,
+        },
         site.now(),
     );
     let all = told().await;
@@ -83,9 +86,32 @@ async fn organisers_see_who_plays_elsewhere_and_what_keeps_others_from_it() {
     assert_eq!(states(&told().await), ["silent", "silent"]);
     assert_eq!(told().await["remote_slots"], 0);
     site.later(3600);
-    workers.works("rack-1", "slot-2", unit, None, site.now());
+    let stuck = WorkTold {
+        what: None,
+        trouble: Some("the stream is <full>"),
+    };
+    workers.works("rack-1", "slot-2", unit, stuck, site.now());
     let all = told().await;
-    assert_eq!(all["workers"][0]["busy"][0]["is_long"], true, "{all:#}");
+    let busy = &all["workers"][0]["busy"][0];
+    assert_eq!(
+        (&busy["is_long"], &busy["trouble"]),
+        (&json!(true), &json!("the stream is <full>"))
+    );
+    let named = format!("rack-1/slot-2, unit {unit} (hit episodes 0 to 49)");
+    let alarm = format!("A worker takes more than an hour: {named}");
+    let trouble =
+        format!("A worker cannot hand in what it has played: {named}: the stream is <full>");
+    assert_eq!(
+        (&all["alarms"], &all["troubles"]),
+        (&json!([alarm]), &json!([trouble]))
+    );
+    for path in ["/organiser", "/organiser/workers"] {
+        let html = shown(&grace.open(path).await, 200);
+        let main = &texts(&html, "main")[0];
+        assert!(main.contains(&alarm) && main.contains(&trouble), "{main}");
+    }
+    workers.works("rack-1", "slot-2", unit, WorkTold::default(), site.now());
+    assert_eq!(told().await["troubles"], json!([]));
     workers.ended(unit);
     assert_eq!(states(&told().await), ["idle", "silent"]);
 

@@ -91,6 +91,15 @@ async fn give_back(
     Ok(())
 }
 
+/// Puts all that `holder` and those below it have back into the queue; the attempts do not count. What comes of them yet is of a lost lease.
+pub(crate) async fn give_back_all(tx: &mut Tx, holder: &str) -> Result<u64> {
+    let leases = queue::leases_of(tx, holder).await?;
+    for (claim, kind) in &leases {
+        give_back(tx, claim, kind, 0, false).await?;
+    }
+    Ok(u64::try_from(leases.len()).unwrap_or(u64::MAX))
+}
+
 impl Store {
     /// Our fault: the unit goes back to the queue after a growing pause. After [`MAX_ATTEMPTS`]
     /// failures the evaluation ends as
@@ -179,6 +188,13 @@ impl Store {
             }
         })
         .await
+    }
+
+    /// Gives all back that `holder` and those below it have, of whom nobody works at it. Returns how many; the attempts do not count.
+    pub async fn give_back_all_of(&self, holder: &str, now: Timestamp) -> Result<u64> {
+        let actor = Actor::Worker(holder.to_owned());
+        self.write(actor, now, async |tx| give_back_all(tx, holder).await)
+            .await
     }
 
     /// Ends the leases of a worker that is known to be dead, and of its slots, so that nobody waits

@@ -1,9 +1,13 @@
 use crate::{
     error::Result,
     event::Actor,
-    operations::{give_back::subject, purpose},
+    operations::{
+        give_back::subject,
+        purpose::{self, Purpose},
+    },
     queue::{self, Claim},
     store::Store,
+    tables::game_attempts,
 };
 use jiff::Timestamp;
 
@@ -31,7 +35,8 @@ impl Store {
     }
 
     /// What was claimed in advance, by `claim.worker`, is begun by another, with a new lease of `lease_s` seconds. False: the
-    /// lease was lost, or another one has begun. So of several who are given the same order one works at it.
+    /// lease was lost, or another one has begun. So of several who are given the same order one works at it; that one may ask again, since
+    /// an answer may get lost.
     pub async fn hand_over(
         &self,
         claim: &Claim,
@@ -41,8 +46,25 @@ impl Store {
     ) -> Result<bool> {
         let actor = Actor::Worker(to.to_owned());
         self.write(actor, now, async |tx| {
-            Ok(queue::hand_over(tx, claim, to).await?
-                && queue::renew(tx, claim, 0, lease_s, now).await?.is_some())
+            if !queue::hand_over(tx, claim, to).await? {
+                return Ok(false);
+            }
+            let Some(kind) = queue::renew(tx, claim, 0, lease_s, now).await? else {
+                return Ok(false);
+            };
+            if let Purpose::Game(id) = purpose::of_unit(tx, claim.unit, &kind).await? {
+                game_attempts::hand_over(tx, id, to).await?;
+            }
+            Ok(true)
+        })
+        .await
+    }
+
+    /// Gives the leases of `holder` and of all below it at least `lease_s` seconds from now on: they may have run out while nobody could
+    /// renew them. Returns how many.
+    pub async fn renew_leases_of(&self, holder: &str, lease_s: u32, now: Timestamp) -> Result<u64> {
+        self.write(Actor::Server, now, async |tx| {
+            queue::renew_of(tx, holder, lease_s).await
         })
         .await
     }

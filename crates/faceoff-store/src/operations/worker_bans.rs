@@ -3,6 +3,7 @@
 use crate::{
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
+    operations::give_back::give_back_all,
     queue,
     store::Store,
     tables::{
@@ -39,7 +40,8 @@ impl Store {
                         "the worker {worker} is banned already"
                     )));
                 }
-                queue::end_leases_of(tx, &holder).await?;
+                // Also of what is just being looked at: it was played by somebody who is not believed.
+                give_back_all(tx, &holder).await?;
                 let played = shards::of_running_by(tx, &holder).await?;
                 for shard in &played {
                     shards::take_back(tx, shard.id).await?;

@@ -107,7 +107,47 @@ pub(crate) async fn is_holder(connection: &mut SqliteConnection, claim: &Claim) 
     Ok(found.unwrap_or_default())
 }
 
-/// Names another as the lease's holder; false if it is not `claim.worker`'s any more.
+/// Whose the unit's lease is, if it is leased under this nonce.
+pub(crate) async fn holder_of(
+    connection: &mut SqliteConnection,
+    unit: Uuid,
+    nonce: Uuid,
+) -> Result<Option<String>> {
+    let (unit, nonce) = (Text(unit), Text(nonce));
+    Ok(sqlx::query_scalar!(
+        r#"SELECT worker AS "worker!" FROM units WHERE id = ? AND nonce = ? AND state = 'leased'"#,
+        unit,
+        nonce,
+    )
+    .fetch_optional(connection)
+    .await?)
+}
+
+/// All leases of `holder` and of every name `holder/…`, with their units' labels.
+pub(crate) async fn leases_of(tx: &mut Tx, holder: &str) -> Result<Vec<(Claim, String)>> {
+    let rows = sqlx::query!(
+        r#"SELECT id AS "id!: Text<Uuid>", kind, worker AS "worker!", nonce AS "nonce!: Text<Uuid>",
+                  claimable_at AS "lease_until: Instant"
+           FROM units
+           WHERE state IN ('queued', 'leased') AND state = 'leased'
+             AND (worker = ?1 OR substr(worker, 1, length(?1) + 1) = ?1 || '/')"#,
+        holder,
+    )
+    .fetch_all(&mut **tx)
+    .await?;
+    let leases = rows.into_iter().map(|row| {
+        let claim = Claim {
+            unit: row.id.0,
+            nonce: row.nonce.0,
+            worker: row.worker,
+            lease_until: row.lease_until.0,
+        };
+        (claim, row.kind)
+    });
+    Ok(leases.collect())
+}
+
+/// Names another as the lease's holder; false if it is neither `claim.worker`'s any more nor the other's already.
 pub(crate) async fn hand_over(
     connection: &mut SqliteConnection,
     claim: &Claim,
@@ -116,7 +156,7 @@ pub(crate) async fn hand_over(
     let (id, nonce) = (Text(claim.unit), Text(claim.nonce));
     let handed = sqlx::query!(
         "UPDATE units SET worker = ?1
-         WHERE id = ?2 AND nonce = ?3 AND worker = ?4 AND state = 'leased'",
+         WHERE id = ?2 AND nonce = ?3 AND worker IN (?4, ?1) AND state = 'leased'",
         to,
         id,
         nonce,
@@ -125,6 +165,21 @@ pub(crate) async fn hand_over(
     .execute(connection)
     .await?;
     Ok(handed.rows_affected() == 1)
+}
+
+/// Gives the leases of `holder`, and of every name `holder/…`, at least `lease_s` seconds from now.
+pub(crate) async fn renew_of(tx: &mut Tx, holder: &str, lease_s: u32) -> Result<u64> {
+    let until = Instant(after(tx.now, lease_s));
+    let renewed = sqlx::query!(
+        "UPDATE units SET claimable_at = ?1
+         WHERE state IN ('queued', 'leased') AND state = 'leased' AND claimable_at < ?1
+           AND (worker = ?2 OR substr(worker, 1, length(?2) + 1) = ?2 || '/')",
+        until,
+        holder,
+    )
+    .execute(&mut **tx)
+    .await?;
+    Ok(renewed.rows_affected())
 }
 
 /// Takes a held unit out of the queue. What is left of its lease is given back to its account, and what

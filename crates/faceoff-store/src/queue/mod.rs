@@ -9,8 +9,8 @@ mod units;
 
 pub use lease::Claim;
 pub(crate) use lease::{
-    Hold, hand_over, hold, is_holder, is_leased, mark_done, park, release, renew, renew_all,
-    requeue_failed, unpark,
+    Hold, hand_over, hold, holder_of, is_holder, is_leased, leases_of, mark_done, park, release,
+    renew, renew_all, renew_of, requeue_failed, unpark,
 };
 pub(crate) use shares::{Account, Lane, account};
 pub(crate) use units::{

@@ -98,6 +98,23 @@ pub(crate) async fn begin(
     .await?)
 }
 
+/// Another slot plays the attempt that is under way than the one that it was given out by.
+pub(crate) async fn hand_over(
+    connection: &mut SqliteConnection,
+    game: GameId,
+    worker: &str,
+) -> Result<()> {
+    let id = Text(game);
+    sqlx::query!(
+        "UPDATE game_attempts SET worker = ? WHERE game_id = ? AND ended_at IS NULL",
+        worker,
+        id,
+    )
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
 /// Ends the attempt of a game that is under way, if one is.
 pub(crate) async fn end(
     connection: &mut SqliteConnection,

@@ -103,6 +103,58 @@ async fn play_next(f: &Fixture) -> GameId {
     game
 }
 
+#[tokio::test]
+async fn who_played_a_game_elsewhere_is_known_and_what_it_has_under_way_goes_with_its_ban() {
+    let f = Fixture::new().await;
+    let (cup, teams) = opened(&f, &["A", "B", "C"], TournamentRules::default()).await;
+    let meetings = [
+        [teams[0], teams[1]],
+        [teams[1], teams[2]],
+        [teams[2], teams[0]],
+    ];
+    start(&f, cup.id, &drawn(1, &[&meetings], &[]))
+        .await
+        .unwrap();
+    let begin = async |claim: &Claim, slot: &str| {
+        let begins = f.store.hand_over(claim, slot, LEASE_S, f.now);
+        assert!(begins.await.unwrap());
+    };
+    let given_out = async || {
+        let claimed = f.store.claim("given out", LEASE_S, f.now).await.unwrap();
+        match claimed.expect("a game waits") {
+            Claimed {
+                claim,
+                work: Work::Game { game, .. },
+            } => (claim, game),
+            other => panic!("{other:?}"),
+        }
+    };
+    let (claim, played) = given_out().await;
+    begin(&claim, "remote/rack-1/slot-0").await;
+    let commit = result(true);
+    let committed = f.store.commit_game(&claim, &commit, f.now);
+    assert_eq!(committed.await.unwrap(), Committed::Now);
+    let rack: WorkerName = "rack-1".parse().unwrap();
+    let games = f.store.played_by(&rack, 10).await.unwrap().games;
+    assert_eq!(games, [played], "an organiser finds it, to void it or not");
+
+    // One is just being looked at, one is somebody else's.
+    let (looked_at, mine) = given_out().await;
+    begin(&looked_at, "remote/rack-1/slot-0").await;
+    let (other, _) = given_out().await;
+    begin(&other, "remote/rack-2/slot-0").await;
+    let ban = f.store.ban_worker(Actor::Server, &rack, WHY, f.now);
+    ban.await.unwrap();
+    let late = f.store.commit_game(&looked_at, &commit, f.now);
+    assert_eq!(late.await.unwrap(), Committed::LeaseLost);
+    assert_eq!(state(&f, mine).await, GameState::Queued);
+    let (again, game) = given_out().await;
+    assert_eq!(game, mine, "another plays it at once");
+    begin(&again, "remote/rack-2/slot-1").await;
+    let committed = f.store.commit_game(&other, &commit, f.now);
+    assert_eq!(committed.await.unwrap(), Committed::Now);
+}
+
 async fn state(f: &Fixture, game: GameId) -> GameState {
     f.store.game(game).await.unwrap().state
 }

@@ -89,6 +89,42 @@ async fn what_a_banned_worker_played_of_runs_that_go_on_is_played_again() {
     assert!(other.worker_bans().await.unwrap().is_empty());
 }
 
+#[tokio::test]
+async fn what_workers_elsewhere_hold_outlives_a_server_that_was_away() {
+    let mut f = Fixture::new().await;
+    let submission = f.ready_team("Alpha").await;
+    f.evaluate(submission.id, &plan()).await;
+    let (elsewhere, shard) = claim_for(&f, "remote/rack-1/slot-0").await;
+    let (own, own_shard) = claim_for(&f, "slot-0").await;
+    let (unbegun, _) = claim_for(&f, "given out").await;
+    f.later(i64::from(LEASE_S) + 5);
+    // What nobody has begun goes back, what others play is theirs for another while; the server's own is as it was.
+    assert_eq!(
+        f.store.give_back_all_of("given out", f.now).await.unwrap(),
+        1
+    );
+    assert_eq!(
+        f.store.renew_leases_of("remote", 60, f.now).await.unwrap(),
+        1
+    );
+    let mut next = Vec::new();
+    while let Some(claimed) = f.store.claim("slot-1", LEASE_S, f.now).await.unwrap() {
+        next.push(claimed.claim.unit);
+    }
+    assert!(next.contains(&unbegun.unit) && next.contains(&own.unit));
+    assert!(!next.contains(&elsewhere.unit));
+    assert_eq!(f.play(&own, &own_shard, 0).await, Committed::LeaseLost);
+    assert_eq!(f.play(&elsewhere, &shard, 0).await, Committed::Now);
+    let is_of = async |name: &str| {
+        let worker = worker(name);
+        f.store
+            .is_of(&worker, elsewhere.unit, elsewhere.nonce)
+            .await
+            .unwrap()
+    };
+    assert!(!is_of("rack-1").await, "it is done");
+}
+
 #[test]
 fn names_are_tokens_of_subjects() {
     for name in ["", "a.b", "a b", "*", ">", "a/b", &"x".repeat(65)] {

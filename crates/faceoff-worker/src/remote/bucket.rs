@@ -1,8 +1,8 @@
 //! Bundles and recordings by a bucket of S3, or of what speaks as it does, in the place of the server's own HTTP: workers get links that
 //! expire, and no key.
 
-use super::granted::file_names;
 use anyhow::Context as _;
+use faceoff_dataset::files_of;
 use faceoff_store::Artifacts;
 use faceoff_types::BundleRef;
 use faceoff_wire::{grant::Grant, remote::Objects};
@@ -95,6 +95,14 @@ impl Bucket {
         })
     }
 
+    /// Is it there? What is claimed for it otherwise comes back.
+    pub(super) async fn probe(&self) -> anyhow::Result<()> {
+        match self.objects.head(&self.bundle("probe")).await {
+            Ok(_) | Err(object_store::Error::NotFound { .. }) => Ok(()),
+            Err(error) => Err(error).context("asking for the bucket"),
+        }
+    }
+
     /// Links to what an order opens. Bundles that are not in the bucket are put there.
     pub(super) async fn opens(
         &self,
@@ -114,7 +122,7 @@ impl Bucket {
             bundles.insert(bundle.blake3.clone(), link.to_string());
         }
         let mut files = BTreeMap::new();
-        for name in file_names(grant) {
+        for name in files_of(grant) {
             let key = self.file(grant.nonce, name);
             let link = self
                 .objects
@@ -163,7 +171,7 @@ impl Bucket {
 
     /// Takes over what was stored under an order.
     pub(super) async fn take(&self, grant: &Grant, artifacts: &Artifacts) -> anyhow::Result<()> {
-        for name in file_names(grant) {
+        for name in files_of(grant) {
             let Some(to) = grant.key_of(name) else {
                 continue;
             };
@@ -195,7 +203,7 @@ impl Bucket {
 
     /// Removes what was stored under an order: it has been taken over, or nobody wants it.
     pub(super) async fn forget(&self, grant: &Grant) {
-        let keys = file_names(grant)
+        let keys = files_of(grant)
             .iter()
             .map(|name| Ok(self.file(grant.nonce, name)));
         let keys = futures::stream::iter(keys.collect::<Vec<_>>()).boxed();

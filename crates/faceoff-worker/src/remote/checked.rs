@@ -34,6 +34,9 @@ impl Checks {
         report: &WorkReport,
         artifacts: &Artifacts,
     ) -> anyhow::Result<Option<String>> {
+        if let Some(difference) = other_end(grant, report) {
+            return Ok(Some(difference));
+        }
         if self.episodes == 0 {
             return Ok(None);
         }
@@ -106,6 +109,31 @@ impl Checks {
         }
         drawn
     }
+}
+
+/// Were there as many faults of the agent as a report that ends its evaluation for them says?
+fn other_end(grant: &Grant, report: &WorkReport) -> Option<String> {
+    let (
+        WorkReport::Play {
+            outcomes,
+            stopped_by_faults,
+            ..
+        },
+        Plays::Shard(spec),
+    ) = (report, &grant.plays)
+    else {
+        return None;
+    };
+    let faults = outcomes.iter().filter(|outcome| outcome.fault.is_some());
+    let faults = u32::try_from(faults.count()).unwrap_or(u32::MAX);
+    let expected = faults > spec.max_faults;
+    (*stopped_by_faults != expected).then(|| {
+        format!(
+            "the report says that faults {} the shard, and it has {faults} where more than {} end it",
+            if *stopped_by_faults { "ended" } else { "did not end" },
+            spec.max_faults
+        )
+    })
 }
 
 /// The episodes of a shard that were played: the first ones, if faults ended it.

@@ -1,5 +1,6 @@
 //! A connection to NATS that comes back by itself, and says in the log when it goes and comes.
 
+use super::names::Names;
 use anyhow::Context as _;
 use async_nats::{Client, ConnectOptions, Event};
 use std::{
@@ -27,11 +28,16 @@ pub struct NatsConfig {
 }
 
 impl NatsConfig {
-    /// Connects as `who`, now or as soon as NATS is there.
-    pub(super) async fn connect(&self, who: &str) -> anyhow::Result<Client> {
+    /// Connects as `who`, now or as soon as NATS is there. `stands` is told why there is no connection, and of none when there is one.
+    pub(super) async fn connect(
+        &self,
+        who: &str,
+        stands: impl Fn(Option<&str>) + Send + Sync + 'static,
+    ) -> anyhow::Result<Client> {
         let told = Arc::new(Told {
             url: self.url.clone(),
             cause: Mutex::default(),
+            stands: Box::new(stands),
         });
         let asked = Arc::clone(&told);
         let options = self
@@ -62,7 +68,7 @@ impl NatsConfig {
     pub(super) async fn options(&self, who: &str) -> anyhow::Result<ConnectOptions> {
         let mut options = ConnectOptions::new()
             .name(who)
-            .custom_inbox_prefix(format!("_INBOX.{}.{who}", self.name))
+            .custom_inbox_prefix(Names::of(&self.name)?.inbox(who))
             .request_timeout(Some(ANSWER));
         if let Some(file) = &self.nkey_file {
             let seed = tokio::fs::read_to_string(file)
@@ -82,6 +88,7 @@ struct Told {
     url: String,
     /// Why it could not be had, as it was told last: the log is told of a change, not of every try.
     cause: Mutex<String>,
+    stands: Box<dyn Fn(Option<&str>) + Send + Sync>,
 }
 
 impl Told {
@@ -90,9 +97,11 @@ impl Told {
         match event {
             Event::Connected => {
                 self.cause_is("");
+                (self.stands)(None);
                 tracing::info!(url, "connected to NATS");
             }
             Event::Disconnected => {
+                (self.stands)(Some(&format!("there is no connection to {url}")));
                 tracing::warn!(
                     url,
                     "no connection to NATS; trying again until there is one"
@@ -111,6 +120,7 @@ impl Told {
             return;
         }
         let url = &self.url;
+        (self.stands)(Some(&format!("{url}: {cause}")));
         if cause.contains("certificate") {
             tracing::error!(
                 url,

@@ -5,8 +5,10 @@ use super::{
     bucket::{Bucket, BucketConfig},
     checked::Checks,
     connection::NatsConfig,
-    granted::{Taken, grant_of, of_its_order, store},
-    names::{self, ALL, Names, ORDERS_CONSUMER, OUTCOMES_CONSUMER, SERVER, WAITING},
+    granted::grant_of,
+    handed_in::AllHandedIn,
+    names::{self, ALL, Names, SERVER, WAITING},
+    streams::Streams,
     taken_back::{AllGivenOut, GivenOut},
 };
 use crate::{
@@ -17,20 +19,16 @@ use crate::{
 use anyhow::Context as _;
 use async_nats::{
     Client,
-    jetstream::{
-        self, AckKind,
-        consumer::{AckPolicy, PullConsumer, pull},
-        stream::{self, DiscardPolicy, RetentionPolicy, Stream},
-    },
+    jetstream::{self, stream::Stream},
 };
-use faceoff_store::{Actor, Lot, Store, StoreError, WorkerName, Workers};
+use faceoff_store::{Lot, Store, StoreError, Workers};
 use faceoff_types::Clock;
 use faceoff_wire::{
-    grant::{Grant, GrantKey},
-    remote::{Introduction, Outcome, RemoteOrder, RemoteOutcome},
+    grant::GrantKey,
+    remote::{Introduction, RemoteOrder},
     work::{Lease, WorkOrder},
 };
-use futures::{StreamExt as _, TryStreamExt as _};
+use futures::StreamExt as _;
 use std::{
     pin::pin,
     sync::Arc,
@@ -39,23 +37,15 @@ use std::{
 use tokio_util::sync::CancellationToken;
 
 /// How often is looked at what nobody tells: orders that nobody begins, work that is due by now.
-const LOOK: Duration = Duration::from_secs(1);
+pub(super) const LOOK: Duration = Duration::from_secs(1);
 /// From one try of what fails to the next.
 const REST: Duration = Duration::from_secs(1);
 /// What has not failed within this goes well: questions to NATS that is away fail before.
 const WELL: Duration = Duration::from_secs(10);
-/// An outcome that cannot be stored now is taken again after this.
-const AGAIN: Duration = Duration::from_secs(5);
-/// What is still being stored of an outcome is there soon.
-const SOON: Duration = Duration::from_secs(1);
-/// So many outcomes are checked at the same time: each takes a thread of its own for a while.
-const CHECKED_AT_ONCE: usize = 2;
-/// Orders in the stream at most; there are never more than free slots.
-const MOST_ORDERS: i64 = 100_000;
-/// Bytes of outcomes that wait for the server at most.
-const MOST_OUTCOME_BYTES: i64 = 1 << 30;
-/// An outcome that is sent twice within this is stored once by NATS; by the server, always.
-const SENT_TWICE_WITHIN: Duration = Duration::from_secs(120);
+/// What workers hold when the server starts is theirs for so long at least, seconds: nobody could renew it before.
+const AT_LEAST_AT_START_S: u32 = 60;
+/// What the server cannot do while NATS is away, which is the cause of all else.
+const REACHES_NATS: &str = "reach NATS";
 
 /// How a server gives work to other machines.
 #[derive(Debug, Clone)]
@@ -75,7 +65,7 @@ pub struct RemoteConfig {
 }
 
 impl RemoteConfig {
-    fn checks(&self) -> Checks {
+    pub(super) fn checks(&self) -> Checks {
         Checks {
             episodes: self.checked_episodes,
             key: self.key.clone(),
@@ -99,10 +89,16 @@ pub async fn dispatch(
         lot: Lot::Plays,
         ..config.local_server(store, clock)
     };
-    // Nobody can begin what a former life of this server has given out.
-    server.end_leases_of(WAITING).await?;
+    take_over(&server).await?;
     let season = server.store.season().await?.commitment;
-    let client = remote.nats.connect(SERVER).await?;
+    let store = server.store.clone();
+    let workers = store.workers();
+    workers.use_them();
+    let tell = workers.clone();
+    let client = remote
+        .nats
+        .connect(SERVER, move |cause| tell.trouble(REACHES_NATS, cause));
+    let client = client.await?;
     let bucket = match &remote.bucket {
         Some(bucket) => {
             bucket.make_folder()?;
@@ -112,9 +108,13 @@ pub async fn dispatch(
     };
     let hub = Arc::new(Hub {
         bucket,
-        jetstream: jetstream::new(client.clone()),
+        streams: Arc::new(Streams::of(
+            jetstream::new(client.clone()),
+            names.clone(),
+            format!("Faceoff, season {season}"),
+        )),
         given_out: Arc::default(),
-        owner: format!("Faceoff, season {season}"),
+        handed_in: Arc::default(),
         client,
         names,
         server,
@@ -128,9 +128,9 @@ pub async fn dispatch(
         lease_s: hub.server.lease_s,
         like: hub.remote.like.clone(),
         given_out: Arc::clone(&hub.given_out),
+        handed_in: Arc::clone(&hub.handed_in),
+        streams: Arc::clone(&hub.streams),
     };
-    let workers = hub.server.store.workers();
-    workers.use_them();
     let banned = hub.server.store.worker_bans().await?;
     workers.set_banned(banned.into_iter().map(|ban| (ban.worker, ban.reason)));
     let again = Again {
@@ -140,11 +140,39 @@ pub async fn dispatch(
     tokio::join!(
         again.run("give out work", || hub.give_out(&shutdown)),
         again.run("take in what came of work", || hub.take_in(&shutdown)),
+        again.run("keep what waits for it", || hub.keep_waiting(&shutdown)),
         again.run("answer workers", || answers.answer(&shutdown)),
         again.run("hear of games", || answers.show(&shutdown)),
     );
     hub.take_back(hub.given_out.take_all(), None).await;
     Ok(())
+}
+
+/// Nobody can begin what a former life of this server has given out; what workers have begun they could not renew while it was away, and may
+/// have handed in.
+async fn take_over(server: &LocalServer) -> anyhow::Result<()> {
+    let (store, now) = (&server.store, server.clock.now());
+    let taken_over = async {
+        store.give_back_all_of(WAITING, now).await?;
+        let lease_s = server.lease_s.max(AT_LEAST_AT_START_S);
+        store.renew_leases_of(names::ELSEWHERE, lease_s, now).await
+    };
+    match taken_over.await {
+        Ok(0) => Ok(()),
+        Ok(units) => {
+            tracing::info!(
+                units,
+                "workers elsewhere have work since before this server"
+            );
+            Ok(())
+        }
+        // They end by themselves.
+        Err(error @ StoreError::FullDisk(_)) => {
+            tracing::warn!(%error, "the leases of this server's last life stay until they run out");
+            Ok(())
+        }
+        Err(error) => Err(error.into()),
+    }
 }
 
 /// Does what is to be done until the shutdown, again and again if it fails. The log is told of a change, not of every try; whoever
@@ -179,7 +207,9 @@ impl Again<'_> {
             let cause = format!("{error:#}");
             if cause != told {
                 tracing::error!(cause, "cannot {what}; trying again");
-                self.workers.trouble(what, Some(&cause));
+                // Where NATS is away, that is told, and not all that follows from it.
+                let of_nats = self.workers.is_troubled(REACHES_NATS);
+                self.workers.trouble(what, (!of_nats).then_some(&*cause));
                 told = cause;
             }
             tokio::select! {
@@ -191,22 +221,24 @@ impl Again<'_> {
 }
 
 /// What gives out and takes in.
-struct Hub {
+pub(super) struct Hub {
     client: Client,
-    jetstream: jetstream::Context,
+    pub(super) streams: Arc<Streams>,
     names: Names,
-    server: LocalServer,
-    remote: RemoteConfig,
-    bucket: Option<Arc<Bucket>>,
+    pub(super) server: LocalServer,
+    pub(super) remote: RemoteConfig,
+    pub(super) bucket: Option<Arc<Bucket>>,
     given_out: Arc<AllGivenOut>,
-    /// Whose streams these are.
-    owner: String,
+    pub(super) handed_in: Arc<AllHandedIn>,
 }
 
 impl Hub {
     async fn give_out(&self, shutdown: &CancellationToken) -> anyhow::Result<()> {
-        let stream = self.stream(self.orders_config()).await?;
-        let mut consumer = self.consumer(&stream, orders_consumer()).await?;
+        let (stream, mut consumer) = self.streams.orders().await?;
+        // Nothing is claimed in vain.
+        if let Some(bucket) = &self.bucket {
+            bucket.probe().await?;
+        }
         let mut free = self.client.subscribe(self.names.free(ALL)).await?;
         let mut signal = self.server.store.work_signal();
         while !shutdown.is_cancelled() {
@@ -241,7 +273,8 @@ impl Hub {
         self.given_out.add(lease.clone(), what, Instant::now());
         match self.publish(*order).await {
             Ok(sequence) => {
-                self.given_out.is_published(lease.nonce, sequence);
+                self.given_out
+                    .is_published(lease.nonce, sequence, Instant::now());
                 Ok(true)
             }
             // It may have gone out all the same: then nobody can begin it, or somebody has.
@@ -255,7 +288,7 @@ impl Hub {
 
     /// Its place in the stream.
     async fn publish(&self, order: WorkOrder) -> anyhow::Result<u64> {
-        let grant = grant_of(&order);
+        let grant = grant_of(&order, &self.remote.like.program);
         let objects = match &self.bucket {
             Some(bucket) => {
                 let artifacts = self.server.store.artifacts();
@@ -272,7 +305,8 @@ impl Hub {
             program: self.remote.like.program.clone(),
             objects,
         })?;
-        let published = self.jetstream.publish(self.names.orders(), order.into());
+        let jetstream = &self.streams.jetstream;
+        let published = jetstream.publish(self.names.orders(), order.into());
         let acknowledged = published.await.context("publishing an order")?;
         let acknowledged = acknowledged.await.context("publishing an order")?;
         Ok(acknowledged.sequence)
@@ -301,250 +335,5 @@ impl Hub {
                 tracing::warn!(%unit, %error, "an order could not be taken back; its lease will end");
             }
         }
-    }
-
-    async fn take_in(&self, shutdown: &CancellationToken) -> anyhow::Result<()> {
-        let stream = self.stream(self.outcomes_config()).await?;
-        let consumer = self.consumer(&stream, outcomes_consumer()).await?;
-        while !shutdown.is_cancelled() {
-            let outcomes = consumer
-                .batch()
-                .max_messages(64)
-                .expires(LOOK)
-                .messages()
-                .await
-                .context("asking for what came of work")?;
-            outcomes
-                .map_err(|error| anyhow::anyhow!(error))
-                .try_for_each_concurrent(CHECKED_AT_ONCE, async |message| {
-                    let acknowledgement = self.take(&message).await;
-                    let acknowledged = message.ack_with(acknowledgement).await;
-                    acknowledged.map_err(|error| anyhow::anyhow!(error))
-                })
-                .await?;
-        }
-        Ok(())
-    }
-
-    /// Stores what came of an order.
-    async fn take(&self, message: &jetstream::Message) -> AckKind {
-        let Some(worker) = names::worker_of(&message.subject) else {
-            tracing::error!(subject = %message.subject, "an outcome of no worker; it is left out");
-            return AckKind::Term;
-        };
-        let mut outcome: RemoteOutcome = match serde_json::from_slice(&message.payload) {
-            Ok(outcome) => outcome,
-            Err(error) => {
-                tracing::error!(%worker, %error, "what a worker sent as an outcome is none; it is left out");
-                return AckKind::Term;
-            }
-        };
-        let unit = outcome.lease.unit;
-        let Some(grant) = of_its_order(&outcome, &self.remote.key) else {
-            tracing::error!(%unit, %worker, "a worker sent an outcome without the order that it is of; it is left out");
-            return AckKind::Ack;
-        };
-        if !outcome.lease.slot.starts_with(&names::slot(&worker, "")) {
-            outcome.lease.slot = names::slot(&worker, "?");
-        }
-        let workers = self.server.store.workers();
-        if workers.ban_of(worker.as_str()).is_some() {
-            tracing::warn!(%unit, %worker, "the worker is banned: what came of it is left out");
-            return AckKind::Ack;
-        }
-        let nonce = outcome.lease.nonce;
-        let acknowledgement = match self.stored(message, grant, outcome).await {
-            Ok(Taken::Held) => {
-                workers.ended(unit);
-                tracing::info!(%unit, %worker, "taken in");
-                AckKind::Ack
-            }
-            Ok(Taken::Lost) => {
-                tracing::info!(%unit, %worker, "no longer this worker's; what came of it is left out");
-                AckKind::Ack
-            }
-            Ok(Taken::Disbelieved(difference)) => self.ban(&worker, &difference).await,
-            Ok(Taken::StillComing) => return AckKind::Nak(Some(SOON)),
-            Err(error) => {
-                tracing::error!(%unit, %worker, cause = format!("{error:#}"), "what came of a unit cannot be stored; trying again");
-                return AckKind::Nak(Some(AGAIN));
-            }
-        };
-        workers.forget_files(nonce);
-        acknowledgement
-    }
-
-    /// Checks and stores an outcome. Meanwhile its unit is held, since its worker has done its part, and NATS hears that it is worked at.
-    async fn stored(
-        &self,
-        message: &jetstream::Message,
-        grant: Grant,
-        outcome: RemoteOutcome,
-    ) -> anyhow::Result<Taken> {
-        let (server, checks, lease) = (
-            self.server.clone(),
-            self.remote.checks(),
-            outcome.lease.clone(),
-        );
-        let (done, bucket) = (grant.episodes(), self.bucket.clone());
-        let mut storing = tokio::spawn(async move {
-            let bucket = bucket.filter(|_| matches!(outcome.outcome, Outcome::Done { .. }));
-            if let Some(bucket) = &bucket
-                && server.store.is_held(grant.unit, grant.nonce).await?
-            {
-                bucket.take(&grant, server.store.artifacts()).await?;
-            }
-            let of = grant.clone();
-            let stored = tokio::task::spawn_blocking(move || store(&server, &checks, &of, outcome))
-                .await??;
-            if let Some(bucket) = &bucket {
-                bucket.forget(&grant).await;
-            }
-            anyhow::Ok(stored)
-        });
-        let every = self.server.renews_every(&lease);
-        loop {
-            tokio::select! {
-                stored = &mut storing => return stored.map_err(anyhow::Error::from).flatten(),
-                () = tokio::time::sleep(every) => {}
-            }
-            let server = self.server.clone();
-            let held = lease.clone();
-            let renewed = tokio::task::spawn_blocking(move || server.renew(&held, done)).await;
-            if let Err(error) = renewed.map_err(anyhow::Error::from).flatten() {
-                tracing::warn!(unit = %lease.unit, cause = format!("{error:#}"), "what is being checked could not be renewed");
-            }
-            // Who is not told so in time delivers it once more, which changes nothing.
-            let _ = message.ack_with(AckKind::Progress).await;
-        }
-    }
-
-    /// Nothing is taken of a worker any more; what it had is given to others.
-    async fn ban(&self, worker: &WorkerName, difference: &str) -> AckKind {
-        let reason = format!("what it recorded is not what the simulator gives: {difference}");
-        let (store, now) = (&self.server.store, self.server.clock.now());
-        match store.ban_worker(Actor::Server, worker, &reason, now).await {
-            Ok(again) => {
-                tracing::error!(
-                    %worker,
-                    difference,
-                    again,
-                    "a worker is banned: what it recorded is not what the simulator gives"
-                );
-                AckKind::Ack
-            }
-            // Two of its outcomes at once.
-            Err(StoreError::Conflict(_)) => AckKind::Ack,
-            Err(error) => {
-                tracing::error!(%worker, %error, difference, "a worker that is not to be believed cannot be banned; trying again");
-                AckKind::Nak(Some(AGAIN))
-            }
-        }
-    }
-
-    /// A stream that is as it is to be, and ours.
-    async fn stream(&self, wanted: stream::Config) -> anyhow::Result<Stream> {
-        let name = wanted.name.clone();
-        let doing = || format!("setting up the stream {name}");
-        let stream = self.jetstream.get_or_create_stream(wanted.clone());
-        let mut stream = stream.await.with_context(doing)?;
-        let found = &stream.cached_info().config;
-        anyhow::ensure!(
-            found.description == wanted.description,
-            "the stream {name} is another server's ({}): give each its own nats.name",
-            found
-                .description
-                .as_deref()
-                .unwrap_or("it does not say whose")
-        );
-        if !is_like(found, &wanted) {
-            self.jetstream
-                .update_stream(&wanted)
-                .await
-                .with_context(|| {
-                    format!(
-                        "the stream {name} was made otherwise than this server needs it, and NATS does not change it: delete it \
-                         (`nats stream rm {name}`), and this server makes it anew; what it held is played again"
-                    )
-                })?;
-            let found = &stream.info().await.with_context(doing)?.config;
-            anyhow::ensure!(
-                is_like(found, &wanted),
-                "NATS keeps the stream {name} otherwise than it was asked to; a newer nats-server may not"
-            );
-        }
-        Ok(stream)
-    }
-
-    async fn consumer(
-        &self,
-        stream: &Stream,
-        wanted: pull::Config,
-    ) -> anyhow::Result<PullConsumer> {
-        let consumer = stream.create_consumer(wanted.clone()).await;
-        let name = wanted.durable_name.as_deref().unwrap_or_default();
-        let consumer = consumer.with_context(|| format!("setting up the consumer {name}"))?;
-        let found = &consumer.cached_info().config;
-        anyhow::ensure!(
-            found.max_deliver == wanted.max_deliver && found.ack_policy == wanted.ack_policy,
-            "NATS keeps the consumer {name} otherwise than it was asked to; a newer nats-server may not"
-        );
-        Ok(consumer)
-    }
-
-    fn orders_config(&self) -> stream::Config {
-        stream::Config {
-            name: self.names.orders_stream(),
-            subjects: vec![self.names.orders()],
-            description: Some(self.owner.clone()),
-            retention: RetentionPolicy::WorkQueue,
-            discard: DiscardPolicy::New,
-            max_messages: MOST_ORDERS,
-            ..stream::Config::default()
-        }
-    }
-
-    fn outcomes_config(&self) -> stream::Config {
-        stream::Config {
-            name: self.names.outcomes_stream(),
-            subjects: vec![self.names.outcomes(ALL)],
-            description: Some(self.owner.clone()),
-            retention: RetentionPolicy::WorkQueue,
-            discard: DiscardPolicy::New,
-            max_bytes: MOST_OUTCOME_BYTES,
-            duplicate_window: SENT_TWICE_WITHIN,
-            ..stream::Config::default()
-        }
-    }
-}
-
-fn is_like(found: &stream::Config, wanted: &stream::Config) -> bool {
-    found.subjects == wanted.subjects
-        && found.retention == wanted.retention
-        && found.discard == wanted.discard
-        && found.storage == wanted.storage
-        && (wanted.max_messages == 0 || found.max_messages == wanted.max_messages)
-        && (wanted.max_bytes == 0 || found.max_bytes == wanted.max_bytes)
-}
-
-/// Each order is delivered once: that nobody has begun it, the server notices by itself.
-fn orders_consumer() -> pull::Config {
-    pull::Config {
-        durable_name: Some(ORDERS_CONSUMER.to_owned()),
-        ack_policy: AckPolicy::Explicit,
-        max_deliver: 1,
-        max_ack_pending: MOST_ORDERS,
-        max_waiting: 8192,
-        ..pull::Config::default()
-    }
-}
-
-fn outcomes_consumer() -> pull::Config {
-    pull::Config {
-        durable_name: Some(OUTCOMES_CONSUMER.to_owned()),
-        ack_policy: AckPolicy::Explicit,
-        ack_wait: Duration::from_secs(60),
-        max_deliver: -1,
-        ..pull::Config::default()
     }
 }

@@ -366,6 +366,7 @@ impl WorkServer for FarServer {
         let ask = Ask::Renew {
             lease: lease.clone(),
             episodes_done,
+            trouble: None,
         };
         let answer = self.link.runtime.block_on(self.ask(&ask));
         match answer {

@@ -5,15 +5,15 @@ use crate::{
     local::LocalServer,
     server::{GivenBack, Holding, WorkServer},
 };
-use faceoff_dataset::{CLIPS_FILE, SHARD_FILES, game::GAME_FILES};
+use faceoff_store::StoreError;
 use faceoff_wire::{
     grant::{Grant, GrantKey, Plays, Writes},
     remote::{Outcome, RemoteOutcome},
     work::{Assignment, Keeps, Lease, WorkOrder, WorkReport},
 };
 
-/// What an order opens.
-pub(super) fn grant_of(order: &WorkOrder) -> Grant {
+/// What an order opens that this program gives out.
+pub(super) fn grant_of(order: &WorkOrder, program: &str) -> Grant {
     let (bundles, writes, plays) = match &order.assignment {
         Assignment::Play {
             agent, keeps, spec, ..
@@ -48,16 +48,7 @@ pub(super) fn grant_of(order: &WorkOrder) -> Grant {
         bundles,
         writes,
         plays,
-    }
-}
-
-/// The files that may be stored under an order, by name.
-pub(super) fn file_names(grant: &Grant) -> &'static [&'static str] {
-    match (&grant.writes, &grant.plays) {
-        (Writes::Folder(_), Plays::Shard(_)) => &SHARD_FILES,
-        (Writes::Folder(_), Plays::Game(_)) => &GAME_FILES,
-        (Writes::File(_), _) => &[CLIPS_FILE],
-        (Writes::Folder(_), Plays::Nothing) | (Writes::Nothing, _) => &[],
+        program: program.to_owned(),
     }
 }
 
@@ -130,7 +121,17 @@ fn done(
             return Ok(Taken::Disbelieved(difference));
         }
     }
-    Ok(server.commit(lease, report)?.into())
+    match server.commit(lease, report) {
+        Ok(holding) => Ok(holding.into()),
+        // It would be refused again, however often it is tried.
+        Err(error) if matches!(error.downcast_ref(), Some(StoreError::Conflict(_))) => {
+            tracing::error!(unit = %lease.unit, slot = lease.slot, %error, "what a worker reported cannot count");
+            let why = "what a worker reported does not fit its order";
+            server.give_back(lease, GivenBack::PlatformFault(why))?;
+            Ok(Taken::Lost)
+        }
+        Err(error) => Err(error),
+    }
 }
 
 /// Does a report name what its order lets it?

@@ -45,6 +45,17 @@ impl Names {
         format!("{}.asks.{worker}", self.server)
     }
 
+    /// Where answers to who are sent: a prefix of subjects, without a dot at its end.
+    pub(super) fn inbox(&self, who: &str) -> String {
+        format!("_INBOX.{}.{who}", self.server)
+    }
+
+    /// Is it a subject on which this worker gets answers, and nobody else?
+    pub(super) fn is_inbox_of(&self, worker: &WorkerName, subject: &str) -> bool {
+        let rest = subject.strip_prefix(&self.inbox(worker.as_str()));
+        rest.is_some_and(|rest| rest.starts_with('.') && !rest.contains(['*', '>']))
+    }
+
     /// Where a worker tells of games under way; `*`: all of them.
     pub(super) fn shows(&self, worker: &str) -> String {
         format!("{}.shows.{worker}", self.server)
@@ -66,6 +77,9 @@ pub(super) const OUTCOMES_CONSUMER: &str = "server";
 pub(super) const ALL: &str = "*";
 /// The holder of leases of orders that nobody has begun. No slot is called this.
 pub(super) const WAITING: &str = "given out";
+
+/// What the holders of leases of all slots elsewhere are below.
+pub(super) const ELSEWHERE: &str = "remote";
 
 /// What the queue calls a slot of a worker elsewhere.
 pub(super) fn slot(worker: &WorkerName, slot: &str) -> String {
@@ -93,6 +107,18 @@ mod tests {
         assert_eq!(names.asks("gpu-1"), "faceoff.asks.gpu-1");
         assert_eq!(worker_of(&names.asks("gpu-1")), "gpu-1".parse().ok());
         assert_eq!(worker_of(&names.asks(ALL)), None);
+        let rack: WorkerName = "rack-1".parse().unwrap();
+        assert!(names.is_inbox_of(&rack, "_INBOX.faceoff.rack-1.abc.1"));
+        for other in [
+            "_INBOX.faceoff.rack-10.abc",
+            "_INBOX.faceoff.rack-1",
+            "_INBOX.faceoff.server.abc",
+            "$JS.API.STREAM.PURGE.faceoff-outcomes",
+            "faceoff.orders",
+            "",
+        ] {
+            assert!(!names.is_inbox_of(&rack, other), "{other}");
+        }
         for bad in ["", "a.b", "a b", "*", ">", &"x".repeat(65)] {
             assert!(Names::of(bad).is_err(), "{bad:?}");
         }

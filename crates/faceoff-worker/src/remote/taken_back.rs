@@ -39,9 +39,11 @@ impl AllGivenOut {
     }
 
     /// It is in the stream; nothing to be kept if it has been begun by then.
-    pub(super) fn is_published(&self, nonce: Uuid, sequence: u64) {
+    pub(super) fn is_published(&self, nonce: Uuid, sequence: u64, now: Instant) {
         if let Some(of) = self.all().get_mut(&nonce) {
             of.sequence = Some(sequence);
+            // Before, nobody could begin it.
+            of.at = now;
         }
     }
 
@@ -90,10 +92,10 @@ mod tests {
         add(1, start);
         add(2, start);
         add(3, start + Duration::from_secs(1));
-        all.is_published(Uuid::from_u128(1), 11);
+        all.is_published(Uuid::from_u128(1), 11, start);
         assert!(all.take(Uuid::from_u128(2)).is_some());
         // NATS may say so after it was begun.
-        all.is_published(Uuid::from_u128(2), 12);
+        all.is_published(Uuid::from_u128(2), 12, start);
         assert!(all.take_late(start + Duration::from_secs(4)).is_empty());
         let late = all.take_late(start + BEGINS_WITHIN);
         assert_eq!(

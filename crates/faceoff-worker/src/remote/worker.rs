@@ -54,7 +54,7 @@ pub async fn work(config: RemoteWorker, shutdown: CancellationToken) -> anyhow::
             config.name
         )
     })?;
-    let client = config.nats.connect(&config.name).await?;
+    let client = config.nats.connect(&config.name, |_| ()).await?;
     let folder = config.slots.scratch_dir.clone();
     let scratch = tokio::task::spawn_blocking(move || Scratch::take(&folder)).await??;
     let link = Arc::new(Link {

@@ -102,10 +102,19 @@ async fn of_server(app: &App) -> Result<(Vec<Item>, Option<(u32, u32)>), Problem
             links: vec![("/organiser/workers".into(), "Workers".into())],
         });
     }
-    for trouble in WorkersView::now(app).troubles {
+    let workers = WorkersView::now(app);
+    for alarm in workers.alarms {
+        items.push(Item {
+            class: "waiting",
+            title: "Something takes long on another machine".to_owned(),
+            detail: format!("{alarm}."),
+            links: vec![("/organiser/workers".into(), "Workers".into())],
+        });
+    }
+    for trouble in workers.troubles {
         items.push(Item {
             class: "bad",
-            title: "Work is not given to other machines".to_owned(),
+            title: "Work on other machines is in trouble".to_owned(),
             detail: format!("{trouble}. It is tried again until it can."),
             links: vec![("/organiser/workers".into(), "Workers".into())],
         });

@@ -63,6 +63,7 @@ fn listed(of: &WorkersView) -> String {
     [own]
         .into_iter()
         .chain(of.troubles.iter().cloned())
+        .chain(of.alarms.iter().cloned())
         .chain([workers])
         .chain(bans)
         .collect::<Vec<_>>()

@@ -1,0 +1,82 @@
+//! What workers have handed in to NATS and the server has not taken in yet: its slots work at something else, so the server keeps the leases.
+
+use faceoff_wire::work::Lease;
+use std::{
+    collections::HashMap,
+    sync::{Mutex, MutexGuard, PoisonError},
+    time::{Duration, Instant},
+};
+use uuid::Uuid;
+
+/// What is taken in at once needs nothing.
+const WAITS_AFTER: Duration = Duration::from_secs(2);
+
+/// By the leases' nonces.
+#[derive(Debug, Default)]
+pub(super) struct AllHandedIn(Mutex<HashMap<Uuid, HandedIn>>);
+
+/// An outcome that waits.
+#[derive(Debug, Clone)]
+pub(super) struct HandedIn {
+    pub(super) lease: Lease,
+    pub(super) episodes_done: u32,
+    since: Instant,
+}
+
+impl AllHandedIn {
+    pub(super) fn add(&self, lease: Lease, episodes_done: u32, now: Instant) {
+        let waits = HandedIn {
+            lease,
+            episodes_done,
+            since: now,
+        };
+        self.all().insert(waits.lease.nonce, waits);
+    }
+
+    /// It is taken in, or nobody's any more.
+    pub(super) fn forget(&self, nonce: Uuid) {
+        self.all().remove(&nonce);
+    }
+
+    /// All that waits for a while by now.
+    pub(super) fn waiting(&self, now: Instant) -> Vec<HandedIn> {
+        let all = self.all();
+        let waits = |of: &&HandedIn| now.duration_since(of.since) >= WAITS_AFTER;
+        all.values().filter(waits).cloned().collect()
+    }
+
+    /// Each entry is whole whatever panicked beside it.
+    fn all(&self) -> MutexGuard<'_, HashMap<Uuid, HandedIn>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use jiff::Timestamp;
+
+    #[test]
+    fn what_waits_is_kept_until_it_is_taken_in() {
+        let (all, start) = (AllHandedIn::default(), Instant::now());
+        let lease = |nonce| Lease {
+            unit: Uuid::from_u128(9),
+            nonce: Uuid::from_u128(nonce),
+            slot: "remote/a/slot-0".into(),
+            expires_at: Timestamp::UNIX_EPOCH,
+            duration_s: 30,
+        };
+        all.add(lease(1), 50, start);
+        all.add(lease(2), 50, start + Duration::from_secs(1));
+        assert!(all.waiting(start + Duration::from_secs(1)).is_empty());
+        let waits = all.waiting(start + WAITS_AFTER);
+        assert_eq!(waits.len(), 1);
+        assert_eq!(
+            (waits[0].lease.nonce, waits[0].episodes_done),
+            (Uuid::from_u128(1), 50)
+        );
+        all.forget(Uuid::from_u128(1));
+        all.forget(Uuid::from_u128(3));
+        assert_eq!(all.waiting(start + Duration::from_secs(60)).len(), 1);
+    }
+}

@@ -1,0 +1,175 @@
+//! The streams and consumers of one server, as they are to be: NATS leaves out silently what an old version does not know, so what comes
+//! back is compared.
+
+use super::names::{ALL, Names, ORDERS_CONSUMER, OUTCOMES_CONSUMER};
+use anyhow::Context as _;
+use async_nats::jetstream::{
+    self,
+    consumer::{AckPolicy, PullConsumer, pull},
+    stream::{self, DiscardPolicy, RetentionPolicy, Stream},
+};
+use std::{
+    sync::atomic::{AtomicBool, Ordering},
+    time::Duration,
+};
+
+/// Orders in the stream at most; there are never more than free slots.
+const MOST_ORDERS: i64 = 100_000;
+/// Bytes of outcomes that wait for the server at most.
+const MOST_OUTCOME_BYTES: i64 = 1 << 30;
+/// An outcome that is sent twice within this is stored once by NATS; by the server, always.
+const SENT_TWICE_WITHIN: Duration = Duration::from_secs(120);
+/// An outcome that the server has taken and not said to have stored comes again after this.
+const TAKEN_FOR: Duration = Duration::from_secs(60);
+/// Slots that may ask at the same time.
+const MOST_WAITING: i64 = 8192;
+
+/// Where streams are, and whose they are to be.
+pub(super) struct Streams {
+    pub(super) jetstream: jetstream::Context,
+    pub(super) names: Names,
+    /// In words, as their description.
+    pub(super) owner: String,
+    /// They are known to be this server's. Until then, and while another's are there, it answers nobody: who asks is another's worker.
+    are_ours: AtomicBool,
+}
+
+impl Streams {
+    pub(super) const fn of(jetstream: jetstream::Context, names: Names, owner: String) -> Self {
+        Self {
+            jetstream,
+            names,
+            owner,
+            are_ours: AtomicBool::new(false),
+        }
+    }
+
+    pub(super) fn are_ours(&self) -> bool {
+        self.are_ours.load(Ordering::Relaxed)
+    }
+
+    pub(super) async fn orders(&self) -> anyhow::Result<(Stream, PullConsumer)> {
+        let stream = self.stream(self.orders_config()).await?;
+        let consumer = consumer(&stream, orders_consumer()).await?;
+        Ok((stream, consumer))
+    }
+
+    pub(super) async fn outcomes(&self) -> anyhow::Result<PullConsumer> {
+        let stream = self.stream(self.outcomes_config()).await?;
+        consumer(&stream, outcomes_consumer()).await
+    }
+
+    /// A stream that is as it is to be, and ours.
+    async fn stream(&self, wanted: stream::Config) -> anyhow::Result<Stream> {
+        let name = wanted.name.clone();
+        let doing = || format!("setting up the stream {name}");
+        let stream = self.jetstream.get_or_create_stream(wanted.clone());
+        let mut stream = stream.await.with_context(doing)?;
+        let found = &stream.cached_info().config;
+        let is_ours = found.description == wanted.description;
+        self.are_ours.store(is_ours, Ordering::Relaxed);
+        anyhow::ensure!(
+            is_ours,
+            "the stream {name} is another server's ({}): give each its own nats.name",
+            found
+                .description
+                .as_deref()
+                .unwrap_or("it does not say whose")
+        );
+        if !is_like(found, &wanted) {
+            self.jetstream
+                .update_stream(&wanted)
+                .await
+                .with_context(|| {
+                    format!(
+                        "the stream {name} was made otherwise than this server needs it, and NATS does not change it: delete it \
+                         (`nats stream rm {name}`), and this server makes it anew; what it held is played again"
+                    )
+                })?;
+            let found = &stream.info().await.with_context(doing)?.config;
+            anyhow::ensure!(
+                is_like(found, &wanted),
+                "NATS keeps the stream {name} otherwise than it was asked to; a newer nats-server may not"
+            );
+        }
+        Ok(stream)
+    }
+
+    fn orders_config(&self) -> stream::Config {
+        stream::Config {
+            name: self.names.orders_stream(),
+            subjects: vec![self.names.orders()],
+            description: Some(self.owner.clone()),
+            retention: RetentionPolicy::WorkQueue,
+            discard: DiscardPolicy::New,
+            max_messages: MOST_ORDERS,
+            ..stream::Config::default()
+        }
+    }
+
+    fn outcomes_config(&self) -> stream::Config {
+        stream::Config {
+            name: self.names.outcomes_stream(),
+            subjects: vec![self.names.outcomes(ALL)],
+            description: Some(self.owner.clone()),
+            retention: RetentionPolicy::WorkQueue,
+            discard: DiscardPolicy::New,
+            max_bytes: MOST_OUTCOME_BYTES,
+            duplicate_window: SENT_TWICE_WITHIN,
+            ..stream::Config::default()
+        }
+    }
+}
+
+async fn consumer(stream: &Stream, wanted: pull::Config) -> anyhow::Result<PullConsumer> {
+    let consumer = stream.create_consumer(wanted.clone()).await;
+    let name = wanted.durable_name.as_deref().unwrap_or_default();
+    let consumer = consumer.with_context(|| format!("setting up the consumer {name}"))?;
+    let found = &consumer.cached_info().config;
+    anyhow::ensure!(
+        is_kept(found, &wanted),
+        "NATS keeps the consumer {name} otherwise than it was asked to; a newer nats-server may not"
+    );
+    Ok(consumer)
+}
+
+fn is_like(found: &stream::Config, wanted: &stream::Config) -> bool {
+    found.subjects == wanted.subjects
+        && found.retention == wanted.retention
+        && found.discard == wanted.discard
+        && found.storage == wanted.storage
+        && (wanted.max_messages == 0 || found.max_messages == wanted.max_messages)
+        && (wanted.max_bytes == 0 || found.max_bytes == wanted.max_bytes)
+        && (wanted.duplicate_window.is_zero() || found.duplicate_window == wanted.duplicate_window)
+}
+
+/// What is not asked for is NATS's to choose.
+fn is_kept(found: &jetstream::consumer::Config, wanted: &pull::Config) -> bool {
+    found.max_deliver == wanted.max_deliver
+        && found.ack_policy == wanted.ack_policy
+        && (wanted.ack_wait.is_zero() || found.ack_wait == wanted.ack_wait)
+        && (wanted.max_ack_pending == 0 || found.max_ack_pending == wanted.max_ack_pending)
+        && (wanted.max_waiting == 0 || found.max_waiting == wanted.max_waiting)
+}
+
+/// Each order is delivered once: that nobody has begun it, the server notices by itself.
+fn orders_consumer() -> pull::Config {
+    pull::Config {
+        durable_name: Some(ORDERS_CONSUMER.to_owned()),
+        ack_policy: AckPolicy::Explicit,
+        max_deliver: 1,
+        max_ack_pending: MOST_ORDERS,
+        max_waiting: MOST_WAITING,
+        ..pull::Config::default()
+    }
+}
+
+fn outcomes_consumer() -> pull::Config {
+    pull::Config {
+        durable_name: Some(OUTCOMES_CONSUMER.to_owned()),
+        ack_policy: AckPolicy::Explicit,
+        ack_wait: TAKEN_FOR,
+        max_deliver: -1,
+        ..pull::Config::default()
+    }
+}

@@ -1,0 +1,244 @@
+//! Takes in what came of work elsewhere, once it is checked.
+
+use super::{
+    dispatch::{Hub, LOOK},
+    granted::{Taken, of_its_order, store},
+    names,
+};
+use crate::server::{Holding, WorkServer};
+use anyhow::Context as _;
+use async_nats::jetstream::{self, AckKind};
+use faceoff_store::{Actor, StoreError, WorkerName};
+use faceoff_types::harmless;
+use faceoff_wire::{
+    grant::Grant,
+    remote::{Outcome, RemoteOutcome},
+};
+use futures::StreamExt as _;
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+use tokio::task::{JoinError, JoinSet};
+use tokio_util::sync::CancellationToken;
+
+/// An outcome that cannot be stored now is taken again after this.
+const AGAIN: Duration = Duration::from_secs(5);
+/// What is still being stored of an outcome is there soon.
+const SOON: Duration = Duration::from_secs(1);
+/// So many outcomes are checked at the same time: each takes a thread of its own for a while.
+const CHECKED_AT_ONCE: usize = 2;
+/// Leases of what waits are looked at at least so often.
+const KEEPS_EVERY: Duration = Duration::from_secs(5);
+/// So much is kept of what a worker says of its own fault, in characters.
+const REASON_SHOWN: usize = 500;
+
+impl Hub {
+    /// Asks for no more than is begun at once: what was fetched and waits would come again after a while, and others would have its unit.
+    pub(super) async fn take_in(
+        self: &Arc<Self>,
+        shutdown: &CancellationToken,
+    ) -> anyhow::Result<()> {
+        let consumer = self.streams.outcomes().await?;
+        let mut taking = JoinSet::new();
+        while !shutdown.is_cancelled() {
+            while taking.len() >= CHECKED_AT_ONCE {
+                taken(taking.join_next().await)?;
+            }
+            let mut outcomes = consumer
+                .batch()
+                .max_messages(CHECKED_AT_ONCE - taking.len())
+                .expires(LOOK)
+                .messages()
+                .await
+                .context("asking for what came of work")?;
+            while let Some(message) = outcomes.next().await {
+                let message = message.map_err(|error| anyhow::anyhow!(error))?;
+                let hub = Arc::clone(self);
+                taking.spawn(async move {
+                    let acknowledgement = hub.take(&message).await;
+                    let acknowledged = message.ack_with(acknowledgement).await;
+                    acknowledged.map_err(|error| anyhow::anyhow!(error))
+                });
+            }
+            while let Some(done) = taking.try_join_next() {
+                taken(Some(done))?;
+            }
+        }
+        while !taking.is_empty() {
+            taken(taking.join_next().await)?;
+        }
+        Ok(())
+    }
+
+    /// Keeps what is handed in for as long as it waits here: whose it was works at something else.
+    pub(super) async fn keep_waiting(&self, shutdown: &CancellationToken) -> anyhow::Result<()> {
+        let every = Duration::from_secs(self.server.lease_s.into()) / 3;
+        while !shutdown.is_cancelled() {
+            for waits in self.handed_in.waiting(Instant::now()) {
+                let (lease, server) = (waits.lease.clone(), self.server.clone());
+                let renewed =
+                    tokio::task::spawn_blocking(move || server.renew(&lease, waits.episodes_done));
+                if renewed.await?? == Holding::Lost {
+                    self.handed_in.forget(waits.lease.nonce);
+                }
+            }
+            tokio::select! {
+                () = shutdown.cancelled() => {}
+                () = tokio::time::sleep(every.min(KEEPS_EVERY)) => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Stores what came of an order.
+    async fn take(&self, message: &jetstream::Message) -> AckKind {
+        let Some(worker) = names::worker_of(&message.subject) else {
+            tracing::error!(subject = %message.subject, "an outcome of no worker; it is left out");
+            return AckKind::Term;
+        };
+        let mut outcome: RemoteOutcome = match serde_json::from_slice(&message.payload) {
+            Ok(outcome) => outcome,
+            Err(error) => {
+                tracing::error!(%worker, %error, "what a worker sent as an outcome is none; it is left out");
+                return AckKind::Term;
+            }
+        };
+        let unit = outcome.lease.unit;
+        let Some(grant) = of_its_order(&outcome, &self.remote.key) else {
+            tracing::error!(%unit, %worker, "a worker sent an outcome without the order that it is of; it is left out");
+            return AckKind::Ack;
+        };
+        if !outcome.lease.slot.starts_with(&names::slot(&worker, "")) {
+            outcome.lease.slot = names::slot(&worker, "?");
+        }
+        let (workers, now) = (self.server.store.workers(), self.server.clock.now());
+        if workers.ban_of(worker.as_str()).is_some() {
+            tracing::warn!(%unit, %worker, "the worker is banned: what came of it is left out");
+            return AckKind::Ack;
+        }
+        let nonce = outcome.lease.nonce;
+        self.handed_in.forget(nonce);
+        // Who has not begun it, or somebody else has: whatever it is, it is not this worker's.
+        match self.server.store.lease_holder(unit, nonce).await {
+            Ok(Some(holder)) if WorkerName::of_holder(&holder).as_ref() != Some(&worker) => {
+                tracing::warn!(%unit, %worker, holder, "the order is not this worker's; what came of it is left out");
+                return AckKind::Ack;
+            }
+            Ok(_) => {}
+            Err(error) => {
+                tracing::error!(%unit, %worker, %error, "the queue cannot be asked whose an outcome is; trying again");
+                return AckKind::Nak(Some(AGAIN));
+            }
+        }
+        if grant.program != self.remote.like.program
+            && matches!(outcome.outcome, Outcome::Done { .. })
+        {
+            tracing::info!(%unit, %worker, "played by another program than this one: it is played again");
+            outcome.outcome = Outcome::Shutdown;
+        }
+        if let Outcome::PlatformFault { reason } = &mut outcome.outcome {
+            *reason = harmless(reason).chars().take(REASON_SHOWN).collect();
+        }
+        let failed = matches!(outcome.outcome, Outcome::PlatformFault { .. });
+        let was_played = matches!(outcome.outcome, Outcome::Done { .. });
+        let acknowledgement = match self.stored(message, grant, outcome).await {
+            Ok(Taken::Held) => {
+                workers.ended(unit);
+                if was_played {
+                    workers.played(worker.as_str());
+                }
+                if failed && let Some((units, until)) = workers.failed(worker.as_str(), unit, now) {
+                    tracing::warn!(%worker, units, %until, "a worker could play none of its last units; it rests");
+                }
+                tracing::info!(%unit, %worker, "taken in");
+                AckKind::Ack
+            }
+            Ok(Taken::Lost) => {
+                tracing::info!(%unit, %worker, "no longer this worker's; what came of it is left out");
+                AckKind::Ack
+            }
+            Ok(Taken::Disbelieved(difference)) => self.ban(&worker, &difference).await,
+            Ok(Taken::StillComing) => return AckKind::Nak(Some(SOON)),
+            Err(error) => {
+                tracing::error!(%unit, %worker, cause = format!("{error:#}"), "what came of a unit cannot be stored; trying again");
+                return AckKind::Nak(Some(AGAIN));
+            }
+        };
+        workers.forget_files(nonce);
+        acknowledgement
+    }
+
+    /// Checks and stores an outcome. Meanwhile its unit is held, since its worker has done its part, and NATS hears that it is worked at.
+    async fn stored(
+        &self,
+        message: &jetstream::Message,
+        grant: Grant,
+        outcome: RemoteOutcome,
+    ) -> anyhow::Result<Taken> {
+        let (server, checks, lease) = (
+            self.server.clone(),
+            self.remote.checks(),
+            outcome.lease.clone(),
+        );
+        let (done, bucket) = (grant.episodes(), self.bucket.clone());
+        let mut storing = tokio::spawn(async move {
+            let bucket = bucket.filter(|_| matches!(outcome.outcome, Outcome::Done { .. }));
+            if let Some(bucket) = &bucket
+                && server.store.is_held(grant.unit, grant.nonce).await?
+            {
+                bucket.take(&grant, server.store.artifacts()).await?;
+            }
+            let of = grant.clone();
+            let stored = tokio::task::spawn_blocking(move || store(&server, &checks, &of, outcome))
+                .await??;
+            if let Some(bucket) = &bucket {
+                bucket.forget(&grant).await;
+            }
+            anyhow::Ok(stored)
+        });
+        let every = self.server.renews_every(&lease);
+        loop {
+            tokio::select! {
+                stored = &mut storing => return stored.map_err(anyhow::Error::from).flatten(),
+                () = tokio::time::sleep(every) => {}
+            }
+            let server = self.server.clone();
+            let held = lease.clone();
+            let renewed = tokio::task::spawn_blocking(move || server.renew(&held, done)).await;
+            if let Err(error) = renewed.map_err(anyhow::Error::from).flatten() {
+                tracing::warn!(unit = %lease.unit, cause = format!("{error:#}"), "what is being checked could not be renewed");
+            }
+            // Who is not told so in time delivers it once more, which changes nothing.
+            let _ = message.ack_with(AckKind::Progress).await;
+        }
+    }
+
+    /// Nothing is taken of a worker any more; what it had is given to others.
+    async fn ban(&self, worker: &WorkerName, difference: &str) -> AckKind {
+        let reason = format!("what it recorded is not what the simulator gives: {difference}");
+        let (store, now) = (&self.server.store, self.server.clock.now());
+        match store.ban_worker(Actor::Server, worker, &reason, now).await {
+            Ok(again) => {
+                tracing::error!(
+                    %worker,
+                    difference,
+                    again,
+                    "a worker is banned: what it recorded is not what the simulator gives"
+                );
+                AckKind::Ack
+            }
+            // Two of its outcomes at once.
+            Err(StoreError::Conflict(_)) => AckKind::Ack,
+            Err(error) => {
+                tracing::error!(%worker, %error, difference, "a worker that is not to be believed cannot be banned; trying again");
+                AckKind::Nak(Some(AGAIN))
+            }
+        }
+    }
+}
+
+/// What comes of what was spawned.
+fn taken(done: Option<Result<anyhow::Result<()>, JoinError>>) -> anyhow::Result<()> {
+    done.map_or(Ok(()), |done| done?)
+}
