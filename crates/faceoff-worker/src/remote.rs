@@ -4,7 +4,8 @@
 //! begins, and committed once.
 //!
 //! `names.rs` is what both sides call things; `dispatch.rs`, `granted.rs` and `answers.rs` are the server's side; `far_server.rs` is the server as
-//! a worker's slots see it, `order_files.rs` its files, `worker.rs` the process that they run in; `checked.rs` is why the server believes what comes back.
+//! a worker's slots see it: `next_order.rs` how they come by orders, `order_files.rs` and `transfer.rs` files, `handing_in.rs` what came of
+//! them; `worker.rs` is the process that they run in, `link.rs` what they share; `checked.rs` is why the server believes what comes back.
 
 mod answers;
 mod bucket;
@@ -14,14 +15,18 @@ mod dispatch;
 mod examine;
 mod far_server;
 mod granted;
+mod handing_in;
+mod link;
 mod names;
+mod next_order;
 mod order_files;
 mod taken_back;
+mod transfer;
 mod worker;
 
 pub use bucket::BucketConfig;
 pub use connection::NatsConfig;
 pub use dispatch::{RemoteConfig, dispatch};
 pub use examine::{Examined, examine};
-pub(crate) use far_server::TooLarge;
+pub(crate) use handing_in::TooLarge;
 pub use worker::{RemoteWorker, work};
