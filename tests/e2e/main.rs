@@ -13,6 +13,7 @@ mod demo;
 mod desks;
 mod elsewhere;
 mod elsewhere_bucket;
+mod elsewhere_ends;
 mod elsewhere_lies;
 mod elsewhere_trouble;
 mod fair_shares;

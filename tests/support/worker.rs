@@ -90,10 +90,18 @@ impl Worker {
     /// # Panics
     /// If it ends with an error.
     pub fn end(self) {
+        self.ask_to_end();
+        self.ends();
+    }
+
+    /// Asks it to end (SIGTERM).
+    ///
+    /// # Panics
+    /// If it was reaped.
+    pub fn ask_to_end(&self) {
         let id = rustix::process::Pid::from_child(&self.process.0);
         rustix::process::kill_process(id, rustix::process::Signal::TERM)
             .expect("a child can be signalled");
-        self.ends();
     }
 
     /// Waits until it has ended by itself.

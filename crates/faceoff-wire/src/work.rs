@@ -223,6 +223,17 @@ pub enum WorkReport {
     },
 }
 
+impl WorkReport {
+    /// How many episodes were played.
+    #[must_use]
+    pub fn episodes(&self) -> u32 {
+        match self {
+            Self::Play { outcomes, .. } => u32::try_from(outcomes.len()).unwrap_or(u32::MAX),
+            Self::Smoke(_) | Self::Game { .. } | Self::Finalise { .. } => 0,
+        }
+    }
+}
+
 /// As a log line names it.
 impl fmt::Display for Assignment {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -5,8 +5,10 @@
 //!
 //! `names.rs` is what both sides call things and `connection.rs` how both reach NATS. The server's side: `streams.rs` are its streams,
 //! `dispatch.rs` gives out what `granted.rs` and `bucket.rs` open, and `taken_back.rs` knows what nobody has begun; `answers.rs` is what workers ask
-//! meanwhile, and `like.rs` which of them get work; `taken_in.rs` takes in what came of it, and `handed_in.rs` knows what waits for that. `examine.rs` asks as a worker would. `far_server.rs` is the server as
-//! a worker's slots see it, `order_files.rs` its files, `worker.rs` the process that they run in; `checked.rs` is why the server believes what comes back.
+//! meanwhile, and `like.rs` which of them get work; `taken_in.rs` takes in what came of it, `checked.rs` is why it believes that, and `handed_in.rs`
+//! knows what waits for it. `examine.rs` asks as a worker would. `far_server.rs` is the server as a worker's slots see it: `next_order.rs` how they come
+//! by orders, `order_files.rs` and `transfer.rs` files, `handing_in.rs` what came of them; `worker.rs` is the process that they run in, `link.rs` what
+//! they share.
 
 mod answers;
 mod bucket;
@@ -17,17 +19,21 @@ mod examine;
 mod far_server;
 mod granted;
 mod handed_in;
+mod handing_in;
 mod like;
+mod link;
 mod names;
+mod next_order;
 mod order_files;
 mod streams;
 mod taken_back;
 mod taken_in;
+mod transfer;
 mod worker;
 
 pub use bucket::BucketConfig;
 pub use connection::NatsConfig;
 pub use dispatch::{RemoteConfig, dispatch};
 pub use examine::{Examined, examine};
-pub(crate) use far_server::TooLarge;
+pub(crate) use handing_in::TooLarge;
 pub use worker::{RemoteWorker, work};

@@ -7,7 +7,7 @@ use crate::{
     local::LocalServer,
     scratch::Scratch,
     server::WorkServer,
-    slot::Slot,
+    slot::{Rests, Slot},
     slot_threads::SlotThreads,
     tidying,
 };
@@ -25,6 +25,8 @@ use tokio_util::sync::CancellationToken;
 pub(crate) struct Intervals {
     /// See [`Slot::idle_poll`].
     pub(crate) idle_poll: Duration,
+    /// After faults of ours.
+    pub(crate) rests: Rests,
     /// How often the recordings of evaluations that are over are removed.
     pub(crate) tidy: Duration,
     /// How long slots may take to leave what they are in the middle of (a step of an agent, an
@@ -36,6 +38,10 @@ impl Default for Intervals {
     fn default() -> Self {
         Self {
             idle_poll: Duration::from_secs(2),
+            rests: Rests {
+                first: Duration::from_secs(2),
+                longest: Duration::from_secs(300),
+            },
             tidy: Duration::from_secs(300),
             shutdown_grace: Duration::from_secs(20),
         }
@@ -185,6 +191,7 @@ pub(crate) async fn run_slots(
             number: index.to_string(),
             metrics: config.metrics.clone(),
             idle_poll: intervals.idle_poll,
+            rests: intervals.rests,
             executor: Executor {
                 timing: None,
                 server: Arc::clone(&server),

@@ -14,6 +14,25 @@ use std::{
 };
 use tokio_util::sync::CancellationToken;
 
+/// How long a slot leaves the queue to others after a fault of ours: twice as long each time, until it has played something. One whose
+/// sandbox or folder is broken would use up the attempts at everything that waits.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rests {
+    /// After the first.
+    pub(crate) first: Duration,
+    /// At most.
+    pub(crate) longest: Duration,
+}
+
+impl Rests {
+    /// After so many faults in a row.
+    fn after(self, faults: u32) -> Duration {
+        let doubled = 1_u32.checked_shl(faults.saturating_sub(1));
+        let rest = doubled.and_then(|times| self.first.checked_mul(times));
+        rest.unwrap_or(self.longest).min(self.longest)
+    }
+}
+
 /// One slot: claims units and works them off, one at a time, on its own thread.
 pub(crate) struct Slot {
     pub(crate) name: String,
@@ -23,6 +42,7 @@ pub(crate) struct Slot {
     /// How long to wait, idle, before looking for units that became claimable by the passing of time:
     /// an expired lease, the end of a back-off, work added by another process.
     pub(crate) idle_poll: Duration,
+    pub(crate) rests: Rests,
     pub(crate) server: Arc<dyn WorkServer>,
     pub(crate) executor: Executor,
     pub(crate) shutdown: CancellationToken,
@@ -33,11 +53,20 @@ impl Slot {
     pub(crate) fn run(mut self) {
         // The log is told of a change, not of every try.
         let mut failing = false;
+        // Since it last played something.
+        let mut faults = 0;
         while !self.shutdown.is_cancelled() {
             let queue = match self.server.claim(&self.name) {
                 Ok(Claimed::Order(order)) => {
                     failing = false;
-                    self.work_on(&order);
+                    match self.work_on(&order) {
+                        UnitEnd::Committed => faults = 0,
+                        UnitEnd::PlatformFault => {
+                            faults += 1;
+                            self.rest(faults);
+                        }
+                        UnitEnd::Lost | UnitEnd::FullDisk => {}
+                    }
                     continue;
                 }
                 Ok(Claimed::Nothing { queue }) => {
@@ -59,7 +88,26 @@ impl Slot {
         }
     }
 
-    fn work_on(&mut self, order: &WorkOrder) {
+    /// After a fault of ours.
+    fn rest(&self, faults: u32) {
+        let rest = self.rests.after(faults);
+        tracing::warn!(
+            slot = self.name,
+            ?rest,
+            faults,
+            "resting after a platform fault"
+        );
+        let woken = Instant::now() + rest;
+        while !self.shutdown.is_cancelled() {
+            let left = woken.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return;
+            }
+            self.server.wait(&self.shutdown, left, None);
+        }
+    }
+
+    fn work_on(&mut self, order: &WorkOrder) -> UnitEnd {
         let (unit, work) = (order.lease.unit, &order.assignment);
         // All that is logged meanwhile, by whatever this calls on the slot's thread, says for whom.
         let _span = span(order).entered();
@@ -70,14 +118,14 @@ impl Slot {
             .unwrap_or_else(|panic| {
                 Err(anyhow::anyhow!("the evaluator failed: {}", words(&*panic)))
             });
-        match ended {
+        let end = match ended {
             Ok(Holding::Held) => {
                 tracing::info!(%unit, %work, "committed");
-                busy.end(UnitEnd::Committed, began.elapsed());
+                UnitEnd::Committed
             }
             Ok(Holding::Lost) => {
                 tracing::info!(%unit, %work, "no longer this slot's");
-                busy.end(UnitEnd::Lost, began.elapsed());
+                UnitEnd::Lost
             }
             Err(error) => {
                 let end = if self.server.met_full_disk(&error) {
@@ -86,9 +134,11 @@ impl Slot {
                     UnitEnd::PlatformFault
                 };
                 self.give_back(order, &error);
-                busy.end(end, began.elapsed());
+                end
             }
-        }
+        };
+        busy.end(end, began.elapsed());
+        end
     }
 
     /// From order to commit. An error is a fault of ours.
@@ -106,6 +156,8 @@ impl Slot {
             }
             Ok(holding)
         });
+        // Whatever it is being told is told by then: whose the unit is decides what an error is.
+        drop(keeper);
         match committed {
             // no fault: the unit was given back, or is another's
             Err(error) if progress.stopped() => {
@@ -232,4 +284,19 @@ fn words(panic: &(dyn std::any::Any + Send)) -> &str {
         .copied()
         .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
         .unwrap_or("no reason given")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rests_double_up_to_the_longest() {
+        let rests = Rests {
+            first: Duration::from_secs(2),
+            longest: Duration::from_secs(300),
+        };
+        let rests = [1, 2, 3, 8, 9, 32, 33, u32::MAX].map(|faults| rests.after(faults).as_secs());
+        assert_eq!(rests, [2, 4, 8, 256, 300, 300, 300, 300]);
+    }
 }

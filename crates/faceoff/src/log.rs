@@ -30,7 +30,7 @@ impl LogFormat {
     pub fn start(self) -> anyhow::Result<()> {
         let wanted = match env::var("RUST_LOG") {
             Ok(wanted) => self::wanted(&wanted)?,
-            Err(VarError::NotPresent) => Targets::new().with_default(LevelFilter::INFO),
+            Err(VarError::NotPresent) => self::wanted("info")?,
             Err(error) => return Err(error).context("RUST_LOG"),
         };
         let lines = tracing_subscriber::fmt::layer()
@@ -50,9 +50,24 @@ impl LogFormat {
     }
 }
 
+/// The client of NATS tells of each try to connect, and why it fails; server and worker say so once for each reason.
+const TALKATIVE: &str = "async_nats";
+
 fn wanted(list: &str) -> anyhow::Result<Targets> {
-    list.parse()
-        .with_context(|| format!("RUST_LOG={list:?}: expected for example info,sqlx::query=debug"))
+    let wanted: Targets = list.parse().with_context(|| {
+        format!("RUST_LOG={list:?}: expected for example info,sqlx::query=debug")
+    })?;
+    let is_named = wanted
+        .iter()
+        .any(|(target, _)| target.starts_with(TALKATIVE));
+    let asks_for_all = wanted
+        .default_level()
+        .is_some_and(|level| level > LevelFilter::INFO);
+    Ok(if is_named || asks_for_all {
+        wanted
+    } else {
+        wanted.with_target(TALKATIVE, LevelFilter::OFF)
+    })
 }
 
 #[cfg(test)]
@@ -68,6 +83,22 @@ mod tests {
         assert!(enabled("sqlx::query", LevelFilter::DEBUG));
         assert!(enabled("faceoff_worker::slot", LevelFilter::INFO));
         assert!(!enabled("faceoff_worker::slot", LevelFilter::DEBUG));
+    }
+
+    #[test]
+    fn the_client_of_nats_is_heard_when_it_is_asked_for() {
+        for (list, heard) in [
+            ("info", false),
+            ("warn,sqlx=debug", false),
+            ("info,async_nats=warn", true),
+            ("info,async_nats::connector=warn", true),
+            ("debug", true),
+        ] {
+            let wanted = super::wanted(list).unwrap();
+            let is_heard = wanted.would_enable("async_nats::connector", &tracing::Level::ERROR);
+            assert_eq!(is_heard, heard, "{list}");
+            assert!(wanted.would_enable("faceoff_worker::slot", &tracing::Level::WARN));
+        }
     }
 
     #[test]

@@ -1,85 +1,36 @@
 //! The server as a slot on another machine sees it: orders, questions and outcomes go by NATS, files by the server's own HTTP.
 
-use super::{
-    connection::ANSWER,
-    names::{self, Names, ORDERS_CONSUMER},
-    order_files::OrderFiles,
-};
+use super::{connection::ANSWER, link::Link, order_files::OrderFiles};
 use crate::{
     full_disk,
     server::{Claimed, GameShow, GivenBack, Holding, QueueMark, WorkServer},
 };
 use anyhow::Context as _;
-use async_nats::{
-    Client, HeaderMap,
-    jetstream::{self, consumer::PullConsumer},
-};
+use async_nats::jetstream::{self, consumer::PullConsumer};
 use faceoff_dataset::CLIPS_FILE;
-use faceoff_store::WorkerName;
 use faceoff_types::{BundleRef, GameId};
 use faceoff_wire::{
-    remote::{Answer, Ask, Introduction, Outcome, RemoteOrder, RemoteOutcome, RemoteShow, Shown},
+    remote::{Answer, Ask, Outcome, RemoteOrder, RemoteShow, Shown},
     work::{Lease, WorkReport},
 };
-use futures::StreamExt as _;
 use std::{
     path::Path,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
 };
-use tokio::runtime::Handle;
 use tokio_util::sync::CancellationToken;
 
-/// How long a request for an order stays open; it may die silently, and is made anew. So short, it is its own heartbeat. NATS's are not
-/// asked for: a `Batch` of async-nats (0.51) that has read one is not woken by what comes next, and the order is lost.
-const OPEN_FOR: Duration = Duration::from_secs(5);
 /// After a refusal or a failure, until it is asked again.
-const REST: Duration = Duration::from_secs(2);
+pub(super) const REST: Duration = Duration::from_secs(2);
 /// A worker without room leaves the queue to others for so long; what it gives back rests there, and it would make all of it rest.
 const FULL_DISK_REST: Duration = Duration::from_secs(10);
-/// So long a worker goes on without asking whether it may.
-const MAY_WORK_FOR: Duration = Duration::from_secs(5);
-/// More than the headers of an outcome have; they count as part of the message.
-const HEADERS_AT_MOST: usize = 256;
-/// Nobody waits longer to show a position.
-const SHOWS_WITHIN: Duration = Duration::from_millis(20);
-
-/// A worker's connection, shared by its slots.
-pub(super) struct Link {
-    pub(super) runtime: Handle,
-    pub(super) client: Client,
-    pub(super) names: Names,
-    pub(super) worker: WorkerName,
-    pub(super) own: Introduction,
-    pub(super) http: reqwest::Client,
-    pub(super) shutdown: CancellationToken,
-    /// Why it may not work, as it was told last: the log is told of a change.
-    pub(super) refused: Mutex<Option<String>>,
-    /// When a slot last had something to do.
-    pub(super) busy_at: Mutex<Instant>,
-    /// When the server last said that it may work.
-    pub(super) may_work_at: Mutex<Option<Instant>>,
-}
-
-impl Link {
-    /// For how long no slot has had anything to do.
-    pub(super) fn idle_for(&self) -> Duration {
-        let busy_at = self.busy_at.lock();
-        busy_at.unwrap_or_else(PoisonError::into_inner).elapsed()
-    }
-
-    fn is_busy(&self) {
-        let mut busy_at = self.busy_at.lock().unwrap_or_else(PoisonError::into_inner);
-        *busy_at = Instant::now();
-    }
-}
 
 /// The server of one slot.
 pub(super) struct FarServer {
-    link: Arc<Link>,
-    jetstream: jetstream::Context,
+    pub(super) link: Arc<Link>,
+    pub(super) jetstream: jetstream::Context,
     /// What orders are asked of, while it answers.
-    consumer: Mutex<Option<PullConsumer>>,
+    pub(super) consumer: Mutex<Option<PullConsumer>>,
     current: Mutex<Current>,
     /// When there was last no room for something.
     full_at: Mutex<Option<Instant>>,
@@ -93,6 +44,8 @@ struct Current {
     held_at: Option<Instant>,
     /// It is no longer this slot's.
     is_lost: bool,
+    /// What keeps it from being handed in.
+    trouble: Option<String>,
 }
 
 impl FarServer {
@@ -117,8 +70,13 @@ impl FarServer {
     }
 
     /// Is what it works at no longer its own? At the end of this worker it is given back.
-    fn has_ended(&self) -> bool {
+    pub(super) fn has_ended(&self) -> bool {
         self.current().is_lost || self.link.shutdown.is_cancelled()
+    }
+
+    /// What is played cannot be handed in, and why; the server is told when it is asked next.
+    pub(super) fn cannot_hand_in(&self, cause: &str) {
+        self.current().trouble = Some(cause.to_owned());
     }
 
     /// Those of what it works at.
@@ -127,186 +85,16 @@ impl FarServer {
     }
 
     async fn store(&self, name: &str, file: &Path) -> anyhow::Result<()> {
-        let http = &self.link.http;
-        let files = self.files();
-        files.store(http, name, file, || self.has_ended()).await
+        let (files, by) = (self.files(), &self.link.carrier);
+        files.store(by, name, file, || self.has_ended()).await
     }
 
-    async fn rest(&self) {
+    pub(super) async fn rest(&self) {
         tokio::select! {
             () = self.link.shutdown.cancelled() => {}
             () = tokio::time::sleep(REST) => {}
         }
     }
-
-    async fn ask(&self, ask: &Ask) -> anyhow::Result<Answer> {
-        let question = serde_json::to_vec(ask)?;
-        let subject = self.link.names.asks(self.link.worker.as_str());
-        let answer = self.link.client.request(subject, question.into());
-        let answer = answer.await.context("asking the server")?;
-        serde_json::from_slice(&answer.payload).context("the server's answer")
-    }
-
-    /// May this worker work? The log is told when that changes. What was answered a moment ago holds: an order says by itself of which
-    /// program it is, and whether it is this worker's the server says when it begins.
-    async fn may_work(&self) -> anyhow::Result<bool> {
-        let asked_at = || {
-            let at = self.link.may_work_at.lock();
-            at.unwrap_or_else(PoisonError::into_inner)
-        };
-        if asked_at().is_some_and(|at| at.elapsed() < MAY_WORK_FOR) {
-            return Ok(true);
-        }
-        let answer = self.ask(&Ask::MayWork(self.link.own.clone())).await?;
-        let reason = match answer {
-            Answer::Yes => None,
-            Answer::No { reason } => Some(reason),
-            Answer::Unknown => return Ok(false),
-        };
-        let mut refused = self
-            .link
-            .refused
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
-        if *refused != reason {
-            match &reason {
-                Some(reason) => tracing::error!(reason, "the server gives this worker no work"),
-                None => tracing::info!("the server gives this worker work"),
-            }
-            refused.clone_from(&reason);
-        }
-        *asked_at() = reason.is_none().then(Instant::now);
-        Ok(reason.is_none())
-    }
-
-    /// What orders are asked of. It is asked for anew after a failure: the stream may have been made anew.
-    async fn consumer(&self) -> anyhow::Result<PullConsumer> {
-        let known = || self.consumer.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(consumer) = known().clone() {
-            return Ok(consumer);
-        }
-        let stream = self.link.names.orders_stream();
-        let found = self
-            .jetstream
-            .get_consumer_from_stream(ORDERS_CONSUMER, stream);
-        let found: PullConsumer = found
-            .await
-            .map_err(|error| anyhow::anyhow!("asking for orders: {error}"))?;
-        *known() = Some(found.clone());
-        Ok(found)
-    }
-
-    /// Waits for an order.
-    async fn order(&self, slot: &str) -> anyhow::Result<Option<RemoteOrder>> {
-        let link = &self.link;
-        let consumer = self.consumer().await?;
-        let mut orders = consumer
-            .batch()
-            .max_messages(1)
-            .expires(OPEN_FOR)
-            .messages()
-            .await
-            .context("asking for an order")?;
-        let free = link.names.free(link.worker.as_str());
-        link.client.publish(free, Default::default()).await?;
-        let order = tokio::select! {
-            // What comes now is not begun, and taken back.
-            () = link.shutdown.cancelled() => return Ok(None),
-            order = orders.next() => order,
-        };
-        let Some(order) = order else {
-            return Ok(None);
-        };
-        let message = order.map_err(|error| anyhow::anyhow!("waiting for an order: {error}"))?;
-        // Each order is delivered once: whose it is decides the lease, and not NATS.
-        message
-            .ack()
-            .await
-            .map_err(|error| anyhow::anyhow!("acknowledging an order: {error}"))?;
-        let mut order: RemoteOrder =
-            serde_json::from_slice(&message.payload).context("an order")?;
-        if order.program != link.own.program {
-            // Nobody begins it, so it is given out again; the next answer says what is wrong.
-            *link
-                .may_work_at
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner) = None;
-            return Ok(None);
-        }
-        let begin = Ask::Begin {
-            lease: order.order.lease.clone(),
-            slot: slot.to_owned(),
-        };
-        Ok(match self.ask(&begin).await? {
-            Answer::Yes => {
-                order.order.lease.slot = names::slot(&link.worker, slot);
-                Some(order)
-            }
-            Answer::No { .. } | Answer::Unknown => None,
-        })
-    }
-
-    /// Sends what came of an order, until NATS has stored it or, of what was played, until the order is no longer this slot's. What is too
-    /// large stays so until somebody helps: after a lease, the server is to know.
-    async fn send(&self, lease: &Lease, outcome: Outcome) -> anyhow::Result<Holding> {
-        let was_played = matches!(outcome, Outcome::Done { .. });
-        let outcome = RemoteOutcome {
-            lease: lease.clone(),
-            grant: self.current().files.grant.clone(),
-            outcome,
-        };
-        let mut headers = HeaderMap::new();
-        headers.insert("Nats-Msg-Id", outcome.id());
-        let payload = serde_json::to_vec(&outcome)?;
-        let began = Instant::now();
-        let within = Duration::from_secs(lease.duration_s.into());
-        let subject = self.link.names.outcomes(self.link.worker.as_str());
-        // The log is told of a change, not of every try.
-        let mut told = String::new();
-        loop {
-            let sent = async {
-                // It may be another after NATS was started anew.
-                let largest = self.link.client.max_payload();
-                if payload.len() + HEADERS_AT_MOST > largest {
-                    return Err(anyhow::Error::from(TooLarge {
-                        bytes: payload.len(),
-                        largest,
-                    }));
-                }
-                let sent = self.jetstream.publish_with_headers(
-                    subject.clone(),
-                    headers.clone(),
-                    payload.clone().into(),
-                );
-                anyhow::Ok(sent.await?.await?)
-            };
-            let Err(error) = sent.await else {
-                return Ok(Holding::Held);
-            };
-            if was_played && self.has_ended() {
-                return Ok(Holding::Lost);
-            }
-            if error.is::<TooLarge>() && began.elapsed() >= within {
-                return Err(error).context("sending what came of the order");
-            }
-            let cause = format!("{error:#}");
-            if cause != told {
-                tracing::warn!(unit = %lease.unit, cause, "what came of the order is not stored by NATS yet; trying again");
-                told = cause;
-            }
-            tokio::time::sleep(REST).await;
-        }
-    }
-}
-
-/// NATS takes no message of this size.
-#[derive(Debug, thiserror::Error)]
-#[error(
-    "what came of the order has {bytes} bytes, and NATS takes messages of {largest} at most: raise its max_payload"
-)]
-pub(crate) struct TooLarge {
-    bytes: usize,
-    largest: usize,
 }
 
 impl WorkServer for FarServer {
@@ -356,6 +144,7 @@ impl WorkServer for FarServer {
                 }),
                 held_at: Some(Instant::now()),
                 is_lost: false,
+                trouble: None,
             };
             Ok(Claimed::Order(Box::new(order)))
         })
@@ -366,9 +155,9 @@ impl WorkServer for FarServer {
         let ask = Ask::Renew {
             lease: lease.clone(),
             episodes_done,
-            trouble: None,
+            trouble: self.current().trouble.clone(),
         };
-        let answer = self.link.runtime.block_on(self.ask(&ask));
+        let answer = self.link.runtime.block_on(self.link.ask(&ask));
         match answer {
             Ok(Answer::Yes) => {
                 self.current().held_at = Some(Instant::now());
@@ -416,21 +205,26 @@ impl WorkServer for FarServer {
             attempt,
             shown,
         };
-        let Ok(words) = serde_json::to_vec(&show) else {
-            return;
-        };
-        let subject = self.link.names.shows(self.link.worker.as_str());
-        self.link.runtime.block_on(async {
-            let published = self.link.client.publish(subject, words.into());
-            // What is not shown in time is not shown.
-            let _ = tokio::time::timeout(SHOWS_WITHIN, published).await;
-        });
+        self.link.runtime.block_on(self.link.show(&show));
     }
 
     fn commit(&self, lease: &Lease, report: WorkReport) -> anyhow::Result<Holding> {
-        let report = Box::new(report);
-        let sent = self.send(lease, Outcome::Done { report });
-        let holding = self.link.runtime.block_on(sent)?;
+        let (report, files) = (Box::new(report), self.files());
+        let handed_in = Ask::HandedIn {
+            lease: lease.clone(),
+            episodes_done: report.episodes(),
+        };
+        let holding = self.link.runtime.block_on(async {
+            let sent = self.send(lease, &files.grant, Outcome::Done { report });
+            let holding = sent.await?;
+            // From now on the server keeps the lease. If it does not hear of that, there is what is left of it.
+            if holding == Holding::Held
+                && let Err(error) = self.link.ask(&handed_in).await
+            {
+                tracing::debug!(%error, "the server was not told that an outcome waits for it");
+            }
+            anyhow::Ok(holding)
+        })?;
         self.link.is_busy();
         Ok(holding)
     }
@@ -447,8 +241,9 @@ impl WorkServer for FarServer {
                 reason: reason.to_owned(),
             },
         };
+        let files = self.files();
         self.link.runtime.block_on(async {
-            let sent = tokio::time::timeout(ANSWER, self.send(lease, outcome));
+            let sent = tokio::time::timeout(ANSWER, self.send(lease, &files.grant, outcome));
             sent.await.context("telling the server")?.map(drop)
         })
     }
@@ -471,8 +266,8 @@ impl WorkServer for FarServer {
     }
 
     fn fetch_bundle(&self, bundle: &BundleRef, archive: &Path) -> anyhow::Result<()> {
-        let (files, http) = (self.files(), &self.link.http);
-        let fetched = files.fetch_bundle(http, bundle, archive, || self.has_ended());
+        let (files, by) = (self.files(), &self.link.carrier);
+        let fetched = files.fetch_bundle(by, bundle, archive, || self.has_ended());
         self.link.runtime.block_on(fetched)
     }
 

@@ -1,21 +1,14 @@
 //! The files of an order, as a worker has them: by the server's own HTTP with the order's grant, or by links to a bucket.
 
+use super::transfer::{Carrier, good};
 use anyhow::Context as _;
 use faceoff_types::BundleRef;
 use faceoff_wire::remote::Objects;
 use futures::TryStreamExt as _;
-use reqwest::{Client, Method, RequestBuilder, Response, StatusCode, header};
-use std::{
-    path::Path,
-    time::{Duration, Instant},
-};
+use reqwest::{Client, Method, RequestBuilder, header};
+use std::path::Path;
 use tokio::io::AsyncWriteExt as _;
 use tokio_util::io::ReaderStream;
-
-/// How long a file is asked for again and again: the server may be starting anew.
-const WITHIN: Duration = Duration::from_secs(60);
-/// From one try to the next.
-const REST: Duration = Duration::from_secs(2);
 
 /// Where they are, and what opens them.
 #[derive(Debug, Default)]
@@ -39,7 +32,7 @@ impl OrderFiles {
     /// Fetches a bundle's archive, again while whoever has it is away and the order has not `ended`.
     pub(super) async fn fetch_bundle(
         &self,
-        http: &Client,
+        by: &Carrier,
         bundle: &BundleRef,
         archive: &Path,
         ended: impl Fn() -> bool,
@@ -48,25 +41,28 @@ impl OrderFiles {
         let links = self.objects.as_ref().map(|objects| &objects.bundles);
         let link = links.map(|links| links.get(blake3));
         let from = self.place(Method::GET, &format!("bundles/{blake3}"), link)?;
-        let fetch = async |request: RequestBuilder| {
-            let answer = good(request.send().await?).await?;
-            let mut file = tokio::fs::File::create(archive).await?;
-            let mut bytes = answer.bytes_stream();
-            while let Some(piece) = bytes.try_next().await? {
-                file.write_all(&piece).await?;
-            }
-            file.flush().await?;
-            Ok(())
-        };
-        self.again(http, &from, fetch, ended)
-            .await
-            .with_context(|| format!("fetching the bundle {}", shown(&from.url)))
+        by.carry(
+            async |http, moved| {
+                let answer = good(self.request(http, &from).send().await?).await?;
+                let mut file = tokio::fs::File::create(archive).await?;
+                let mut bytes = answer.bytes_stream();
+                while let Some(piece) = bytes.try_next().await? {
+                    moved.add(piece.len());
+                    file.write_all(&piece).await?;
+                }
+                file.flush().await?;
+                Ok(())
+            },
+            ended,
+        )
+        .await
+        .with_context(|| format!("fetching the bundle {}", shown(&from.url)))
     }
 
     /// Stores a file under this name, likewise.
     pub(super) async fn store(
         &self,
-        http: &Client,
+        by: &Carrier,
         name: &str,
         file: &Path,
         ended: impl Fn() -> bool,
@@ -74,20 +70,27 @@ impl OrderFiles {
         let links = self.objects.as_ref().map(|objects| &objects.files);
         let link = links.map(|links| links.get(name));
         let to = self.place(Method::PUT, &format!("files/{name}"), link)?;
-        let send = async |request: RequestBuilder| {
-            let body = tokio::fs::File::open(file).await?;
-            let bytes = body.metadata().await?.len();
-            let answer = request
-                .header(header::CONTENT_LENGTH, bytes)
-                .body(reqwest::Body::wrap_stream(ReaderStream::new(body)))
-                .send()
-                .await?;
-            let _ = good(answer).await?;
-            Ok(())
-        };
-        self.again(http, &to, send, ended)
-            .await
-            .with_context(|| format!("storing a file at {}", shown(&to.url)))
+        by.carry(
+            async |http, moved| {
+                let body = tokio::fs::File::open(file).await?;
+                let bytes = body.metadata().await?.len();
+                moved.of(bytes);
+                let moves = moved.clone();
+                let pieces =
+                    ReaderStream::new(body).inspect_ok(move |piece| moves.add(piece.len()));
+                let answer = self
+                    .request(http, &to)
+                    .header(header::CONTENT_LENGTH, bytes)
+                    .body(reqwest::Body::wrap_stream(pieces))
+                    .send()
+                    .await?;
+                let _ = good(answer).await?;
+                Ok(())
+            },
+            ended,
+        )
+        .await
+        .with_context(|| format!("storing a file at {}", shown(&to.url)))
     }
 
     /// A link's, if files go by links.
@@ -109,70 +112,16 @@ impl OrderFiles {
         })
     }
 
-    async fn again(
-        &self,
-        http: &Client,
-        place: &Place,
-        mut once: impl AsyncFnMut(RequestBuilder) -> anyhow::Result<()>,
-        ended: impl Fn() -> bool,
-    ) -> anyhow::Result<()> {
-        let began = Instant::now();
-        loop {
-            let mut request = http.request(place.method.clone(), &place.url);
-            if place.granted {
-                request = request.header(header::AUTHORIZATION, format!("Grant {}", self.grant));
-            }
-            let Err(error) = once(request).await else {
-                return Ok(());
-            };
-            if !is_away(&error) || began.elapsed() >= WITHIN || ended() {
-                return Err(error);
-            }
-            tokio::time::sleep(REST).await;
+    fn request(&self, http: &Client, place: &Place) -> RequestBuilder {
+        let request = http.request(place.method.clone(), &place.url);
+        if place.granted {
+            return request.header(header::AUTHORIZATION, format!("Grant {}", self.grant));
         }
+        request
     }
 }
 
 /// What of an address is told: what follows opens it.
 fn shown(url: &str) -> &str {
     url.split('?').next().unwrap_or_default()
-}
-
-/// The server, or the proxy before it, has no time now.
-#[derive(Debug, thiserror::Error)]
-#[error("the server answered {0}")]
-struct Busy(StatusCode);
-
-/// Is it worth asking again?
-fn is_away(error: &anyhow::Error) -> bool {
-    error.chain().any(|cause| {
-        cause.is::<Busy>()
-            || cause.downcast_ref::<reqwest::Error>().is_some_and(|error| {
-                let before = error.is_connect() || error.is_timeout() || error.is_request();
-                // In the middle of what it answers.
-                before || error.is_body() || error.is_decode()
-            })
-    })
-}
-
-/// An answer that is no refusal.
-async fn good(answer: Response) -> anyhow::Result<Response> {
-    let status = answer.status();
-    if status.is_success() {
-        return Ok(answer);
-    }
-    let busy = [
-        StatusCode::TOO_MANY_REQUESTS,
-        StatusCode::BAD_GATEWAY,
-        StatusCode::SERVICE_UNAVAILABLE,
-        StatusCode::GATEWAY_TIMEOUT,
-    ];
-    if busy.contains(&status) {
-        return Err(Busy(status).into());
-    }
-    let told = answer.text().await.unwrap_or_default();
-    if status == StatusCode::INSUFFICIENT_STORAGE {
-        return Err(std::io::Error::from(std::io::ErrorKind::StorageFull).into());
-    }
-    anyhow::bail!("the server answered {status}: {told}")
 }

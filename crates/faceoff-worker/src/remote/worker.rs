@@ -2,8 +2,10 @@
 
 use super::{
     connection::{ANSWER, NatsConfig},
-    far_server::{FarServer, Link},
+    far_server::FarServer,
+    link::Link,
     names::{self, Names},
+    transfer::{Carrier, Patience},
 };
 use crate::{
     evaluator::Runner,
@@ -29,7 +31,7 @@ pub struct RemoteWorker {
     pub name: String,
     /// What it is.
     pub own: Introduction,
-    /// Fetches and stores files.
+    /// Fetches and stores files. How long nothing may move is watched here: it has no such limit of its own.
     pub http: reqwest::Client,
     /// It ends once no slot has had anything to do for so long; none: it goes on.
     pub ends_after: Option<Duration>,
@@ -63,9 +65,13 @@ pub async fn work(config: RemoteWorker, shutdown: CancellationToken) -> anyhow::
         names,
         worker: name,
         own: config.own,
-        http: config.http,
+        carrier: Carrier {
+            http: config.http,
+            patience: Patience::default(),
+        },
         shutdown: shutdown.clone(),
         refused: Mutex::default(),
+        unread: Mutex::default(),
         busy_at: Mutex::new(Instant::now()),
         may_work_at: Mutex::default(),
     });

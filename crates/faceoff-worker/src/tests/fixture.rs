@@ -7,6 +7,7 @@ use crate::{
     local::LocalServer,
     server::WorkServer,
     service::{Intervals, SlotsConfig, WorkerConfig, run_with},
+    slot::Rests,
     slot_threads::SlotThreads,
 };
 use faceoff_metrics::Metrics;
@@ -272,6 +273,8 @@ pub(super) struct Server {
     /// About the real time, by which files are dated.
     begun: Timestamp,
     pub(super) ahead_s: Arc<AtomicI64>,
+    /// Of its slots.
+    pub(super) intervals: Intervals,
 }
 
 /// Renewed after a third of it by the real time: never while a test looks.
@@ -286,6 +289,15 @@ impl Server {
             folder,
             begun: Timestamp::now(),
             ahead_s: Arc::default(),
+            intervals: Intervals {
+                idle_poll: Duration::from_millis(20),
+                tidy: Duration::from_millis(20),
+                rests: Rests {
+                    first: Duration::ZERO,
+                    longest: Duration::ZERO,
+                },
+                ..Intervals::default()
+            },
         }
     }
 
@@ -405,11 +417,6 @@ impl Server {
         between: impl FnOnce(LocalServer) -> Arc<dyn WorkServer>,
     ) -> Running {
         let config = self.config(slots);
-        let intervals = Intervals {
-            idle_poll: Duration::from_millis(20),
-            tidy: Duration::from_millis(20),
-            ..Intervals::default()
-        };
         let server = config.local_server(self.store.clone(), self.clock());
         let shutdown = CancellationToken::new();
         let task = tokio::spawn(run_with(
@@ -417,7 +424,7 @@ impl Server {
             between(server),
             Arc::clone(evaluator) as Arc<dyn Evaluator>,
             config,
-            intervals,
+            self.intervals,
             shutdown.clone(),
         ));
         Running { shutdown, task }

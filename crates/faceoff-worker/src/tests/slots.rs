@@ -1,14 +1,18 @@
 //! Units from claim to commit, and faults of ours.
 
 use super::fixture::*;
-use crate::tidying;
+use crate::{slot::Rests, tidying};
 use faceoff_replay::{Key, Pack};
 use faceoff_runner::PlatformFault;
 use faceoff_store::*;
 use faceoff_types::*;
-use std::sync::{
-    Arc,
-    atomic::{AtomicU32, Ordering},
+use std::{
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicU32, Ordering},
+    },
+    thread,
+    time::Duration,
 };
 use tokio_util::sync::CancellationToken;
 
@@ -111,6 +115,41 @@ async fn a_panic_and_a_fault_of_ours_cost_nothing_but_time() {
     ));
     assert_eq!(evaluator.played.lock().unwrap().len(), 6);
     running.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_slot_that_failed_rests_while_another_plays_and_ends_when_it_is_asked_to() {
+    let hour = Duration::from_secs(3600);
+    let mut server = Server::new().await;
+    server.intervals.shutdown_grace = hour;
+    server.intervals.rests = Rests {
+        first: hour,
+        longest: hour,
+    };
+    let id = server.evaluation().await;
+    let (began, ahead_s) = (Arc::<Mutex<Vec<_>>>::default(), Arc::clone(&server.ahead_s));
+    let slots = Arc::clone(&began);
+    let evaluator = Scripted::new(move |_, _| {
+        // The rest of the unit passes; that of the slot does not.
+        ahead_s.fetch_add(10, Ordering::SeqCst);
+        let mut slots = slots.lock().unwrap();
+        slots.push(thread::current().name().map(str::to_owned));
+        match slots.len() {
+            1 => Err(PlatformFault::Recording("a broken disk".into())),
+            _ => Ok(()),
+        }
+    });
+    let running = server.work(2, &evaluator);
+    assert!(matches!(
+        server.over(id).await,
+        EvaluationState::Finished { .. }
+    ));
+    // For longer than the test may take, unless the rest ends with the slot.
+    running.stop().await;
+    let slots = began.lock().unwrap();
+    let (failed, played) = slots.split_first().unwrap();
+    assert_eq!(played.len(), 6);
+    assert!(!played.contains(failed), "{slots:?}");
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]

@@ -1,7 +1,7 @@
 //! What other machines are given.
 
 use crate::{
-    commands::{files_client::files_client, introduction::introduction},
+    commands::{files_client::bucket_client, introduction::introduction},
     config::Config,
 };
 use faceoff_http::LinkKey;
@@ -26,7 +26,7 @@ pub(super) fn config(
     let bucket = match &config.nats.bucket {
         Some(url) => Some(BucketConfig {
             url: url.clone(),
-            http: files_client(config.nats.ca_file.as_deref())?,
+            http: bucket_client(config.nats.ca_file.as_deref())?,
             folder: config.server.data_dir.join("from-bucket"),
         }),
         None => None,
