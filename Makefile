@@ -14,7 +14,7 @@ CARGO      ?= cargo
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
 
-.PHONY: demo test web wheel pictures test-api test-python test-learning fuzz busy load elsewhere crowd soak steady frames test-cgroup2 test-box lint format fidelity setup setup-test agents dist clean-demo help
+.PHONY: demo test web wheel pictures test-api test-python test-learning fuzz busy load elsewhere crowd objects soak steady frames test-cgroup2 test-box lint format fidelity setup setup-test agents dist clean-demo help
 
 help:
 	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
@@ -33,6 +33,7 @@ help:
 	@echo "make load   how much looking on a server bears, and that agents notice nothing of it"
 	@echo "make elsewhere   what it costs to play on another machine"
 	@echo "make crowd   what one server carries when many machines work for it: SHARDS=$(SHARDS) WORKERS=$(WORKERS) SLEEP_S=$(SLEEP_S)"
+	@echo "make objects   what files by JetStream's object store would take, against HTTP, on a link of 200 ms"
 	@echo "make soak   upload, play, read, fill the disk and kill the server, all at once: MINUTES=$(MINUTES)"
 	@echo "make steady run the tests ten times, and three times on a busy machine"
 	@echo "make frames   how much CPU time a frame of a replay takes its script"
@@ -148,6 +149,11 @@ elsewhere: setup-test
 crowd: setup-test
 	$(CARGO) build --release --locked --package faceoff --package faceoff-tests --bin faceoff --example crowd
 	SHARDS=$(SHARDS) WORKERS=$(WORKERS) SLEEP_S=$(SLEEP_S) RECORDING_BYTES=$(RECORDING_BYTES) $(RELEASE)/examples/crowd
+
+# The same files by JetStream's object store and by HTTP, without a delay and with 200 ms there and back; some five minutes.
+objects: setup-test
+	$(CARGO) build --release --locked --package faceoff-tests --example objects
+	$(RELEASE)/examples/objects
 
 # All disturbances at once; SOAK_SEED=N for other moments than last time.
 soak: setup-test
