@@ -62,7 +62,7 @@ quietly env FACEOFF_TOKEN="$team_token" "$program" submit "$work/ours.tar"
 evaluation=/api/v1/evaluations/$("$program" admin --json start-day |
     python3 -c 'import json, sys; [made] = json.load(sys.stdin)["created"]; print(made["id"])')
 awaited 300 'a["state"] not in ("queued", "running", "finalising")' "$evaluation"
-is_so 'a["state"] == "finished" and a["result"]["score"] > 0' "$evaluation" || {
+is_so 'a["state"] == "finished" and [t["episodes"] for t in a["result"]["tasks"].values()] == [4] * 3 and a["result"]["score"] >= 0' "$evaluation" || {
     cat "$work/answer" >&2
     fail "the evaluation of an image is not finished with a score"
 }
