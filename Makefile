@@ -29,7 +29,7 @@ help:
 	@echo "make test-learning   learn from nothing, and try the libraries that need torch (8 GB)"
 	@echo "make test-cgroup2   the sandbox's limits on cgroup v2, in a virtual machine that has nothing else"
 	@echo "make test-box   make the images' file systems without an engine, and start what is in them"
-	@echo "make test-engine   build the images with Docker, and have a day played in containers: WHOLE=1: the program, too"
+	@echo "make test-engine   build the images with Docker, and have a day played in containers; WHOLE=1 compiles there, too"
 	@echo "make fuzz   feed the readers what is nearly valid: MINUTES=$(MINUTES)"
 	@echo "make busy   play beside hogs, floods and bursts of processes"
 	@echo "make load   how much looking on a server bears, and that agents notice nothing of it"
