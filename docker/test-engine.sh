@@ -19,6 +19,9 @@ fail() {
     exit 1
 }
 [ "$(id -u)" -eq 0 ] || fail "an engine is started by root"
+# Its end takes a while, in which the engine's data go.
+exec 9>"$work/lock"
+flock --nonblock 9 || fail "another one is at work in $work"
 # shellcheck source=docker/engine/start.sh
 . "$folder/engine/start.sh"
 trap engine_stop EXIT

@@ -22,7 +22,7 @@ engine_start() {
     # shellcheck disable=SC2086 # words on purpose
     setsid dockerd --config-file "$run/daemon.json" --host "unix://$run/sock" --pidfile "$run/pid" --exec-root "$run/exec" \
         --data-root "$work/data" --containerd-namespace "${run##*/}" --containerd-plugins-namespace "${run##*/}-plugins" \
-        --exec-opt native.cgroupdriver=cgroupfs --bridge none --iptables=false --ip6tables=false $runtime >"$work/dockerd.log" 2>&1 &
+        --exec-opt native.cgroupdriver=cgroupfs --bridge none --iptables=false --ip6tables=false $runtime >"$work/dockerd.log" 2>&1 9>&- &
     engine=$!
     export DOCKER_HOST="unix://$run/sock"
     # The builder that the engine has by itself; the newer one is a plugin of the client.
