@@ -9,12 +9,13 @@ MINUTES  ?= 60
 SHARDS   ?= 10000
 WORKERS  ?= 200
 SLEEP_S  ?= 10
+WHOLE    ?=
 
 CARGO      ?= cargo
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
 
-.PHONY: demo test web wheel pictures test-api test-python test-learning fuzz busy load elsewhere crowd objects soak steady frames test-cgroup2 test-box lint format fidelity setup setup-test agents dist clean-demo help
+.PHONY: demo test web wheel pictures test-api test-python test-learning fuzz busy load elsewhere crowd objects soak steady frames test-cgroup2 test-box test-engine lint format fidelity setup setup-test agents dist clean-demo help
 
 help:
 	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
@@ -28,6 +29,7 @@ help:
 	@echo "make test-learning   learn from nothing, and try the libraries that need torch (8 GB)"
 	@echo "make test-cgroup2   the sandbox's limits on cgroup v2, in a virtual machine that has nothing else"
 	@echo "make test-box   make the images' file systems without an engine, and start what is in them"
+	@echo "make test-engine   build the images with Docker, and have a day played in containers; WHOLE=1 compiles there, too"
 	@echo "make fuzz   feed the readers what is nearly valid: MINUTES=$(MINUTES)"
 	@echo "make busy   play beside hogs, floods and bursts of processes"
 	@echo "make load   how much looking on a server bears, and that agents notice nothing of it"
@@ -123,6 +125,12 @@ test-box: setup
 	@docker/setup.sh box
 	$(CARGO) build --locked --workspace --bins --tests
 	TARGET_DIR=$(TARGET_DIR) docker/test-box.sh
+
+# The same by a real engine, a Docker of its own. As root. WHOLE=1: the program is compiled in an image, too, which takes long.
+test-engine: setup
+	@docker/setup.sh engine
+	$(CARGO) build --locked --workspace --bins --tests
+	WHOLE=$(WHOLE) TARGET_DIR=$(TARGET_DIR) docker/test-engine.sh
 
 # The fuzz targets, all at once for so many minutes; FUZZ_SEED=N for other inputs than last time.
 fuzz: setup-test

@@ -24,20 +24,24 @@ ordinary() {
 }
 
 top=/sys/fs/cgroup
+privileged="start it privileged, with a cgroup namespace of its own (docker run --privileged --cgroupns=private)"
 if [ ! -e $top/cgroup.controllers ]; then
     if [ -d $top/memory ] && [ -w $top/memory ]; then
         echo "entrypoint: control groups are of version 1, of which root hands none out: the command stays root" >&2
         exec "$@"
     fi
-    missing "there is no control group of version 2 at $top"
+    if [ -d $top/memory ]; then
+        missing "the container's control groups, which are of version 1, are read-only: $privileged"
+    else
+        missing "there is no control group at $top"
+    fi
     ordinary "$@"
 fi
 own=$top$(sed -n 's/^0:://p' /proc/self/cgroup)
 own=${own%/}
 own=${own%/faceoff-service}
 if [ ! -d "$own" ] || [ ! -w "$own/cgroup.procs" ] || ! mkdir -p "$own/faceoff-service" 2>/dev/null; then
-    missing "the container's control group is read-only: start it privileged, with a cgroup namespace of its own" \
-        "(docker run --privileged --cgroupns=private)"
+    missing "the container's control group is read-only: $privileged"
     ordinary "$@"
 fi
 for controller in memory pids cpu; do

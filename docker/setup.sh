@@ -8,6 +8,7 @@
 #   docker/setup.sh steady   also what keeps the machine busy while the tests run again and again
 #   docker/setup.sh cgroup2  also a virtual machine, for the tests of the other version of control groups
 #   docker/setup.sh box      also what the images are made of, where no engine makes them
+#   docker/setup.sh engine   also Docker, what its images are made of, and who else saves images
 #
 # As root it installs them with apt-get; otherwise it prints the command and fails.
 set -eu
@@ -61,6 +62,16 @@ if [ "$purpose" = box ]; then
     need curl curl
     need ip iproute2
     python3 -c 'import ensurepip' 2>/dev/null || missing="$missing python3-venv"
+fi
+if [ "$purpose" = engine ]; then
+    need dockerd docker.io
+    need docker docker.io
+    need mmdebstrap mmdebstrap
+    need capsh libcap2-bin
+    need curl curl
+    need skopeo skopeo
+    need podman podman
+    python3 -c 'import yaml' 2>/dev/null || missing="$missing python3-yaml"
 fi
 if [ "$purpose" = steady ]; then
     need stress-ng stress-ng

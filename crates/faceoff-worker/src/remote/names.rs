@@ -50,8 +50,12 @@ impl Names {
         format!("_INBOX.{}.{who}", self.server)
     }
 
-    /// Is it a subject on which this worker gets answers, and nobody else?
+    /// Is it a subject on which this worker gets answers, and nobody else? Where workers have an account of their own, NATS has replaced it by one
+    /// that it alone may name.
     pub(super) fn is_inbox_of(&self, worker: &WorkerName, subject: &str) -> bool {
+        if subject.starts_with(BETWEEN_ACCOUNTS) {
+            return true;
+        }
         let rest = subject.strip_prefix(&self.inbox(worker.as_str()));
         rest.is_some_and(|rest| rest.starts_with('.') && !rest.contains(['*', '>']))
     }
@@ -67,6 +71,8 @@ impl Names {
     }
 }
 
+/// How subjects begin on which NATS passes answers on from one account to another; it refuses whoever says that they are to be answered there.
+const BETWEEN_ACCOUNTS: &str = "_R_.";
 /// What the server is called where workers have names.
 pub(super) const SERVER: &str = "server";
 /// What workers have in common when they take orders.
@@ -109,6 +115,7 @@ mod tests {
         assert_eq!(worker_of(&names.asks(ALL)), None);
         let rack: WorkerName = "rack-1".parse().unwrap();
         assert!(names.is_inbox_of(&rack, "_INBOX.faceoff.rack-1.abc.1"));
+        assert!(names.is_inbox_of(&rack, "_R_.abc.xyz"));
         for other in [
             "_INBOX.faceoff.rack-10.abc",
             "_INBOX.faceoff.rack-1",

@@ -1,0 +1,68 @@
+#!/usr/bin/env python3
+"""A service of docker/compose.yaml as arguments of `docker run`, one a line, in place of Compose's own program.
+
+usage: service.py SERVICE CONFIGS [MORE]      (CONFIGS: a folder for the files that Compose would mount; MORE: what to append to them)
+
+A key that this script does not know is refused, so that nothing of the file is left out unseen. Left out on purpose are the way in from
+outside, for whoever tries the service is inside, and what is to be started before.
+"""
+
+import os
+import pathlib
+import re
+import sys
+
+import yaml
+
+compose = yaml.safe_load((pathlib.Path(__file__).parent.parent / "compose.yaml").read_text())
+name, configs, *more = sys.argv[1], *map(pathlib.Path, sys.argv[2:])
+service = compose["services"][name]
+
+
+def volume(value):
+    if value.split(":")[0] not in compose["volumes"]:
+        sys.exit(f"error: {name} has the volume {value}, which is none of the file's")
+    return ["--volume", value]
+
+
+def seconds(value):
+    return str(int(value.removesuffix("s")))
+
+
+def config(value):
+    return ["--volume", f"{configs / value['source']}:{value['target']}:ro"]
+
+
+def variables(value):
+    """With the environment's values, as Compose has them."""
+    return re.sub(r"\$\{(\w+):-([^}]*)\}", lambda found: os.environ.get(found[1]) or found[2], value)
+
+
+def network(value):
+    """The one without a way out."""
+    return ["--network", next(one for one in value if compose["networks"][one].get("internal")), "--network-alias", name]
+
+
+known = {
+    "privileged": lambda value: ["--privileged"] if value else [],
+    "cgroup": lambda value: ["--cgroupns", value],
+    "restart": lambda value: ["--restart", value],
+    "stop_grace_period": lambda value: ["--stop-timeout", seconds(value)],
+    "shm_size": lambda value: ["--shm-size", value],
+    "environment": lambda value: [word for key in value for word in ("--env", f"{key}={value[key]}")],
+    "configs": lambda value: [word for one in value for word in config(one)],
+    "volumes": lambda value: [word for one in value for word in volume(one)],
+    "hostname": lambda value: ["--hostname", value],
+    "networks": network,
+    "cpuset": lambda value: ["--cpuset-cpus", variables(value)],
+}
+LEFT_OUT = {"ports", "depends_on"}
+IMAGE = {"build", "image", "command"}
+
+options = [word for key in service if key not in LEFT_OUT | IMAGE for word in known[key](service[key])]
+configs.mkdir(exist_ok=True)
+for one in service.get("configs", []):
+    texts = [compose["configs"][one["source"]]["content"], *(file.read_text() for file in more)]
+    (configs / one["source"]).write_text("".join(texts))
+image = {"server": "faceoff", "worker": "faceoff-worker"}[service["build"]["target"]] if "build" in service else service["image"]
+print("\n".join(["--name", name, *options, image, *service.get("command", [])]))
