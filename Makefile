@@ -11,11 +11,14 @@ WORKERS  ?= 200
 SLEEP_S  ?= 10
 WHOLE    ?=
 
+# End-to-end tests wait for most of their time.
+TEST_THREADS ?= $(shell echo $$(( 2 * $$(nproc) )))
+
 CARGO      ?= cargo
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
 
-.PHONY: demo test web wheel pictures test-api test-python test-learning fuzz busy load elsewhere crowd objects soak steady frames test-cgroup2 test-box test-engine lint format fidelity setup setup-test agents dist clean-demo help
+.PHONY: demo test tests-of-python tests-of-api tests-of-agents web wheel pictures test-api test-python test-learning fuzz busy load elsewhere crowd objects soak steady frames test-cgroup2 test-box test-engine lint format fidelity setup setup-test agents dist clean-demo help
 
 help:
 	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
@@ -79,16 +82,23 @@ demo: setup
 test: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
 	docker/runtime.sh $(TARGET_DIR)/runtimes/python3-ml
-	TARGET_DIR=$(TARGET_DIR) tests/s3/setup.sh
-	python3 agents/test_agents.py
-	web/client/build.sh test
-	TARGET_DIR=$(TARGET_DIR) tests/api/test.sh
-	TARGET_DIR=$(TARGET_DIR) crates/faceoff-py/test.sh test
+	@# Side by side, since most of their time each waits: for a registry, for one program, for one of two CPUs.
+	$(MAKE) --no-print-directory --output-sync=target --jobs=3 tests-of-python tests-of-api tests-of-agents
 	if $(CARGO) nextest --version >/dev/null 2>&1; \
-	    then $(CARGO) nextest run --locked --workspace --no-fail-fast; \
+	    then $(CARGO) nextest run --locked --workspace --no-fail-fast --test-threads $(TEST_THREADS); \
 	    else $(CARGO) test --locked --workspace --no-fail-fast -- --test-threads 2; fi
 	@# The golden hashes again, as the released program computes them: the same bits.
 	$(CARGO) test --release --locked --package faceoff-sim --test it golden
+
+# Parts of `make test`, which has built what they need.
+tests-of-python:
+	TARGET_DIR=$(TARGET_DIR) crates/faceoff-py/test.sh test
+tests-of-api:
+	TARGET_DIR=$(TARGET_DIR) tests/api/test.sh
+tests-of-agents:
+	python3 agents/test_agents.py
+	web/client/build.sh test
+	TARGET_DIR=$(TARGET_DIR) tests/s3/setup.sh
 
 # The script of the replay pages, from its sources; what it makes is committed.
 web:

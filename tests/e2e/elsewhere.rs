@@ -2,7 +2,7 @@
 
 use crate::{
     Team,
-    kills::{Archive, assert_same, copy_folder, outcome},
+    kills::{Archive, assert_same, copy_folder, draw, outcome},
     path_of, start_day,
 };
 use async_nats::{ConnectOptions, Event, Message};
@@ -214,38 +214,76 @@ fn a_worker_that_has_waited_begins_the_first_order_that_it_is_sent() {
     assert_eq!(begun, orders);
 }
 
+/// What ends, without a word.
+#[derive(Debug, Clone, Copy)]
+enum Ends {
+    Worker,
+    Server,
+    Nats,
+    Link,
+}
+
 #[test]
 fn whoever_is_killed_or_cut_off_nothing_is_lost_and_nothing_done_twice() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let contest = Contest::prepare(scratch.path());
     let mut nats = Nats::start(&scratch.path().join("nats"));
+    let nats_address = nats.address();
     let (files, link) = (Relay::start(), Relay::start());
-    link.lead_to(nats.address());
+    link.lead_to(nats_address);
     let config = giving(&nats, files.address());
-    let server = Server::start(&contest.data, &config);
+    let mut server = Server::start(&contest.data, &config);
     files.lead_to(server.address().into());
-    let killed = Worker::start(scratch.path(), "killed", &taking(nats.address(), 1));
+    let killed = || Worker::start(scratch.path(), "killed", &taking(nats_address, 1));
+    let mut mortal = killed();
     let stays = Worker::start(scratch.path(), "stays", &taking(link.address(), 1));
     resume(&server);
 
-    // A worker in the middle of something.
-    killed.wait_for_log("begun", 3);
-    drop(killed);
-    // The server, while others play; it comes back at another place, to which the same address leads.
-    stays.wait_for_log("begun", 4);
-    server.kill();
-    let server = Server::start(&contest.data, &config);
-    files.lead_to(server.address().into());
-    // NATS itself.
-    stays.wait_for_log("committed", 6);
-    nats.kill_and_start();
-    // The worker's link, for longer than nothing, and then a slow one.
-    stays.wait_for_log("committed", 8);
-    link.cut();
-    server.wait_for_log("taken in", 1);
-    link.lead_to(nats.address());
-    link.delay(Duration::from_millis(200));
-
+    // Who is killed when is drawn: after how many shards of the one that stays, and how far into the next.
+    let seed = std::env::var("KILL_SEED")
+        .ok()
+        .and_then(|seed| seed.parse().ok());
+    let seed: u64 = seed.unwrap_or_else(|| {
+        let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+        now.expect("the clock is right").as_secs()
+    });
+    println!("KILL_SEED={seed}");
+    let mut draws = (seed << 20..).map(draw);
+    let mut drawn = || draws.next().unwrap_or_default();
+    let mut ends = [
+        Ends::Worker,
+        Ends::Worker,
+        Ends::Server,
+        Ends::Server,
+        Ends::Nats,
+        Ends::Link,
+    ]
+    .map(|end| (drawn(), end));
+    ends.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+    for (shards, (_, end)) in (1..).zip(ends) {
+        stays.wait_for_log("committed", shards);
+        std::thread::sleep(Duration::from_secs_f64(drawn()));
+        match end {
+            Ends::Worker => {
+                drop(mortal);
+                mortal = killed();
+            }
+            // It comes back at another place, to which the same address leads.
+            Ends::Server => {
+                server.kill();
+                server = Server::start(&contest.data, &config);
+                files.lead_to(server.address().into());
+            }
+            Ends::Nats => nats.kill_and_start(),
+            // For longer than nothing, and then it is a slow one.
+            Ends::Link => {
+                link.cut();
+                std::thread::sleep(Duration::from_secs_f64(3.0 * drawn()));
+                link.lead_to(nats_address);
+                link.delay(Duration::from_millis(200));
+            }
+        }
+    }
     contest.ends_alike(&server);
 }
 
@@ -316,10 +354,9 @@ fn a_worker_that_is_not_like_the_server_is_told_so_and_gets_nothing() {
             "{told}"
         );
     }
-    // Another server on the same streams says so, and disturbs nobody.
+    // Another server on the same streams says so, and answers nobody while the first works.
     let other = Server::start(&scratch.path().join("other"), &config);
     other.wait_for_log("is another server's", 1);
-    drop(other);
 
     // Strangers get no files.
     for header in [None, Some("Grant 00.00")] {
@@ -347,6 +384,17 @@ fn a_worker_that_is_not_like_the_server_is_told_so_and_gets_nothing() {
     let finished = team.finished(&server, &evaluation);
     assert_eq!(finished["state"], "finished", "{finished:#}");
     assert!(like.log().contains("committed"));
+    assert!(!like.log().contains("no longer"), "{}", like.log());
+    let troubles = other
+        .get("/api/v1/workers", Some(&other.admin_token))
+        .json::<Value>();
+    let troubles = troubles.expect("the API speaks JSON")["troubles"].to_string();
+    assert!(
+        troubles.contains("is another server's")
+            && troubles.contains("give each its own nats.name"),
+        "{troubles}"
+    );
+    drop(other);
     assert!(!lacks.log().contains("begun"), "{}", lacks.log());
     let told = server.get("/api/v1/workers", Some(&server.admin_token));
     let told: Value = told.json().expect("the API speaks JSON");
@@ -381,7 +429,7 @@ fn without_nats_a_server_starts_waits_and_goes_on_once_it_is_there() {
         });
         assert_eq!(health["status"], 503, "{health:#}");
     };
-    not_ready("The server cannot give out work");
+    not_ready("The server cannot reach NATS: nats://");
     let worker = Worker::start(scratch.path(), "worker", &taking(link.address(), 1));
     worker.wait_for_log("NATS cannot be reached", 1);
     let team = Team::create(&server, "Alpha");

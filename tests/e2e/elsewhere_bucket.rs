@@ -15,7 +15,7 @@ fn files_pass_by_a_bucket_and_a_worker_needs_no_way_to_the_server() {
     let server = Server::start_with_environment(&contest.data, &config, &environment);
     let worker = Worker::start(scratch.path(), "worker", &taking(nats.address(), 1));
     resume(&server);
-    server.wait_for_log("putting a bundle into the bucket", 1);
+    server.wait_for_log("asking for the bucket", 1);
     assert!(!worker.log().contains("begun"), "{}", worker.log());
     link.lead_to(bucket.address());
 

@@ -19,6 +19,12 @@ struct Liar {
 }
 
 impl Liar {
+    /// Where it is answered it says as a worker does; nobody else is answered.
+    async fn connect(nats: &Nats) -> Result<Client, async_nats::ConnectError> {
+        let options = async_nats::ConnectOptions::new().custom_inbox_prefix("_INBOX.faceoff.liar");
+        options.connect(nats.url()).await
+    }
+
     async fn asks(&self, question: &Value) -> Value {
         let words = serde_json::to_vec(question).expect("it is JSON");
         let answer = self.client.request("faceoff.asks.liar", words.into()).await;
@@ -113,7 +119,7 @@ fn a_worker_that_lies_is_banned_by_name_and_others_play_what_it_had() {
         "kind": "may_work", "program": "0".repeat(64), "version": "1", "runtimes": [], "slots": 1,
     });
     let liar = runtime.block_on(async {
-        let client = async_nats::connect(nats.url()).await;
+        let client = Liar::connect(&nats).await;
         let liar = Liar {
             client: client.expect("NATS is there"),
         };
@@ -189,7 +195,7 @@ fn a_game_that_nobody_has_played_is_not_believed_and_one_that_was_played_elsewhe
 
     let runtime = tokio::runtime::Runtime::new().expect("a runtime starts");
     runtime.block_on(async {
-        let client = async_nats::connect(nats.url()).await;
+        let client = Liar::connect(&nats).await;
         let liar = Liar {
             client: client.expect("NATS is there"),
         };

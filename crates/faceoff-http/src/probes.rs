@@ -7,7 +7,11 @@ use crate::{
     layers,
     paths::LIVE_PATH,
     problem::Problem,
-    views::health::{HealthView, LiveView},
+    views::{
+        health::{HealthView, LiveView},
+        queue,
+        workers::WorkersView,
+    },
 };
 use axum::{
     Json, Router, extract::State, http::header, middleware, response::IntoResponse, routing::get,
@@ -55,6 +59,7 @@ async fn standing(app: &AppState) -> Result<Standing, Problem> {
     let room = app.store.room();
     let numbers = app.store.numbers(now).await?;
     let waited = |since| now.duration_since(since).as_secs_f64().max(0.0);
+    let over_at = queue::outlook(app).await?.over_at(now);
     let disks = ["data", "scratch"].into_iter().zip(room.disks());
     Ok(Standing {
         database_writable: app.store.health(now).await.database_writable,
@@ -64,6 +69,7 @@ async fn standing(app: &AppState) -> Result<Standing, Problem> {
             without_room: numbers.without_room,
             paused: numbers.held || room.is_short(),
             oldest_wait_s: numbers.waiting_since.map_or(0.0, waited),
+            expected_s: over_at.map_or(f64::NAN, |at| at.duration_since(now).as_secs_f64()),
         },
         open_evaluations: numbers.open_evaluations,
         slots: app.config.capacity.slots,
@@ -75,6 +81,7 @@ async fn standing(app: &AppState) -> Result<Standing, Problem> {
             .iter()
             .filter(|worker| worker.is_there(now))
             .count(),
+        remote_long: WorkersView::now(app).alarms.len(),
         disks: disks
             .filter_map(|(of, space)| {
                 space.map(|space| Disk {

@@ -20,6 +20,8 @@ pub struct Standing {
     pub remote_slots: u32,
     /// Workers elsewhere that were heard of a moment ago.
     pub remote_workers: usize,
+    /// Units that one of them has worked at for so long that it is worth a look.
+    pub remote_long: usize,
     /// The disks that the server writes to.
     pub disks: Vec<Disk>,
     /// What the process holds.
@@ -39,6 +41,8 @@ pub struct Queue {
     pub paused: bool,
     /// For how long the first of what waits has waited, seconds; 0: nothing waits.
     pub oldest_wait_s: f64,
+    /// In how long all that counts is expected to be over with the slots there are now, seconds; not a number: nobody can tell.
+    pub expected_s: f64,
 }
 
 /// A file system.
@@ -79,10 +83,12 @@ pub(crate) struct Gauges {
     units: Family<OfState, Gauge>,
     paused: Gauge,
     oldest_wait: Latest,
+    expected: Latest,
     evaluations: Gauge,
     slots: Gauge,
     remote_slots: Gauge,
     remote_workers: Gauge,
+    remote_long: Gauge,
     free: Family<OfDisk, Gauge>,
     size: Family<OfDisk, Gauge>,
     resident: Gauge,
@@ -114,6 +120,12 @@ impl Gauges {
             Unit::Seconds,
             gauges.oldest_wait.clone(),
         );
+        all.register_with_unit(
+            "queue_expected",
+            "In how long all that counts is expected to be over with the slots there are; NaN where that was never measured, or the queue is held",
+            Unit::Seconds,
+            gauges.expected.clone(),
+        );
         all.register(
             "evaluations_open",
             "Evaluations that are not over",
@@ -129,6 +141,11 @@ impl Gauges {
             "remote_workers",
             "Workers on other machines that were heard of in the last half minute",
             gauges.remote_workers.clone(),
+        );
+        all.register(
+            "remote_long_units",
+            "Units that a worker on another machine has worked at for more than an hour",
+            gauges.remote_long.clone(),
         );
         all.register_with_unit(
             "disk_free",
@@ -169,6 +186,7 @@ impl Gauges {
             slots,
             remote_slots,
             remote_workers,
+            remote_long,
             disks,
             process,
         } = now;
@@ -184,11 +202,14 @@ impl Gauges {
         }
         self.paused.set(queue.paused.into());
         self.oldest_wait.set(queue.oldest_wait_s);
+        self.expected.set(queue.expected_s);
         self.evaluations.set((*open_evaluations).into());
         self.slots.set((*slots).into());
         self.remote_slots.set((*remote_slots).into());
         self.remote_workers
             .set(i64::try_from(*remote_workers).unwrap_or(i64::MAX));
+        self.remote_long
+            .set(i64::try_from(*remote_long).unwrap_or(i64::MAX));
         for disk in disks {
             let of = OfDisk { disk: disk.of };
             self.free.get_or_create(&of).set(whole(disk.free_bytes));

@@ -434,7 +434,7 @@ mod tests {
         let busy = &all[0].busy["slot-0"];
         assert_eq!((busy.what.as_deref(), busy.since), (Some("hit"), at(40)));
         assert_eq!(busy.trouble.as_deref(), Some("no room"));
-        workers.works("a", "slot-0", unit, WorkTold::default(), at(51));
+        workers.works("a", "slot-0", unit, WorkTold::default(), at(50));
         assert_eq!(workers.all()[0].busy["slot-0"].trouble, None);
         // One that works since before this process counts as what it is seen to do.
         workers.works("earlier", "slot-3", Uuid::from_u128(2), hit, at(50));

@@ -383,6 +383,7 @@ impl Stub {
             let renew = Ask::Renew {
                 lease: order.lease.clone(),
                 episodes_done: (part * episodes as f64) as u32,
+                trouble: None,
             };
             match self.ask(&renew).await {
                 Ok(Answer::Yes) => {}
@@ -445,6 +446,12 @@ impl Stub {
             }
         }
         self.evaluations.handed_in(order.part_of);
+        let handed_in = Ask::HandedIn {
+            lease: order.lease.clone(),
+            episodes_done: order.spec.episodes.end - order.spec.episodes.start,
+        };
+        // That the server keeps the lease is of use, and no more.
+        let _ = self.ask(&handed_in).await;
         Ok(failed)
     }
 

@@ -25,7 +25,12 @@ pub const fn side_file(side: Side) -> &'static str {
 }
 
 /// The files of a recorded game.
-pub const GAME_FILES: [&str; 3] = [GAME_FILE, side_file(Side::First), side_file(Side::Second)];
+pub const GAME_FILES: [&str; 4] = [
+    GAME_FILE,
+    side_file(Side::First),
+    side_file(Side::Second),
+    CLIPS_FILE,
+];
 
 /// What a side saw and did.
 pub(super) const fn steps_file(side: Side) -> &'static str {

@@ -79,10 +79,14 @@ async fn the_numbers_follow_what_happens() {
         ) >= 1.0
     );
 
+    assert_eq!(number(&before, "faceoff_queue_expected_seconds"), 0.0);
     let submission = site.valid_submission(&team, "striker").await;
     site.evaluate(&team, &submission).await;
     site.later(90);
     let during = numbers().await;
+    // Nothing of the kind was played before.
+    assert!(number(&during, "faceoff_queue_expected_seconds").is_nan());
+    assert_eq!(number(&during, "faceoff_remote_long_units"), 0.0);
     assert_eq!(number(&during, "faceoff_evaluations_open"), 1.0);
     let waiting = "faceoff_queue_units{state=\"waiting\"}";
     assert!(number(&during, waiting) >= 1.0);

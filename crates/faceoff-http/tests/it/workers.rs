@@ -112,6 +112,11 @@ async fn organisers_see_who_plays_elsewhere_and_what_keeps_others_from_it() {
     }
     workers.works("rack-1", "slot-2", unit, WorkTold::default(), site.now());
     assert_eq!(told().await["troubles"], json!([]));
+    let metrics = site.get("/metrics", Some(ADMIN)).await.body;
+    assert!(
+        metrics.contains("faceoff_remote_long_units 1\n"),
+        "{metrics}"
+    );
     workers.ended(unit);
     assert_eq!(states(&told().await), ["idle", "silent"]);
 

@@ -38,6 +38,21 @@ pub struct Outlook {
     pub games: HashMap<GameId, QueuePlace>,
 }
 
+impl Outlook {
+    /// When all of it will be over: now if there is nothing, and `None` where that depends on what was never measured.
+    #[must_use]
+    pub fn over_at(&self, now: Timestamp) -> Option<Timestamp> {
+        let places = self
+            .submissions
+            .values()
+            .chain(self.evaluations.values())
+            .chain(self.games.values());
+        places
+            .map(|place| place.expected_at)
+            .try_fold(now, |latest, at| at.map(|at| latest.max(at)))
+    }
+}
+
 /// What a day has left to play.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OpenWork {

@@ -34,11 +34,11 @@ impl Checks {
         report: &WorkReport,
         artifacts: &Artifacts,
     ) -> anyhow::Result<Option<String>> {
-        if let Some(difference) = other_end(grant, report) {
-            return Ok(Some(difference));
-        }
         if self.episodes == 0 {
             return Ok(None);
+        }
+        if let Some(difference) = other_end(grant, report) {
+            return Ok(Some(difference));
         }
         let found = match (report, &grant.plays) {
             (
