@@ -224,6 +224,10 @@ enum Ends {
 }
 
 #[test]
+#[expect(
+    clippy::print_stdout,
+    reason = "by its seed a run that failed is repeated"
+)]
 fn whoever_is_killed_or_cut_off_nothing_is_lost_and_nothing_done_twice() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let contest = Contest::prepare(scratch.path());

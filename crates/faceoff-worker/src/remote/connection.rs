@@ -83,12 +83,15 @@ impl NatsConfig {
     }
 }
 
+/// Is told why there is no connection, or of none.
+type Tells = dyn Fn(Option<&str>) + Send + Sync;
+
 /// What the log was told of a connection.
 struct Told {
     url: String,
     /// Why it could not be had, as it was told last: the log is told of a change, not of every try.
     cause: Mutex<String>,
-    stands: Box<dyn Fn(Option<&str>) + Send + Sync>,
+    stands: Box<Tells>,
 }
 
 impl Told {
