@@ -28,8 +28,6 @@ const AGAIN: Duration = Duration::from_secs(5);
 const SOON: Duration = Duration::from_secs(1);
 /// So many outcomes are checked at the same time: each takes a thread of its own for a while.
 const CHECKED_AT_ONCE: usize = 2;
-/// Leases of what waits are looked at at least so often.
-const KEEPS_EVERY: Duration = Duration::from_secs(5);
 /// So much is kept of what a worker says of its own fault, in characters.
 const REASON_SHOWN: usize = 500;
 
@@ -85,7 +83,7 @@ impl Hub {
             }
             tokio::select! {
                 () = shutdown.cancelled() => {}
-                () = tokio::time::sleep(every.min(KEEPS_EVERY)) => {}
+                () = tokio::time::sleep(every) => {}
             }
         }
         Ok(())
@@ -118,7 +116,6 @@ impl Hub {
             return AckKind::Ack;
         }
         let nonce = outcome.lease.nonce;
-        self.handed_in.forget(nonce);
         // Who has not begun it, or somebody else has: whatever it is, it is not this worker's.
         match self.server.store.lease_holder(unit, nonce).await {
             Ok(Some(holder)) if WorkerName::of_holder(&holder).as_ref() != Some(&worker) => {
@@ -165,6 +162,8 @@ impl Hub {
                 return AckKind::Nak(Some(AGAIN));
             }
         };
+        // What comes again, above, is kept until it is taken.
+        self.handed_in.forget(nonce);
         workers.forget_files(nonce);
         acknowledgement
     }
