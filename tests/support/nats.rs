@@ -87,6 +87,20 @@ impl Nats {
     /// If it does not start.
     pub fn kill_and_start(&mut self) {
         self.process.end();
+        self.start_again();
+    }
+
+    /// Likewise, and of its streams nothing is left.
+    ///
+    /// # Panics
+    /// If it does not start, or its streams cannot be removed.
+    pub fn lose_all_and_start(&mut self) {
+        self.process.end();
+        fs::remove_dir_all(self.folder.join("jetstream")).expect("its streams can be removed");
+        self.start_again();
+    }
+
+    fn start_again(&mut self) {
         self.process = run(&self.folder, &self.address.port().to_string());
         wait_for(|| TcpStream::connect(self.address).ok());
     }

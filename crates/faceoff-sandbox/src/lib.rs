@@ -47,7 +47,7 @@ pub use error::{SandboxError, SpawnError, WriteError};
 pub use faceoff_types::ResourceLimits as Limits;
 pub use isolation::{Isolation, Layer};
 pub use line_pipe::ReadLine;
-pub use memory_image::{MemoryImage, NoImage};
+pub use memory_image::{MEMORY, MemoryImage, NoImage};
 pub use probe::{HostFeature, probe_host};
 pub use process::{AgentProcess, Usage};
 pub use runtime::{Runtime, RuntimeFiles};

@@ -17,7 +17,7 @@ use std::{
 };
 
 /// A file system in memory that every Linux host has.
-pub(crate) const MEMORY: &str = "/dev/shm";
+pub const MEMORY: &str = "/dev/shm";
 /// Images begin with this.
 pub(crate) const IMAGE_PREFIX: &str = "faceoff-runtime-";
 /// What a file takes at least.

@@ -61,7 +61,7 @@ fn probe(layer: Layer) -> HostFeature {
         Err(why) => HostFeature {
             layer,
             available: false,
-            cure: Some(cure(layer)),
+            cure: Some(cure(layer, &why)),
             found: why,
         },
     }
@@ -208,9 +208,9 @@ fn bundle(layer: Layer) -> io::Result<(tempfile::TempDir, PathBuf)> {
     Ok((outer, bundle))
 }
 
-fn cure(layer: Layer) -> String {
+fn cure(layer: Layer, why: &str) -> String {
     match layer {
-        Layer::Namespaces => cure_namespaces(),
+        Layer::Namespaces => cure_namespaces(why),
         Layer::Seccomp => {
             "use a kernel with CONFIG_SECCOMP_FILTER=y (every distribution's since 2014)".into()
         }
@@ -242,7 +242,7 @@ fn cure_cgroups() -> String {
 }
 
 /// The usual switches that keep an ordinary user from making a sandbox, in the order they bite.
-fn cure_namespaces() -> String {
+fn cure_namespaces(why: &str) -> String {
     const SWITCHES: [(&str, &str, &str); 3] = [
         (
             "/proc/sys/kernel/unprivileged_userns_clone",
@@ -263,12 +263,18 @@ fn cure_namespaces() -> String {
     if Bubblewrap::find().is_err() {
         return bubblewrap::CURE_INSTALL.into();
     }
+    // Then namespaces were made, and only the last step in them was refused.
+    if why.contains("mount proc") {
+        return "have a /proc without masked files, beside which agents may have one of their own; in Docker: docker run \
+                --security-opt systempaths=unconfined"
+            .into();
+    }
     let switch = SWITCHES
         .iter()
         .find(|(file, bad, _)| fs::read_to_string(file).is_ok_and(|value| value.trim() == *bad));
     match switch {
         Some((.., command)) => (*command).to_owned(),
-        None => "allow user namespaces; in Docker: docker run --security-opt seccomp=unconfined --security-opt \
+        None => "allow user namespaces; in Docker: docker run --security-opt seccomp=docker/seccomp.json --security-opt \
                  apparmor=unconfined --security-opt systempaths=unconfined"
             .into(),
     }

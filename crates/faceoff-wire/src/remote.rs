@@ -84,6 +84,8 @@ pub enum Ask {
         lease: Lease,
         /// How far it is.
         episodes_done: u32,
+        /// Where it is in the stream of outcomes.
+        sequence: u64,
     },
 }
 
@@ -170,6 +172,12 @@ impl RemoteOutcome {
     /// The name under which it is accepted once: unit and lease.
     #[must_use]
     pub fn id(&self) -> String {
-        format!("{}/{}", self.lease.unit, self.lease.nonce)
+        Self::id_of(&self.lease)
+    }
+
+    /// Likewise, of what comes of work under a lease.
+    #[must_use]
+    pub fn id_of(lease: &Lease) -> String {
+        format!("{}/{}", lease.unit, lease.nonce)
     }
 }

@@ -425,7 +425,7 @@ impl Stub {
         let began = Instant::now();
         let within = Duration::from_secs(order.lease.duration_s.into());
         let mut failed = 0;
-        loop {
+        let sequence = loop {
             let sent = async {
                 let sent = self.jetstream.publish_with_headers(
                     subject.clone(),
@@ -435,7 +435,7 @@ impl Stub {
                 anyhow::Ok(sent.await?.await?)
             };
             match sent.await {
-                Ok(_) => break,
+                Ok(stored) => break stored.sequence,
                 Err(error) if began.elapsed() >= within => {
                     return Err(error).context("handing in what came of an order");
                 }
@@ -444,11 +444,12 @@ impl Stub {
                     tokio::time::sleep(REST).await;
                 }
             }
-        }
+        };
         self.evaluations.handed_in(order.part_of);
         let handed_in = Ask::HandedIn {
             lease: order.lease.clone(),
             episodes_done: order.spec.episodes.end - order.spec.episodes.start,
+            sequence,
         };
         // That the server keeps the lease is of use, and no more.
         let _ = self.ask(&handed_in).await;

@@ -161,10 +161,12 @@ impl Answers {
             Ask::HandedIn {
                 lease,
                 episodes_done,
+                sequence,
             } => {
                 let held = self.store.is_of(&worker, lease.unit, lease.nonce).await;
                 if matches!(held, Ok(true)) {
-                    self.handed_in.add(lease, episodes_done, Instant::now());
+                    let now = Instant::now();
+                    self.handed_in.add(lease, episodes_done, sequence, now);
                 }
                 held
             }

@@ -210,20 +210,22 @@ impl WorkServer for FarServer {
 
     fn commit(&self, lease: &Lease, report: WorkReport) -> anyhow::Result<Holding> {
         let (report, files) = (Box::new(report), self.files());
-        let handed_in = Ask::HandedIn {
-            lease: lease.clone(),
-            episodes_done: report.episodes(),
-        };
+        let episodes_done = report.episodes();
         let holding = self.link.runtime.block_on(async {
             let sent = self.send(lease, &files.grant, Outcome::Done { report });
-            let holding = sent.await?;
+            let Some(sequence) = sent.await? else {
+                return anyhow::Ok(Holding::Lost);
+            };
+            let handed_in = Ask::HandedIn {
+                lease: lease.clone(),
+                episodes_done,
+                sequence,
+            };
             // From now on the server keeps the lease. If it does not hear of that, there is what is left of it.
-            if holding == Holding::Held
-                && let Err(error) = self.link.ask(&handed_in).await
-            {
+            if let Err(error) = self.link.ask(&handed_in).await {
                 tracing::debug!(%error, "the server was not told that an outcome waits for it");
             }
-            anyhow::Ok(holding)
+            anyhow::Ok(Holding::Held)
         })?;
         self.link.is_busy();
         Ok(holding)

@@ -58,6 +58,8 @@ pub(super) enum Taken {
     Held,
     /// It is of no order that is its worker's.
     Lost,
+    /// It does not fit its order, which is given back: a fault of ours.
+    Unusable,
     /// It is not what the simulator gives; the words are for organisers.
     Disbelieved(String),
     /// A file of it is still on its way.
@@ -110,7 +112,7 @@ fn done(
         tracing::error!(unit = %lease.unit, slot = lease.slot, "a worker's report is not of its order");
         let why = GivenBack::PlatformFault("a worker's report was not of its order");
         server.give_back(lease, why)?;
-        return Ok(Taken::Lost);
+        return Ok(Taken::Unusable);
     }
     // What was stored before, or is another's by now, needs no look; its files may be gone.
     if server.is_held(lease)? {
@@ -128,7 +130,7 @@ fn done(
             tracing::error!(unit = %lease.unit, slot = lease.slot, %error, "what a worker reported cannot count");
             let why = "what a worker reported does not fit its order";
             server.give_back(lease, GivenBack::PlatformFault(why))?;
-            Ok(Taken::Lost)
+            Ok(Taken::Unusable)
         }
         Err(error) => Err(error),
     }

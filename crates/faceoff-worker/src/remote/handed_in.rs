@@ -20,14 +20,17 @@ pub(super) struct AllHandedIn(Mutex<HashMap<Uuid, HandedIn>>);
 pub(super) struct HandedIn {
     pub(super) lease: Lease,
     pub(super) episodes_done: u32,
+    /// Where it is in the stream of outcomes.
+    pub(super) sequence: u64,
     since: Instant,
 }
 
 impl AllHandedIn {
-    pub(super) fn add(&self, lease: Lease, episodes_done: u32, now: Instant) {
+    pub(super) fn add(&self, lease: Lease, episodes_done: u32, sequence: u64, now: Instant) {
         let waits = HandedIn {
             lease,
             episodes_done,
+            sequence,
             since: now,
         };
         self.all().insert(waits.lease.nonce, waits);
@@ -36,6 +39,11 @@ impl AllHandedIn {
     /// It is taken in, or nobody's any more.
     pub(super) fn forget(&self, nonce: Uuid) {
         self.all().remove(&nonce);
+    }
+
+    /// Does it wait yet?
+    pub(super) fn has(&self, nonce: Uuid) -> bool {
+        self.all().contains_key(&nonce)
     }
 
     /// All that waits for a while by now.
@@ -66,16 +74,22 @@ mod tests {
             expires_at: Timestamp::UNIX_EPOCH,
             duration_s: 30,
         };
-        all.add(lease(1), 50, start);
-        all.add(lease(2), 50, start + Duration::from_secs(1));
+        all.add(lease(1), 50, 7, start);
+        all.add(lease(2), 50, 8, start + Duration::from_secs(1));
         assert!(all.waiting(start + Duration::from_secs(1)).is_empty());
         let waits = all.waiting(start + WAITS_AFTER);
         assert_eq!(waits.len(), 1);
         assert_eq!(
-            (waits[0].lease.nonce, waits[0].episodes_done),
-            (Uuid::from_u128(1), 50)
+            (
+                waits[0].lease.nonce,
+                waits[0].episodes_done,
+                waits[0].sequence
+            ),
+            (Uuid::from_u128(1), 50, 7)
         );
+        assert!(all.has(Uuid::from_u128(1)));
         all.forget(Uuid::from_u128(1));
+        assert!(!all.has(Uuid::from_u128(1)));
         all.forget(Uuid::from_u128(3));
         assert_eq!(all.waiting(start + Duration::from_secs(60)).len(), 1);
     }

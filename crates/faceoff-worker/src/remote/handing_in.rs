@@ -1,7 +1,6 @@
 //! What came of orders, on its way to the server.
 
 use super::far_server::{FarServer, REST};
-use crate::server::Holding;
 use anyhow::Context as _;
 use async_nats::HeaderMap;
 use faceoff_wire::{
@@ -16,14 +15,14 @@ const HEADERS_AT_MOST: usize = 256;
 const STORED_WITHIN: Duration = Duration::from_secs(10);
 
 impl FarServer {
-    /// Sends what came of an order, until NATS has stored it or, of what was played, until the order is no longer this slot's. What is too
-    /// large stays so until somebody helps: after a lease, the server is to know.
+    /// Sends what came of an order, until NATS has stored it or, of what was played, until the order is no longer this slot's: where it is in the
+    /// stream of outcomes, if it is there. What is too large stays so until somebody helps: after a lease, the server is to know.
     pub(super) async fn send(
         &self,
         lease: &Lease,
         grant: &str,
         outcome: Outcome,
-    ) -> anyhow::Result<Holding> {
+    ) -> anyhow::Result<Option<u64>> {
         let was_played = matches!(outcome, Outcome::Done { .. });
         let outcome = RemoteOutcome {
             lease: lease.clone(),
@@ -57,11 +56,12 @@ impl FarServer {
                 let stored = tokio::time::timeout(STORED_WITHIN, stored).await;
                 stored.context("NATS has not answered in time")?
             };
-            let Err(error) = sent.await else {
-                return Ok(Holding::Held);
+            let error = match sent.await {
+                Ok(stored) => return Ok(Some(stored.sequence)),
+                Err(error) => error,
             };
             if was_played && self.has_ended() {
-                return Ok(Holding::Lost);
+                return Ok(None);
             }
             if error.is::<TooLarge>() && began.elapsed() >= within {
                 return Err(error).context("sending what came of the order");

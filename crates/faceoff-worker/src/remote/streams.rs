@@ -3,11 +3,15 @@
 
 use super::names::{ALL, Names, ORDERS_CONSUMER, OUTCOMES_CONSUMER};
 use anyhow::Context as _;
-use async_nats::jetstream::{
-    self,
-    consumer::{AckPolicy, PullConsumer, pull},
-    stream::{self, DiscardPolicy, RetentionPolicy, Stream},
+use async_nats::{
+    header::NATS_MESSAGE_ID,
+    jetstream::{
+        self,
+        consumer::{AckPolicy, PullConsumer, pull},
+        stream::{self, DiscardPolicy, RawMessageErrorKind, RetentionPolicy, Stream},
+    },
 };
+use faceoff_wire::{remote::RemoteOutcome, work::Lease};
 use std::{
     sync::atomic::{AtomicBool, Ordering},
     time::Duration,
@@ -57,6 +61,21 @@ impl Streams {
     pub(super) async fn outcomes(&self) -> anyhow::Result<PullConsumer> {
         let stream = self.stream(self.outcomes_config()).await?;
         consumer(&stream, outcomes_consumer()).await
+    }
+
+    /// Is what came of work under this lease at its place? NATS may say that it has stored something before its disk has, and lose it.
+    pub(super) async fn has_outcome(&self, lease: &Lease, sequence: u64) -> anyhow::Result<bool> {
+        let name = self.names.outcomes_stream();
+        let stream = self.jetstream.get_stream_no_info(&name).await?;
+        match stream.get_raw_message(sequence).await {
+            // After a loss the place may be another's.
+            Ok(message) => {
+                let id = message.headers.get(NATS_MESSAGE_ID);
+                Ok(id.is_some_and(|id| id.as_str() == RemoteOutcome::id_of(lease)))
+            }
+            Err(error) if error.kind() == RawMessageErrorKind::NoMessageFound => Ok(false),
+            Err(error) => Err(error).with_context(|| format!("looking into the stream {name}")),
+        }
     }
 
     /// A stream that is as it is to be, and ours.

@@ -3,9 +3,10 @@
 use super::{
     dispatch::{Hub, LOOK},
     granted::{Taken, of_its_order, store},
+    handed_in::HandedIn,
     names,
 };
-use crate::server::{Holding, WorkServer};
+use crate::server::{GivenBack, Holding, WorkServer};
 use anyhow::Context as _;
 use async_nats::jetstream::{self, AckKind};
 use faceoff_store::{Actor, StoreError, WorkerName};
@@ -37,7 +38,7 @@ impl Hub {
         self: &Arc<Self>,
         shutdown: &CancellationToken,
     ) -> anyhow::Result<()> {
-        let consumer = self.streams.outcomes().await?;
+        let mut consumer = self.streams.outcomes().await?;
         let mut taking = JoinSet::new();
         while !shutdown.is_cancelled() {
             while taking.len() >= CHECKED_AT_ONCE {
@@ -50,7 +51,9 @@ impl Hub {
                 .messages()
                 .await
                 .context("asking for what came of work")?;
+            let mut are_none = true;
             while let Some(message) = outcomes.next().await {
+                are_none = false;
                 let message = message.map_err(|error| anyhow::anyhow!(error))?;
                 let hub = Arc::clone(self);
                 taking.spawn(async move {
@@ -62,6 +65,10 @@ impl Hub {
             while let Some(done) = taking.try_join_next() {
                 taken(Some(done))?;
             }
+            // Of a stream that is there no more nobody says so: NATS may have lost it, and then it is made anew.
+            if are_none {
+                consumer = self.streams.outcomes().await?;
+            }
         }
         while !taking.is_empty() {
             taken(taking.join_next().await)?;
@@ -69,18 +76,43 @@ impl Hub {
         Ok(())
     }
 
-    /// Keeps what is handed in for as long as it waits here: whose it was works at something else.
+    /// Keeps what is handed in for as long as it waits here: whose it was works at something else. What NATS has lost is played again.
     pub(super) async fn keep_waiting(&self, shutdown: &CancellationToken) -> anyhow::Result<()> {
         let every = Duration::from_secs(self.server.lease_s.into()) / 3;
         while !shutdown.is_cancelled() {
-            for waits in self.handed_in.waiting(Instant::now()) {
-                let (lease, server) = (waits.lease.clone(), self.server.clone());
-                let renewed =
-                    tokio::task::spawn_blocking(move || server.renew(&lease, waits.episodes_done));
-                if renewed.await?? == Holding::Lost {
-                    self.handed_in.forget(waits.lease.nonce);
+            let mut looks = Ok(());
+            for HandedIn {
+                lease,
+                episodes_done,
+                sequence,
+                ..
+            } in self.handed_in.waiting(Instant::now())
+            {
+                // While NATS does not tell, nothing is lost.
+                let mut is_there = true;
+                if looks.is_ok() {
+                    let looked = self.streams.has_outcome(&lease, sequence).await;
+                    looks = looked.map(|found| is_there = found);
+                }
+                let nonce = lease.nonce;
+                // What was taken in meanwhile is there no more, either.
+                if !self.handed_in.has(nonce) {
+                    continue;
+                }
+                let server = self.server.clone();
+                let kept = tokio::task::spawn_blocking(move || {
+                    if is_there {
+                        return server.renew(&lease, episodes_done);
+                    }
+                    tracing::warn!(unit = %lease.unit, slot = lease.slot, "NATS has lost what came of a unit: it is played again");
+                    server.give_back(&lease, GivenBack::Shutdown)?;
+                    Ok(Holding::Lost)
+                });
+                if kept.await?? == Holding::Lost {
+                    self.handed_in.forget(nonce);
                 }
             }
+            looks?;
             tokio::select! {
                 () = shutdown.cancelled() => {}
                 () = tokio::time::sleep(every) => {}
@@ -117,17 +149,17 @@ impl Hub {
         }
         let nonce = outcome.lease.nonce;
         // Who has not begun it, or somebody else has: whatever it is, it is not this worker's.
-        match self.server.store.lease_holder(unit, nonce).await {
+        let is_over = match self.server.store.lease_holder(unit, nonce).await {
             Ok(Some(holder)) if WorkerName::of_holder(&holder).as_ref() != Some(&worker) => {
                 tracing::warn!(%unit, %worker, holder, "the order is not this worker's; what came of it is left out");
                 return AckKind::Ack;
             }
-            Ok(_) => {}
+            Ok(holder) => holder.is_none(),
             Err(error) => {
                 tracing::error!(%unit, %worker, %error, "the queue cannot be asked whose an outcome is; trying again");
                 return AckKind::Nak(Some(AGAIN));
             }
-        }
+        };
         if grant.program != self.remote.like.program
             && matches!(outcome.outcome, Outcome::Done { .. })
         {
@@ -139,16 +171,32 @@ impl Hub {
         }
         let failed = matches!(outcome.outcome, Outcome::PlatformFault { .. });
         let was_played = matches!(outcome.outcome, Outcome::Done { .. });
+        let fails = || {
+            if let Some((units, until)) = workers.failed(worker.as_str(), unit, now) {
+                tracing::warn!(%worker, units, %until, "a worker could play none of its last units; it rests");
+            }
+        };
         let acknowledgement = match self.stored(message, grant, outcome).await {
+            // Whoever sends it once more has done nothing by that.
+            Ok(Taken::Held) if is_over => {
+                tracing::info!(%unit, %worker, "over already; what came of it is left out");
+                AckKind::Ack
+            }
             Ok(Taken::Held) => {
                 workers.ended(unit);
                 if was_played {
                     workers.played(worker.as_str());
                 }
-                if failed && let Some((units, until)) = workers.failed(worker.as_str(), unit, now) {
-                    tracing::warn!(%worker, units, %until, "a worker could play none of its last units; it rests");
+                if failed {
+                    fails();
                 }
                 tracing::info!(%unit, %worker, "taken in");
+                AckKind::Ack
+            }
+            Ok(Taken::Unusable) => {
+                workers.ended(unit);
+                fails();
+                tracing::info!(%unit, %worker, "given back: what came of it cannot count");
                 AckKind::Ack
             }
             Ok(Taken::Lost) => {

@@ -3,6 +3,7 @@
 mod checked;
 mod elsewhere;
 mod permissions;
+mod printed;
 mod times;
 
 use crate::{
@@ -13,11 +14,13 @@ use anyhow::{Context as _, bail};
 use checked::Checked;
 use clap::Args;
 use faceoff_runner::inventory;
-use faceoff_sandbox::{HostFeature, Isolation, Layer, MemoryImage, Runtime, probe_host};
+use faceoff_sandbox::{
+    HostFeature, Isolation, Layer, MEMORY, MemoryImage, NoImage, Runtime, probe_host,
+};
 use faceoff_store::Room;
 use faceoff_types::{RuntimeContent, RuntimeInventory};
 use serde::Serialize;
-use std::{io::Write, path::PathBuf};
+use std::{io::Write as _, path::PathBuf};
 
 /// Checks what this host offers and what is missing.
 #[derive(Debug, Args)]
@@ -90,16 +93,6 @@ struct Feature {
     host: HostFeature,
     /// Named in `[sandbox] given_up`.
     given_up: bool,
-}
-
-impl Feature {
-    const fn mark(&self) -> &'static str {
-        match (self.host.available, self.given_up) {
-            (_, true) => "given up",
-            (true, false) => "ok",
-            (false, false) => "MISSING",
-        }
-    }
 }
 
 #[derive(Debug, Serialize)]
@@ -175,66 +168,6 @@ impl Findings {
             nats: Vec::new(),
         }
     }
-
-    fn print(&self, out: &mut impl Write) -> std::io::Result<()> {
-        writeln!(out, "Sandbox")?;
-        for feature in &self.features {
-            let HostFeature {
-                layer, found, cure, ..
-            } = &feature.host;
-            writeln!(
-                out,
-                "  {:<9} {:<14} {found}",
-                feature.mark(),
-                layer.as_str()
-            )?;
-            print_cure(out, cure.as_deref())?;
-        }
-        writeln!(out, "Runtimes")?;
-        for runtime in &self.runtimes {
-            let mark = if runtime.available { "ok" } else { "none" };
-            writeln!(out, "  {mark:<9} {:<14} {}", runtime.name, runtime.found)?;
-            print_cure(out, runtime.cure.as_deref())?;
-        }
-        let kept = &self.in_memory;
-        let mark = if kept.available { "ok" } else { "none" };
-        writeln!(out, "  {mark:<9} {:<14} {}", "in memory", kept.found)?;
-        print_cure(out, kept.cure.as_deref())?;
-        let cpus = &self.cpus;
-        writeln!(out, "CPUs")?;
-        let bound = match cpus.agent_cpus.as_slice() {
-            [] if cpus.usable >= 2 * cpus.slots => "CPUs of their own, slot by slot".to_owned(),
-            [] => "the CPUs of the service".to_owned(),
-            list => format!("CPUs {list:?}"),
-        };
-        writeln!(
-            out,
-            "  {} usable, {} worker slot(s), agents on: {bound}",
-            cpus.usable, cpus.slots
-        )?;
-        print_cure(out, cpus.advice.as_deref())?;
-        writeln!(out, "Descriptors")?;
-        writeln!(out, "  {}", self.descriptors.found)?;
-        print_cure(out, self.descriptors.cure.as_deref())?;
-        writeln!(out, "Disks")?;
-        for disk in &self.disks {
-            writeln!(out, "  {}: {}", disk.folder.display(), disk.found)?;
-            print_cure(out, disk.cure.as_deref())?;
-        }
-        writeln!(out, "Host")?;
-        for checked in &self.host {
-            writeln!(out, "  {}: {}", checked.name, checked.found)?;
-            print_cure(out, checked.cure.as_deref())?;
-        }
-        if !self.nats.is_empty() {
-            writeln!(out, "Work for a server elsewhere")?;
-        }
-        for checked in &self.nats {
-            writeln!(out, "  {}: {}", checked.name, checked.found)?;
-            print_cure(out, checked.cure.as_deref())?;
-        }
-        Ok(())
-    }
 }
 
 /// Layers that are neither there nor given up.
@@ -243,13 +176,6 @@ fn missing(features: &[Feature]) -> impl Iterator<Item = Layer> {
         .iter()
         .filter(|feature| !feature.host.available && !feature.given_up)
         .map(|feature| feature.host.layer)
-}
-
-fn print_cure(out: &mut impl Write, cure: Option<&str>) -> std::io::Result<()> {
-    match cure {
-        Some(cure) => writeln!(out, "  {:<9} -> {cure}", ""),
-        None => Ok(()),
-    }
 }
 
 /// Each is asked inside the sandbox, as far as this host has one.
@@ -293,7 +219,18 @@ fn in_memory(config: &Config) -> InMemory {
         Err(why) => InMemory {
             available: false,
             found: format!("{why}: an agent may learn what others have read of them"),
-            cure: Some("offer smaller runtimes, or raise sandbox.resident_bytes".to_owned()),
+            cure: Some(match why {
+                NoImage::NoRoom { bytes, .. } => {
+                    let mib = (bytes >> 20).next_multiple_of(100) + 100;
+                    format!(
+                        "offer smaller runtimes, or have a larger {MEMORY}: mount -o remount,size={mib}m {MEMORY}; \
+                         in Docker: docker run --shm-size {mib}m"
+                    )
+                }
+                NoImage::TooLarge { .. } | NoImage::Failed(_) => {
+                    "offer smaller runtimes, or raise sandbox.resident_bytes".to_owned()
+                }
+            }),
         },
     }
 }
@@ -506,6 +443,14 @@ mod tests {
             "{text}"
         );
         assert!(text.contains("-> what to type"), "{text}");
+        // What helps against several stands once.
+        let mut several = findings(false, false);
+        several.features.extend(found.features);
+        let mut text = Vec::new();
+        several.print(&mut text).unwrap();
+        let text = String::from_utf8(text).unwrap();
+        assert_eq!(text.matches("MISSING").count(), 2, "{text}");
+        assert_eq!(text.matches("-> what to type").count(), 1, "{text}");
         assert_eq!(missing(&findings(false, true).features).count(), 0);
         assert_eq!(missing(&findings(true, false).features).count(), 0);
     }

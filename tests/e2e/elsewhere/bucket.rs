@@ -1,6 +1,6 @@
 //! Bundles and recordings by a bucket of S3, in the place of the server's own HTTP.
 
-use crate::elsewhere::{Contest, giving, resume, taking};
+use super::{Contest, giving, resume, taking};
 use faceoff_tests::{bucket::Bucket, nats::Nats, relay::Relay, server::Server, worker::Worker};
 
 #[test]

@@ -1,12 +1,10 @@
 //! Workers on other machines that are asked to end (SIGTERM) in the middle of something: it goes back at once, and counts for nothing. Leases
 //! last for an hour here, so that nobody else would have it if its end were waited for.
 
-use crate::{
-    Team, dataset,
-    elsewhere::{Contest, giving, resume, taking},
-    entry, path_of, start_day,
-};
-use faceoff_tests::{bundle, nats::Nats, relay::Relay, server::Server, worker::Worker};
+use super::{Contest, giving, resume, taking};
+use crate::{Team, dataset, entry, path_of, start_day};
+use faceoff_tests::{bundle, nats::Nats, relay::Relay, repository, server::Server, worker::Worker};
+use serde_json::json;
 use std::net::TcpListener;
 
 fn for_an_hour(config: &str) -> String {
@@ -89,4 +87,42 @@ fn what_is_being_played_goes_back_and_another_begins_it() {
     first.ends();
     assert!(!log.contains("platform fault"), "{log}");
     assert!(!log.contains("committed"), "{log}");
+}
+
+#[test]
+fn what_is_cancelled_stops_elsewhere_and_the_slot_goes_on() {
+    let scratch = tempfile::tempdir().expect("a scratch folder can be made");
+    let nats = Nats::start(&scratch.path().join("nats"));
+    let files = Relay::start();
+    let config = giving(&nats, files.address())
+        .replace("episodes_per_task = 10", "episodes_per_task = 40")
+        .replace("episodes_per_shard = 1", "episodes_per_shard = 40");
+    let server = Server::start(&scratch.path().join("data"), &config);
+    files.lead_to(server.address().into());
+    // No smoke run has so many control steps; each shard here has more.
+    let hangs = bundle::python_agent(
+        "seen = globals().setdefault('seen', [0])\nseen[0] += 1\nif seen[0] > 3000: time.sleep(600)\nsay(hold)",
+    );
+    let hangs = bundle::python_bundle(scratch.path(), "hangs", &hangs);
+    let (slow, quick) = (
+        Team::create(&server, "Slow"),
+        Team::create(&server, "Quick"),
+    );
+    let of_slow = slow.submit(&server, &hangs);
+    let of_quick = quick.submit(&server, &repository().join("agents/hold"));
+    assert_eq!(of_slow["state"], "valid", "{of_slow:#}");
+    let worker = Worker::start(scratch.path(), "worker", &taking(nats.address(), 1));
+    let day = start_day(&server);
+    let [of_slow, of_quick] = [&of_slow, &of_quick].map(|submission| path_of(&day, submission));
+    let _ = server.poll(&of_slow, &slow.token, |answer| answer["state"] == "running");
+    let cancelled = server.post(
+        &format!("{of_slow}/cancel"),
+        &server.admin_token,
+        &json!({ "reason": "Its team asked for it" }),
+    );
+    assert!(cancelled.status().is_success(), "{}", cancelled.status());
+    worker.wait_for_log("no longer this slot's", 1);
+    let finished = quick.finished(&server, &of_quick);
+    assert_eq!(finished["state"], "finished", "{finished:#}");
+    worker.end();
 }

@@ -1,0 +1,89 @@
+//! What `faceoff doctor` found, as a table.
+
+use super::{Feature, Findings};
+use faceoff_sandbox::HostFeature;
+use std::io::Write;
+
+impl Feature {
+    const fn mark(&self) -> &'static str {
+        match (self.host.available, self.given_up) {
+            (_, true) => "given up",
+            (true, false) => "ok",
+            (false, false) => "MISSING",
+        }
+    }
+}
+
+impl Findings {
+    /// As a table.
+    pub(super) fn print(&self, out: &mut impl Write) -> std::io::Result<()> {
+        writeln!(out, "Sandbox")?;
+        let mut features = self.features.iter().peekable();
+        while let Some(feature) = features.next() {
+            let HostFeature {
+                layer, found, cure, ..
+            } = &feature.host;
+            writeln!(
+                out,
+                "  {:<9} {:<14} {found}",
+                feature.mark(),
+                layer.as_str()
+            )?;
+            // What helps against several in a row stands once, below the last.
+            if features.peek().is_none_or(|next| next.host.cure != *cure) {
+                print_cure(out, cure.as_deref())?;
+            }
+        }
+        writeln!(out, "Runtimes")?;
+        for runtime in &self.runtimes {
+            let mark = if runtime.available { "ok" } else { "none" };
+            writeln!(out, "  {mark:<9} {:<14} {}", runtime.name, runtime.found)?;
+            print_cure(out, runtime.cure.as_deref())?;
+        }
+        let kept = &self.in_memory;
+        let mark = if kept.available { "ok" } else { "none" };
+        writeln!(out, "  {mark:<9} {:<14} {}", "in memory", kept.found)?;
+        print_cure(out, kept.cure.as_deref())?;
+        let cpus = &self.cpus;
+        writeln!(out, "CPUs")?;
+        let bound = match cpus.agent_cpus.as_slice() {
+            [] if cpus.usable >= 2 * cpus.slots => "CPUs of their own, slot by slot".to_owned(),
+            [] => "the CPUs of the service".to_owned(),
+            list => format!("CPUs {list:?}"),
+        };
+        writeln!(
+            out,
+            "  {} usable, {} worker slot(s), agents on: {bound}",
+            cpus.usable, cpus.slots
+        )?;
+        print_cure(out, cpus.advice.as_deref())?;
+        writeln!(out, "Descriptors")?;
+        writeln!(out, "  {}", self.descriptors.found)?;
+        print_cure(out, self.descriptors.cure.as_deref())?;
+        writeln!(out, "Disks")?;
+        for disk in &self.disks {
+            writeln!(out, "  {}: {}", disk.folder.display(), disk.found)?;
+            print_cure(out, disk.cure.as_deref())?;
+        }
+        writeln!(out, "Host")?;
+        for checked in &self.host {
+            writeln!(out, "  {}: {}", checked.name, checked.found)?;
+            print_cure(out, checked.cure.as_deref())?;
+        }
+        if !self.nats.is_empty() {
+            writeln!(out, "Work for a server elsewhere")?;
+        }
+        for checked in &self.nats {
+            writeln!(out, "  {}: {}", checked.name, checked.found)?;
+            print_cure(out, checked.cure.as_deref())?;
+        }
+        Ok(())
+    }
+}
+
+fn print_cure(out: &mut impl Write, cure: Option<&str>) -> std::io::Result<()> {
+    match cure {
+        Some(cure) => writeln!(out, "  {:<9} -> {cure}", ""),
+        None => Ok(()),
+    }
+}
