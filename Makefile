@@ -11,14 +11,14 @@ WORKERS  ?= 200
 SLEEP_S  ?= 10
 WHOLE    ?=
 
-# End-to-end tests wait for most of their time: twice as many are quicker where nothing else runs.
-TEST_THREADS ?= $(shell nproc)
+# Tests wait for much of their time, so there are more at a time than CPUs.
+TEST_THREADS ?= $(shell echo $$((2 * $$(nproc))))
 
 CARGO      ?= cargo
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
 
-.PHONY: demo test tests-of-python tests-of-api tests-of-agents web wheel pictures test-api test-python test-learning fuzz busy load elsewhere crowd objects soak steady frames test-cgroup2 test-box test-engine lint format fidelity setup setup-test agents dist clean-demo help
+.PHONY: demo test tests-built tests-of-rust tests-of-release tests-of-python tests-of-api tests-of-agents web wheel pictures test-api test-python test-learning fuzz busy load elsewhere crowd objects soak steady frames test-cgroup2 test-box test-engine lint format fidelity setup setup-test agents dist clean-demo help
 
 help:
 	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
@@ -77,20 +77,27 @@ demo: setup
 	    --bundle agents/hold --bundle $(TARGET_DIR)/bundles/striker --bundle agents/reckless \
 	    $(if $(filter 0,$(SERVE)),--no-serve)
 
+# Side by side what waits for much of its time: for a registry, for one program, for one of two CPUs. What Cargo says is told as it comes
+# (the + below), all else when it is complete.
+SIDE_BY_SIDE = $(MAKE) --no-print-directory --output-sync=target --keep-going --jobs
+
+test: setup-test
+	$(SIDE_BY_SIDE) tests-built tests-of-agents
+	$(SIDE_BY_SIDE) tests-of-rust tests-of-python tests-of-api tests-of-release
+
+# Parts of `make test`, in two rounds: Rust's tests use what those of the agents and pages install.
 # The programs first: the end-to-end tests run the real binary and the real agents. With --tests the
 # dependencies get the same features as in the run below, and are not built twice.
-test: setup-test
-	$(CARGO) build --locked --workspace --bins --tests
+tests-built:
+	+$(CARGO) build --locked --workspace --bins --tests
 	docker/runtime.sh $(TARGET_DIR)/runtimes/python3-ml
-	@# Side by side, since most of their time each waits: for a registry, for one program, for one of two CPUs.
-	$(MAKE) --no-print-directory --output-sync=target --jobs=3 tests-of-python tests-of-api tests-of-agents
-	if $(CARGO) nextest --version >/dev/null 2>&1; \
+tests-of-rust:
+	+if $(CARGO) nextest --version >/dev/null 2>&1; \
 	    then $(CARGO) nextest run --locked --workspace --no-fail-fast --test-threads $(TEST_THREADS); \
-	    else $(CARGO) test --locked --workspace --no-fail-fast -- --test-threads 2; fi
-	@# The golden hashes again, as the released program computes them: the same bits.
+	    else $(CARGO) test --locked --workspace --no-fail-fast -- --test-threads $(TEST_THREADS); fi
+# The golden hashes again, as the released program computes them: the same bits.
+tests-of-release:
 	$(CARGO) test --release --locked --package faceoff-sim --test it golden
-
-# Parts of `make test`, which has built what they need.
 tests-of-python:
 	TARGET_DIR=$(TARGET_DIR) crates/faceoff-py/test.sh test
 tests-of-api:
