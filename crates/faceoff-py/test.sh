@@ -1,8 +1,8 @@
 #!/bin/sh
 # Makes the wheel of the Python package, and tests it where nothing but that wheel is installed.
 #   test.sh wheel       one wheel in TARGET/wheels, for glibc 2.17 and later: zig links it
-#   test.sh test [...]  a wheel for this host's glibc, which shares what was built before; pytest where it alone is
-#                       installed. The rest of the arguments goes to pytest
+#   test.sh test [...]  a wheel for this host's glibc of the development build, as the programs are that it is compared with;
+#                       pytest where it alone is installed. The rest of the arguments goes to pytest
 #   test.sh learning    that wheel beside the libraries that need torch; the examples learn anew
 #   test.sh versions    the environments' tests, of the wheel in TARGET/wheels, by each interpreter of PYTHONS
 # TARGET_DIR (default: target), PYTHON (default: python3) and PYTHONS (default: PYTHON) may be set.
@@ -34,13 +34,13 @@ wheel() {
     rm -rf "$out"
     # The interpreter is named so that one of an active environment is not taken; abi3 makes it one for all.
     (cd "$here" && PATH=$target/python-build/bin:$PATH CARGO_TARGET_DIR=$target \
-        maturin build --quiet --release --locked --interpreter "$python" --out "$out" "$@")
+        maturin build --quiet --locked --interpreter "$python" --out "$out" "$@")
     ls "$out"/*.whl
 }
 
 case ${1:-} in
     wheel)
-        wheel "$target/wheels" --zig --target x86_64-unknown-linux-gnu --compatibility manylinux2014
+        wheel "$target/wheels" --release --zig --target x86_64-unknown-linux-gnu --compatibility manylinux2014
         ;;
     test)
         shift
@@ -59,7 +59,7 @@ case ${1:-} in
         ;;
     learning)
         shift
-        wheel "$target/wheels-of-this-host"
+        wheel "$target/wheels-of-this-host" --release
         environment "$target/python-learning" "$here/tests_learning/requirements.txt"
         "$target/python-learning/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps \
             "$target"/wheels-of-this-host/*.whl

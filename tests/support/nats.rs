@@ -100,6 +100,21 @@ impl Nats {
         self.start_again();
     }
 
+    /// Likewise, and of its streams only how far they were read is left, as after a power cut.
+    ///
+    /// # Panics
+    /// If it does not start, or what it has stored cannot be removed.
+    pub fn lose_messages_and_start(&mut self) {
+        self.process.end();
+        let streams = fs::read_dir(self.folder.join("jetstream/$G/streams"));
+        for stream in streams.expect("it has streams") {
+            let messages = stream.expect("a folder can be read").path().join("msgs");
+            fs::remove_dir_all(&messages).expect("a stream has messages");
+            fs::create_dir(&messages).expect("a folder can be made");
+        }
+        self.start_again();
+    }
+
     fn start_again(&mut self) {
         self.process = run(&self.folder, &self.address.port().to_string());
         wait_for(|| TcpStream::connect(self.address).ok());

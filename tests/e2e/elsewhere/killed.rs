@@ -16,6 +16,8 @@ enum Ends {
     Nats,
     /// It, and all that it had stored: streams, orders, outcomes.
     NatsAndStreams,
+    /// It, and what was in its streams.
+    NatsAndMessages,
     Link,
 }
 
@@ -57,6 +59,7 @@ fn whoever_is_killed_or_cut_off_nothing_is_lost_and_nothing_done_twice() {
         Ends::Server,
         Ends::Nats,
         Ends::NatsAndStreams,
+        Ends::NatsAndMessages,
         Ends::Link,
     ]
     .map(|end| (drawn(), end));
@@ -81,6 +84,7 @@ fn whoever_is_killed_or_cut_off_nothing_is_lost_and_nothing_done_twice() {
             }
             Ends::Nats => nats.kill_and_start(),
             Ends::NatsAndStreams => nats.lose_all_and_start(),
+            Ends::NatsAndMessages => nats.lose_messages_and_start(),
             // For longer than nothing, and then it is a slow one.
             Ends::Link => {
                 link.cut();

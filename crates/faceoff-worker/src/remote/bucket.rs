@@ -182,11 +182,11 @@ impl Bucket {
                 Err(object_store::Error::NotFound { .. }) => continue,
                 Err(error) => return Err(error).context("taking a recording out of the bucket"),
             };
-            anyhow::ensure!(
-                found.meta.size <= LARGEST_BYTES,
-                "{from} has {} bytes, at most {LARGEST_BYTES} are taken",
-                found.meta.size
-            );
+            if found.meta.size > LARGEST_BYTES {
+                let bytes = found.meta.size;
+                tracing::error!(%from, bytes, "no recording has so large a file; it is left out");
+                continue;
+            }
             let mut file = tempfile::NamedTempFile::new_in(&self.folder)?;
             let mut bytes = found.into_stream();
             while let Some(piece) = bytes.try_next().await? {

@@ -8,7 +8,7 @@ use super::{
     granted::grant_of,
     handed_in::AllHandedIn,
     names::{self, ALL, Names, SERVER, WAITING},
-    streams::Streams,
+    streams::{LOST_A_PART, Streams, is_ahead},
     taken_back::{AllGivenOut, GivenOut},
 };
 use crate::{
@@ -234,7 +234,8 @@ pub(super) struct Hub {
 
 impl Hub {
     async fn give_out(&self, shutdown: &CancellationToken) -> anyhow::Result<()> {
-        let (stream, mut consumer) = self.streams.orders().await?;
+        let (mut stream, mut consumer) = self.streams.orders().await?;
+        let mut looked_at = Instant::now();
         // Nothing is claimed in vain.
         if let Some(bucket) = &self.bucket {
             bucket.probe().await?;
@@ -246,6 +247,11 @@ impl Hub {
             let late = self.given_out.take_late(Instant::now());
             self.take_back(late, Some(&stream)).await;
             let info = consumer.info().await.context("asking who waits for work")?;
+            if looked_at.elapsed() >= LOOK {
+                let state = &stream.info().await.context("looking at the orders")?.state;
+                anyhow::ensure!(!is_ahead(info, state), LOST_A_PART);
+                looked_at = Instant::now();
+            }
             let waiting = u64::try_from(info.num_waiting).unwrap_or_default();
             for _ in 0..waiting.saturating_sub(info.num_pending) {
                 if !self.give_out_one().await? {

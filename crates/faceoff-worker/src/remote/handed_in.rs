@@ -2,7 +2,7 @@
 
 use faceoff_wire::work::Lease;
 use std::{
-    collections::HashMap,
+    collections::{HashMap, HashSet},
     sync::{Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
 };
@@ -13,7 +13,24 @@ const WAITS_AFTER: Duration = Duration::from_secs(2);
 
 /// By the leases' nonces.
 #[derive(Debug, Default)]
-pub(super) struct AllHandedIn(Mutex<HashMap<Uuid, HandedIn>>);
+pub(super) struct AllHandedIn {
+    waiting: Mutex<HashMap<Uuid, HandedIn>>,
+    /// What is being looked at.
+    taken: Mutex<HashSet<Uuid>>,
+}
+
+/// An outcome is being looked at for as long as this lives.
+#[derive(Debug)]
+pub(super) struct Here<'a> {
+    all: &'a AllHandedIn,
+    nonce: Uuid,
+}
+
+impl Drop for Here<'_> {
+    fn drop(&mut self) {
+        self.all.taken().remove(&self.nonce);
+    }
+}
 
 /// An outcome that waits.
 #[derive(Debug, Clone)]
@@ -22,7 +39,7 @@ pub(super) struct HandedIn {
     pub(super) episodes_done: u32,
     /// Where it is in the stream of outcomes.
     pub(super) sequence: u64,
-    since: Instant,
+    pub(super) since: Instant,
 }
 
 impl AllHandedIn {
@@ -41,9 +58,15 @@ impl AllHandedIn {
         self.all().remove(&nonce);
     }
 
-    /// Does it wait yet?
-    pub(super) fn has(&self, nonce: Uuid) -> bool {
-        self.all().contains_key(&nonce)
+    /// It is here, whatever becomes of the stream.
+    pub(super) fn take(&self, nonce: Uuid) -> Here<'_> {
+        self.taken().insert(nonce);
+        Here { all: self, nonce }
+    }
+
+    /// Is it here, or was it?
+    pub(super) fn is_taken(&self, nonce: Uuid) -> bool {
+        self.taken().contains(&nonce) || !self.all().contains_key(&nonce)
     }
 
     /// All that waits for a while by now.
@@ -55,7 +78,11 @@ impl AllHandedIn {
 
     /// Each entry is whole whatever panicked beside it.
     fn all(&self) -> MutexGuard<'_, HashMap<Uuid, HandedIn>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn taken(&self) -> MutexGuard<'_, HashSet<Uuid>> {
+        self.taken.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -87,9 +114,14 @@ mod tests {
             ),
             (Uuid::from_u128(1), 50, 7)
         );
-        assert!(all.has(Uuid::from_u128(1)));
-        all.forget(Uuid::from_u128(1));
-        assert!(!all.has(Uuid::from_u128(1)));
+        let nonce = Uuid::from_u128(1);
+        assert!(!all.is_taken(nonce));
+        let here = all.take(nonce);
+        assert!(all.is_taken(nonce), "it is here");
+        drop(here);
+        assert!(!all.is_taken(nonce), "it waits again");
+        all.forget(nonce);
+        assert!(all.is_taken(nonce), "it was here");
         all.forget(Uuid::from_u128(3));
         assert_eq!(all.waiting(start + Duration::from_secs(60)).len(), 1);
     }

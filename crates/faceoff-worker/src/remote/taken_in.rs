@@ -29,6 +29,8 @@ const AGAIN: Duration = Duration::from_secs(5);
 const SOON: Duration = Duration::from_secs(1);
 /// So many outcomes are checked at the same time: each takes a thread of its own for a while.
 const CHECKED_AT_ONCE: usize = 2;
+/// So many of those that wait are looked for in their stream each time: each is read there as a whole.
+const LOOKED_FOR_AT_ONCE: usize = 16;
 /// So much is kept of what a worker says of its own fault, in characters.
 const REASON_SHOWN: usize = 500;
 
@@ -38,8 +40,22 @@ impl Hub {
         self: &Arc<Self>,
         shutdown: &CancellationToken,
     ) -> anyhow::Result<()> {
-        let mut consumer = self.streams.outcomes().await?;
         let mut taking = JoinSet::new();
+        let ended = self.fetch(&mut taking, shutdown).await;
+        // What is being checked is not broken off, whatever keeps others from being fetched.
+        while !taking.is_empty() {
+            taken(taking.join_next().await)?;
+        }
+        ended
+    }
+
+    async fn fetch(
+        self: &Arc<Self>,
+        taking: &mut JoinSet<anyhow::Result<()>>,
+        shutdown: &CancellationToken,
+    ) -> anyhow::Result<()> {
+        let mut consumer = self.streams.outcomes().await?;
+        let mut held_back = None;
         while !shutdown.is_cancelled() {
             while taking.len() >= CHECKED_AT_ONCE {
                 taken(taking.join_next().await)?;
@@ -65,13 +81,10 @@ impl Hub {
             while let Some(done) = taking.try_join_next() {
                 taken(Some(done))?;
             }
-            // Of a stream that is there no more nobody says so: NATS may have lost it, and then it is made anew.
             if are_none {
-                consumer = self.streams.outcomes().await?;
+                let checked = self.streams.check_outcomes(&mut consumer, &mut held_back);
+                checked.await?;
             }
-        }
-        while !taking.is_empty() {
-            taken(taking.join_next().await)?;
         }
         Ok(())
     }
@@ -80,39 +93,40 @@ impl Hub {
     pub(super) async fn keep_waiting(&self, shutdown: &CancellationToken) -> anyhow::Result<()> {
         let every = Duration::from_secs(self.server.lease_s.into()) / 3;
         while !shutdown.is_cancelled() {
-            let mut looks = Ok(());
+            let mut waiting = self.handed_in.waiting(Instant::now());
             for HandedIn {
                 lease,
                 episodes_done,
-                sequence,
                 ..
-            } in self.handed_in.waiting(Instant::now())
+            } in waiting.clone()
             {
-                // While NATS does not tell, nothing is lost.
-                let mut is_there = true;
-                if looks.is_ok() {
-                    let looked = self.streams.has_outcome(&lease, sequence).await;
-                    looks = looked.map(|found| is_there = found);
-                }
-                let nonce = lease.nonce;
-                // What was taken in meanwhile is there no more, either.
-                if !self.handed_in.has(nonce) {
-                    continue;
-                }
-                let server = self.server.clone();
-                let kept = tokio::task::spawn_blocking(move || {
-                    if is_there {
-                        return server.renew(&lease, episodes_done);
-                    }
-                    tracing::warn!(unit = %lease.unit, slot = lease.slot, "NATS has lost what came of a unit: it is played again");
-                    server.give_back(&lease, GivenBack::Shutdown)?;
-                    Ok(Holding::Lost)
-                });
-                if kept.await?? == Holding::Lost {
+                let (server, nonce) = (self.server.clone(), lease.nonce);
+                let renewed =
+                    tokio::task::spawn_blocking(move || server.renew(&lease, episodes_done));
+                if renewed.await?? == Holding::Lost {
                     self.handed_in.forget(nonce);
                 }
             }
-            looks?;
+            // Outcomes come in order, so those that wait for long say enough of all.
+            waiting.sort_by_key(|waits| waits.since);
+            waiting.truncate(LOOKED_FOR_AT_ONCE);
+            for HandedIn {
+                lease, sequence, ..
+            } in waiting
+            {
+                let is_there = self.streams.has_outcome(&lease, sequence).await?;
+                // What is here is not lost, and what was taken in meanwhile is there no more, either.
+                if is_there || self.handed_in.is_taken(lease.nonce) {
+                    continue;
+                }
+                self.handed_in.forget(lease.nonce);
+                tracing::warn!(unit = %lease.unit, slot = lease.slot, "NATS has lost what came of a unit: it is played again");
+                let server = self.server.clone();
+                let given_back = tokio::task::spawn_blocking(move || {
+                    server.give_back(&lease, GivenBack::Shutdown)
+                });
+                given_back.await??;
+            }
             tokio::select! {
                 () = shutdown.cancelled() => {}
                 () = tokio::time::sleep(every) => {}
@@ -176,9 +190,10 @@ impl Hub {
                 tracing::warn!(%worker, units, %until, "a worker could play none of its last units; it rests");
             }
         };
+        let _here = self.handed_in.take(nonce);
         let acknowledgement = match self.stored(message, grant, outcome).await {
             // Whoever sends it once more has done nothing by that.
-            Ok(Taken::Held) if is_over => {
+            Ok(Taken::Held | Taken::Unusable) if is_over => {
                 tracing::info!(%unit, %worker, "over already; what came of it is left out");
                 AckKind::Ack
             }
@@ -203,7 +218,10 @@ impl Hub {
                 tracing::info!(%unit, %worker, "no longer this worker's; what came of it is left out");
                 AckKind::Ack
             }
-            Ok(Taken::Disbelieved(difference)) => self.ban(&worker, &difference).await,
+            Ok(Taken::Disbelieved(difference)) => match self.ban(&worker, &difference).await {
+                again @ AckKind::Nak(_) => return again,
+                banned => banned,
+            },
             Ok(Taken::StillComing) => return AckKind::Nak(Some(SOON)),
             Err(error) => {
                 tracing::error!(%unit, %worker, cause = format!("{error:#}"), "what came of a unit cannot be stored; trying again");
