@@ -28,7 +28,7 @@ const MOST_OUTCOME_BYTES: i64 = 1 << 30;
 const SENT_TWICE_WITHIN: Duration = Duration::from_secs(120);
 /// An outcome that the server has taken and not said to have stored comes again after this.
 const TAKEN_FOR: Duration = Duration::from_secs(60);
-/// What is there yet is delivered once more then, which changes nothing.
+/// Said of a stream that has less than its consumer believes. What is there yet is then delivered once more, which changes nothing.
 pub(super) const LOST_A_PART: &str =
     "NATS has lost a part of what it had stored: its consumer is made anew";
 /// Slots that may ask at the same time.

@@ -41,10 +41,10 @@ impl Hub {
         shutdown: &CancellationToken,
     ) -> anyhow::Result<()> {
         let mut taking = JoinSet::new();
-        let ended = self.fetch(&mut taking, shutdown).await;
+        let mut ended = self.fetch(&mut taking, shutdown).await;
         // What is being checked is not broken off, whatever keeps others from being fetched.
-        while !taking.is_empty() {
-            taken(taking.join_next().await)?;
+        while let Some(done) = taking.join_next().await {
+            ended = ended.and(taken(Some(done)));
         }
         ended
     }
