@@ -56,7 +56,7 @@ fn the_demo_plays_a_day_and_its_board_is_served() {
             .expect("a dataset has its score"),
     )
     .expect("it is JSON");
-    assert_eq!(results["ruleset"], "airhockey-2023.2");
+    assert_eq!(results["ruleset"], "airhockey-2023.3");
     assert_eq!(results["profile"], "evaluation");
     for task in ["hit", "defend", "prepare"] {
         assert_eq!(results["tasks"][task]["episodes"], 3, "{task}");

@@ -154,13 +154,13 @@ fn what_the_server_does_not_take_or_cannot_tell_is_refused_in_words() {
         .get("/api/v1/runtimes", None)
         .text()
         .expect("the API speaks text");
-    let other = told.replace("airhockey-2023.2", "airhockey-2031.1");
+    let other = told.replace("airhockey-2023.3", "airhockey-2031.1");
     assert_ne!(told, other);
     refused(
         &hold,
         &answering(other),
         &[],
-        &["airhockey-2031.1", "airhockey-2023.2", "version of faceoff"],
+        &["airhockey-2031.1", "airhockey-2023.3", "version of faceoff"],
     );
     // What was never played leaves nothing behind.
     assert!(!out.join("results.json").exists());

@@ -197,11 +197,11 @@ fn a_data_folder_of_the_first_release_continues_where_it_was_cut_off() {
         beta["id"].as_str().expect("it has an id")
     );
     let finished = server.poll(&path, &admin, |answer| answer["state"] == "finished");
-    assert_eq!(finished["result"]["ruleset"], "airhockey-2023.2");
+    assert_eq!(finished["result"]["ruleset"], "airhockey-2023.3");
     let board = get(&server, "/api/v1/board", &admin);
-    assert_eq!(board["ruleset"], "airhockey-2023.2");
+    assert_eq!(board["ruleset"], "airhockey-2023.3");
     for row in board["rows"].as_array().expect("a board has rows") {
-        assert_eq!(row["ruleset"], "airhockey-2023.2", "{board:#}");
+        assert_eq!(row["ruleset"], "airhockey-2023.3", "{board:#}");
     }
     assert_board(&server, "/api/v1/board?revision=1", FIRST, 2);
 }

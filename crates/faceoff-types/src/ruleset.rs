@@ -14,14 +14,21 @@ pub enum Ruleset {
     /// world and time budgets.
     #[serde(rename = "airhockey-2023.2")]
     Second,
+    /// The clock of a step begins before the evaluator touches anything that it shares with the agent. Of the
+    /// evaluator's own calls nothing is excused but its thread's wait to run. CPU time that an agent uses between
+    /// its answer and the next question counts as the next step's; in a game on shared CPUs, an agent that has
+    /// answered is frozen meanwhile. Of the agent's CPUs, only the wait of a thread that then ran towards the answer
+    /// counts as the host's. The simulation is the second ruleset's.
+    #[serde(rename = "airhockey-2023.3")]
+    Third,
 }
 
 impl Ruleset {
     /// All, the earlier first.
-    pub const ALL: [Self; 2] = [Self::First, Self::Second];
+    pub const ALL: [Self; 3] = [Self::First, Self::Second, Self::Third];
 
     /// What new runs are played by.
-    pub const CURRENT: Self = Self::Second;
+    pub const CURRENT: Self = Self::Third;
 
     /// The name in files and tables.
     #[must_use]
@@ -29,6 +36,7 @@ impl Ruleset {
         match self {
             Self::First => "airhockey-2023.1",
             Self::Second => "airhockey-2023.2",
+            Self::Third => "airhockey-2023.3",
         }
     }
 
@@ -37,8 +45,19 @@ impl Ruleset {
     pub const fn action_limit(self) -> f64 {
         match self {
             Self::First => f64::MAX,
-            Self::Second => ACTION_LIMIT,
+            Self::Second | Self::Third => ACTION_LIMIT,
         }
+    }
+
+    /// Are there games of it? The first ruleset is older than games.
+    #[must_use]
+    pub const fn has_games(self) -> bool {
+        !matches!(self, Self::First)
+    }
+
+    /// The names of all, for messages.
+    fn names() -> String {
+        Self::ALL.map(Self::as_str).join(", ")
     }
 }
 
@@ -50,8 +69,7 @@ impl fmt::Display for Ruleset {
 
 /// Rules that this version does not know.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("unknown ruleset {0:?}: this version knows {first} and {second}",
-        first = Ruleset::First, second = Ruleset::Second)]
+#[error("unknown ruleset {0:?}: this version knows {known}", known = Ruleset::names())]
 pub struct UnknownRuleset(pub String);
 
 impl FromStr for Ruleset {
@@ -80,3 +98,29 @@ pub const GAME_WINDOWS: u32 = 90;
 
 /// Every so many fouls of a robot give its opponent one point (reference implementation).
 pub const FOULS_PER_POINT: u32 = 3;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ruleset_names_are_read_as_they_are_written() {
+        for ruleset in Ruleset::ALL {
+            let json = serde_json::to_string(&ruleset).unwrap();
+            assert_eq!(json, format!("\"{ruleset}\""));
+            assert_eq!(serde_json::from_str::<Ruleset>(&json).unwrap(), ruleset);
+            assert_eq!(ruleset.as_str().parse::<Ruleset>(), Ok(ruleset));
+        }
+        assert_eq!(Ruleset::ALL.last(), Some(&Ruleset::CURRENT));
+    }
+
+    #[test]
+    fn unknown_ruleset_error_lists_all_known_names() {
+        let unknown = "airhockey-1999".parse::<Ruleset>().unwrap_err();
+        assert_eq!(
+            unknown.to_string(),
+            "unknown ruleset \"airhockey-1999\": this version knows airhockey-2023.1, airhockey-2023.2, \
+             airhockey-2023.3"
+        );
+    }
+}

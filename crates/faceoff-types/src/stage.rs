@@ -42,7 +42,7 @@ impl FromStr for StageDay {
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct StageRules {
     /// The simulator and the scoring.
-    #[cfg_attr(feature = "openapi", schema(value_type = String, example = "airhockey-2023.2"))]
+    #[cfg_attr(feature = "openapi", schema(value_type = String, example = "airhockey-2023.3"))]
     pub ruleset: Ruleset,
     /// The perturbations.
     pub profile: Profile,

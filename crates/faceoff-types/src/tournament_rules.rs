@@ -15,7 +15,7 @@ pub const MAX_FREE_GAMES: u32 = 1000;
 #[serde(default, deny_unknown_fields)]
 pub struct TournamentRules {
     /// The simulator and the scoring.
-    #[cfg_attr(feature = "openapi", schema(value_type = String, example = "airhockey-2023.2"))]
+    #[cfg_attr(feature = "openapi", schema(value_type = String, example = "airhockey-2023.3"))]
     pub ruleset: Ruleset,
     /// Who meets whom.
     pub format: TournamentFormat,

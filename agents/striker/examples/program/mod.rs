@@ -103,6 +103,6 @@ fn hello(own: usize) -> Value {
             "joint_pos_limit": info.joint_pos_limit, "joint_vel_limit": info.joint_vel_limit,
             "joint_acc_limit": info.joint_acc_limit, "base_frame": info.base_frame,
         },
-        "ruleset": "airhockey-2023.2",
+        "ruleset": "airhockey-2023.3",
     }})
 }

@@ -61,7 +61,7 @@ fn hello(task: &str) -> Value {
             "joint_acc_limit": both(velocity.map(|v| 10.0 * v)),
             "base_frame": [[[1.0, 0.0, 0.0, -1.51], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -0.1], [0.0, 0.0, 0.0, 1.0]]],
         },
-        "episode_steps": 500, "ruleset": "airhockey-2023.2",
+        "episode_steps": 500, "ruleset": "airhockey-2023.3",
     }})
 }
 

@@ -58,11 +58,13 @@ pub fn verify_game(
 /// have.
 fn made_here(recording: &GameRecording) -> Result<(), DatasetError> {
     let (manifest, here) = (recording.manifest(), simulator_id());
-    if manifest.spec.ruleset != Ruleset::CURRENT {
+    let ruleset = manifest.spec.ruleset;
+    if !ruleset.has_games() {
+        let with_games = Ruleset::ALL.into_iter().filter(|one| one.has_games());
+        let names: Vec<_> = with_games.map(Ruleset::as_str).collect();
         return Err(DatasetError::Foreign(format!(
-            "the game says {}; games are played by {} alone",
-            manifest.spec.ruleset,
-            Ruleset::CURRENT
+            "the game says {ruleset}; games are played by {} alone",
+            names.join(" and ")
         )));
     }
     manifest

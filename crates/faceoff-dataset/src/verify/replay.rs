@@ -163,7 +163,7 @@ impl Again<'_> {
         let wrong = |recorded: String| {
             let expected = match self.ruleset {
                 Ruleset::First => format!("{} finite numbers", self.interpolation.len()),
-                Ruleset::Second => format!(
+                Ruleset::Second | Ruleset::Third => format!(
                     "{} numbers of at most {ACTION_LIMIT} in magnitude",
                     self.interpolation.len()
                 ),

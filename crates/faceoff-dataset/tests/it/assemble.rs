@@ -223,7 +223,7 @@ fn what_is_missing_twice_or_foreign_is_refused() {
     evaluation.meta.ruleset = Ruleset::First;
     refused(
         &evaluation,
-        "was played by airhockey-2023.2, the evaluation by airhockey-2023.1",
+        "was played by airhockey-2023.3, the evaluation by airhockey-2023.1",
     );
     evaluation.meta.seed = evaluation.meta.seed.model_mismatch();
     refused(&evaluation, "belongs to another evaluation");

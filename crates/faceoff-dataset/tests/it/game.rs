@@ -164,6 +164,16 @@ fn a_recording_verifies_packed_and_unpacked_and_the_same_game_gives_the_same_byt
     assert!(!out.path().join("tables").exists());
 }
 
+#[test]
+fn games_of_the_second_ruleset_verify() {
+    let (_out, unpacked) = recorded();
+    let earlier = Forgery::of(unpacked.path());
+    for name in ["manifest.json", "results.json"] {
+        earlier.text(name, "airhockey-2023.3", "airhockey-2023.2");
+    }
+    assert_eq!(verify(earlier.reseal().dir.path()), Ok(STEPS));
+}
+
 /// A forger who also states the hashes anew is found out by what the simulation gives.
 #[test]
 fn every_column_that_a_forger_touches_is_found() {
@@ -256,9 +266,14 @@ fn what_is_damaged_is_told_apart_from_what_is_foreign() {
     for (from, to, words) in [
         ("faceoff-game/1", "faceoff-game/9", "this version reads"),
         (
-            "airhockey-2023.2",
+            "airhockey-2023.3",
             "airhockey-2023.1",
-            "games are played by",
+            "games are played by airhockey-2023.2 and airhockey-2023.3 alone",
+        ),
+        (
+            "airhockey-2023.3",
+            "airhockey-1999",
+            "`airhockey-2023.1`, `airhockey-2023.2`, `airhockey-2023.3`",
         ),
     ] {
         let forged = Forgery::of(unpacked.path());

@@ -468,9 +468,10 @@ fn other_layouts_rulesets_and_simulators_are_named() {
             "layout is \"faceoff-dataset/1\"",
         ),
         (
-            "airhockey-2023.2",
+            "airhockey-2023.3",
             "airhockey-1999",
-            "unknown ruleset \"airhockey-1999\"",
+            "unknown ruleset \"airhockey-1999\": this version knows airhockey-2023.1, airhockey-2023.2, \
+             airhockey-2023.3",
         ),
         (
             &*fingerprint,
@@ -486,6 +487,19 @@ fn other_layouts_rulesets_and_simulators_are_named() {
             }
             other => panic!("{other:?}"),
         }
+    }
+}
+
+#[test]
+fn datasets_of_earlier_rulesets_verify() {
+    for earlier in ["airhockey-2023.1", "airhockey-2023.2"] {
+        let forgery = forgery();
+        for name in ["manifest.json", "results.json"] {
+            forgery.text(name, "airhockey-2023.3", earlier);
+        }
+        let verified = check(forgery.reseal().dir.path(), 2).unwrap();
+        assert_eq!(verified.result.ruleset, earlier);
+        assert_eq!(verified.episodes, 4);
     }
 }
 
@@ -551,8 +565,8 @@ fn throwing(turn: &Turn) -> Option<[[f64; 7]; 2]> {
 fn numbers_beyond_a_rulesets_bound_are_found() {
     let forge = |ruleset: &str| {
         let forgery = forgery();
-        forgery.text("manifest.json", "airhockey-2023.2", ruleset);
-        forgery.text("results.json", "airhockey-2023.2", ruleset);
+        forgery.text("manifest.json", "airhockey-2023.3", ruleset);
+        forgery.text("results.json", "airhockey-2023.3", ruleset);
         forgery.table("steps.parquet", |batch| {
             let mut columns = batch.columns().to_vec();
             let index = batch.schema().index_of("action").unwrap();
@@ -579,9 +593,11 @@ fn numbers_beyond_a_rulesets_bound_are_found() {
         });
         difference(forgery.reseal().dir.path(), 2)
     };
-    let found = forge("airhockey-2023.2");
-    assert_eq!((&*found.field, &*found.recorded), ("action", "20000.0"));
-    assert_eq!(found.expected, "14 numbers of at most 10000 in magnitude");
+    for bounded in ["airhockey-2023.2", "airhockey-2023.3"] {
+        let found = forge(bounded);
+        assert_eq!((&*found.field, &*found.recorded), ("action", "20000.0"));
+        assert_eq!(found.expected, "14 numbers of at most 10000 in magnitude");
+    }
     // The first ruleset only asked for finite numbers; what they lead to is another state.
     let found = forge("airhockey-2023.1");
     assert_ne!(found.field, "action");

@@ -39,7 +39,7 @@ pub struct BoardView {
     /// Since when those were the stage's.
     pub since: Timestamp,
     /// The simulator and the scoring that the scores refer to.
-    #[schema(example = "airhockey-2023.2")]
+    #[schema(example = "airhockey-2023.3")]
     pub ruleset: String,
     /// What each task's success rate weighs in the overall score.
     pub weights: TaskWeights,

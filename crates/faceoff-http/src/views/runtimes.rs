@@ -13,7 +13,7 @@ use utoipa::ToSchema;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct RuntimesView {
     /// The ruleset of what is played now.
-    #[schema(example = "airhockey-2023.2")]
+    #[schema(example = "airhockey-2023.3")]
     pub ruleset: String,
     /// What `agent.toml` may name, with what was found in each when the server started; empty in an archive.
     pub runtimes: Vec<RuntimeInventory>,

@@ -20,7 +20,7 @@ pub struct SeasonView {
     /// As the organiser named it.
     pub name: String,
     /// The rules that all scores refer to.
-    #[schema(example = "airhockey-2023.2")]
+    #[schema(example = "airhockey-2023.3")]
     pub ruleset: String,
     /// BLAKE3 of the season secret, 64 hexadecimal digits. All seeds derive from the secret, so that
     /// nobody can change them after the commitment is known.

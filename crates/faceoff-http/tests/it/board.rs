@@ -65,7 +65,7 @@ async fn the_board_shows_tiers_in_order_with_rates_intervals_points_and_score() 
         assert!(first.contains(part), "{part:?} is not in {first:?}");
     }
     let caption = &texts(&html, ".board caption")[0];
-    let setting = "evaluation profile, 1000 episodes per task, rules airhockey-2023.2";
+    let setting = "evaluation profile, 1000 episodes per task, rules airhockey-2023.3";
     assert!(caption.contains(setting), "{caption}");
     let commitment = site.store.season().await.unwrap().commitment;
     let legend = texts(&html, ".legend").join(" ");
@@ -86,7 +86,7 @@ async fn the_board_shows_tiers_in_order_with_rates_intervals_points_and_score() 
     ] {
         assert!(legend.contains(&rule), "{rule:?} is not in the legend");
     }
-    assert!(texts(&html, "footer")[0].contains("airhockey-2023.2"));
+    assert!(texts(&html, "footer")[0].contains("airhockey-2023.3"));
     assert!(texts(&html, ".lead")[0].contains("Test season"));
     // what a screen reader needs of a table
     assert_eq!(texts(&html, "table.board caption").len(), 1);
@@ -130,7 +130,7 @@ async fn until_the_day_is_released_the_boards_tell_score_and_points_only() {
         assert_eq!((&row["tier"], &row["team"]), (&json!(tier), &json!(name)));
     }
     assert_eq!(board["rows"].as_array().unwrap().len(), ORDER.len());
-    assert_eq!(board["ruleset"], "airhockey-2023.2");
+    assert_eq!(board["ruleset"], "airhockey-2023.3");
     let stage = site.stage().await;
     assert_eq!(
         (&board["stage"], &board["stage_name"], &board["revision"]),

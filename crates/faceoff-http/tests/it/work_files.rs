@@ -217,7 +217,7 @@ async fn a_banned_worker_reads_and_writes_nothing_more() {
 /// What is played under an order whose files are a game's.
 fn game() -> GameSpec {
     let spec = json!({
-        "ruleset": "airhockey-2023.2", "steps": 500, "profile": "ideal", "seed": "0".repeat(64),
+        "ruleset": "airhockey-2023.3", "steps": 500, "profile": "ideal", "seed": "0".repeat(64),
         "mismatch_seed": "0".repeat(64), "perturbations": PerturbationSettings::default(),
     });
     serde_json::from_value(spec).unwrap()

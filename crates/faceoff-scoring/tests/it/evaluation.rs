@@ -118,7 +118,7 @@ fn an_evaluation_takes_the_worst_task_for_safety_and_weighs_the_rates() {
     assert_eq!(result.tier, Tier::Improvable);
     assert_eq!(
         (result.ruleset.as_str(), result.profile),
-        ("airhockey-2023.2", Profile::Evaluation)
+        ("airhockey-2023.3", Profile::Evaluation)
     );
     assert_eq!((result.seed, result.tasks), (seed, tasks.clone()));
 

@@ -50,7 +50,7 @@ impl Bounds {
     pub const fn of(ruleset: Ruleset) -> Self {
         match ruleset {
             Ruleset::First => Self::FINITE,
-            Ruleset::Second => Self::WIDE,
+            Ruleset::Second | Ruleset::Third => Self::WIDE,
         }
     }
 

@@ -5,13 +5,14 @@ use faceoff_store::*;
 use faceoff_types::*;
 
 /// Makes all that is there what an earlier program has left.
-async fn was_begun_under_the_first(f: &Fixture) {
+async fn was_begun_under(f: &Fixture, earlier: Ruleset) {
     let mut connection = f.connection().await;
     for change in [
-        "UPDATE runs SET ruleset = 'airhockey-2023.1'",
-        "UPDATE stage_revisions SET rules = json_set(rules, '$.ruleset', 'airhockey-2023.1')",
+        "UPDATE runs SET ruleset = ?",
+        "UPDATE stage_revisions SET rules = json_set(rules, '$.ruleset', ?)",
     ] {
-        let changed = sqlx::query(change).execute(&mut connection).await.unwrap();
+        let query = sqlx::query(change).bind(earlier.as_str());
+        let changed = query.execute(&mut connection).await.unwrap();
         assert!(changed.rows_affected() > 0);
     }
 }
@@ -53,29 +54,29 @@ async fn newest(f: &Fixture) -> (u32, Ruleset) {
 
 #[tokio::test]
 async fn what_is_under_way_at_an_upgrade_finishes_by_its_own_rules_on_its_own_board() {
+    for earlier in Ruleset::ALL {
+        if earlier != Ruleset::CURRENT {
+            upgrade_from(earlier).await;
+        }
+    }
+}
+
+async fn upgrade_from(earlier: Ruleset) {
     let mut f = Fixture::new().await;
     let [alpha, beta] = [f.ready_team("Alpha").await, f.ready_team("Beta").await];
     f.evaluate(alpha.id, &plan()).await;
     assert_eq!(newest(&f).await, (1, Ruleset::CURRENT));
-    was_begun_under_the_first(&f).await;
-    assert_eq!(play(&f, 10.0).await, Ruleset::First);
-    assert_eq!(newest(&f).await, (1, Ruleset::First));
+    was_begun_under(&f, earlier).await;
+    assert_eq!(play(&f, 10.0).await, earlier);
+    assert_eq!(newest(&f).await, (1, earlier));
 
     // The new program starts, with the same configuration.
     f.later(24 * 3600);
     f.evaluate(alpha.id, &plan()).await;
-    assert_eq!(
-        newest(&f).await,
-        (1, Ruleset::First),
-        "until there is a result"
-    );
-    assert_eq!(
-        play(&f, 20.0).await,
-        Ruleset::First,
-        "Beta's was queued before"
-    );
-    assert_eq!(play(&f, 30.0).await, Ruleset::Second);
-    assert_eq!(newest(&f).await, (2, Ruleset::Second));
+    assert_eq!(newest(&f).await, (1, earlier), "until there is a result");
+    assert_eq!(play(&f, 20.0).await, earlier, "Beta's was queued before");
+    assert_eq!(play(&f, 30.0).await, Ruleset::CURRENT);
+    assert_eq!(newest(&f).await, (2, Ruleset::CURRENT));
     assert_eq!(teams(&f, 1).await, ["Alpha", "Beta"]);
     assert_eq!(teams(&f, 2).await, ["Alpha"]);
     assert_eq!(f.board().await[0].result.score, 30.0);

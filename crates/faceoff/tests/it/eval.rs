@@ -71,7 +71,7 @@ fn the_result_does_not_depend_on_workers_sandbox_or_packing() {
         assert!(output.status.success(), "{name}: {}", text(&output.stderr));
         let table = text(&output.stdout);
         assert!(
-            table.contains("hold: evaluation (airhockey-2023.2)"),
+            table.contains("hold: evaluation (airhockey-2023.3)"),
             "{table}"
         );
         assert!(table.contains("\ndefend          3 "), "{table}");

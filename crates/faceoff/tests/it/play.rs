@@ -43,7 +43,7 @@ fn a_game_leaves_results_and_a_recording_that_verifies() {
     assert!(output.status.success(), "{}", text(&output.stderr));
     let table = text(&output.stdout);
     assert!(
-        table.contains("hold against hold: evaluation (airhockey-2023.2)"),
+        table.contains("hold against hold: evaluation (airhockey-2023.3)"),
         "{table}"
     );
     assert!(table.contains("1000 control steps, 2 windows"), "{table}");
