@@ -1,6 +1,8 @@
 //! Stages over HTTP and on pages.
 
 use crate::site::{ADMIN, Answer, Site, result};
+use faceoff_store::{Actor, StageChange};
+use faceoff_types::{Ruleset, StageRules};
 use reqwest::Method;
 use serde_json::{Value, json};
 
@@ -160,6 +162,40 @@ async fn other_rules_of_an_open_stage_are_confirmed_and_get_a_board_of_their_own
         "{}",
         other.body
     );
+}
+
+#[tokio::test]
+async fn stage_keeps_its_ruleset_until_its_rules_change() {
+    let site = Site::start().await;
+    let is = site.store.stages().await.unwrap().remove(0);
+    // As a program of the ruleset before has left it.
+    let earlier = StageChange {
+        rules: Some(StageRules {
+            ruleset: Ruleset::Second,
+            ..is.rules.rules
+        }),
+        ..StageChange::default()
+    };
+    let now = site.now();
+    let left = site
+        .store
+        .change_stage(Actor::Organiser, is.id, earlier, now);
+    left.await.unwrap();
+    let stage = site.get("/api/v1/stages", None).await.json(200)[0].clone();
+    for (body, revision, ruleset) in [
+        (json!({ "name": "Heats" }), 2, "airhockey-2023.2"),
+        (
+            json!({ "episodes_per_task": 9, "confirm": "Heats" }),
+            3,
+            "airhockey-2023.3",
+        ),
+    ] {
+        let changed = change(&site, &stage, body).await.json(200);
+        assert_eq!(
+            (&changed["revision"], &changed["ruleset"]),
+            (&json!(revision), &json!(ruleset))
+        );
+    }
 }
 
 #[tokio::test]

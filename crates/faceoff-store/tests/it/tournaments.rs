@@ -830,6 +830,29 @@ async fn a_schedule_is_played_again_with_fresh_seeds_and_beside_what_counts() {
 }
 
 #[tokio::test]
+async fn tournament_of_an_earlier_ruleset_keeps_it() {
+    let f = Fixture::new().await;
+    let rules = TournamentRules {
+        ruleset: Ruleset::Second,
+        ..TournamentRules::default()
+    };
+    let (cup, teams) = opened(&f, &["A", "B"], rules).await;
+    start(&f, cup.id, &drawn(1, &[&[[teams[0], teams[1]]]], &[]))
+        .await
+        .unwrap();
+    // The new program starts.
+    let claimed = f.reopen().await.claim("slot 0", LEASE_S, f.now).await;
+    let Some(Claimed {
+        work: Work::Game { rules, .. },
+        ..
+    }) = claimed.unwrap()
+    else {
+        panic!("expected a game");
+    };
+    assert_eq!(rules.ruleset, Ruleset::Second);
+}
+
+#[tokio::test]
 async fn a_closed_tournament_stays_as_it_is_and_lets_its_archives_go() {
     let f = Fixture::new().await;
     let (cup, teams) = opened(&f, &["A", "B"], TournamentRules::default()).await;
