@@ -273,16 +273,19 @@ async fn changed_rules(
     let is_named = fields
         .as_ref()
         .is_some_and(|fields| fields.contains_key("ruleset"));
-    let mut rules = merged("rules", is, fields)?;
-    if is_named && rules.ruleset != Ruleset::CURRENT {
-        let detail = format!(
-            "ruleset: expected {}, the one that games are played by, got {}; leave it out",
-            Ruleset::CURRENT,
-            rules.ruleset
-        );
-        return Err(Problem::invalid("rules", detail));
+    let mut rules: TournamentRules = merged("rules", is, fields)?;
+    // An upgrade of the program alone changes nothing of a tournament.
+    if rules != *is {
+        if is_named && rules.ruleset != Ruleset::CURRENT {
+            let detail = format!(
+                "ruleset: expected {}, the current one, got {}; leave it out",
+                Ruleset::CURRENT,
+                rules.ruleset
+            );
+            return Err(Problem::invalid("rules", detail));
+        }
+        rules.ruleset = Ruleset::CURRENT;
     }
-    rules.ruleset = Ruleset::CURRENT;
     rules
         .check()
         .map_err(|error| Problem::invalid("rules", error))?;

@@ -5,6 +5,8 @@ use super::{
     slot::Went,
 };
 use crate::site::{ADMIN, text};
+use faceoff_store::{Actor, TournamentChange};
+use faceoff_types::{Ruleset, TournamentRules};
 use serde_json::{Value, json};
 
 fn row<'a>(view: &'a Value, team: &str) -> &'a Value {
@@ -338,4 +340,40 @@ async fn rules_are_fixed_once_a_round_was_started_and_settings_are_not() {
     cup.change(json!({ "settings": { "publishes": "never" } }))
         .await
         .json(200);
+}
+
+#[tokio::test]
+async fn tournament_keeps_its_ruleset_until_its_rules_change() {
+    let cup = Cup::open(&["A", "B"], json!({})).await;
+    let store = &cup.site.store;
+    let opened = store.tournaments().await.unwrap().remove(0);
+    // As a program of the ruleset before has left it.
+    let earlier = TournamentChange {
+        rules: Some(TournamentRules {
+            ruleset: Ruleset::Second,
+            ..opened.rules
+        }),
+        ..TournamentChange::default()
+    };
+    let now = cup.site.now();
+    store
+        .change_tournament(Actor::Organiser, opened.id, &earlier, now)
+        .await
+        .unwrap();
+    for rules in [
+        json!({}),
+        json!({ "mirrored": false }),
+        json!({ "ruleset": "airhockey-2023.2" }),
+    ] {
+        let same = cup.change(json!({ "rules": rules })).await.json(200);
+        assert_eq!(same["rules"]["ruleset"], "airhockey-2023.2");
+    }
+    let named = json!({ "ruleset": "airhockey-2023.2", "steps": 1500 });
+    cup.change(json!({ "rules": named })).await.problem(
+        422,
+        "invalid-content",
+        &["ruleset", "airhockey-2023.3", "leave it out"],
+    );
+    let changed = cup.change(json!({ "rules": { "steps": 1500 } })).await;
+    assert_eq!(changed.json(200)["rules"]["ruleset"], "airhockey-2023.3");
 }
