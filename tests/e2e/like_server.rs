@@ -158,30 +158,51 @@ fn what_the_server_does_not_take_or_cannot_tell_is_refused_in_words() {
     assert_ne!(told, other);
     refused(
         &hold,
-        &answering(other),
+        &answering(vec![other]),
         &[],
         &["airhockey-2031.1", "airhockey-2023.3", "version of faceoff"],
+    );
+    // A server of this version, whose stage began under the ruleset before.
+    let stages = server
+        .get("/api/v1/stages", None)
+        .text()
+        .expect("the API speaks text");
+    let earlier = stages.replace("airhockey-2023.3", "airhockey-2023.2");
+    assert_ne!(stages, earlier);
+    refused(
+        &hold,
+        &answering(vec![told, earlier]),
+        &[],
+        &[
+            "“Qualifying” still plays by airhockey-2023.2",
+            "airhockey-2023.3",
+            "--stage",
+        ],
     );
     // What was never played leaves nothing behind.
     assert!(!out.join("results.json").exists());
 }
 
-/// The address of a server that gives this answer, once.
-fn answering(body: String) -> String {
+/// The address of a server that gives these answers, one after the other.
+fn answering(bodies: Vec<String>) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").expect("there is a free port");
     let address = listener.local_addr().expect("it has an address");
     thread::spawn(move || {
-        let (mut client, _) = listener.accept().expect("somebody asks");
-        let mut asked = Vec::new();
-        let mut byte = [0];
-        while !asked.ends_with(b"\r\n\r\n") && client.read(&mut byte).is_ok_and(|read| read == 1) {
-            asked.push(byte[0]);
+        for body in bodies {
+            let (mut client, _) = listener.accept().expect("somebody asks");
+            let mut asked = Vec::new();
+            let mut byte = [0];
+            while !asked.ends_with(b"\r\n\r\n")
+                && client.read(&mut byte).is_ok_and(|read| read == 1)
+            {
+                asked.push(byte[0]);
+            }
+            let answer = format!(
+                "HTTP/1.1 200 OK\r\ncontent-type: application/json\r\ncontent-length: {}\r\nconnection: close\r\n\r\n{body}",
+                body.len()
+            );
+            client.write_all(answer.as_bytes()).expect("it listens");
         }
-        let answer = format!(
-            "HTTP/1.1 200 OK\r\ncontent-type: application/json\r\ncontent-length: {}\r\nconnection: close\r\n\r\n{body}",
-            body.len()
-        );
-        client.write_all(answer.as_bytes()).expect("it listens");
     });
     format!("http://{address}")
 }

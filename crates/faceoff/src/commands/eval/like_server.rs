@@ -52,7 +52,8 @@ impl LikeServer {
         let ruleset = stage.rules.rules.ruleset;
         ensure!(
             ruleset == Ruleset::CURRENT,
-            "its stage “{}” plays by {ruleset}, and this program by {RULESET}; use the server's version of faceoff",
+            "its stage “{}” still plays by {ruleset}, and this program by {RULESET}; name another stage (--stage), or use \
+             a version of faceoff that plays by {ruleset}",
             stage.name
         );
         let offer = server.stages.iter().find(|offer| offer.id == stage.id);
