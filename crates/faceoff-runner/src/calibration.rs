@@ -7,7 +7,8 @@ use faceoff_sandbox::affinity::pin_current_thread;
 use faceoff_types::{RoundTrips, SlotTiming};
 use faceoff_wire::Message;
 use std::{
-    io::{self, PipeReader, PipeWriter, Read as _, Write as _},
+    io::{Read as _, Write as _},
+    os::unix::net::UnixStream,
     thread::{self, JoinHandle},
     time::Instant,
 };
@@ -25,8 +26,8 @@ struct CalibrationAgent {
     question: Vec<u8>,
     answer: Vec<u8>,
     /// `None` only while it is being dropped.
-    to_agent: Option<PipeWriter>,
-    from_agent: PipeReader,
+    to_agent: Option<UnixStream>,
+    from_agent: UnixStream,
     agent: Option<JoinHandle<()>>,
 }
 
@@ -34,11 +35,12 @@ impl CalibrationAgent {
     /// Starts the thread, on the agent's CPUs; without any, wherever the calling thread may run.
     ///
     /// # Errors
-    /// When the host has no pipe or thread left.
+    /// When the host has no socket or thread left.
     pub fn start(agent_cpus: &[usize]) -> Result<Self, PlatformFault> {
         let failed = || PlatformFault::io("starting the calibration agent");
-        let (questions, to_agent) = io::pipe().map_err(failed())?;
-        let (from_agent, answers) = io::pipe().map_err(failed())?;
+        // Two pairs, as an agent has.
+        let (questions, to_agent) = UnixStream::pair().map_err(failed())?;
+        let (from_agent, answers) = UnixStream::pair().map_err(failed())?;
         let mut question = Vec::new();
         Message::step(0, &[-std::f64::consts::FRAC_1_PI; 23]).write_line(&mut question);
         let (cpus, length) = (agent_cpus.to_vec(), question.len());
@@ -58,7 +60,7 @@ impl CalibrationAgent {
     /// Adds `count` round trips to `times_s`, in seconds.
     ///
     /// # Errors
-    /// When the pipe fails.
+    /// When a socket fails.
     pub fn measure(&mut self, count: u32, times_s: &mut Vec<f64>) -> Result<(), PlatformFault> {
         let Some(to_agent) = &mut self.to_agent else {
             return Ok(());
@@ -131,8 +133,8 @@ impl Calibration {
     }
 }
 
-/// Answers until the question's pipe is closed.
-fn answer(cpus: &[usize], length: usize, mut questions: PipeReader, mut answers: PipeWriter) {
+/// Answers until no question can come.
+fn answer(cpus: &[usize], length: usize, mut questions: UnixStream, mut answers: UnixStream) {
     if let Err(error) = pin_current_thread(cpus) {
         tracing::warn!(%error, "the calibration agent cannot be pinned to the agent's CPUs");
     }

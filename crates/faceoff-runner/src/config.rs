@@ -1,3 +1,4 @@
+use crate::supervisor::Supervision;
 use faceoff_sandbox::{Isolation, Layer, Limits, Runtime};
 use faceoff_types::{IMAGE_RUNTIME, TimeLimits};
 use std::collections::BTreeMap;
@@ -17,9 +18,23 @@ pub struct AgentEnvironment {
     pub images: bool,
     /// CPUs for the agent; the thread that simulates keeps off them. Empty: no pinning.
     pub agent_cpus: Vec<usize>,
+    /// Who ends an agent that holds its evaluator, or whose job was cancelled.
+    pub supervision: Supervision,
 }
 
 impl AgentEnvironment {
+    /// Is the agent's CPU time counted at little cost, and does it have to be?
+    pub(crate) fn counts_cpus(&self) -> bool {
+        self.isolation.enforces(Layer::CgroupCpu)
+    }
+
+    /// May agents of these two run on the same CPU?
+    pub(crate) fn share_cpus([a, b]: [&Self; 2]) -> bool {
+        a.agent_cpus.is_empty()
+            || b.agent_cpus.is_empty()
+            || a.agent_cpus.iter().any(|cpu| b.agent_cpus.contains(cpu))
+    }
+
     /// Are container images run here? They need the sandbox's namespaces.
     #[must_use]
     pub fn runs_images(&self) -> bool {

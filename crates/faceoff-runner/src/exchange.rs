@@ -4,12 +4,15 @@
 use crate::{
     bundle::Bundle,
     config::AgentEnvironment,
+    cpu_use::CpuUse,
     fault::{PlatformFault, Trouble},
-    host_watch::{Evidence, GLANCE_LASTS, HostWatch, Over, Wait},
+    host_watch::{Evidence, GLANCE_LASTS, HostWatch, LONGEST_EXTENSION, Over, Wait},
+    supervisor::{Busy, Ended, Supervised},
     waited::Waited,
 };
 use faceoff_sandbox::{
-    AgentProcess, CpuReading, Layer, ReadLine, Runtime, SpawnError, SpawnSpec, WriteError, affinity,
+    AgentProcess, CpuReading, Layer, Outcome, OwnWait, ReadLine, Runtime, SpawnError, SpawnSpec,
+    WriteError, affinity,
 };
 use faceoff_types::{AgentFaultKind, Phase, TimeLimits};
 use faceoff_wire::{MAX_LINE_BYTES, Message, answer, quote_line};
@@ -26,22 +29,29 @@ const QUICK: Duration = Duration::from_micros(50);
 #[derive(Debug)]
 pub(crate) struct Exchange<'w> {
     process: AgentProcess,
+    supervised: Supervised,
     watch: &'w dyn HostWatch,
-    /// Does the agent keep to CPUs that the calling thread keeps off?
-    apart: bool,
+    /// The calling thread's CPUs, if the agent keeps off all of them.
+    own_cpus: Option<Vec<usize>>,
     /// Was its last answer a quick one?
     is_quick: bool,
     /// What the counters said at the last glance.
-    glance: Option<Arc<CpuReading>>,
+    glance: Option<Glance>,
     /// The message being sent; its memory is reused.
     line: Vec<u8>,
-    /// CPU time of the whole process tree at its last answer, or when it was asked long after that, in seconds, where
-    /// the host tells.
-    cpu_time_s: Option<f64>,
-    /// When that was.
-    cpu_time_at: Instant,
+    cpu: CpuUse,
     /// How long it may take to exit once it has closed its output, so that its status can be told.
     exit_grace: Duration,
+}
+
+/// Counters right before a question.
+#[derive(Debug, Clone)]
+struct Glance {
+    at: Instant,
+    /// Of the agent's CPUs, where the host tells.
+    cpus: Option<Arc<CpuReading>>,
+    /// Of the calling thread, where it keeps off the agent's CPUs.
+    own: Option<Arc<OwnWait>>,
 }
 
 /// A question that waits for its answer.
@@ -50,6 +60,9 @@ pub(crate) struct Sent {
     phase: Phase,
     limit_s: f64,
     wait: Wait,
+    own: Option<Arc<OwnWait>>,
+    /// CPU time that the agent used between its last answer and this question.
+    head_start: Duration,
 }
 
 /// The line that came back.
@@ -105,15 +118,15 @@ impl<'w> Exchange<'w> {
             SpawnError::Agent(fault) => fault.into(),
             SpawnError::Platform(error) => Trouble::from(error),
         })?;
-        let apart = !env.agent_cpus.is_empty()
-            && affinity::allowed()
-                .is_ok_and(|own| own.iter().all(|cpu| !env.agent_cpus.contains(cpu)));
+        let own_cpus = affinity::allowed().ok().filter(|own| {
+            !env.agent_cpus.is_empty() && own.iter().all(|cpu| !env.agent_cpus.contains(cpu))
+        });
         Ok(Self {
-            cpu_time_s: process.cpu_time_s(),
-            cpu_time_at: Instant::now(),
+            supervised: Supervised::new(process.killer()?, &env.supervision),
+            cpu: CpuUse::begin(process.cpu_time_s(), env),
             process,
             watch,
-            apart,
+            own_cpus,
             is_quick: false,
             glance: None,
             line: Vec::with_capacity(4096),
@@ -128,50 +141,109 @@ impl<'w> Exchange<'w> {
         phase: Phase,
         limit_s: f64,
     ) -> Result<Sent, Trouble> {
+        message.write_line(&mut self.line);
+        let glance = self.glance(phase);
+        // From here on whatever it takes is the agent's: the calls that follow meet what it can reach.
+        let asked = Instant::now();
+        let limit = TimeLimits::duration(limit_s);
+        let _busy = self.supervised.busy(self.longest(asked, limit));
+        let sent = self.ask(asked, phase);
+        let sent = sent.map(|head_start| Sent {
+            phase,
+            limit_s,
+            wait: Wait::begin(glance.cpus, asked, Instant::now(), limit),
+            own: glance.own,
+            head_start,
+        });
+        self.unless_ended(sent, phase, limit_s, asked)
+    }
+
+    /// Sends the line; returns the agent's head start.
+    fn ask(&mut self, asked: Instant, phase: Phase) -> Result<Duration, Trouble> {
+        self.process.thaw();
         // During start-up anything counts as an answer: the agent runs before `hello` is sent.
         if phase != Phase::StartUp && self.process.has_pending_output()? {
             return Err(self.early(phase));
         }
-        message.write_line(&mut self.line);
-        let before = self.glance(phase);
-        // In a game it may have been the other side's turn meanwhile: what it ran then is not of this wait.
-        if self.cpu_time_at.elapsed() >= GLANCE_LASTS {
-            self.cpu_time_s = self.process.cpu_time_s();
-            self.cpu_time_at = Instant::now();
-        }
+        let head_start = self.cpu.asked(asked, || self.process.cpu_time_s());
         match self.process.send_line(&self.line) {
-            Ok(asked) => {
-                let limit = TimeLimits::duration(limit_s);
-                let wait = Wait::begin(before, asked, Instant::now(), limit);
-                Ok(Sent {
-                    phase,
-                    limit_s,
-                    wait,
-                })
-            }
+            Ok(()) => Ok(head_start),
             Err(WriteError::Closed) => Err(self.closed()),
             Err(WriteError::Platform(error)) => Err(error.into()),
         }
     }
 
+    /// The latest that all limits of a wait can be over, however often it is extended.
+    fn longest(&self, asked: Instant, limit: Duration) -> Instant {
+        asked + limit * (1 + LONGEST_EXTENSION) + self.exit_grace
+    }
+
+    /// What the supervisor says is what happened: the rest follows from the agent's death.
+    fn unless_ended<T>(
+        &self,
+        came: Result<T, Trouble>,
+        phase: Phase,
+        limit_s: f64,
+        asked: Instant,
+    ) -> Result<T, Trouble> {
+        match self.supervised.ended() {
+            None => came,
+            Some(Ended::Cancelled) => Err(PlatformFault::Cancelled.into()),
+            Some(Ended::Stalled) => Err(Trouble::Late {
+                fault: AgentFaultKind::TimedOut { phase, limit_s },
+                waited: Box::new(Waited {
+                    wall: asked.elapsed(),
+                    host: Duration::ZERO,
+                    head_start: Duration::ZERO,
+                    cpu_time_s: None,
+                }),
+            }),
+        }
+    }
+
     /// The counters before a question, which may be as old as [`GLANCE_LASTS`]: to read them for each of an
-    /// instant agent's questions would cost more than the answer.
-    fn glance(&mut self, phase: Phase) -> Option<Arc<CpuReading>> {
+    /// instant agent's questions would cost more than the answer. They are the kernel's: no agent holds one.
+    fn glance(&mut self, phase: Phase) -> Glance {
         if phase != Phase::Step {
             self.process.know_threads();
             self.glance = None;
         }
-        let is_fresh = |glance: &Arc<CpuReading>| glance.at().elapsed() < GLANCE_LASTS;
-        if !self.glance.as_ref().is_some_and(is_fresh) {
-            self.glance = self.process.glance_at_cpus().map(Arc::new);
+        match &self.glance {
+            Some(glance) if glance.at.elapsed() < GLANCE_LASTS => glance.clone(),
+            _ => {
+                let own = self.own_cpus.as_deref().map(OwnWait::now);
+                let glance = Glance {
+                    own: own.map(Arc::new),
+                    cpus: self.process.glance_at_cpus().map(Arc::new),
+                    at: Instant::now(),
+                };
+                self.glance.insert(glance).clone()
+            }
         }
-        self.glance.clone()
+    }
+
+    /// Stops the agent until it is asked again, where the host has something that does.
+    pub fn freeze(&mut self) {
+        self.process.freeze();
+    }
+
+    /// Can it be stopped?
+    pub fn can_freeze(&self) -> bool {
+        self.process.can_freeze()
     }
 
     /// Waits for the answer until `until`, which may have passed, or until its limit is over; `None` if it
     /// may still come.
     pub fn poll(&mut self, sent: &mut Sent, until: Instant) -> Result<Option<Answer>, Trouble> {
-        if self.apart && self.is_quick {
+        let (phase, limit_s, asked) = (sent.phase, sent.limit_s, sent.wait.asked);
+        let due = self.longest(asked, TimeLimits::duration(limit_s));
+        let _busy = self.supervised.busy(due);
+        let came = self.await_answer(sent, until);
+        self.unless_ended(came, phase, limit_s, asked)
+    }
+
+    fn await_answer(&mut self, sent: &mut Sent, until: Instant) -> Result<Option<Answer>, Trouble> {
+        if self.own_cpus.is_some() && self.is_quick {
             self.process.look_out(until.min(sent.wait.asked + QUICK))?;
         }
         loop {
@@ -210,6 +282,13 @@ impl<'w> Exchange<'w> {
     /// Waits until one of several agents has something for [`Self::poll`], which is due at `until` in any
     /// case.
     pub fn wait_for_any(asked: &[(&Self, &Sent)], until: Instant) -> Result<(), PlatformFault> {
+        let _busy: Vec<Busy> = asked
+            .iter()
+            .map(|(one, sent)| {
+                let limit = TimeLimits::duration(sent.limit_s);
+                one.supervised.busy(one.longest(sent.wait.asked, limit))
+            })
+            .collect();
         let processes: Vec<&AgentProcess> = asked.iter().map(|(one, _)| &one.process).collect();
         let until = asked
             .iter()
@@ -221,27 +300,26 @@ impl<'w> Exchange<'w> {
     /// time at the next question; if it no longer listens, it meets its fault there.
     pub fn tell(&mut self, message: &Message<'_>) -> Result<(), PlatformFault> {
         message.write_line(&mut self.line);
+        let _busy = self.supervised.busy(Instant::now() + self.exit_grace);
         match self.process.send_line(&self.line) {
-            Ok(_) | Err(WriteError::Closed) => Ok(()),
+            Ok(()) | Err(WriteError::Closed) => Ok(()),
             Err(WriteError::Platform(error)) => Err(error.into()),
         }
     }
 
     fn answer(&mut self, sent: &Sent, bytes: Vec<u8>, at: Instant) -> Answer {
-        let cpu_time_s = self.process.cpu_time_s();
-        let waited = self.waited(sent, at, used_s(self.cpu_time_s, cpu_time_s));
-        self.cpu_time_s = cpu_time_s;
-        self.cpu_time_at = at;
+        self.cpu.answered(at, self.process.cpu_time_s());
+        let waited = self.waited(sent, at, Outcome::Answered);
         self.is_quick = waited.wall < QUICK;
         Answer { bytes, waited }
     }
 
     /// Nothing has come when the evaluator wanted to be woken.
-    fn look(&self, sent: &mut Sent) -> Result<(), Trouble> {
-        let (now, wait) = (Instant::now(), &mut sent.wait);
-        if now >= wait.deadline {
-            let used_s = used_s(self.cpu_time_s, self.process.cpu_time_s());
-            let waited = self.waited(sent, now, used_s);
+    fn look(&mut self, sent: &mut Sent) -> Result<(), Trouble> {
+        let now = Instant::now();
+        if now >= sent.wait.deadline {
+            self.cpu.looked(self.process.cpu_time_s());
+            let waited = self.waited(sent, now, Outcome::Pending);
             let fault = AgentFaultKind::TimedOut {
                 phase: sent.phase,
                 limit_s: sent.limit_s,
@@ -253,7 +331,12 @@ impl<'w> Exchange<'w> {
                 Over::ByTheHost => Err(Trouble::Host { fault, waited }),
             };
         }
+        let wait = &mut sent.wait;
         if now >= wait.wake {
+            if wait.is_first_look() {
+                // Those that it has begun since are among them, too.
+                self.process.know_threads();
+            }
             wait.look(self.process.read_cpus());
             // From when it was seen that nothing is there: an evaluator that is held up after that is late.
             wait.sleep_on(now);
@@ -261,38 +344,44 @@ impl<'w> Exchange<'w> {
         Ok(())
     }
 
-    /// The wait for an answer until `now`; `agent_ran_s` is the CPU time since the answer before, or since it was asked
-    /// if that was long ago.
-    fn waited(&self, sent: &Sent, now: Instant, agent_ran_s: Option<f64>) -> Waited {
+    /// The wait for an answer until `now`.
+    fn waited(&self, sent: &Sent, now: Instant, outcome: Outcome) -> Waited {
         Waited {
             wall: now.saturating_duration_since(sent.wait.asked),
-            host: self.taken_by_host(sent, now, agent_ran_s),
-            cpu_time_s: agent_ran_s,
+            host: self.taken_by_host(sent, now, outcome),
+            head_start: sent.head_start,
+            cpu_time_s: self.cpu.since_answer_s(),
         }
     }
 
-    fn taken_by_host(&self, sent: &Sent, now: Instant, agent_ran_s: Option<f64>) -> Duration {
+    fn taken_by_host(&self, sent: &Sent, now: Instant, outcome: Outcome) -> Duration {
         if !sent.wait.is_late(now) {
             return Duration::ZERO;
         }
         let wait = &sent.wait;
         let taken =
             self.process
-                .taken_from_it_since(wait.asked, wait.first_reading(), wait.before());
+                .taken_from_it_since(wait.asked, wait.looks(), wait.before(), outcome);
+        let own = self.own_cpus.as_deref().zip(sent.own.as_deref());
         let evidence = Evidence {
             now,
             kept: taken.map(|taken| taken.kept),
-            most: taken.map_or(Duration::ZERO, |taken| taken.most),
             stolen: taken.map_or(Duration::ZERO, |taken| taken.stolen),
-            agent_ran: agent_ran_s.map(TimeLimits::duration),
-            apart: self.apart,
+            agent_ran: self.cpu.since_question_s().map(TimeLimits::duration),
+            own_wait: own.map(|(cpus, before)| OwnWait::now(cpus).since(before)),
         };
         sent.wait.taken(self.watch, evidence)
     }
 
     /// Gives the agent `grace` to exit, then kills it; returns the end of its standard error.
     pub fn finish(self, grace: Duration) -> Result<String, PlatformFault> {
-        Ok(self.process.finish(grace)?.stderr_tail)
+        let Self {
+            process,
+            supervised,
+            ..
+        } = self;
+        let _busy = supervised.busy(Instant::now() + grace);
+        Ok(process.finish(grace)?.stderr_tail)
     }
 
     /// The agent has written before it was asked, or has closed its output.
@@ -306,7 +395,7 @@ impl<'w> Exchange<'w> {
         }
     }
 
-    /// The agent's end of a pipe is closed: by exit, by a kill, or by itself.
+    /// The agent's end of a channel is closed: by exit, by a kill, or by itself.
     fn closed(&mut self) -> Trouble {
         match self.process.diagnose_end(self.exit_grace) {
             Ok(end) => end.unwrap_or(AgentFaultKind::ClosedOutput).into(),
@@ -356,9 +445,4 @@ fn unasked(phase: Phase, line: &[u8]) -> Trouble {
         fault: unasked_for(phase),
         line: Some(quote_line(line)),
     }
-}
-
-/// What was used between two looks at a clock, in seconds.
-fn used_s(before_s: Option<f64>, now_s: Option<f64>) -> Option<f64> {
-    Some((now_s? - before_s?).max(0.0))
 }

@@ -2,7 +2,7 @@
 //! answers that are late: before that there is no more than a glance at them, which costs some
 //! microseconds.
 
-use faceoff_sandbox::CpuReading;
+use faceoff_sandbox::{CpuReading, Looks};
 use std::{
     sync::Arc,
     time::{Duration, Instant},
@@ -20,7 +20,7 @@ pub(crate) const GLANCE_LASTS: Duration = Duration::from_millis(5);
 const ORDINARY_LATENESS: Duration = Duration::from_millis(1);
 /// A hard limit is extended by the host's share up to this many times itself; then the host explains
 /// the missing answer.
-const LONGEST_EXTENSION: u32 = 4;
+pub(crate) const LONGEST_EXTENSION: u32 = 4;
 
 /// Judges the evidence of what the host took; tests put others in its place.
 pub trait HostWatch: std::fmt::Debug + Sync {
@@ -49,12 +49,8 @@ pub(crate) struct Wait {
     before: Option<Arc<CpuReading>>,
     /// By how much too long it took the evaluator to write the question.
     held_up: Duration,
-    /// The answer is late, and this is what the counters said first.
-    late: Option<Option<CpuReading>>,
-    /// What they said last, if not at first.
-    last: Option<CpuReading>,
-    /// For how long the agent was seen waiting to run at two looks in a row.
-    unlet: Duration,
+    /// The answer is late, and this is what the counters said since.
+    late: Option<Option<Looks>>,
     /// For how long the evaluator was busy with another agent's end since nothing was there.
     away: Duration,
     /// When the evaluator wants to be woken.
@@ -69,14 +65,13 @@ pub(crate) struct Evidence {
     pub now: Instant,
     /// That the agent was kept from running; `None` where the host does not tell.
     pub kept: Option<Duration>,
-    /// More than this cannot have been taken.
-    pub most: Duration,
     /// That there was no CPU at all: nobody ran, even if a kernel counts it as somebody's run time.
     pub stolen: Duration,
-    /// That the agent itself ran, since its last answer.
+    /// That the agent itself ran, since it was asked.
     pub agent_ran: Option<Duration>,
-    /// Are the evaluator's CPUs none of the agent's?
-    pub apart: bool,
+    /// For how long the evaluator itself was kept from running, since shortly before it asked; `None` if its CPUs are
+    /// the agent's, too.
+    pub own_wait: Option<Duration>,
 }
 
 impl Wait {
@@ -95,8 +90,6 @@ impl Wait {
             before,
             held_up: lateness(asked, written),
             late: None,
-            last: None,
-            unlet: Duration::ZERO,
             away: Duration::ZERO,
             wake: (asked + FIRST_LOOK).min(deadline),
             deadline,
@@ -108,19 +101,21 @@ impl Wait {
         self.late.is_some() || now > self.wake + ORDINARY_LATENESS
     }
 
+    /// Has the agent not been looked at since it was asked?
+    pub fn is_first_look(&self) -> bool {
+        self.late.is_none()
+    }
+
     /// What the counters say at a look, now that the answer is late.
     pub fn look(&mut self, reading: Option<CpuReading>) {
-        let Some(first) = &self.late else {
-            if let (Some(before), Some(now)) = (&self.before, &reading) {
-                self.unlet += now.stolen_unlet_since(before, self.asked);
+        match (&mut self.late, reading) {
+            (None, reading) => {
+                let before = self.before.as_deref();
+                self.late = Some(reading.map(|now| Looks::begin(now, before, self.asked)));
             }
-            self.late = Some(reading);
-            return;
-        };
-        if let (Some(before), Some(now)) = (self.last.as_ref().or(first.as_ref()), &reading) {
-            self.unlet += now.unlet_since(before);
+            (Some(Some(looks)), Some(reading)) => looks.add(reading),
+            (Some(_), _) => {}
         }
-        self.last = reading;
     }
 
     /// What the counters said at a glance before the question.
@@ -128,8 +123,8 @@ impl Wait {
         self.before.as_deref()
     }
 
-    /// What the counters said when the answer was found to be late.
-    pub fn first_reading(&self) -> Option<&CpuReading> {
+    /// What the counters said since the answer was found to be late.
+    pub fn looks(&self) -> Option<&Looks> {
         self.late.as_ref()?.as_ref()
     }
 
@@ -153,22 +148,22 @@ impl Wait {
         let Evidence {
             now,
             kept,
-            most,
             stolen,
             agent_ran,
-            apart,
+            own_wait,
         } = evidence;
         let wall = now.saturating_duration_since(self.asked);
         // An answer that lay there when the evaluator woke late may have come at any time since it wanted
-        // to, and a question that it was held up with may not have been there to be answered. Its CPUs
-        // being out of the agent's reach, that is nobody's fault here.
-        let overslept = match kept {
-            Some(_) if apart => self.held_up + lateness(self.wake, now),
+        // to, and a question that it was held up with may not have been there to be answered. That is nobody's fault
+        // here as far as it wanted to run and was not let, on CPUs out of the agent's reach. What else one of its calls
+        // may have waited for the agent may have held.
+        let overslept = match (kept, own_wait) {
+            (Some(_), Some(own)) => own.min(self.held_up + lateness(self.wake, now)),
             _ => Duration::ZERO,
         };
         let ran = agent_ran.map_or(wall, |ran| ran.min(wall.saturating_sub(stolen)));
         let proven = kept
-            .map(|kept| kept.max(self.unlet.min(most)) + overslept)
+            .map(|kept| kept + overslept)
             // Whatever the rest says: while it ran, it was not kept from running.
             .map(|proven| proven.min(wall.saturating_sub(ran)));
         // What the evaluator did elsewhere is nobody's but ours, whoever shares whose CPUs; but an agent that ran
@@ -222,14 +217,14 @@ mod tests {
 
     const MS: fn(u64) -> Duration = Duration::from_millis;
 
+    /// An evaluator that did nothing but wait to run, if its CPUs are its own.
     fn evidence(now: Instant, others_ms: u64, agent_ms: u64, apart: bool) -> Evidence {
         Evidence {
             now,
             kept: Some(MS(others_ms)),
-            most: MS(others_ms),
             stolen: Duration::ZERO,
             agent_ran: Some(MS(agent_ms)),
-            apart,
+            own_wait: apart.then_some(MS(1000)),
         }
     }
 
@@ -268,23 +263,6 @@ mod tests {
     }
 
     #[test]
-    fn what_looks_found_is_believed_as_far_as_somebody_can_have_taken_it() {
-        let asked = Instant::now();
-        let mut wait = Wait::begin(None, asked, asked, MS(1000));
-        wait.unlet = MS(30);
-        let taken = |most| {
-            let evidence = Evidence {
-                most: MS(most),
-                ..evidence(asked + MS(40), 5, 1, false)
-            };
-            wait.taken(&Counters, evidence)
-        };
-        assert_eq!(taken(50), MS(30));
-        assert_eq!(taken(20), MS(20));
-        assert_eq!(taken(0), MS(5), "what the counters prove stays");
-    }
-
-    #[test]
     fn an_evaluator_that_wakes_late_beyond_the_agents_reach_is_the_hosts_doing() {
         let asked = Instant::now();
         let mut wait = Wait::begin(None, asked, asked, MS(1000));
@@ -316,6 +294,21 @@ mod tests {
         assert_eq!(taken(40, 42, false), MS(0), "it may have run meanwhile");
         assert_eq!(taken(1, 12, true), MS(6), "that is ordinary");
         assert_eq!(taken(40, 41, true), MS(40), "but never what it ran");
+    }
+
+    #[test]
+    fn only_its_own_wait_to_run_excuses_an_evaluator() {
+        let asked = Instant::now();
+        let wait = Wait::begin(None, asked, asked + MS(5000), MS(1000));
+        let taken = |own| {
+            let evidence = Evidence {
+                own_wait: Some(MS(own)),
+                ..evidence(asked + MS(5001), 0, 1, true)
+            };
+            wait.taken(&Counters, evidence)
+        };
+        assert_eq!(taken(0), MS(0), "something else held its call");
+        assert_eq!(taken(30), MS(30));
     }
 
     #[test]

@@ -6,13 +6,14 @@
 //! side is a [`PlatformFault`] and yields no report.
 //!
 //! This crate reads no environment variable and no configuration file, speaks no HTTP and knows no
-//! database. It measures time around the agent's pipe, which is its job; all else that it computes
+//! database. It measures time around the agent's channel, which is its job; all else that it computes
 //! follows from the seeds.
 
 mod budget;
 pub mod bundle;
 mod calibration;
 mod config;
+mod cpu_use;
 mod exchange;
 mod fault;
 mod game;
@@ -23,6 +24,7 @@ mod player;
 mod session;
 mod shard;
 mod smoke;
+mod supervisor;
 mod waited;
 mod wire_env;
 
@@ -41,4 +43,5 @@ pub use inventory::inventory;
 pub use session::Session;
 pub use shard::{Observer, play_shard, run_shard, run_shard_watched};
 pub use smoke::{SMOKE_STEPS, SmokeDefect, SmokeReport, smoke, smoke_watched};
+pub use supervisor::{Supervision, standing_still};
 pub use waited::Waited;

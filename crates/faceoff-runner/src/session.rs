@@ -150,6 +150,17 @@ impl<'w> Session<'w> {
         }
     }
 
+    /// Stops the agent until it is asked again, where the host has something that does.
+    pub fn freeze(&mut self) {
+        self.exchange.freeze();
+    }
+
+    /// Does the host have something that stops the agent until it is asked again?
+    #[must_use]
+    pub fn can_freeze(&self) -> bool {
+        self.exchange.can_freeze()
+    }
+
     /// Is an answer due?
     #[must_use]
     pub const fn is_asked(&self) -> bool {

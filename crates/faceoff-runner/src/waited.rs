@@ -3,18 +3,20 @@ use std::{fmt, time::Duration};
 /// Whose time a wait was.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Waited {
-    /// From the first attempt to write the question on.
+    /// From right before the evaluator turned to the agent, to the answer's last byte.
     pub wall: Duration,
     /// What the host took of that.
     pub host: Duration,
-    /// CPU time that the agent's process tree used meanwhile, in seconds, where the host tells.
+    /// CPU time that the agent's process tree had used since its last answer, before it was asked.
+    pub head_start: Duration,
+    /// CPU time that the agent's process tree used since its last answer, in seconds, where the host tells.
     pub cpu_time_s: Option<f64>,
 }
 
 impl Waited {
     /// What counts.
     pub(crate) fn of_the_agent(&self) -> Duration {
-        self.wall.saturating_sub(self.host)
+        self.wall.saturating_sub(self.host) + self.head_start
     }
 }
 
@@ -27,6 +29,13 @@ impl fmt::Display for Waited {
             ms(self.wall),
             ms(self.host)
         )?;
+        if ms(self.head_start) >= 0.05 {
+            write!(
+                f,
+                "; {:.1} ms of CPU time that it used before it was asked count as well",
+                ms(self.head_start)
+            )?;
+        }
         match self.cpu_time_s {
             Some(cpu_s) => write!(f, "; the agent's processes ran {:.1} ms", 1e3 * cpu_s),
             None => Ok(()),

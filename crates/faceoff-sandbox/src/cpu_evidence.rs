@@ -9,9 +9,8 @@
 use crate::{
     cpu_clock,
     cpu_counters::{Ticks, of_cpus, text, throttled, ticks, ticks_of, usage},
-    cpu_waits::{KnownThreads, Waits},
+    cpu_waits::{KnownThreads, Ledger, Outcome, Waits},
 };
-use rustix::process::Pid;
 use std::{
     fs::{self, File},
     time::{Duration, Instant},
@@ -61,9 +60,6 @@ pub struct CpuReading {
 pub struct Taken {
     /// For how long it was kept from running.
     pub kept: Duration,
-    /// More than this cannot have been taken of it: what others ran on its CPUs and what was stolen, less what its
-    /// own quota held it up.
-    pub most: Duration,
     /// How much of the span there was no CPU at all, for a machine below a virtual one held it up. Kernels
     /// differ in whether that is also the run time of whoever was on it.
     pub stolen: Duration,
@@ -82,32 +78,13 @@ impl CpuReading {
         self.at
     }
 
-    /// For how long since `before` the agent was not let run, as seen by two looks at its threads: one of them wanted
-    /// to run at both and did not sleep in between, and none of them ran. A thread that was woken on a CPU which the
-    /// machine below holds up is seen by nothing else: its wait is counted from when that CPU has heard of it.
-    pub fn unlet_since(&self, before: &Self) -> Duration {
-        let (Some(then), Some(now)) = (&before.waits, &self.waits) else {
-            return Duration::ZERO;
-        };
-        if !now.one_never_slept_since(then) {
-            return Duration::ZERO;
-        }
+    /// For how long since `before` the agent could have run and did not: none of its threads ran, and its own quota did
+    /// not hold it up.
+    fn idle_since(&self, before: &Self) -> Duration {
         self.at
             .saturating_duration_since(before.at)
             .saturating_sub(self.ran_since(before))
             .saturating_sub(self.throttled.saturating_sub(before.throttled))
-    }
-
-    /// What was stolen since a glance `before` the agent was `asked`, if one of its threads wants to run and was not
-    /// let since: whether it slept until now nobody has seen, but not longer than there was no CPU.
-    pub fn stolen_unlet_since(&self, before: &Self, asked: Instant) -> Duration {
-        let (Some(then), Some(now)) = (&before.waits, &self.waits) else {
-            return Duration::ZERO;
-        };
-        if !now.one_is_not_let_since(then) {
-            return Duration::ZERO;
-        }
-        stolen(before, self).min(self.at.saturating_duration_since(asked))
     }
 
     /// What the agent ran, the most that either count tells.
@@ -117,9 +94,47 @@ impl CpuReading {
     }
 }
 
+/// What looks at the CPUs of an agent whose answer is late have found. A thread that was woken on a CPU which the
+/// machine below holds up is seen by nothing else: its wait is counted from when that CPU has heard of it.
+#[derive(Debug, Clone)]
+pub struct Looks {
+    first: CpuReading,
+    /// If there were more than one.
+    last: Option<CpuReading>,
+    ledger: Ledger,
+}
+
+impl Looks {
+    /// The first look, at an agent that was `asked` after a `glance`.
+    #[must_use]
+    pub fn begin(first: CpuReading, glance: Option<&CpuReading>, asked: Instant) -> Self {
+        let mut ledger = Ledger::default();
+        if let (Some(now), Some(glance)) = (&first.waits, glance)
+            && let Some(then) = &glance.waits
+        {
+            let stolen = stolen(glance, &first).min(first.at.saturating_duration_since(asked));
+            ledger.begin(then, now, stolen);
+        }
+        Self {
+            first,
+            last: None,
+            ledger,
+        }
+    }
+
+    /// A look more, which finds no answer either.
+    pub fn add(&mut self, now: CpuReading) {
+        let before = self.last.as_ref().unwrap_or(&self.first);
+        if let (Some(then), Some(waits)) = (&before.waits, &now.waits) {
+            self.ledger.add(then, waits, now.idle_since(before));
+        }
+        self.last = Some(now);
+    }
+}
+
 impl CpuEvidence {
     /// The counters now, as the beginning of a span; `None` if the host does not tell.
-    pub(crate) fn begin(&self, agent: &[Pid]) -> Option<CpuReading> {
+    pub(crate) fn begin(&self, agent: &KnownThreads) -> Option<CpuReading> {
         self.read(First::Agent, agent)
     }
 
@@ -135,44 +150,57 @@ impl CpuEvidence {
             all: of_cpus(&text(all)?, &self.cpus)?,
             throttled: self.throttled(),
             ticks: ticks_of(&fs::read_to_string("/proc/stat").ok()?, &self.cpus)?,
-            waits: Some(agent.waits()?),
+            waits: Some(agent.glance()?),
             at: Instant::now(),
         })
     }
 
-    /// What was taken of the time since `begun`, or by the glance before the agent was `asked`: for how long it was
-    /// kept from running, the more that either proves, and how much was stolen since the earlier of them.
+    /// What was taken of the time since the looks began, or by the glance before the agent was `asked`: for how long it
+    /// was kept from running, the most that any of them proves, and how much was stolen since the earlier of them.
     pub(crate) fn taken_since(
         &self,
         asked: Instant,
-        begun: Option<&CpuReading>,
+        looks: Option<&Looks>,
         glance: Option<&CpuReading>,
-        agent: &[Pid],
+        agent: &KnownThreads,
+        outcome: Outcome,
     ) -> Option<Taken> {
         let now = self.read(First::Others, agent)?;
-        let precise = matches!(self.run_time, RunTime::PerCpu { .. });
-        let since_begun =
-            begun.map(|begun| taken(begun, &now, precise).max(kept_waiting(begun, &now, precise)));
+        let none = Ledger::default();
+        let judge = Judge {
+            precise: matches!(self.run_time, RunTime::PerCpu { .. }),
+            ledger: looks.map_or(&none, |looks| &looks.ledger),
+            outcome,
+        };
+        let begun = looks.map(|looks| &looks.first);
+        let since_begun = begun.map(|begun| {
+            judge
+                .taken(begun, &now)
+                .max(judge.kept_waiting(begun, &now))
+        });
         // What others ran right before a glance may be charged to them after it, and what they ran between it
         // and the question was not taken from the answer.
         let since_glance = glance.map(|glance| {
             let age = asked.saturating_duration_since(glance.at);
-            let ran = taken(glance, &now, precise).saturating_sub(LAG + age);
-            ran.max(kept_waiting(glance, &now, precise).saturating_sub(age))
+            let ran = judge.taken(glance, &now).saturating_sub(LAG + age);
+            ran.max(judge.kept_waiting(glance, &now).saturating_sub(age))
         });
-        let kept = since_begun.max(since_glance).unwrap_or_default();
         // The earlier reading is the one of the longer span.
         let from = glance.or(begun);
+        let most = from
+            .map(|from| most(from, &now, judge.precise))
+            .unwrap_or_default();
+        let unlet = match &now.waits {
+            Some(now) => judge.ledger.longest_unlet(now, outcome).min(most),
+            None => Duration::ZERO,
+        };
         Some(Taken {
-            kept,
-            most: from
-                .map(|from| most(from, &now, precise))
-                .unwrap_or_default(),
+            kept: since_begun.max(since_glance).unwrap_or_default().max(unlet),
             stolen: from.map(|from| stolen(from, &now)).unwrap_or_default(),
         })
     }
 
-    fn read(&self, first: First, processes: &[Pid]) -> Option<CpuReading> {
+    fn read(&self, first: First, threads: &KnownThreads) -> Option<CpuReading> {
         let mut at = Instant::now();
         let mut agent = Duration::ZERO;
         if first == First::Agent {
@@ -191,11 +219,11 @@ impl CpuEvidence {
         Some(CpuReading {
             at,
             agent,
-            clocks: cpu_clock::run_time_of(processes),
+            clocks: cpu_clock::run_time_of(threads.processes()),
             all,
             throttled: self.throttled(),
             ticks,
-            waits: Waits::read(processes),
+            waits: threads.look(),
         })
     }
 
@@ -213,79 +241,92 @@ impl CpuEvidence {
     }
 }
 
-/// What others provably took of all CPUs at once.
-fn taken(from: &CpuReading, to: &CpuReading, precise: bool) -> Duration {
-    let wall = to.at.saturating_duration_since(from.at);
-    let agent = to.agent.saturating_sub(from.agent);
-    let (mut busy, mut idle, mut stolen) = (0, 0, 0);
-    for (from, to) in from.ticks.iter().zip(&to.ticks) {
-        // A counter that moved by n ticks has counted more than n - 1 and less than n + 1.
-        let at_least = |from: u64, to: u64| to.saturating_sub(from).saturating_sub(1);
-        busy += std::iter::zip(from.busy, to.busy)
-            .map(|(from, to)| at_least(from, to))
-            .sum::<u64>();
-        idle += std::iter::zip(from.idle, to.idle)
-            .map(|(from, to)| to.saturating_sub(from) + 1)
-            .sum::<u64>();
-        stolen += at_least(from.stolen, to.stolen);
-    }
-    // Who sleeps is kept from nothing, also while time is stolen: it ran, or seemed to, or waited to.
-    let waited = match (&from.waits, &to.waits) {
-        (Some(from), Some(to)) => to.longest_since(from, wall),
-        _ => wall,
-    };
-    let cpus = u32::try_from(to.ticks.len()).unwrap_or(u32::MAX);
-    let (busy, idle, stolen) = (ticks(busy), ticks(idle), ticks(stolen));
-    let others = if precise {
-        // Kernels differ in whether stolen time is also somebody's run time: it must not count twice.
-        to.all
-            .saturating_sub(from.all)
-            .saturating_sub(agent)
-            .max(stolen)
-    } else {
-        // Ticks are sampled: an agent that runs whenever one is due would seem to be others. Then most of
-        // the time is idle.
-        (busy + stolen)
-            .min((wall * cpus).saturating_sub(idle))
-            .saturating_sub(agent)
-    };
-    // Whoever asks why an answer was late finds it in the log.
-    tracing::debug!(
-        ?wall,
-        ?others,
-        ?agent,
-        ?stolen,
-        ?waited,
-        from = ?from.ticks,
-        to = ?to.ticks,
-        "evidence of what the host took"
-    );
-    others
-        .saturating_sub(wall * cpus.saturating_sub(1))
-        .saturating_sub(to.throttled.saturating_sub(from.throttled))
-        .min(stolen.min(waited + agent).saturating_add(waited))
-        .min(wall)
+/// How counters are read.
+struct Judge<'a> {
+    /// Do they tell of everything that ran, in nanoseconds?
+    precise: bool,
+    ledger: &'a Ledger,
+    outcome: Outcome,
 }
 
-/// For how long the agent was kept from running by what does not lag behind: of an only CPU what one of its
-/// threads waited for, less what all of them ran; or what was stolen while one ran, seemed to, or waited to. An
-/// agent can bring about neither, and by sleeping it is kept from nothing.
-fn kept_waiting(from: &CpuReading, to: &CpuReading, precise: bool) -> Duration {
-    if !precise {
-        return Duration::ZERO;
+impl Judge<'_> {
+    /// The longest wait of one of the agent's threads, as far as it counts; `None` where the kernel does not tell.
+    fn waited(&self, from: &CpuReading, to: &CpuReading, wall: Duration) -> Option<Duration> {
+        let (from, to) = (from.waits.as_ref()?, to.waits.as_ref()?);
+        Some(to.longest_since(from, wall, self.ledger, self.outcome))
     }
-    let wall = to.at.saturating_duration_since(from.at);
-    let waited = match (&from.waits, &to.waits, &to.ticks[..]) {
-        (Some(from), Some(to), [_]) => to.longest_since(from, wall),
-        _ => Duration::ZERO,
-    };
-    let ran = to.agent.saturating_sub(from.agent);
-    let stolen = stolen(from, to).min(waited + ran);
-    waited
-        .saturating_sub(ran)
-        .saturating_sub(to.throttled.saturating_sub(from.throttled))
-        .max(stolen)
-        .min(wall)
+
+    /// What others provably took of all CPUs at once.
+    fn taken(&self, from: &CpuReading, to: &CpuReading) -> Duration {
+        let wall = to.at.saturating_duration_since(from.at);
+        let agent = to.agent.saturating_sub(from.agent);
+        let (mut busy, mut idle, mut stolen) = (0, 0, 0);
+        for (from, to) in from.ticks.iter().zip(&to.ticks) {
+            // A counter that moved by n ticks has counted more than n - 1 and less than n + 1.
+            let at_least = |from: u64, to: u64| to.saturating_sub(from).saturating_sub(1);
+            busy += std::iter::zip(from.busy, to.busy)
+                .map(|(from, to)| at_least(from, to))
+                .sum::<u64>();
+            idle += std::iter::zip(from.idle, to.idle)
+                .map(|(from, to)| to.saturating_sub(from) + 1)
+                .sum::<u64>();
+            stolen += at_least(from.stolen, to.stolen);
+        }
+        // Who sleeps is kept from nothing, also while time is stolen: it ran, or seemed to, or waited to.
+        let waited = self.waited(from, to, wall).unwrap_or(wall);
+        let cpus = u32::try_from(to.ticks.len()).unwrap_or(u32::MAX);
+        let (busy, idle, stolen) = (ticks(busy), ticks(idle), ticks(stolen));
+        let others = if self.precise {
+            // Kernels differ in whether stolen time is also somebody's run time: it must not count twice.
+            to.all
+                .saturating_sub(from.all)
+                .saturating_sub(agent)
+                .max(stolen)
+        } else {
+            // Ticks are sampled: an agent that runs whenever one is due would seem to be others. Then most of
+            // the time is idle.
+            (busy + stolen)
+                .min((wall * cpus).saturating_sub(idle))
+                .saturating_sub(agent)
+        };
+        // Whoever asks why an answer was late finds it in the log.
+        tracing::debug!(
+            ?wall,
+            ?others,
+            ?agent,
+            ?stolen,
+            ?waited,
+            from = ?from.ticks,
+            to = ?to.ticks,
+            "evidence of what the host took"
+        );
+        others
+            .saturating_sub(wall * cpus.saturating_sub(1))
+            .saturating_sub(to.throttled.saturating_sub(from.throttled))
+            .min(stolen.min(waited + agent).saturating_add(waited))
+            .min(wall)
+    }
+
+    /// For how long the agent was kept from running by what does not lag behind: of an only CPU what one of its
+    /// threads waited for, less what all of them ran; or what was stolen while one ran, seemed to, or waited to. An
+    /// agent can bring about neither, and by sleeping it is kept from nothing.
+    fn kept_waiting(&self, from: &CpuReading, to: &CpuReading) -> Duration {
+        if !self.precise {
+            return Duration::ZERO;
+        }
+        let wall = to.at.saturating_duration_since(from.at);
+        let waited = match &to.ticks[..] {
+            [_] => self.waited(from, to, wall).unwrap_or_default(),
+            _ => Duration::ZERO,
+        };
+        let ran = to.agent.saturating_sub(from.agent);
+        let stolen = stolen(from, to).min(waited + ran);
+        waited
+            .saturating_sub(ran)
+            .saturating_sub(to.throttled.saturating_sub(from.throttled))
+            .max(stolen)
+            .min(wall)
+    }
 }
 
 /// What others ran and what was stolen, on all CPUs together, less what the agent's own quota held it up.
@@ -320,6 +361,16 @@ mod tests {
 
     const MS: fn(u64) -> Duration = Duration::from_millis;
 
+    /// Who was not let run while an answer may still come.
+    const fn judge(precise: bool) -> Judge<'static> {
+        static NONE: Ledger = Ledger::NONE;
+        Judge {
+            precise,
+            ledger: &NONE,
+            outcome: Outcome::Pending,
+        }
+    }
+
     fn reading(at: Instant, agent: u64, all: u64, ticks: &[Ticks]) -> CpuReading {
         CpuReading {
             at,
@@ -347,7 +398,7 @@ mod tests {
             let still = vec![Ticks::default(); ticks.len()];
             let from = reading(begun, 500, 700, &still);
             let to = reading(begun + MS(wall), 500 + agent, 700 + all, ticks);
-            super::taken(&from, &to, true)
+            judge(true).taken(&from, &to)
         };
         let one = [cpu(0, 0, 0)];
         assert_eq!(taken(0, 60, &one, 100), MS(60));
@@ -392,7 +443,7 @@ mod tests {
             let mut to = reading(begun + MS(30), 500 + agent, 700, ticks);
             from.waits = Some(Waits::of_one_thread(MS(400), MS(10)));
             to.waits = Some(Waits::of_one_thread(MS(401), MS(10 + waited)));
-            kept_waiting(&from, &to, true)
+            judge(true).kept_waiting(&from, &to)
         };
         let one = [cpu(0, 0, 0)];
         assert_eq!(kept(1, 26, &one), MS(25));
@@ -412,12 +463,16 @@ mod tests {
         from.waits = Some(Waits::of_one_thread(MS(400), MS(10)));
         to.waits = from.waits.clone();
         assert_eq!(
-            super::taken(&from, &to, true),
+            judge(true).taken(&from, &to),
             MS(1),
             "a sleeper's time is its own"
         );
         let still = reading(begun, 0, 0, &one);
-        assert_eq!(kept_waiting(&still, &still, false), MS(0), "ticks alone");
+        assert_eq!(
+            judge(false).kept_waiting(&still, &still),
+            MS(0),
+            "ticks alone"
+        );
     }
 
     #[test]
@@ -429,7 +484,15 @@ mod tests {
             reading
         };
         let first = at(10, 3, 7, 5, true);
-        let unlet = |later: &CpuReading| later.unlet_since(&first);
+        let pending = |looks: &Looks, now: &CpuReading| {
+            let waits = now.waits.as_ref().unwrap();
+            looks.ledger.longest_unlet(waits, Outcome::Pending)
+        };
+        let unlet = |later: &CpuReading| {
+            let mut looks = Looks::begin(first.clone(), None, begun);
+            looks.add(later.clone());
+            pending(&looks, later)
+        };
         assert_eq!(unlet(&at(15, 3, 7, 5, true)), MS(5));
         assert_eq!(unlet(&at(15, 5, 7, 5, true)), MS(3), "less what it ran");
         assert_eq!(
@@ -448,7 +511,10 @@ mod tests {
 
         // A glance does not tell who wants to run.
         let glance = at(0, 3, 7, 4, false);
-        let stolen = |now: &CpuReading| now.stolen_unlet_since(&glance, begun + MS(2));
+        let stolen = |now: &CpuReading| {
+            let looks = Looks::begin(now.clone(), Some(&glance), begun + MS(2));
+            pending(&looks, now)
+        };
         assert_eq!(stolen(&at(10, 3, 7, 4, true)), MS(0), "nothing was stolen");
         assert_eq!(stolen(&at(20, 3, 7, 5, true)), MS(10));
         assert_eq!(stolen(&at(10, 3, 7, 6, true)), MS(8), "never more than all");
@@ -475,7 +541,7 @@ mod tests {
         let from = reading(begun, 0, 0, &[cpu(0, 0, 0)]);
         let mut to = reading(begun + MS(100), 10, 90, &[cpu(0, 0, 0)]);
         to.throttled = MS(50);
-        assert_eq!(taken(&from, &to, true), MS(30));
+        assert_eq!(judge(true).taken(&from, &to), MS(30));
     }
 
     #[test]
@@ -484,7 +550,7 @@ mod tests {
         let taken = |agent, ticks| {
             let from = reading(begun, 0, 0, &[cpu(0, 0, 0)]);
             let to = reading(begun + MS(200), agent, 0, &[ticks]);
-            super::taken(&from, &to, false)
+            judge(false).taken(&from, &to)
         };
         assert_eq!(taken(0, cpu(20, 0, 0)), MS(180));
         assert_eq!(taken(50, cpu(20, 0, 0)), MS(130));

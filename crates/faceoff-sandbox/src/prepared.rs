@@ -6,10 +6,10 @@ use crate::{
     agent_user::AgentUser,
     bubblewrap::{Bubblewrap, environment},
     cgroup::AgentCgroup,
-    channel::{Channel, Kind},
+    channel::Channel,
     child_setup::{ChildSetup, StepReport, rlimits},
     error::IoContext,
-    line_pipe::LinePipe,
+    line_socket::LineSocket,
     owner::Owner,
     process_tree::ProcessTree,
     seccomp::Filters,
@@ -23,7 +23,7 @@ use std::{
     fs, io,
     os::unix::{fs::PermissionsExt, process::CommandExt},
     path::{Path, PathBuf},
-    process::{Command, Stdio},
+    process::Command,
     time::{Duration, Instant},
 };
 
@@ -32,7 +32,7 @@ const SET_UP_PATIENCE: Duration = Duration::from_secs(120);
 
 /// What runs, and our ends of it.
 pub(crate) struct Started {
-    pub lines: LinePipe,
+    pub lines: LineSocket,
     /// How `/proc/*/fd` names the agent's output.
     pub output_name: String,
     pub stderr: StderrTail,
@@ -65,11 +65,7 @@ impl Prepared {
         }
         let enforces = |layer| spec.isolation.enforces(layer);
         let user = AgentUser::for_next_agent()?;
-        let channel = Channel::new(if user.is_some() {
-            Kind::Pipes
-        } else {
-            Kind::Sockets
-        })?;
+        let channel = Channel::new()?;
         let cgroup = AgentCgroup::create(&spec.limits, &spec.isolation, &spec.cpus)?;
         let held_by_cpuset = cgroup.as_ref().is_some_and(|cgroup| cgroup.holds_cpus);
         let filters = if enforces(Layer::Seccomp) {
@@ -139,7 +135,7 @@ impl Prepared {
         Ok(Self {
             command,
             setup,
-            channel: Channel::new(Kind::Pipes)?,
+            channel: Channel::new()?,
             status: None,
             cgroup: None,
             scratch: None,
@@ -158,28 +154,24 @@ impl Prepared {
         } = self;
         let Channel {
             lines,
-            agents: [stdin, stdout],
+            log,
+            agents: [stdin, stdout, stderr],
             output_name,
         } = channel;
         command
             .stdin(stdin)
             .stdout(stdout)
-            .stderr(Stdio::piped())
+            .stderr(stderr)
             .process_group(0);
         let sandboxed = status.is_some();
         let report = setup.install(&mut command).context("cannot make a pipe")?;
-        let mut child = match spawner::spawn(command) {
+        let child = match spawner::spawn(command) {
             Ok(child) => child,
             Err(source) => return Err(start_failure(report, source, sandboxed, spec)),
         };
-        let stderr = child.stderr.take();
         const WATCH: &str = "cannot watch the agent";
         let mut tree = ProcessTree::new(child, status, cgroup, scratch).context(WATCH)?;
-        let Some(stderr) = stderr else {
-            return Err(SandboxError::other(WATCH, "its log is missing").into());
-        };
-        let mut stderr =
-            StderrTail::drain(stderr.into(), spec.limits.stderr_tail_bytes).context(WATCH)?;
+        let mut stderr = StderrTail::drain(log, spec.limits.stderr_tail_bytes).context(WATCH)?;
         if let Some(status) = &mut tree.status {
             match status.wait_for_child(Instant::now() + SET_UP_PATIENCE)? {
                 Some(init) => tree.watch_init(init),

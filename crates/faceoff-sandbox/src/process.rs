@@ -1,12 +1,12 @@
 use crate::{
-    CpuReading, Isolation, Limits, ReadLine, SandboxError, SpawnError, SpawnSpec, Taken,
-    WriteError,
+    CpuReading, Isolation, Killer, Limits, Looks, Outcome, ReadLine, SandboxError, SpawnError,
+    SpawnSpec, Taken, WriteError,
     cgroup::AgentCgroup,
     command_check::check_command,
     cpu_waits::KnownThreads,
     end::{End, Evidence},
     error::IoContext,
-    line_pipe::{Closed, LinePipe, wait_for_any},
+    line_socket::{Closed, LineSocket, wait_for_any},
     next_look::NextLook,
     output_holders,
     prepared::{Prepared, Started},
@@ -23,20 +23,21 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// How long to wait for the exit status once the pipes are closed.
+/// How long to wait for the exit status once a channel is closed.
 const END_PATIENCE: Duration = Duration::from_millis(500);
 
 /// A running agent. Dropping it kills and reaps the whole tree and removes its cgroup and scratch.
 #[derive(Debug)]
 pub struct AgentProcess {
-    lines: LinePipe,
+    lines: LineSocket,
     output_name: String,
     stderr: StderrTail,
     tree: ProcessTree,
     limits: Limits,
     next_look: NextLook,
-    /// Whose waits [`Self::glance_at_cpus`] reads.
+    /// Whose waits are read.
     threads: KnownThreads,
+    is_frozen: bool,
     end: Option<End>,
 }
 
@@ -55,7 +56,7 @@ pub struct Usage {
 
 impl AgentProcess {
     /// Starts the agent. Returns when its sandbox exists; that its program cannot be executed may show
-    /// only then, as a closed pipe and [`AgentFaultKind::CannotStart`] from [`Self::diagnose_end`].
+    /// only then, as a closed channel and [`AgentFaultKind::CannotStart`] from [`Self::diagnose_end`].
     ///
     /// # Errors
     /// [`SpawnError::Agent`] if the bundle's command cannot be started, [`SpawnError::Platform`] if the
@@ -90,22 +91,23 @@ impl AgentProcess {
             limits: spec.limits,
             next_look: NextLook::first(Instant::now()),
             threads: KnownThreads::default(),
+            is_frozen: false,
             end: None,
         })
     }
 
-    /// Sends `line` (which ends in `\n`) without waiting, and returns the time of the attempt: from then
-    /// on the agent's time runs. What it leaves no room for follows while its answer is waited for.
+    /// Sends `line` (which ends in `\n`) without waiting. What the agent leaves no room for follows while its
+    /// answer is waited for.
     ///
     /// # Errors
     /// [`WriteError::Closed`] is the agent's doing, the rest is ours.
-    pub fn send_line(&mut self, line: &[u8]) -> Result<Instant, WriteError> {
+    pub fn send_line(&mut self, line: &[u8]) -> Result<(), WriteError> {
         // Before the call: on a shared CPU the agent may run, and even answer, before it returns.
         let at = Instant::now();
         match self.lines.send(line) {
             Ok(Ok(())) => {
                 self.next_look = NextLook::first(at);
-                Ok(at)
+                Ok(())
             }
             Ok(Err(Closed)) => {
                 self.diagnose_end(END_PATIENCE)?;
@@ -113,6 +115,35 @@ impl AgentProcess {
             }
             Err(source) => Err(SandboxError::io("cannot write to the agent", source).into()),
         }
+    }
+
+    /// Stops the whole tree until [`Self::thaw`]; a tree that is ended is thawed. Tells whether the host has
+    /// something that stops it.
+    pub fn freeze(&mut self) -> bool {
+        let freezer = self.tree.cgroup.as_ref().and_then(AgentCgroup::freezer);
+        self.is_frozen = freezer.is_some_and(|freezer| freezer.freeze());
+        self.is_frozen
+    }
+
+    /// Lets a frozen tree go on.
+    pub fn thaw(&mut self) {
+        if std::mem::take(&mut self.is_frozen) {
+            self.tree.thaw();
+        }
+    }
+
+    /// Does the host have something that stops the whole tree?
+    pub fn can_freeze(&self) -> bool {
+        let cgroup = self.tree.cgroup.as_ref();
+        cgroup.is_some_and(|cgroup| cgroup.freezer().is_some())
+    }
+
+    /// Ends the tree from another thread.
+    ///
+    /// # Errors
+    /// When the host has no descriptor left.
+    pub fn killer(&self) -> Result<Killer, SandboxError> {
+        self.tree.killer().context("cannot watch over the agent")
     }
 
     /// Has the channel taken every line that was sent?
@@ -124,7 +155,7 @@ impl AgentProcess {
     /// one that has passed takes what is there already.
     ///
     /// # Errors
-    /// When the pipe or the sandbox itself failed; never for what the agent does.
+    /// When the socket or the sandbox itself failed; never for what the agent does.
     pub fn read_line(
         &mut self,
         max_bytes: usize,
@@ -154,7 +185,7 @@ impl AgentProcess {
     /// take: only on a CPU that the agent cannot use.
     ///
     /// # Errors
-    /// When the pipe itself failed.
+    /// When the socket itself failed.
     pub fn look_out(&mut self, until: Instant) -> Result<(), SandboxError> {
         self.lines
             .look_out(until)
@@ -166,7 +197,7 @@ impl AgentProcess {
     /// that, too, `read_line` does, with a deadline that has passed.
     ///
     /// # Errors
-    /// When the pipes cannot be waited for.
+    /// When the sockets cannot be waited for.
     pub fn wait_for_any(agents: &[&Self], deadline: Instant) -> Result<(), SandboxError> {
         if agents.iter().any(|agent| agent.lines.holds_line()) {
             return Ok(());
@@ -194,7 +225,7 @@ impl AgentProcess {
     /// Is there unread output already (an answer before the question)?
     ///
     /// # Errors
-    /// When the pipe cannot be asked.
+    /// When the socket cannot be asked.
     pub fn has_pending_output(&mut self) -> Result<bool, SandboxError> {
         self.lines
             .has_pending_output()
@@ -226,50 +257,60 @@ impl AgentProcess {
         self.tree.cpu_time_s()
     }
 
-    /// The counters of the agent's CPUs, as the beginning of a span; `None` without a cgroup.
+    /// Looks up which threads the agent has; nothing is known of others, nor of more than the first few.
+    pub fn know_threads(&mut self) {
+        if self.counts_cpus() {
+            self.threads.update(&self.tree.processes());
+        }
+    }
+
+    fn counts_cpus(&self) -> bool {
+        let cgroup = self.tree.cgroup.as_ref();
+        cgroup.is_some_and(|cgroup| cgroup.cpu_evidence.is_some())
+    }
+
+    /// The counters of the agent's CPUs, as a look at it; `None` without a cgroup.
     pub fn read_cpus(&self) -> Option<CpuReading> {
         let evidence = self.tree.cgroup.as_ref()?.cpu_evidence.as_ref()?;
-        evidence.begin(&self.tree.processes())
+        evidence.begin(&self.threads)
     }
 
-    /// Looks up which threads the agent has; [`Self::glance_at_cpus`] knows no others.
-    pub fn know_threads(&mut self) {
-        self.threads = KnownThreads::of(&self.tree.processes());
-    }
-
-    /// [`Self::read_cpus`] in some microseconds: of the threads that were known when that was last looked
-    /// up. `None` also where the kernel counts in ticks alone.
+    /// [`Self::read_cpus`] in some microseconds, without what threads want. `None` also where the kernel counts in
+    /// ticks alone.
     pub fn glance_at_cpus(&self) -> Option<CpuReading> {
         let evidence = self.tree.cgroup.as_ref()?.cpu_evidence.as_ref()?;
         evidence.glance(&self.threads)
     }
 
-    /// For how much of the time since `asked`, or since it `begun` to be late, or by the `glance` before it was
+    /// For how much of the time since `asked`, or since `looks` at it began, or by the `glance` before it was
     /// asked, the agent wanted to run and
     /// could not, because all CPUs that it may use ran something outside of its cgroup, or were held up by a
-    /// machine below this one; without either, zero. `None` where the host does not tell. Never more
+    /// machine below this one; without either, zero. `None` where the host does not tell. Only waits of a thread
+    /// count that then ran, unless the answer is still to come. Never more
     /// than the kernel's counters prove: with version 1 of the cgroup interface in nanoseconds, with version
     /// 2 in ticks of 10 ms, of which a few may be missing. They lag behind by 10 ms at most: so long the
-    /// agent must have been waited for when it `begun`, and as much, with its age, is taken off since a glance.
+    /// agent must have been waited for when looks begin, and as much, with its age, is taken off since a glance.
     pub fn taken_from_it_since(
         &self,
         asked: Instant,
-        begun: Option<&CpuReading>,
+        looks: Option<&Looks>,
         glance: Option<&CpuReading>,
+        outcome: Outcome,
     ) -> Option<Taken> {
         let evidence = self.tree.cgroup.as_ref()?.cpu_evidence.as_ref()?;
-        if begun.is_none() && glance.is_none() {
+        if looks.is_none() && glance.is_none() {
             return Some(Taken::default());
         }
-        evidence.taken_since(asked, begun, glance, &self.tree.processes())
+        evidence.taken_since(asked, looks, glance, &self.threads, outcome)
     }
 
-    /// Closes the agent's input, waits up to `grace` for it to exit, then kills the tree; always reaps.
+    /// Ends the agent's input, waits up to `grace` for it to exit, then kills the tree; always reaps.
     ///
     /// # Errors
     /// When the sandbox failed under the agent.
     pub fn finish(mut self, grace: Duration) -> Result<Usage, SandboxError> {
-        self.lines.close_input();
+        self.lines.end_input();
+        self.thaw();
         if self.observe_end(grace).is_none() {
             self.kill();
         }
@@ -289,8 +330,8 @@ impl AgentProcess {
             },
         };
         self.tree.clean_up();
-        match self.end.take() {
-            Some(End::Platform(why)) => Err(SandboxError::other("the sandbox failed", why)),
+        match &self.end {
+            Some(End::Platform(why)) => Err(SandboxError::other("the sandbox failed", why.clone())),
             _ => Ok(usage),
         }
     }
@@ -335,5 +376,12 @@ impl AgentProcess {
             self.end = Some(evidence.end());
         }
         self.end.as_ref()
+    }
+}
+
+impl Drop for AgentProcess {
+    /// Whatever else was forgotten: nothing that is shared with an agent is closed while it lives.
+    fn drop(&mut self) {
+        self.kill();
     }
 }

@@ -1,7 +1,8 @@
 //! The processes of one agent: their end awaited, forced, and cleaned up after.
 
 use crate::{
-    cgroup::AgentCgroup, cpu_clock::TreeClock, line_pipe::wait_for, status_pipe::StatusPipe,
+    Killer, cgroup::AgentCgroup, cpu_clock::TreeClock, line_socket::wait_for,
+    status_pipe::StatusPipe,
 };
 use rustix::{
     event::PollFlags,
@@ -122,18 +123,39 @@ impl ProcessTree {
         // the host's init, which in a container may be us.
         if let Some(init) = &self.sandbox_init {
             let _ = pidfd_send_signal(init, Signal::KILL);
+            self.thaw();
             if matches!(self.wait(Instant::now() + FOLLOW_PATIENCE), Ok(Some(_))) {
                 return;
             }
         }
         self.end_relatives();
         let _ = self.child.kill();
+        self.thaw();
         if !matches!(self.wait(Instant::now() + KILL_PATIENCE), Ok(Some(_))) {
             tracing::error!(
                 pid = self.child.id(),
                 "an agent's process did not end after SIGKILL"
             );
         }
+    }
+
+    /// Lets the tree go on, if it was frozen.
+    pub(crate) fn thaw(&self) {
+        if let Some(freezer) = self.cgroup.as_ref().and_then(AgentCgroup::freezer) {
+            freezer.thaw();
+        }
+    }
+
+    /// Ends the tree from other threads.
+    pub(crate) fn killer(&self) -> io::Result<Killer> {
+        let processes = self.sandbox_init.iter().chain([&self.child_end]);
+        let cgroups = self.cgroup.as_ref().map(|cgroup| cgroup.leaves().to_vec());
+        Ok(Killer {
+            processes: processes
+                .map(OwnedFd::try_clone)
+                .collect::<io::Result<_>>()?,
+            cgroups: cgroups.unwrap_or_default(),
+        })
     }
 
     /// Without a sandbox, whose end is the end of all in it: ends the child's process group and its

@@ -79,6 +79,8 @@ const REFUSED: &[i64] = &[
     libc::SYS_clock_adjtime,
     libc::SYS_nfsservctl,
     libc::SYS_lookup_dcookie,
+    // a thread with a slice of its own choice lets others go first, and seems to be kept waiting
+    libc::SYS_sched_setattr,
     // personality switches off address-space randomisation
     libc::SYS_personality,
 ];

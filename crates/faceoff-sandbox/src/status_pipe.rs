@@ -1,6 +1,6 @@
 //! What bubblewrap tells about its child: its pid when it exists, its exit code when it has ended.
 
-use crate::{SandboxError, error::IoContext, line_pipe::wait_for};
+use crate::{SandboxError, error::IoContext, line_socket::wait_for};
 use rustix::{
     event::PollFlags,
     io::{Errno, ioctl_fionbio, read},

@@ -2,7 +2,8 @@
 
 use rustix::{
     event::{PollFd, PollFlags, poll},
-    io::{Errno, FdFlags, fcntl_setfd, ioctl_fionbio, read},
+    io::Errno,
+    net::{RecvFlags, recv},
     pipe::{PipeFlags, pipe_with},
 };
 use std::{
@@ -24,22 +25,20 @@ const PAUSE_AFTER_FULL_CHUNK: Duration = Duration::from_millis(1);
 pub(crate) struct StderrTail {
     tail: Arc<Mutex<VecDeque<u8>>>,
     thread: Option<JoinHandle<()>>,
-    /// Dropped to end the thread although somebody still holds the pipe.
+    /// Dropped to end the thread although the agent's end is still open somewhere.
     stop: Option<OwnedFd>,
 }
 
 impl StderrTail {
-    /// Starts draining `pipe`, keeping its last `keep_bytes`.
-    pub(crate) fn drain(pipe: OwnedFd, keep_bytes: u64) -> io::Result<Self> {
-        ioctl_fionbio(&pipe, true)?;
+    /// Starts draining `log`, a socket, keeping its last `keep_bytes`.
+    pub(crate) fn drain(log: OwnedFd, keep_bytes: u64) -> io::Result<Self> {
         let (stop_seen, stop) = pipe_with(PipeFlags::CLOEXEC)?;
-        fcntl_setfd(&stop, FdFlags::CLOEXEC)?;
         let keep = usize::try_from(keep_bytes).unwrap_or(usize::MAX);
         let tail = Arc::new(Mutex::new(VecDeque::new()));
         let shared = Arc::clone(&tail);
         let thread = std::thread::Builder::new()
             .name("agent-stderr".into())
-            .spawn(move || drain_until_closed(&pipe, &stop_seen, keep, &shared))?;
+            .spawn(move || drain_until_closed(&log, &stop_seen, keep, &shared))?;
         Ok(Self {
             tail,
             thread: Some(thread),
@@ -53,7 +52,7 @@ impl StderrTail {
         String::from_utf8_lossy(tail.make_contiguous()).into_owned()
     }
 
-    /// Takes what is still in the pipe and ends the thread. Call when the tree is dead.
+    /// Takes what is still there and ends the thread. Call when the tree is dead.
     pub(crate) fn close(&mut self) {
         drop(self.stop.take());
         if let Some(thread) = self.thread.take() {
@@ -72,13 +71,13 @@ fn lock(tail: &Mutex<VecDeque<u8>>) -> MutexGuard<'_, VecDeque<u8>> {
     tail.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn drain_until_closed(pipe: &OwnedFd, stop: &OwnedFd, keep: usize, tail: &Mutex<VecDeque<u8>>) {
+fn drain_until_closed(log: &OwnedFd, stop: &OwnedFd, keep: usize, tail: &Mutex<VecDeque<u8>>) {
     let mut chunk = vec![0; CHUNK_BYTES];
-    // What a pipe holds at most when the writers are dead; a survivor's flood is not followed further.
+    // More than a socket holds when the writers are dead; a survivor's flood is not followed further.
     let mut left_after_stop = 1 << 20;
     loop {
         let mut fds = [
-            PollFd::new(pipe, PollFlags::IN),
+            PollFd::new(log, PollFlags::IN),
             PollFd::new(stop, PollFlags::IN),
         ];
         match poll(&mut fds, None) {
@@ -86,9 +85,9 @@ fn drain_until_closed(pipe: &OwnedFd, stop: &OwnedFd, keep: usize, tail: &Mutex<
             Err(_) => return,
         }
         let stopped = !fds[1].revents().is_empty();
-        match read(pipe, &mut chunk) {
-            Ok(0) => return,
-            Ok(count) => {
+        match recv(log, &mut chunk[..], RecvFlags::DONTWAIT) {
+            Ok((0, _)) => return,
+            Ok((count, _)) => {
                 let mut tail = lock(tail);
                 tail.extend(&chunk[..count]);
                 let excess = tail.len().saturating_sub(keep);

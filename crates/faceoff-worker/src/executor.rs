@@ -9,7 +9,7 @@ use crate::{
     shown::Shown,
 };
 use anyhow::Context as _;
-use faceoff_runner::{AgentEnvironment, CLIPS_FILE, GameSpec, bundle::Bundle};
+use faceoff_runner::{AgentEnvironment, CLIPS_FILE, GameSpec, Supervision, bundle::Bundle};
 use faceoff_sandbox::{Isolation, Runtime};
 use faceoff_types::{AgentLimits, GameId, SlotTiming, SmokeOutcome, StageRuntimes};
 use faceoff_wire::work::{
@@ -46,11 +46,17 @@ pub(crate) struct AgentHost {
 
 impl AgentHost {
     /// Of an agent that plays alone.
-    fn environment(&self, limits: &AgentLimits) -> AgentEnvironment {
-        self.environment_on(self.cpus.of_agent(0).to_vec(), limits)
+    fn environment(&self, limits: &AgentLimits, progress: &Progress) -> AgentEnvironment {
+        self.environment_on(self.cpus.of_agent(0).to_vec(), limits, progress)
     }
 
-    fn environment_on(&self, agent_cpus: Vec<usize>, limits: &AgentLimits) -> AgentEnvironment {
+    fn environment_on(
+        &self,
+        agent_cpus: Vec<usize>,
+        limits: &AgentLimits,
+        progress: &Progress,
+    ) -> AgentEnvironment {
+        let progress = progress.clone();
         AgentEnvironment {
             limits: limits.resources.clone(),
             time: limits.time.clone(),
@@ -58,6 +64,7 @@ impl AgentHost {
             runtimes: self.runtimes.clone(),
             images: self.images,
             agent_cpus,
+            supervision: Supervision::of(move || progress.stopped()),
         }
     }
 }
@@ -160,7 +167,7 @@ impl Executor {
                 log: String::new(),
             });
         }
-        let environment = self.host.environment(&agent.limits);
+        let environment = self.host.environment(&agent.limits, progress);
         let smoke = self
             .evaluator
             .smoke(spec, &bundle, &environment, &|| progress.stopped())?;
@@ -191,7 +198,7 @@ impl Executor {
         mut progress: Progress,
     ) -> anyhow::Result<WorkReport> {
         let bundle = self.valid_bundle(agent, None, &progress)?;
-        let environment = self.host.environment(&agent.limits);
+        let environment = self.host.environment(&agent.limits, &progress);
         let out = self.folder("recording")?;
         let played = self
             .evaluator
@@ -247,8 +254,10 @@ impl Executor {
         ];
         let [first_cpus, second_cpus] = self.host.cpus.of_a_game();
         let envs = [
-            self.host.environment_on(first_cpus, &first.limits),
-            self.host.environment_on(second_cpus, &second.limits),
+            self.host
+                .environment_on(first_cpus, &first.limits, shown.progress()),
+            self.host
+                .environment_on(second_cpus, &second.limits, shown.progress()),
         ];
         let out = self.folder("game")?;
         let played = self.evaluator.play_game(

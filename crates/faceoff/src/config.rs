@@ -7,7 +7,7 @@
 use anyhow::{Context, anyhow};
 use faceoff_http::{ConnectionLimits, HttpLimits, LeastRate};
 use faceoff_notify::WebhookRules;
-use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::BundleLimits};
+use faceoff_runner::{AgentEnvironment, Supervision, TimeLimits, bundle::BundleLimits};
 use faceoff_sandbox::{Isolation, Layer, Limits, Runtime, affinity};
 use faceoff_store::UploadQuota;
 use faceoff_types::{
@@ -431,6 +431,7 @@ impl Config {
             runtimes,
             images: self.sandbox.images,
             agent_cpus: self.workers.agent_cpus.clone(),
+            supervision: Supervision::default(),
         }
     }
 

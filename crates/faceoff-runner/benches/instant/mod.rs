@@ -1,6 +1,6 @@
 //! An agent that answers at once: the benchmark's own program, started with `--agent`.
 
-use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::Bundle};
+use faceoff_runner::{AgentEnvironment, Supervision, TimeLimits, bundle::Bundle};
 use faceoff_sandbox::{Isolation, Limits, Runtime};
 use faceoff_wire::Manifest;
 use std::{
@@ -85,5 +85,6 @@ pub fn environment(isolation: Isolation) -> AgentEnvironment {
         runtimes: BTreeMap::from([("native".to_owned(), Runtime::native())]),
         images: false,
         agent_cpus: Vec::new(),
+        supervision: Supervision::default(),
     }
 }

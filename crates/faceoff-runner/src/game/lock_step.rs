@@ -1,29 +1,41 @@
-//! Both sides are asked before either is waited for, and whatever one does, the other's clock is its own.
+//! Both sides are asked before either is waited for, and whatever one does, the other's clock is its own. Where both
+//! share CPUs, who has answered is frozen until it is asked again: it would compute in the other's time.
 
 use super::side_player::{SidePlayer, Started};
 use crate::{calibration::Calibration, fault::PlatformFault, session::Session};
 use faceoff_episode::{GameCourse, GameSink, Question};
+use faceoff_sandbox::{Layer, SandboxError};
 use faceoff_types::{Side, TimeLimits};
 use std::time::{Duration, Instant};
 
 /// What takes longer than this while one side is seen to has kept us from looking at the other.
 const AWAY: Duration = Duration::from_millis(1);
 
+/// What becomes of a side that has answered before the other one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum OnceAnswered {
+    /// It has CPUs of its own.
+    GoesOn,
+    /// It is frozen until it is asked again.
+    IsFrozen,
+}
+
 /// Plays a game to its end; `cancelled` is asked before each step.
 pub(super) fn play<S: GameSink>(
     course: &mut GameCourse<S>,
     sides: &mut [SidePlayer<'_>; 2],
     calibrations: &mut [Calibration; 2],
+    answered: OnceAnswered,
     cancelled: impl Fn(&mut S) -> bool,
 ) -> Result<(), PlatformFault> {
     while course.end().is_none() {
-        get_ready(course, sides)?;
+        get_ready(course, sides, answered)?;
         let (rally, mut steps) = (course.rally(), 0);
         while course.is_in_rally() {
             if cancelled(course.sink()) {
                 return Err(PlatformFault::Cancelled);
             }
-            step(course, sides)?;
+            step(course, sides, answered)?;
             steps += 1;
         }
         for side in &mut *sides {
@@ -43,14 +55,18 @@ pub(super) fn play<S: GameSink>(
 fn get_ready<S: GameSink>(
     course: &mut GameCourse<S>,
     sides: &mut [SidePlayer<'_>; 2],
+    answered: OnceAnswered,
 ) -> Result<(), PlatformFault> {
     let rally = course.rally();
     let [first, second] = sides;
     let started: [Started; 2] = [first.start()?, second.start()?];
+    if answered == OnceAnswered::IsFrozen && !(first.can_freeze() && second.can_freeze()) {
+        return Err(no_freezer().into());
+    }
     ask_both(sides, |_, player| {
         player.ask(|session| session.send_reset(rally))
     })?;
-    wait_for_both(sides)?;
+    wait_for_both(sides, answered)?;
     let [first, second] = sides;
     let [first_started, second_started] = started;
     let entries = [first.entry(first_started), second.entry(second_started)];
@@ -63,6 +79,7 @@ fn get_ready<S: GameSink>(
 fn step<S: GameSink>(
     course: &mut GameCourse<S>,
     sides: &mut [SidePlayer<'_>; 2],
+    answered: OnceAnswered,
 ) -> Result<(), PlatformFault> {
     let questions = [
         course.question(Side::First)?,
@@ -74,7 +91,7 @@ fn step<S: GameSink>(
         }
         None => Ok(()),
     })?;
-    wait_for_both(sides)?;
+    wait_for_both(sides, answered)?;
     let [first, second] = &*sides;
     course.answer([first.response(), second.response()])?;
     end_faulty(course, sides);
@@ -106,19 +123,44 @@ fn ask_both(
 }
 
 /// Waits until neither side's answer is due; the first that comes is taken first.
-fn wait_for_both(sides: &mut [SidePlayer<'_>; 2]) -> Result<(), PlatformFault> {
+fn wait_for_both(
+    sides: &mut [SidePlayer<'_>; 2],
+    answered: OnceAnswered,
+) -> Result<(), PlatformFault> {
     let [first, second] = sides;
     loop {
         match (first.due(), second.due()) {
             (None, None) => return Ok(()),
-            (Some(_), None) => first.look(Instant::now() + TimeLimits::LONGEST)?,
-            (None, Some(_)) => second.look(Instant::now() + TimeLimits::LONGEST)?,
+            (Some(_), None) => wait_for_last(first, second, answered)?,
+            (None, Some(_)) => wait_for_last(second, first, answered)?,
             (Some(a), Some(b)) => {
                 Session::wait_for_any(&[a, b], Instant::now() + TimeLimits::LONGEST)?;
                 look(first, second)?;
                 look(second, first)?;
             }
         }
+    }
+}
+
+/// Waits for the side that is late, whose other has answered.
+fn wait_for_last(
+    late: &mut SidePlayer<'_>,
+    other: &mut SidePlayer<'_>,
+    answered: OnceAnswered,
+) -> Result<(), PlatformFault> {
+    if answered == OnceAnswered::IsFrozen {
+        other.freeze();
+    }
+    late.look(Instant::now() + TimeLimits::LONGEST)
+}
+
+fn no_freezer() -> SandboxError {
+    SandboxError::Unavailable {
+        layer: Layer::CgroupCpu,
+        why: "the agents of a game share CPUs here, so that who has answered must be stopped until it is asked again, \
+              and this service may use no freezer of cgroups: give each side CPUs of its own (three for a slot), run the \
+              service as root, or hand it a cgroup of the freezer as of the other controllers"
+            .to_owned(),
     }
 }
 

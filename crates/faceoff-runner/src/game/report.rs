@@ -1,4 +1,7 @@
-use super::{lock_step, side_player::SidePlayer};
+use super::{
+    lock_step::{self, OnceAnswered},
+    side_player::SidePlayer,
+};
 use crate::{
     bundle::Bundle,
     calibration::Calibration,
@@ -151,9 +154,20 @@ pub fn play_game<S: GameSink>(
         observer: &mut *observer,
     };
     let mut course = GameCourse::begin(&arena, spec.steps, spec.limits.clone(), told);
-    let played = lock_step::play(&mut course, &mut sides, &mut calibrations, |told| {
-        told.observer.cancelled()
-    });
+    // Outside of a sandbox nothing is counted.
+    let answered = if AgentEnvironment::share_cpus(envs) && envs.iter().all(|env| env.counts_cpus())
+    {
+        OnceAnswered::IsFrozen
+    } else {
+        OnceAnswered::GoesOn
+    };
+    let played = lock_step::play(
+        &mut course,
+        &mut sides,
+        &mut calibrations,
+        answered,
+        |told| told.observer.cancelled(),
+    );
     let ended = played.map(|()| {
         let FinishedGame {
             outcome,

@@ -179,6 +179,18 @@ impl<'a> SidePlayer<'a> {
         Ok(())
     }
 
+    /// Stops the agent, if it has answered, until it is asked again.
+    pub fn freeze(&mut self) {
+        if let (Some(session), Some(Ok(_))) = (&mut self.session, &self.came) {
+            session.freeze();
+        }
+    }
+
+    /// Can the agent be stopped, if it runs?
+    pub fn can_freeze(&self) -> bool {
+        self.session.as_ref().is_none_or(Session::can_freeze)
+    }
+
     /// Something of ours was seen to meanwhile.
     pub fn was_not_looked_at(&mut self, away: Duration) {
         if let Some(session) = &mut self.session {

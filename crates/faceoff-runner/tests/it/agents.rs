@@ -1,6 +1,6 @@
 //! Agents in Python, behaving and not, each a real process.
 
-use faceoff_runner::{AgentEnvironment, TimeLimits, bundle::Bundle};
+use faceoff_runner::{AgentEnvironment, Supervision, TimeLimits, bundle::Bundle};
 use faceoff_sandbox::{Isolation, Limits, Runtime, RuntimeFiles};
 use faceoff_wire::Manifest;
 use std::{collections::BTreeMap, fs, os::unix::fs::PermissionsExt};
@@ -117,6 +117,7 @@ pub fn sandboxed() -> AgentEnvironment {
         ]),
         images: true,
         agent_cpus: Vec::new(),
+        supervision: Supervision::default(),
     }
 }
 

@@ -2,8 +2,9 @@
 
 use super::{
     files,
+    freezer::Freezer,
     hierarchy::{Hierarchies, Home, Version},
-    leaf::{leaf_name, remove_leaf},
+    leaf::{end_all, leaf_name, remove_leaf},
 };
 use crate::{
     Isolation, Layer, Limits, SandboxError,
@@ -49,6 +50,8 @@ pub(crate) struct AgentCgroup {
     pub(crate) cpu_evidence: Option<CpuEvidence>,
     /// Does a cpuset hold the tree to its CPUs, whatever it asks for?
     pub(crate) holds_cpus: bool,
+    /// Stops the tree and lets it go on, where the host has one.
+    freezer: Option<Freezer>,
 }
 
 impl AgentCgroup {
@@ -79,6 +82,7 @@ impl AgentCgroup {
             cpu_usage: None,
             cpu_evidence: None,
             holds_cpus: false,
+            freezer: None,
         };
         // Where a controller is known to be needed in the same v2 cgroup, all are enabled together.
         let all: Vec<&str> = wanted.iter().map(|(_, controller)| *controller).collect();
@@ -112,7 +116,23 @@ impl AgentCgroup {
         if !cpus.is_empty() {
             group.holds_cpus = group.hold_cpus(&hierarchies, &name, cpus);
         }
+        group.freezer = group.make_freezer(&hierarchies, &name);
         Ok(Some(group))
+    }
+
+    fn make_freezer(&mut self, hierarchies: &Hierarchies, name: &str) -> Option<Freezer> {
+        let home = hierarchies.find("freezer")?;
+        let controllers: &[&str] = match home.version {
+            Version::V1 => &["freezer"],
+            Version::V2 => &[],
+        };
+        let leaf = self.leaf(&home, controllers, name).ok()?;
+        Freezer::open(home.version, &leaf)
+    }
+
+    /// Stops and starts the tree; `None` where the host has nothing for it.
+    pub(crate) fn freezer(&self) -> Option<&Freezer> {
+        self.freezer.as_ref()
     }
 
     /// The agent's folder below `home`, made if need be.
@@ -330,10 +350,21 @@ impl AgentCgroup {
         pids.into_iter().filter_map(Pid::from_raw).collect()
     }
 
+    /// Its folder in each hierarchy.
+    pub(crate) fn leaves(&self) -> &[PathBuf] {
+        &self.leaves
+    }
+
     /// Kills what still lives in it and removes it.
     pub(crate) fn remove(&mut self) {
         (self.cpu_usage, self.cpu_evidence) = (None, None);
-        for leaf in std::mem::take(&mut self.leaves) {
+        self.freezer = None;
+        let leaves = std::mem::take(&mut self.leaves);
+        // All of them before one is waited for: the tree may be frozen in another than it is found in.
+        for leaf in &leaves {
+            end_all(leaf);
+        }
+        for leaf in leaves {
             remove_leaf(&leaf);
         }
     }

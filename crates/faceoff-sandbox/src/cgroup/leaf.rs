@@ -1,6 +1,6 @@
 //! The folder of one agent in one hierarchy: its name, and its end.
 
-use super::files;
+use super::{files, freezer::thaw_leaf};
 use crate::owner::Owner;
 use rustix::process::{Pid, Signal, kill_process};
 use std::{
@@ -20,7 +20,7 @@ pub(super) fn remove_leaf(leaf: &Path) {
     const PATIENCE: Duration = Duration::from_secs(60);
     let deadline = Instant::now() + PATIENCE;
     loop {
-        kill_all(leaf);
+        end_all(leaf);
         match fs::remove_dir(leaf) {
             Ok(()) => break,
             Err(error) if error.kind() == io::ErrorKind::NotFound => break,
@@ -35,6 +35,12 @@ pub(super) fn remove_leaf(leaf: &Path) {
         // Fails while other agents are in it, as it should.
         let _ = fs::remove_dir(folder);
     }
+}
+
+/// Kills every process of the cgroup, and lets frozen ones go on to die: version 1 keeps them otherwise.
+pub(crate) fn end_all(leaf: &Path) {
+    kill_all(leaf);
+    thaw_leaf(leaf);
 }
 
 fn kill_all(leaf: &Path) {

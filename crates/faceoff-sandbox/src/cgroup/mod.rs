@@ -6,9 +6,11 @@
 
 mod agent;
 mod files;
+mod freezer;
 mod hierarchy;
 mod leaf;
 mod stale;
 
 pub(crate) use agent::{AgentCgroup, LimitHit};
+pub(crate) use leaf::end_all;
 pub(crate) use stale::sweep;

@@ -12,7 +12,7 @@ pub(crate) fn sweep() -> usize {
     let Ok(hierarchies) = Hierarchies::read() else {
         return 0;
     };
-    let folders: BTreeSet<PathBuf> = ["memory", "pids", "cpu", "cpuacct", "cpuset"]
+    let folders: BTreeSet<PathBuf> = ["memory", "pids", "cpu", "cpuacct", "cpuset", "freezer"]
         .iter()
         .filter_map(|controller| hierarchies.find(controller))
         .map(|home| home.own.join(FOLDER))

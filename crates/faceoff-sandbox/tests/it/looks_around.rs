@@ -94,7 +94,7 @@ fn an_agent_has_no_rights_no_terminal_and_no_descriptors_but_its_three() {
     assert_eq!(report["other_descriptors"], serde_json::json!([]));
     for descriptor in report["descriptors"].as_array().unwrap() {
         assert!(
-            descriptor.as_str().unwrap().starts_with("pipe:"),
+            descriptor.as_str().unwrap().starts_with("socket:"),
             "{descriptor}"
         );
     }

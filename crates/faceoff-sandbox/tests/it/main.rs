@@ -17,6 +17,7 @@ mod ends;
 mod floods;
 mod harness;
 mod hoards;
+mod holds;
 mod images;
 mod killed_service;
 mod looks_around;

@@ -450,6 +450,7 @@ impl Server {
                     runtimes: BTreeMap::new(),
                     images: false,
                     agent_cpus: Vec::new(),
+                    supervision: faceoff_runner::Supervision::default(),
                 },
                 metrics: Metrics::new("0.0.0"),
             },

@@ -86,6 +86,7 @@ impl Server {
                     runtimes,
                     images: false,
                     agent_cpus: Vec::new(),
+                    supervision: faceoff_runner::Supervision::default(),
                 },
                 metrics: Metrics::new("0.0.0"),
             },

@@ -6,7 +6,8 @@ use memchr::memchr;
 use rustix::{
     buffer::spare_capacity,
     event::{PollFd, PollFlags, Timespec, poll},
-    io::{Errno, ioctl_fionbio, ioctl_fionread, read, write},
+    io::{Errno, ioctl_fionread},
+    net::{RecvFlags, SendFlags, Shutdown, recv, send, shutdown},
 };
 use std::{
     io,
@@ -14,7 +15,7 @@ use std::{
     time::Instant,
 };
 
-/// One read: a pipe's whole content, so that an answer costs one system call.
+/// One read: the longest answer, so that it costs one system call.
 const READ_BYTES: usize = 64 << 10;
 /// How much of an oversized line is handed back.
 const HEAD_BYTES: usize = 1024;
@@ -46,8 +47,10 @@ pub(crate) struct Closed;
 
 /// Both ends that the service holds.
 #[derive(Debug)]
-pub(crate) struct LinePipe {
-    input: Option<OwnedFd>,
+pub(crate) struct LineSocket {
+    input: OwnedFd,
+    /// The agent has been told that nothing more will come.
+    is_shut: bool,
     /// What there was no room for yet.
     unsent: Vec<u8>,
     output: OwnedFd,
@@ -59,24 +62,27 @@ pub(crate) struct LinePipe {
     last_read_at: Instant,
 }
 
-impl LinePipe {
-    pub(crate) fn new(input: OwnedFd, output: OwnedFd) -> io::Result<Self> {
-        ioctl_fionbio(&input, true)?;
-        ioctl_fionbio(&output, true)?;
-        Ok(Self {
-            input: Some(input),
+impl LineSocket {
+    pub(crate) fn new(input: OwnedFd, output: OwnedFd) -> Self {
+        Self {
+            input,
+            is_shut: false,
             unsent: Vec::new(),
             output,
             buffer: Vec::with_capacity(2 * READ_BYTES),
             start: 0,
             searched: 0,
             last_read_at: Instant::now(),
-        })
+        }
     }
 
-    pub(crate) fn close_input(&mut self) {
-        self.input = None;
+    /// Ends the agent's standard input. The socket itself stays until the agent is dead: to close one may be work.
+    pub(crate) fn end_input(&mut self) {
+        self.is_shut = true;
         self.unsent.clear();
+        if let Err(error) = shutdown(&self.input, Shutdown::Write) {
+            tracing::debug!(%error, "an agent's input is ended already");
+        }
     }
 
     /// Writes what there is room for; the rest follows while an answer is waited for.
@@ -89,7 +95,7 @@ impl LinePipe {
         Ok(sent.map(|count| self.unsent.extend_from_slice(&bytes[count..])))
     }
 
-    /// Has everything been taken by the pipe?
+    /// Has everything been taken by the socket?
     pub(crate) const fn is_all_sent(&self) -> bool {
         self.unsent.is_empty()
     }
@@ -101,12 +107,16 @@ impl LinePipe {
 
     /// Writes until there is no room; returns the number of bytes that were taken.
     fn write(&self, bytes: &[u8]) -> io::Result<Result<usize, Closed>> {
-        let Some(input) = &self.input else {
+        if self.is_shut {
             return Ok(Err(Closed));
-        };
+        }
         let mut sent = 0;
         while sent < bytes.len() {
-            match write(input, &bytes[sent..]) {
+            match send(
+                &self.input,
+                &bytes[sent..],
+                SendFlags::DONTWAIT | SendFlags::NOSIGNAL,
+            ) {
                 Ok(count) => sent += count,
                 Err(Errno::AGAIN) => break,
                 Err(Errno::INTR) => {}
@@ -171,14 +181,13 @@ impl LinePipe {
 
     /// What there is to wait for: output, and room for what was not sent yet.
     pub(crate) fn awaited(&self) -> Vec<PollFd<'_>> {
-        let room = self.input.as_ref().filter(|_| !self.is_all_sent());
-        [(Some(&self.output), PollFlags::IN), (room, PollFlags::OUT)]
-            .into_iter()
-            .filter_map(|(fd, flags)| Some(PollFd::new(fd?, flags)))
+        let room = (!self.is_all_sent()).then(|| PollFd::new(&self.input, PollFlags::OUT));
+        std::iter::once(PollFd::new(&self.output, PollFlags::IN))
+            .chain(room)
             .collect()
     }
 
-    /// Is there unread output, in the buffer or in the pipe?
+    /// Is there unread output, in the buffer or in the socket?
     pub(crate) fn has_pending_output(&self) -> io::Result<bool> {
         Ok(self.start < self.buffer.len() || ioctl_fionread(&self.output)? > 0)
     }
@@ -226,10 +235,16 @@ impl LinePipe {
         }
         // Bounded: `take_line` refuses before more than the cap and one read have gathered.
         self.buffer.reserve(READ_BYTES);
-        let result = read(&self.output, spare_capacity(&mut self.buffer));
+        let result = recv(
+            &self.output,
+            spare_capacity(&mut self.buffer),
+            RecvFlags::DONTWAIT,
+        );
         self.last_read_at = Instant::now();
         match result {
-            Ok(count) => Ok(count > 0),
+            Ok((count, _)) => Ok(count > 0),
+            // It closed its end with something of ours unread.
+            Err(Errno::CONNRESET) => Ok(false),
             Err(Errno::AGAIN | Errno::INTR) => Ok(true),
             Err(error) => Err(error.into()),
         }
@@ -265,20 +280,19 @@ pub(crate) fn wait_for_any(fds: &mut [PollFd<'_>], deadline: Instant) -> io::Res
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rustix::pipe::pipe;
-    use std::{fs::File, io::Write as _, thread, time::Duration};
+    use std::{io::Write as _, os::unix::net::UnixStream, thread, time::Duration};
 
     /// The service's ends, and the agent's output.
-    fn line_pipe() -> (LinePipe, File) {
-        let (_agents_input, input) = pipe().unwrap();
-        let (output, agents_output) = pipe().unwrap();
-        (LinePipe::new(input, output).unwrap(), agents_output.into())
+    fn line_socket() -> (LineSocket, UnixStream) {
+        let (_agents_input, input) = UnixStream::pair().unwrap();
+        let (output, agents_output) = UnixStream::pair().unwrap();
+        (LineSocket::new(input.into(), output.into()), agents_output)
     }
 
     #[test]
     fn looking_out_ends_with_the_line_with_the_output_and_with_its_time() {
         let far = || Instant::now() + Duration::from_secs(3600);
-        let (mut lines, mut agent) = line_pipe();
+        let (mut lines, mut agent) = line_socket();
         agent.write_all(b"here\n").unwrap();
         lines.look_out(far()).unwrap();
         let line = lines.read_line(100, Instant::now()).unwrap();
@@ -293,7 +307,7 @@ mod tests {
 
     #[test]
     fn looking_out_for_a_line_that_never_ends_ends() {
-        let (mut lines, mut agent) = line_pipe();
+        let (mut lines, mut agent) = line_socket();
         let flood = thread::spawn(move || while agent.write_all(&[b'x'; 4096]).is_ok() {});
         for _ in 0..10 {
             lines

@@ -1,0 +1,104 @@
+//! How long the calling thread itself was kept from running: of what holds up an evaluator between asking and
+//! hearing, this alone no agent can bring about on CPUs that are not its own.
+
+use crate::cpu_counters::{Ticks, ticks, ticks_of};
+use std::{
+    cell::RefCell,
+    fs::{self, File},
+    os::unix::fs::FileExt,
+    time::Duration,
+};
+
+/// The counters of the calling thread at one time. Only the difference of two of the same thread says something.
+#[derive(Debug, Clone, Default)]
+pub struct OwnWait {
+    waited: Duration,
+    /// Of the CPUs that it may use.
+    ticks: Vec<Ticks>,
+}
+
+thread_local! {
+    /// `None` where the kernel does not tell.
+    static SCHEDULE: RefCell<Option<File>> =
+        RefCell::new(File::open("/proc/thread-self/schedstat").ok());
+}
+
+impl OwnWait {
+    /// The counters now; `cpus` are those that the thread may use.
+    #[must_use]
+    pub fn now(cpus: &[usize]) -> Self {
+        let stat = fs::read_to_string("/proc/stat").ok();
+        Self {
+            waited: SCHEDULE.with_borrow(|file| file.as_ref().and_then(waited).unwrap_or_default()),
+            ticks: stat
+                .and_then(|stat| ticks_of(&stat, cpus))
+                .unwrap_or_default(),
+        }
+    }
+
+    /// For how long the thread wanted to run since `before` and was not let, or the machine below this one held up all
+    /// of its CPUs; zero where the host does not tell.
+    #[must_use]
+    pub fn since(&self, before: &Self) -> Duration {
+        let each = std::iter::zip(&before.ticks, &self.ticks);
+        let stolen = each.map(|(before, now)| now.stolen.saturating_sub(before.stolen));
+        self.waited.saturating_sub(before.waited) + ticks(stolen.min().unwrap_or_default())
+    }
+}
+
+/// The second number of `schedstat`: nanoseconds of waiting to run.
+fn waited(file: &File) -> Option<Duration> {
+    let mut bytes = [0; 128];
+    let count = file.read_at(&mut bytes, 0).ok()?;
+    let text = std::str::from_utf8(&bytes[..count]).ok()?;
+    let waited = text.split_ascii_whitespace().nth(1)?.parse().ok()?;
+    Some(Duration::from_nanos(waited))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::affinity;
+    use std::{
+        sync::atomic::{AtomicBool, Ordering},
+        thread,
+    };
+
+    #[test]
+    fn a_wait_behind_another_thread_is_counted_and_sleep_is_not() {
+        let cpu = affinity::allowed().unwrap()[0];
+        let over = AtomicBool::new(false);
+        thread::scope(|scope| {
+            let pinned = scope.spawn(|| {
+                affinity::pin_current_thread(&[cpu]).unwrap();
+                let before = OwnWait::now(&[cpu]);
+                // With another thread that never sleeps on the same CPU.
+                while OwnWait::now(&[cpu]).since(&before) < Duration::from_millis(20) {}
+                over.store(true, Ordering::Relaxed);
+            });
+            scope.spawn(|| {
+                affinity::pin_current_thread(&[cpu]).unwrap();
+                while !over.load(Ordering::Relaxed) {}
+            });
+            pinned.join().unwrap();
+        });
+        assert_eq!(OwnWait::default().since(&OwnWait::now(&[])), Duration::ZERO);
+    }
+
+    #[test]
+    fn only_what_was_stolen_of_all_cpus_held_it_up() {
+        let stolen = |each: &[u64]| OwnWait {
+            waited: Duration::ZERO,
+            ticks: each
+                .iter()
+                .map(|stolen| Ticks {
+                    stolen: *stolen,
+                    ..Ticks::default()
+                })
+                .collect(),
+        };
+        let before = stolen(&[1, 5]);
+        assert_eq!(stolen(&[4, 7]).since(&before), Duration::from_millis(20));
+        assert_eq!(stolen(&[4, 5]).since(&before), Duration::ZERO);
+    }
+}
