@@ -121,7 +121,7 @@ impl<'a> Budget<'a> {
     }
 
     /// Asked before each piece of work.
-    fn check(&self) -> Result<(), BundleError> {
+    pub(super) fn check(&self) -> Result<(), BundleError> {
         if self.ended.borrow().is_some() {
             return Err(BundleError::Cancelled);
         }

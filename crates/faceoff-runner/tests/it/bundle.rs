@@ -38,6 +38,14 @@ fn refused(bytes: &[u8], needle: &str) -> TempDir {
     refused_with(bytes, BundleLimits::default(), needle)
 }
 
+/// Refused before anything was written.
+#[track_caller]
+fn refused_unwritten(bytes: &[u8], limits: BundleLimits, needle: &str) {
+    let dir = refused_with(bytes, limits, needle);
+    let written: Vec<_> = fs::read_dir(dir.path().join("out")).unwrap().collect();
+    assert!(written.is_empty(), "{needle:?} after {written:?}");
+}
+
 fn mode(path: &Path) -> u32 {
     path.metadata().unwrap().permissions().mode() & 0o7777
 }
@@ -423,6 +431,62 @@ fn fifty_thousand_and_one_files_are_one_too_many() {
         .iter()
         .fold(Tar::with_manifest(), |tar, name| tar.file(name, 0o644, b""));
     refused(&tar.gz(), "more than 50000 files");
+}
+
+#[test]
+fn folders_beyond_the_limit_are_not_made() {
+    let names: Vec<String> = (0..50_001).map(|i| format!("d{i}/")).collect();
+    let tar = || names.iter().fold(Tar::new(), |tar, name| tar.folder(name));
+    for bytes in [tar().gz(), tar().zst()] {
+        refused_unwritten(&bytes, BundleLimits::default(), "more than 50000 folders");
+    }
+}
+
+#[test]
+fn empty_folders_are_there_with_their_modes() {
+    let tar = || {
+        Tar::with_manifest()
+            .folder("empty/")
+            .entry(EntryType::Directory, "closed", 0o700, "", b"")
+            .folder("a/b/c/")
+            .file("a/x", 0o600, b"x")
+            .file("late/y", 0o644, b"y")
+            .folder("late/")
+    };
+    let zipped = zip(&[
+        ("agent.toml", 0o644, MANIFEST.as_bytes()),
+        ("empty/", 0o755, b""),
+        ("closed/", 0o700, b""),
+        ("a/b/c/", 0o755, b""),
+        ("a/x", 0o600, b"x"),
+        ("late/y", 0o644, b"y"),
+        ("late/", 0o755, b""),
+    ]);
+    for bytes in [tar().gz(), tar().zst(), zipped] {
+        let (_dir, bundle) = accepted(&bytes);
+        for folder in ["empty", "closed", "a", "a/b", "a/b/c", "late"] {
+            let path = bundle.dir.join(folder);
+            assert!(path.symlink_metadata().unwrap().is_dir(), "{folder}");
+            assert_eq!(mode(&path), 0o755, "{folder}");
+        }
+        assert_eq!(fs::read(bundle.dir.join("a/x")).unwrap(), b"x");
+        assert_eq!(fs::read(bundle.dir.join("late/y")).unwrap(), b"y");
+        assert_eq!(fs::read_dir(bundle.dir.join("empty")).unwrap().count(), 0);
+    }
+}
+
+#[test]
+fn folder_that_holds_only_a_link_is_made() {
+    let tar = Tar::with_manifest()
+        .symlink("only/a/link", "../../agent.toml")
+        .symlink("to", "only/a")
+        .entry(EntryType::Link, "other/name", 0o644, "agent.toml", b"");
+    let (_dir, bundle) = accepted(&tar.gz());
+    for path in ["only/a/link", "to/link", "other/name"] {
+        let text = fs::read_to_string(bundle.dir.join(path)).unwrap();
+        assert_eq!(text, MANIFEST, "{path}");
+    }
+    assert_eq!(mode(&bundle.dir.join("only/a")), 0o755);
 }
 
 #[test]

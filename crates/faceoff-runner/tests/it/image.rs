@@ -975,6 +975,16 @@ fn an_image_may_be_packed_with_its_folder() {
 }
 
 #[test]
+fn empty_folders_of_the_archive_leave_nothing() {
+    let tar = TestImage::agent([base()]).docker();
+    let bytes = tar.folder("empty/deep/").folder("layer0/empty/").gz();
+    let (dir, _, image) = accepted(&bytes);
+    assert_eq!(image.text("usr/bin/tool"), "tool");
+    let left: Vec<_> = fs::read_dir(dir.path().join("out")).unwrap().collect();
+    assert_eq!(left.len(), 1, "{left:?}");
+}
+
+#[test]
 fn what_may_have_been_meant_is_told() {
     let exported = "This looks like the file system of a container (`docker export`): send its image, as `docker save` \
                     writes it";

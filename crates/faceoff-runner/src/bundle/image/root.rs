@@ -2,7 +2,7 @@ use super::words::{invalid, what_to_write};
 use crate::bundle::{
     budget::Budget,
     entry::{
-        FOLDER_MODE, PATH_MAX_BYTES, check_target, invalid as invalid_entry, normalise, write_name,
+        PATH_MAX_BYTES, check_target, invalid as invalid_entry, make_folder, normalise, write_name,
         write_new,
     },
     error::BundleError,
@@ -11,9 +11,7 @@ use crate::bundle::{
 use fs_err::{self as fs, os::unix::fs::symlink};
 use std::{
     collections::{BTreeMap, btree_map::Entry},
-    fs::Permissions,
     io::Read,
-    os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
 };
 
@@ -520,14 +518,6 @@ impl Sink for Root<'_> {
 fn parts(path: &str) -> Vec<String> {
     let part = |part: &str| (!matches!(part, "" | ".")).then(|| part.to_owned());
     path.rsplit('/').filter_map(part).collect()
-}
-
-fn make_folder(place: &Path) -> Result<(), BundleError> {
-    fs::create_dir(place)?;
-    Ok(fs::set_permissions(
-        place,
-        Permissions::from_mode(FOLDER_MODE),
-    )?)
 }
 
 fn make_links(folder: &Folder, place: &Path) -> Result<(), BundleError> {
