@@ -55,6 +55,8 @@ pub(super) struct Budget<'a> {
     allowed: Cell<u64>,
     /// What became files, in bytes.
     content: Cell<u64>,
+    /// What an archive's directory says that files have, in bytes.
+    stated: Cell<u64>,
     entries: Cell<u64>,
     members: Cell<u64>,
     /// Taken in by decompressors, in bytes …
@@ -86,6 +88,7 @@ impl<'a> Budget<'a> {
             read: Cell::new(0),
             allowed: Cell::new(BESIDE_BYTES),
             content: Cell::new(0),
+            stated: Cell::new(0),
             entries: Cell::new(0),
             members: Cell::new(0),
             packed: Cell::new(0),
@@ -169,8 +172,18 @@ impl<'a> Budget<'a> {
     /// What became part of a file, or was read as the content of one that is left out.
     pub(super) fn content(&self, entry: &str, bytes: usize) -> Result<(), BundleError> {
         self.content.set(self.content.get() + bytes as u64);
+        self.check_content(entry, self.content.get())
+    }
+
+    /// What an archive's directory says of a file, none of which has been read.
+    pub(super) fn stated(&self, entry: &str, bytes: u64) -> Result<(), BundleError> {
+        self.stated.set(self.stated.get().saturating_add(bytes));
+        self.check_content(entry, self.stated.get())
+    }
+
+    fn check_content(&self, entry: &str, bytes: u64) -> Result<(), BundleError> {
         let most = self.limits.unpacked_bytes;
-        if self.content.get() > most {
+        if bytes > most {
             return self.refuse(if self.is_root.get() {
                 format!(
                     "what the image's layers hold comes to more than {most} bytes (stopped at entry {entry:?}): \

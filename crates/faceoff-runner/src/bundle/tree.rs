@@ -43,6 +43,16 @@ impl<'a> Tree<'a> {
         })
     }
 
+    /// Where an archive that lists what it holds is checked before any of it is written.
+    pub fn plan_mut(&mut self) -> &mut Plan {
+        &mut self.plan
+    }
+
+    /// Forgets what has been checked, of which nothing is written: it comes again with its content.
+    pub fn forget_plan(&mut self) {
+        self.plan = Plan::new(self.budget.limits().files);
+    }
+
     /// The place on the disk of something that is no folder, and those that lead there.
     fn make_way(&mut self, path: &str) -> Result<PathBuf, BundleError> {
         for folder in self.plan.missing_folders(path) {
