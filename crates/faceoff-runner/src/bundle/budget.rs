@@ -25,8 +25,9 @@ const MEMBERS: u64 = 1 << 16;
 /// What compressors add to a stream, in bytes: its header, and what some note there. Beyond this and
 /// [`BESIDE_BYTES`] nothing that is compressed is larger than what it holds.
 const PACKED_BYTES_PER_MEMBER: u64 = 1 << 10;
-/// How much of names may be compared to follow all links, in bytes.
-const LINK_BYTES: u64 = 64 << 20;
+/// How much of names may be compared to follow all links, in bytes. Fifty thousand links of ordinary paths come to a
+/// quarter of it.
+const LINK_BYTES: u64 = 128 << 20;
 /// How much of names may be looked up to place the entries of an image's layers, in bytes. A hundred thousand
 /// entries of ordinary paths come to a tenth of it.
 const LOOKED_UP_BYTES: u64 = 256 << 20;
@@ -230,10 +231,11 @@ impl<'a> Budget<'a> {
         self.check()
     }
 
-    /// Names compared to follow a link.
+    /// A name that is compared to follow a link, or the target of one.
     pub(super) fn followed(&self, bytes: usize) -> Result<(), BundleError> {
-        self.link_bytes.set(self.link_bytes.get() + bytes as u64);
-        if self.link_bytes.get() > LINK_BYTES {
+        let followed = self.link_bytes.get() + bytes as u64 + LOOKED_UP_AT_LEAST;
+        self.link_bytes.set(followed);
+        if followed > LINK_BYTES {
             return self.refuse("the archive's links lead through too many others".to_owned());
         }
         self.check()
@@ -474,6 +476,17 @@ mod tests {
         cancelled.set(true);
         let told = budget.verdict(budget.entry());
         assert!(matches!(told, Err(BundleError::Cancelled)), "{told:?}");
+    }
+
+    #[test]
+    fn links_of_the_shortest_names_are_counted() {
+        let (now, never) = (Instant::now, || false);
+        let budget = Budget::new(&LIMITS, &now, &never);
+        let almost = usize::try_from(LINK_BYTES - 2 * LOOKED_UP_AT_LEAST).unwrap();
+        budget.followed(almost).unwrap();
+        budget.followed(0).unwrap();
+        let told = budget.verdict(budget.followed(0)).unwrap_err().to_string();
+        assert!(told.contains("lead through too many others"), "{told}");
     }
 
     #[test]

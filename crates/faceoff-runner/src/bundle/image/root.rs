@@ -224,6 +224,7 @@ impl<'a> Root<'a> {
                                 format_args!("goes through more than {MOST_LINKS} links"),
                             ));
                         }
+                        self.budget.looked_up(target.len())?;
                         if target.starts_with('/') {
                             at.clear();
                         }
