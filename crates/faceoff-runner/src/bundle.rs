@@ -7,6 +7,7 @@ mod error;
 mod image;
 mod links;
 mod node;
+mod plan;
 mod sink;
 mod tar_archive;
 mod tree;
@@ -50,8 +51,11 @@ pub struct Bundle {
 /// decompression bomb is stopped at the limit whatever its headers claim, and count all that an
 /// archive is made of: headers, long names, padding, directories and streams one after another as well as
 /// the files. Of an image they hold for its layers as they come and, once more, for what they hold; layers
-/// take twice [`BundleLimits::unpacked_bytes`] of the disk at most. `cancelled` is asked for every piece. After an error `into` holds a part of the archive;
-/// the caller removes it.
+/// take twice [`BundleLimits::unpacked_bytes`] of the disk at most. `cancelled` is asked for every piece.
+///
+/// Of a `.zip` nothing is written before its directory has been checked: numbers, names, kinds and stated
+/// sizes. Of any archive a folder is made when something is put into it, or at the end. After an error `into`
+/// holds a part of the archive; the caller removes it.
 ///
 /// # Errors
 /// [`BundleError::Invalid`] with the entry's name for links that leave the bundle, absolute or

@@ -25,8 +25,9 @@ const MEMBERS: u64 = 1 << 16;
 /// What compressors add to a stream, in bytes: its header, and what some note there. Beyond this and
 /// [`BESIDE_BYTES`] nothing that is compressed is larger than what it holds.
 const PACKED_BYTES_PER_MEMBER: u64 = 1 << 10;
-/// How much of names may be compared to follow all links, in bytes.
-const LINK_BYTES: u64 = 64 << 20;
+/// How much of names may be compared to follow all links, in bytes. Fifty thousand links of ordinary paths come to a
+/// quarter of it.
+const LINK_BYTES: u64 = 128 << 20;
 /// How much of names may be looked up to place the entries of an image's layers, in bytes. A hundred thousand
 /// entries of ordinary paths come to a tenth of it.
 const LOOKED_UP_BYTES: u64 = 256 << 20;
@@ -55,6 +56,8 @@ pub(super) struct Budget<'a> {
     allowed: Cell<u64>,
     /// What became files, in bytes.
     content: Cell<u64>,
+    /// What an archive's directory says that files have, in bytes.
+    stated: Cell<u64>,
     entries: Cell<u64>,
     members: Cell<u64>,
     /// Taken in by decompressors, in bytes …
@@ -86,6 +89,7 @@ impl<'a> Budget<'a> {
             read: Cell::new(0),
             allowed: Cell::new(BESIDE_BYTES),
             content: Cell::new(0),
+            stated: Cell::new(0),
             entries: Cell::new(0),
             members: Cell::new(0),
             packed: Cell::new(0),
@@ -121,7 +125,7 @@ impl<'a> Budget<'a> {
     }
 
     /// Asked before each piece of work.
-    fn check(&self) -> Result<(), BundleError> {
+    pub(super) fn check(&self) -> Result<(), BundleError> {
         if self.ended.borrow().is_some() {
             return Err(BundleError::Cancelled);
         }
@@ -169,8 +173,18 @@ impl<'a> Budget<'a> {
     /// What became part of a file, or was read as the content of one that is left out.
     pub(super) fn content(&self, entry: &str, bytes: usize) -> Result<(), BundleError> {
         self.content.set(self.content.get() + bytes as u64);
+        self.check_content(entry, self.content.get())
+    }
+
+    /// What an archive's directory says of a file, none of which has been read.
+    pub(super) fn stated(&self, entry: &str, bytes: u64) -> Result<(), BundleError> {
+        self.stated.set(self.stated.get().saturating_add(bytes));
+        self.check_content(entry, self.stated.get())
+    }
+
+    fn check_content(&self, entry: &str, bytes: u64) -> Result<(), BundleError> {
         let most = self.limits.unpacked_bytes;
-        if self.content.get() > most {
+        if bytes > most {
             return self.refuse(if self.is_root.get() {
                 format!(
                     "what the image's layers hold comes to more than {most} bytes (stopped at entry {entry:?}): \
@@ -217,10 +231,11 @@ impl<'a> Budget<'a> {
         self.check()
     }
 
-    /// Names compared to follow a link.
+    /// A name that is compared to follow a link, or the target of one.
     pub(super) fn followed(&self, bytes: usize) -> Result<(), BundleError> {
-        self.link_bytes.set(self.link_bytes.get() + bytes as u64);
-        if self.link_bytes.get() > LINK_BYTES {
+        let followed = self.link_bytes.get() + bytes as u64 + LOOKED_UP_AT_LEAST;
+        self.link_bytes.set(followed);
+        if followed > LINK_BYTES {
             return self.refuse("the archive's links lead through too many others".to_owned());
         }
         self.check()
@@ -461,6 +476,17 @@ mod tests {
         cancelled.set(true);
         let told = budget.verdict(budget.entry());
         assert!(matches!(told, Err(BundleError::Cancelled)), "{told:?}");
+    }
+
+    #[test]
+    fn links_of_the_shortest_names_are_counted() {
+        let (now, never) = (Instant::now, || false);
+        let budget = Budget::new(&LIMITS, &now, &never);
+        let almost = usize::try_from(LINK_BYTES - 2 * LOOKED_UP_AT_LEAST).unwrap();
+        budget.followed(almost).unwrap();
+        budget.followed(0).unwrap();
+        let told = budget.verdict(budget.followed(0)).unwrap_err().to_string();
+        assert!(told.contains("lead through too many others"), "{told}");
     }
 
     #[test]

@@ -67,6 +67,13 @@ pub(super) fn check_target(entry: &str, target: &str) -> Result<(), BundleError>
     Ok(())
 }
 
+/// Makes a folder that is not there yet.
+pub(super) fn make_folder(place: &Path) -> Result<(), BundleError> {
+    fs_err::create_dir(place)?;
+    fs_err::set_permissions(place, Permissions::from_mode(FOLDER_MODE))?;
+    Ok(())
+}
+
 /// Gives a file another name.
 pub(super) fn write_name(entry: &str, file: &Path, place: &Path) -> Result<(), BundleError> {
     fs_err::hard_link(file, place).map_err(|error| match error.kind() {

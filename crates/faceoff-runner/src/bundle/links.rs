@@ -7,7 +7,7 @@ const MOST_LINKS: usize = 40;
 /// Follows the link at `path` through the tree as the system would. A step above the bundle's
 /// folder `root` (a path in the tree, empty for its top) is an escape, even if the path returns.
 /// A target that does not exist is harmless as long as it would be inside. `followed` is told how long each
-/// name is that is looked up, and ends a walk that is too long.
+/// target is that is taken apart, and each name that is looked up, and ends a walk that is too long.
 pub(super) fn check(
     nodes: &BTreeMap<String, Node>,
     root: &str,
@@ -21,6 +21,8 @@ pub(super) fn check(
     let mut at: Vec<String> = path.split('/').map(str::to_owned).collect();
     at.pop();
     let mut links = 1;
+    let mut count = |name: &str| followed(name.len()).map_err(|error| error.to_string());
+    count(target)?;
     // What is still to be walked, the next part last.
     let mut todo: Vec<String> = parts(target).ok_or_else(leaves)?;
     while let Some(part) = todo.pop() {
@@ -32,13 +34,14 @@ pub(super) fn check(
         }
         at.push(part);
         let name = at.join("/");
-        followed(name.len()).map_err(|error| error.to_string())?;
+        count(&name)?;
         if let Some(Node::Link { target: next }) = nodes.get(&name) {
             links += 1;
             if links > MOST_LINKS {
                 return Err(format!("is a link that leads in a circle: {target:?}"));
             }
             at.pop();
+            count(next)?;
             todo.extend(parts(next).ok_or_else(leaves)?);
         }
     }

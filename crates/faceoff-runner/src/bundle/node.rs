@@ -1,9 +1,11 @@
 /// What an entry of the archive became.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Node {
-    /// A folder; `named` when the archive has an entry for it, not only for something inside.
     Folder {
+        /// The archive has an entry for it, not only for something inside.
         named: bool,
+        /// It is on the disk: a folder is made when something is put into it, or at the end.
+        is_made: bool,
     },
     File,
     Link {

@@ -1,9 +1,10 @@
 use super::{
     budget::Budget,
-    entry::{FOLDER_MODE, check_target, invalid, normalise, unusable, write_name, write_new},
+    entry::{FOLDER_MODE, check_target, invalid, make_folder, unusable, write_name, write_new},
     error::BundleError,
     links,
     node::Node,
+    plan::Plan,
     sink::{Sink, Special},
 };
 use fs_err::{self as fs, os::unix::fs::symlink};
@@ -17,12 +18,13 @@ use std::{
 
 /// The folder that grows while an archive is read. What is in it is known from memory, never asked
 /// back from the disk, and symbolic links are made last: nothing can be written through one.
+///
+/// A folder is made when a file is put into it, or at the end: an archive of too many folders is refused before
+/// there is one of them to be made, and to be removed again, which is slower still.
 pub(super) struct Tree<'a> {
     into: PathBuf,
     budget: &'a Budget<'a>,
-    nodes: BTreeMap<String, Node>,
-    files: u64,
-    folders: u64,
+    plan: Plan,
 }
 
 impl<'a> Tree<'a> {
@@ -37,97 +39,45 @@ impl<'a> Tree<'a> {
         Ok(Self {
             into: into.to_owned(),
             budget,
-            nodes: BTreeMap::new(),
-            files: 0,
-            folders: 0,
+            plan: Plan::new(budget.limits().files),
         })
     }
 
-    fn check_mode(entry: &str, mode: u32) -> Result<(), BundleError> {
-        match mode & 0o6000 {
-            0 => Ok(()),
-            _ => Err(invalid(entry, "has a set-user-id or set-group-id bit")),
-        }
+    /// Where an archive that lists what it holds is checked before any of it is written.
+    pub fn plan_mut(&mut self) -> &mut Plan {
+        &mut self.plan
     }
 
-    /// Takes a place in the tree for something that is no folder.
-    fn place(&mut self, entry: &str, node: Node) -> Result<PathBuf, BundleError> {
-        let path = normalise(entry)?;
-        if path.is_empty() {
-            return Err(invalid(entry, "is the root, but not a folder"));
-        }
-        if let Some((parent, _)) = path.rsplit_once('/') {
-            self.make_folder(entry, parent, false)?;
-        }
-        if self.nodes.contains_key(&path) {
-            return Err(invalid(entry, "is in the archive twice"));
-        }
-        self.files += 1;
-        let most = self.budget.limits().files;
-        if self.files > most {
-            return Err(BundleError::Invalid(format!(
-                "the archive has more than {most} files"
-            )));
-        }
-        let target = self.into.join(&path);
-        self.nodes.insert(path, node);
-        Ok(target)
+    /// Forgets what has been checked, of which nothing is written: it comes again with its content.
+    pub fn forget_plan(&mut self) {
+        self.plan = Plan::new(self.budget.limits().files);
     }
 
-    fn make_folder(&mut self, entry: &str, path: &str, named: bool) -> Result<(), BundleError> {
-        match self.nodes.get_mut(path) {
-            Some(Node::Folder { named: before }) => {
-                if named && *before {
-                    return Err(invalid(entry, "is in the archive twice"));
-                }
-                *before |= named;
-                return Ok(());
-            }
-            Some(Node::File) => {
-                return Err(invalid(
-                    entry,
-                    format_args!("needs {path:?} to be a folder, but it is a file"),
-                ));
-            }
-            Some(Node::Link { .. }) => {
-                return Err(invalid(
-                    entry,
-                    format_args!("goes through the link {path:?}"),
-                ));
-            }
-            None => {}
+    /// The place on the disk of something that is no folder, and those that lead there.
+    fn make_way(&mut self, path: &str) -> Result<PathBuf, BundleError> {
+        for folder in self.plan.missing_folders(path) {
+            make_folder(&self.into.join(&folder))?;
+            self.plan.set_made(&folder);
         }
-        if let Some((parent, _)) = path.rsplit_once('/') {
-            self.make_folder(entry, parent, false)?;
-        }
-        self.folders += 1;
-        let most = self.budget.limits().files;
-        if self.folders > most {
-            return Err(BundleError::Invalid(format!(
-                "the archive has more than {most} folders"
-            )));
-        }
-        let place = self.into.join(path);
-        fs::create_dir(&place)?;
-        fs::set_permissions(&place, Permissions::from_mode(FOLDER_MODE))?;
-        self.nodes.insert(path.to_owned(), Node::Folder { named });
-        Ok(())
+        Ok(self.into.join(path))
     }
 
-    /// The folder and what is in it, if it is not to be finished as a bundle: no links are made.
+    /// The folder and what is in it, if it is not to be finished as a bundle: no links are made, and no folders
+    /// that hold no file.
     pub fn into_parts(self) -> (PathBuf, BTreeMap<String, Node>) {
-        (self.into, self.nodes)
+        (self.into, self.plan.into_nodes())
     }
 
     /// The folder that holds `manifest`: the root (an empty path) or the single top folder.
     pub fn bundle_root(&self, manifest: &str) -> Option<String> {
-        if self.nodes.contains_key(manifest) {
+        let nodes = self.plan.nodes();
+        if nodes.contains_key(manifest) {
             return Some(String::new());
         }
-        let mut top = self.nodes.iter().filter(|(path, _)| !path.contains('/'));
+        let mut top = nodes.iter().filter(|(path, _)| !path.contains('/'));
         match (top.next(), top.next()) {
             (Some((folder, Node::Folder { .. })), None)
-                if self.nodes.contains_key(&format!("{folder}/{manifest}")) =>
+                if nodes.contains_key(&format!("{folder}/{manifest}")) =>
             {
                 Some(folder.clone())
             }
@@ -140,8 +90,9 @@ impl<'a> Tree<'a> {
         let BundleError::Invalid(told) = error else {
             return error;
         };
-        let has = |path: &str| self.nodes.contains_key(path);
-        let mut tops = self.nodes.iter().filter(|(path, _)| !path.contains('/'));
+        let nodes = self.plan.nodes();
+        let has = |path: &str| nodes.contains_key(path);
+        let mut tops = nodes.iter().filter(|(path, _)| !path.contains('/'));
         let only_top = tops.next().filter(|_| tops.next().is_none());
         BundleError::Invalid(match only_top {
             _ if has(".dockerenv") || (has("etc") && has("usr") && !has("agent.toml")) => format!(
@@ -155,17 +106,26 @@ impl<'a> Tree<'a> {
         })
     }
 
-    /// Checks that every link stays inside of the bundle's folder `root`, then makes the links.
+    /// Checks that every link stays inside of the bundle's folder `root`, then makes the folders that are not there
+    /// yet and, last, the links.
     pub fn finish(self, root: &str) -> Result<(), BundleError> {
-        for (path, node) in &self.nodes {
+        let nodes = self.plan.nodes();
+        for (path, node) in nodes {
             if let Node::Link { target } = node {
-                links::check(&self.nodes, root, path, target, &mut |bytes| {
+                links::check(nodes, root, path, target, &mut |bytes| {
                     self.budget.followed(bytes)
                 })
                 .map_err(|problem| invalid(path, problem))?;
             }
         }
-        for (path, node) in &self.nodes {
+        // A folder comes before what is in it.
+        for (path, node) in nodes {
+            if let Node::Folder { is_made: false, .. } = node {
+                self.budget.check()?;
+                make_folder(&self.into.join(path))?;
+            }
+        }
+        for (path, node) in nodes {
             if let Node::Link { target } = node {
                 symlink(target, self.into.join(path))?;
             }
@@ -175,45 +135,27 @@ impl<'a> Tree<'a> {
 }
 
 impl Sink for Tree<'_> {
+    /// Made by [`Tree::finish`], or with the first file in it.
     fn folder(&mut self, entry: &str, mode: u32) -> Result<(), BundleError> {
-        Self::check_mode(entry, mode)?;
-        let path = normalise(entry)?;
-        if path.is_empty() {
-            return Ok(());
-        }
-        self.make_folder(entry, &path, true)
+        self.plan.add_folder(entry, mode)
     }
 
     fn file(&mut self, entry: &str, mode: u32, content: &mut dyn Read) -> Result<(), BundleError> {
-        Self::check_mode(entry, mode)?;
-        let target = self.place(entry, Node::File)?;
-        write_new(entry, &target, mode, content, self.budget)
+        let path = self.plan.add_file(entry, mode)?;
+        let place = self.make_way(&path)?;
+        write_new(entry, &place, mode, content, self.budget)
     }
 
     /// Checked and made by [`Tree::finish`].
     fn link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
         check_target(entry, target)?;
-        self.place(
-            entry,
-            Node::Link {
-                target: target.to_owned(),
-            },
-        )?;
-        Ok(())
+        self.plan.add_link(entry, target)
     }
 
     /// Of a file that the archive has brought already.
     fn hard_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError> {
-        let existing = normalise(target)?;
-        if self.nodes.get(&existing) != Some(&Node::File) {
-            return Err(invalid(
-                entry,
-                format_args!(
-                    "is a hard link to {target:?}, which is no earlier file of the archive"
-                ),
-            ));
-        }
-        let place = self.place(entry, Node::File)?;
+        let (existing, path) = self.plan.add_hard_link(entry, target)?;
+        let place = self.make_way(&path)?;
         write_name(entry, &self.into.join(existing), &place)
     }
 

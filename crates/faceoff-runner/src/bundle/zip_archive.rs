@@ -2,15 +2,18 @@ use super::{
     budget::{Budget, Metered},
     entry::unusable,
     error::BundleError,
+    plan::Plan,
     sink::Sink,
     tree::Tree,
 };
 use std::{
     fs::File,
-    io::{BufReader, Read},
+    io::{BufReader, Read, Seek},
 };
 use zip::{
-    CompressionMethod, System, ZipReadOptions, read::Config, result::ZipError,
+    CompressionMethod, System, ZipReadOptions,
+    read::{Config, ZipFileEntry},
+    result::ZipError,
     unstable::read::ZipIterable,
 };
 
@@ -22,28 +25,21 @@ const KIND_LINK: u32 = 0o120_000;
 /// Longest target of a symbolic link, in bytes.
 const LINK_MAX_BYTES: u64 = 4096;
 
-/// Unpacks a zip archive, entry by entry as its central directory lists them: the directory is
-/// never held in memory, and two entries of one name are both seen. (The library's indexed reader
-/// does neither; its iterating one may change between versions, which the lock file pins.)
-///
-/// What is read of the file is counted, since its entries may overlap: each of them could have the same
-/// bytes decompressed again, which need not come to anything.
-pub(super) fn unpack<'a>(
-    file: BufReader<File>,
-    packed: u64,
-    tree: &mut Tree<'a>,
-    budget: &'a Budget<'a>,
-) -> Result<(), BundleError> {
-    // Each byte is needed about once.
-    budget.allow(2 * packed);
-    let file = Metered::new(file, budget);
-    let mut archive = ZipIterable::try_new(file, Config::default())
-        .map_err(|error| damaged("", error))?
-        .enforce_header_consistency(true);
-    let files = archive.files().map_err(|error| damaged("", error))?;
-    while let Some(entry) = files.next() {
-        let entry = entry.map_err(|error| damaged("", error))?;
-        budget.entry()?;
+/// What the central directory says of an entry.
+struct Header {
+    name: String,
+    mode: u32,
+    kind: Kind,
+}
+
+enum Kind {
+    Folder,
+    File,
+    Link,
+}
+
+impl Header {
+    fn of(entry: &ZipFileEntry<'_>) -> Result<Self, BundleError> {
         let name = std::str::from_utf8(entry.name_raw())
             .map_err(|_| {
                 BundleError::Invalid(format!(
@@ -70,18 +66,50 @@ pub(super) fn unpack<'a>(
             (_, mode) => mode,
         };
         let kind = match mode & KIND_MASK {
-            0 if name.ends_with('/') => KIND_FOLDER,
-            0 => KIND_FILE,
-            kind => kind,
+            KIND_FOLDER => Kind::Folder,
+            0 | KIND_FILE if name.ends_with('/') => Kind::Folder,
+            0 | KIND_FILE => Kind::File,
+            KIND_LINK => Kind::Link,
+            _ => return Err(unusable(&name, "a device, pipe or socket")),
         };
+        Ok(Self { name, mode, kind })
+    }
+}
+
+/// Unpacks a zip archive, entry by entry as its central directory lists them: the directory is
+/// never held in memory, and two entries of one name are both seen. (The library's indexed reader
+/// does neither; its iterating one may change between versions, which the lock file pins.)
+///
+/// The directory is read twice: what can be refused for what it says is refused before anything is written.
+///
+/// What is read of the file is counted, since its entries may overlap: each of them could have the same
+/// bytes decompressed again, which need not come to anything.
+pub(super) fn unpack<'a>(
+    file: BufReader<File>,
+    packed: u64,
+    tree: &mut Tree<'a>,
+    budget: &'a Budget<'a>,
+) -> Result<(), BundleError> {
+    // Each byte is needed about once, those of the directory once more to check it, and to find the directory behind
+    // what an archive may begin with is a search. An entry's own share covers its seeks in both passes.
+    budget.allow(3 * packed);
+    let file = Metered::new(file, budget);
+    let mut archive =
+        ZipIterable::try_new(file, Config::default()).map_err(|error| damaged("", error))?;
+    check_directory(&mut archive, tree.plan_mut(), budget)?;
+    tree.forget_plan();
+    let mut archive = archive.enforce_header_consistency(true);
+    let files = archive.files().map_err(|error| damaged("", error))?;
+    while let Some(entry) = files.next() {
+        let entry = entry.map_err(|error| damaged("", error))?;
+        let Header { name, mode, kind } = Header::of(&entry)?;
         let mut content = entry
             .with_reader(files.reader_mut(), ZipReadOptions::new())
             .map_err(|error| damaged(&name, error))?;
         match kind {
-            KIND_FOLDER => tree.folder(&name, mode)?,
-            KIND_FILE if name.ends_with('/') => tree.folder(&name, mode)?,
-            KIND_FILE => tree.file(&name, mode, &mut content)?,
-            KIND_LINK => {
+            Kind::Folder => tree.folder(&name, mode)?,
+            Kind::File => tree.file(&name, mode, &mut content)?,
+            Kind::Link => {
                 let mut target = Vec::new();
                 (&mut content)
                     .take(LINK_MAX_BYTES)
@@ -91,7 +119,30 @@ pub(super) fn unpack<'a>(
                     .map_err(|_| unusable(&name, "a link to a name that is not UTF-8"))?;
                 tree.link(&name, &target)?;
             }
-            _ => return Err(unusable(&name, "a device, pipe or socket")),
+        }
+    }
+    Ok(())
+}
+
+/// Checks all that needs no content. Local headers are not looked at: those lie all over the archive, where the
+/// directory is in one piece.
+fn check_directory<R: Read + Seek>(
+    archive: &mut ZipIterable<R>,
+    plan: &mut Plan,
+    budget: &Budget<'_>,
+) -> Result<(), BundleError> {
+    for entry in archive.files().map_err(|error| damaged("", error))? {
+        let entry = entry.map_err(|error| damaged("", error))?;
+        budget.entry()?;
+        let Header { name, mode, kind } = Header::of(&entry)?;
+        match kind {
+            Kind::Folder => plan.add_folder(&name, mode)?,
+            Kind::File => {
+                plan.add_file(&name, mode)?;
+                budget.stated(&name, entry.size())?;
+            }
+            // Where it leads is its content.
+            Kind::Link => plan.add_link(&name, "")?,
         }
     }
     Ok(())

@@ -1,10 +1,14 @@
 //! Archives that are small, hold little and take long to read, unless what reading them costs is counted.
 
-use crate::archives::{Tar, write};
+use crate::archives::{MANIFEST, Tar, write};
 use faceoff_runner::bundle::{BundleError, BundleLimits, unpack};
 use flate2::{Compression, Crc, write::GzEncoder};
-use std::{cell::Cell, io::Write};
+use std::{
+    cell::Cell,
+    io::{Cursor, Write},
+};
 use tar::EntryType;
+use zip::{ZipWriter, write::FullFileOptions};
 
 const MIB: usize = 1 << 20;
 /// The reason of all that is more reading than files.
@@ -281,6 +285,24 @@ fn a_zip_whose_files_share_their_bytes_is_read_about_once() {
     let bomb = quoting_zip(200, MIB);
     assert!(bomb.len() < MIB + MIB / 8, "{} bytes", bomb.len());
     refused(&bomb, TOO_MUCH);
+}
+
+#[test]
+fn zip_of_a_large_directory_may_be_read_twice() {
+    let comment = "c".repeat(60_000);
+    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+    for index in 0..400 {
+        let name = match index {
+            0 => "agent.toml".to_owned(),
+            _ => format!("f{index}"),
+        };
+        let options = FullFileOptions::default().with_file_comment(comment.as_str());
+        zip.start_file(name, options).unwrap();
+        if index == 0 {
+            zip.write_all(MANIFEST.as_bytes()).unwrap();
+        }
+    }
+    verdict(&zip.finish().unwrap().into_inner()).unwrap();
 }
 
 #[test]

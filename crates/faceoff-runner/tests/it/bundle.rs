@@ -38,6 +38,14 @@ fn refused(bytes: &[u8], needle: &str) -> TempDir {
     refused_with(bytes, BundleLimits::default(), needle)
 }
 
+/// Refused before anything was written.
+#[track_caller]
+fn refused_unwritten(bytes: &[u8], limits: BundleLimits, needle: &str) {
+    let dir = refused_with(bytes, limits, needle);
+    let written: Vec<_> = fs::read_dir(dir.path().join("out")).unwrap().collect();
+    assert!(written.is_empty(), "{needle:?} after {written:?}");
+}
+
 fn mode(path: &Path) -> u32 {
     path.metadata().unwrap().permissions().mode() & 0o7777
 }
@@ -286,17 +294,11 @@ fn devices_pipes_and_set_id_bits_are_refused() {
             .gz(),
         "set-user-id",
     );
-    // The library writes no such modes, so they are patched into the central directory's entry.
     for (mode, what) in [
         (0o104_755_u16, "set-user-id"),
         (0o020_644, "a device, pipe or socket"),
     ] {
-        let mut bytes = zip(&[("x", 0o644, b"")]);
-        let at = bytes
-            .windows(4)
-            .rposition(|magic| magic == b"PK\x01\x02")
-            .unwrap();
-        bytes[at + 40..at + 42].copy_from_slice(&mode.to_le_bytes());
+        let bytes = change_last_entry(zip(&[("x", 0o644, b"")]), 40, &mode.to_le_bytes());
         refused(&bytes, what);
     }
 }
@@ -359,6 +361,24 @@ fn long_names_of_both_dialects_are_read() {
     refused(&size.gz(), "states a size outside of its header");
 }
 
+/// Changes a field of the last entry in the central directory of a zip: the library writes no such values.
+fn change_last_entry(mut zip: Vec<u8>, at: usize, value: &[u8]) -> Vec<u8> {
+    let entry = zip
+        .windows(4)
+        .rposition(|magic| magic == b"PK\x01\x02")
+        .unwrap();
+    zip[entry + at..][..value.len()].copy_from_slice(value);
+    zip
+}
+
+/// A zip of one file that both of its headers state to have ten bytes.
+fn understated_zip(name: &str, content: &[u8]) -> Vec<u8> {
+    let size = 10_u32.to_le_bytes();
+    let mut bytes = change_last_entry(zip(&[(name, 0o644, content)]), 24, &size);
+    bytes[22..26].copy_from_slice(&size);
+    bytes
+}
+
 #[test]
 fn bombs_are_stopped_while_they_stream() {
     let limits = BundleLimits {
@@ -368,19 +388,27 @@ fn bombs_are_stopped_while_they_stream() {
         ..BundleLimits::default()
     };
     let bomb = vec![0; 40 << 20];
-    for bytes in [
-        Tar::with_manifest().file("bomb", 0o644, &bomb).gz(),
-        Tar::with_manifest().file("bomb", 0o644, &bomb).zst(),
-        zip(&[("bomb", 0o644, &bomb)]),
+    let too_much = "unpacks to more than 1048576 bytes (stopped at entry \"bomb\")";
+    for (bytes, needle) in [
+        (
+            Tar::with_manifest().file("bomb", 0o644, &bomb).gz(),
+            too_much,
+        ),
+        (
+            Tar::with_manifest().file("bomb", 0o644, &bomb).zst(),
+            too_much,
+        ),
+        (understated_zip("bomb", &bomb), "damaged at \"bomb\""),
     ] {
         assert!(
             bytes.len() < 1 << 20,
             "the bomb is small before it is unpacked"
         );
-        let dir = refused_with(&bytes, limits, "unpacks to more than 1048576 bytes");
+        let dir = refused_with(&bytes, limits, needle);
         let written = dir.path().join("out/bomb").metadata().unwrap().len();
         assert!(written <= 1 << 20, "{written} bytes were written");
     }
+    refused_unwritten(&zip(&[("bomb", 0o644, &bomb)]), limits, too_much);
     // A header that describes the next entry is no way around the limit.
     let header = Tar::with_manifest().entry(EntryType::GNULongName, "l", 0o644, "", &bomb);
     refused_with(&header.gz(), limits, "has a header of 41943040 bytes");
@@ -423,6 +451,119 @@ fn fifty_thousand_and_one_files_are_one_too_many() {
         .iter()
         .fold(Tar::with_manifest(), |tar, name| tar.file(name, 0o644, b""));
     refused(&tar.gz(), "more than 50000 files");
+}
+
+#[test]
+fn folders_beyond_the_limit_are_not_made() {
+    let names: Vec<String> = (0..50_001).map(|i| format!("d{i}/")).collect();
+    let tar = || names.iter().fold(Tar::new(), |tar, name| tar.folder(name));
+    let entries: Vec<(&str, u32, &[u8])> = names
+        .iter()
+        .map(|name| (name.as_str(), 0o755, &b""[..]))
+        .collect();
+    for bytes in [tar().gz(), tar().zst(), zip(&entries)] {
+        refused_unwritten(
+            &bytes,
+            BundleLimits::default(),
+            "the archive has more than 50000 folders",
+        );
+    }
+}
+
+#[test]
+fn zip_with_an_unusable_last_entry_writes_nothing() {
+    let ending = |name: &str| {
+        zip(&[
+            ("agent.toml", 0o644, MANIFEST.as_bytes()),
+            ("empty/", 0o755, b""),
+            ("a", 0o644, b"1"),
+            (name, 0o644, b"2"),
+        ])
+    };
+    let field = |at: usize, value: &[u8]| change_last_entry(ending("b"), at, value);
+    for (bytes, needle) in [
+        (field(8, &[1, 0]), "\"b\" is encrypted"),
+        (field(10, &[12, 0]), "by another method than deflate"),
+        (
+            field(24, &0x9000_0000_u32.to_le_bytes()),
+            "unpacks to more than 2147483648 bytes (stopped at entry \"b\")",
+        ),
+        (
+            field(40, &0o020_644_u16.to_le_bytes()),
+            "\"b\" is a device, pipe or socket",
+        ),
+        (
+            field(40, &0o104_755_u16.to_le_bytes()),
+            "\"b\" has a set-user-id or set-group-id bit",
+        ),
+        // The name.
+        (field(46, b"a"), "\"a\" is in the archive twice"),
+        (field(46, b"\xff"), "has a name that is not UTF-8"),
+        (field(46, b"\\"), "named with a backslash"),
+        (field(46, b"/"), "\"/\" has an absolute path"),
+        (ending("../b"), "\"../b\" has '..' in its path"),
+        (
+            ending("a/b"),
+            "needs \"a\" to be a folder, but it is a file",
+        ),
+        (ending(&"n".repeat(256)), "has too long a path"),
+    ] {
+        refused_unwritten(&bytes, BundleLimits::default(), needle);
+    }
+    let few = BundleLimits {
+        files: 2,
+        ..BundleLimits::default()
+    };
+    refused_unwritten(&ending("b"), few, "more than 2 files");
+    refused_unwritten(&ending("1/2/b"), few, "more than 2 folders");
+    accepted(&ending("b"));
+}
+
+#[test]
+fn empty_folders_are_there_with_their_modes() {
+    let tar = || {
+        Tar::with_manifest()
+            .folder("empty/")
+            .entry(EntryType::Directory, "closed", 0o700, "", b"")
+            .folder("a/b/c/")
+            .file("a/x", 0o600, b"x")
+            .file("late/y", 0o644, b"y")
+            .folder("late/")
+    };
+    let zipped = zip(&[
+        ("agent.toml", 0o644, MANIFEST.as_bytes()),
+        ("empty/", 0o755, b""),
+        ("closed/", 0o700, b""),
+        ("a/b/c/", 0o755, b""),
+        ("a/x", 0o600, b"x"),
+        ("late/y", 0o644, b"y"),
+        ("late/", 0o755, b""),
+    ]);
+    for bytes in [tar().gz(), tar().zst(), zipped] {
+        let (_dir, bundle) = accepted(&bytes);
+        for folder in ["empty", "closed", "a", "a/b", "a/b/c", "late"] {
+            let path = bundle.dir.join(folder);
+            assert!(path.symlink_metadata().unwrap().is_dir(), "{folder}");
+            assert_eq!(mode(&path), 0o755, "{folder}");
+        }
+        assert_eq!(fs::read(bundle.dir.join("a/x")).unwrap(), b"x");
+        assert_eq!(fs::read(bundle.dir.join("late/y")).unwrap(), b"y");
+        assert_eq!(fs::read_dir(bundle.dir.join("empty")).unwrap().count(), 0);
+    }
+}
+
+#[test]
+fn folder_that_holds_only_a_link_is_made() {
+    let tar = Tar::with_manifest()
+        .symlink("only/a/link", "../../agent.toml")
+        .symlink("to", "only/a")
+        .entry(EntryType::Link, "other/name", 0o644, "agent.toml", b"");
+    let (_dir, bundle) = accepted(&tar.gz());
+    for path in ["only/a/link", "to/link", "other/name"] {
+        let text = fs::read_to_string(bundle.dir.join(path)).unwrap();
+        assert_eq!(text, MANIFEST, "{path}");
+    }
+    assert_eq!(mode(&bundle.dir.join("only/a")), 0o755);
 }
 
 #[test]

@@ -258,6 +258,66 @@ fn whiteouts_hide_what_is_below_and_nothing_else() {
 }
 
 #[test]
+fn empty_folders_are_there_unless_hidden_or_replaced() {
+    let (_dir, image) = root_of([
+        Tar::new()
+            .entry(EntryType::Directory, "var/empty/", 0o700, "", b"")
+            .folder("var/hidden/deep/")
+            .folder("var/file/deep/")
+            .folder("var/filled/deep/")
+            .folder("opaque/deep/")
+            .folder("tmp/deep/")
+            .symlink("only/a/link", "../../var"),
+        Tar::new()
+            .file("var/.wh.hidden", 0o644, b"")
+            .file("opaque/.wh..wh..opq", 0o644, b"")
+            .file("var/file", 0o644, b"now a file")
+            .file("var/filled/deep/x", 0o644, b"x")
+            .folder("var/filled/more/"),
+    ]);
+    for folder in [
+        "var",
+        "var/empty",
+        "var/filled/deep",
+        "var/filled/more",
+        "only/a",
+    ] {
+        assert!(
+            image.at(folder).symlink_metadata().unwrap().is_dir(),
+            "{folder}"
+        );
+        assert_eq!(image.mode(folder), 0o755, "{folder}");
+    }
+    for gone in ["var/hidden", "opaque/deep", "tmp/deep"] {
+        assert!(!image.is_there(gone), "{gone}");
+    }
+    assert_eq!(image.text("var/file"), "now a file");
+    assert_eq!(image.text("var/filled/deep/x"), "x");
+    assert_eq!(image.link("only/a/link"), "../../var");
+}
+
+#[test]
+fn folders_of_a_layer_beyond_the_limit_are_not_made() {
+    let limits = BundleLimits {
+        files: 20,
+        ..BundleLimits::default()
+    };
+    let folders = (0..21).fold(Tar::new(), |tar, index| tar.folder(&format!("d{index}/")));
+    let (dir, result) = try_unpack(&TestImage::of([folders]).docker().gz(), limits);
+    let Err(BundleError::Invalid(told)) = result else {
+        panic!("{result:?}");
+    };
+    assert_eq!(
+        told,
+        "layer 1 of the image's 1 (COPY . /agent): the container image has more than 20 folders in all layers"
+    );
+    let made: Vec<_> = fs::read_dir(dir.path().join("out/root0"))
+        .unwrap()
+        .collect();
+    assert!(made.is_empty(), "{made:?}");
+}
+
+#[test]
 fn an_opaque_root_hides_all_that_is_below() {
     let (_dir, image) = root_of([
         base(),
@@ -975,6 +1035,16 @@ fn an_image_may_be_packed_with_its_folder() {
 }
 
 #[test]
+fn empty_folders_of_the_archive_leave_nothing() {
+    let tar = TestImage::agent([base()]).docker();
+    let bytes = tar.folder("empty/deep/").folder("layer0/empty/").gz();
+    let (dir, _, image) = accepted(&bytes);
+    assert_eq!(image.text("usr/bin/tool"), "tool");
+    let left: Vec<_> = fs::read_dir(dir.path().join("out")).unwrap().collect();
+    assert_eq!(left.len(), 1, "{left:?}");
+}
+
+#[test]
 fn what_may_have_been_meant_is_told() {
     let exported = "This looks like the file system of a container (`docker export`): send its image, as `docker save` \
                     writes it";
@@ -1105,7 +1175,7 @@ fn a_cancelled_image_stops() {
         &TestImage::agent([base()]).docker().gz(),
     );
     // At each of the moments at which it may be asked for.
-    for moment in 0..200 {
+    for moment in 0..400 {
         let into = dir.path().join(format!("out{moment}"));
         let asked = std::cell::Cell::new(0);
         let cancelled = || {

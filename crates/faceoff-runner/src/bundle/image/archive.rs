@@ -29,7 +29,7 @@ const MOST_DOCUMENTS: u32 = 64;
 const MOST_LINKS: usize = 40;
 
 /// The files of an unpacked archive that may be an image. As everywhere, what is there is known from memory;
-/// of its links none is on the disk.
+/// of its links none is on the disk, and of its folders those that hold a file.
 pub(in crate::bundle) struct Archive<'a> {
     into: PathBuf,
     nodes: BTreeMap<String, Node>,
@@ -183,9 +183,9 @@ impl<'a> Archive<'a> {
         for top in self.tops() {
             let place = self.into.join(top);
             match self.nodes.get(top) {
-                Some(Node::Folder { .. }) => fs::remove_dir_all(place)?,
+                Some(Node::Folder { is_made: true, .. }) => fs::remove_dir_all(place)?,
                 Some(Node::File) => fs::remove_file(place)?,
-                Some(Node::Link { .. }) | None => {}
+                Some(Node::Folder { .. } | Node::Link { .. }) | None => {}
             }
         }
         Ok(())

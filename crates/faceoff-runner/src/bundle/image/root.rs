@@ -2,7 +2,7 @@ use super::words::{invalid, what_to_write};
 use crate::bundle::{
     budget::Budget,
     entry::{
-        FOLDER_MODE, PATH_MAX_BYTES, check_target, invalid as invalid_entry, normalise, write_name,
+        PATH_MAX_BYTES, check_target, invalid as invalid_entry, make_folder, normalise, write_name,
         write_new,
     },
     error::BundleError,
@@ -11,9 +11,7 @@ use crate::bundle::{
 use fs_err::{self as fs, os::unix::fs::symlink};
 use std::{
     collections::{BTreeMap, btree_map::Entry},
-    fs::Permissions,
     io::Read,
-    os::unix::fs::PermissionsExt,
     path::{Path, PathBuf},
 };
 
@@ -42,7 +40,8 @@ const WHITEOUT_NOTE: &str = ".wh..wh.";
 /// The root that grows while layers are applied. What is in it is known from memory, never asked back from
 /// the disk, where there are folders and files only until all layers are applied: symbolic links are followed
 /// in memory, as they lead inside of the root, and made last. So nothing of the host's can be reached
-/// through one, whatever it says.
+/// through one, whatever it says. A folder is made when a file is put into it, or at the end: too many of them are
+/// refused before there is one to be made and removed.
 pub(super) struct Root<'a> {
     place: PathBuf,
     budget: &'a Budget<'a>,
@@ -57,6 +56,8 @@ pub(super) struct Root<'a> {
 #[derive(Debug, Default)]
 struct Folder {
     children: BTreeMap<String, Node>,
+    /// It is on the disk, and so is what leads to it.
+    is_made: bool,
 }
 
 #[derive(Debug)]
@@ -149,7 +150,7 @@ impl Node {
             Kind::Folder(folder) => {
                 folder.hide_all(place, layer, budget)?;
                 let stays = self.layer == layer || !folder.children.is_empty();
-                if !stays {
+                if !stays && folder.is_made {
                     fs::remove_dir(place)?;
                 }
                 Ok(stays)
@@ -171,7 +172,10 @@ impl<'a> Root<'a> {
         Ok(Self {
             place: place.to_owned(),
             budget,
-            top: Folder::default(),
+            top: Folder {
+                children: BTreeMap::new(),
+                is_made: true,
+            },
             layer: 0,
             files: 0,
             folders: 0,
@@ -220,6 +224,7 @@ impl<'a> Root<'a> {
                                 format_args!("goes through more than {MOST_LINKS} links"),
                             ));
                         }
+                        self.budget.looked_up(target.len())?;
                         if target.starts_with('/') {
                             at.clear();
                         }
@@ -291,18 +296,18 @@ impl<'a> Root<'a> {
         Ok(())
     }
 
-    /// Makes the folders on the way, and clears the spot of what is there.
+    /// Adds the folders on the way, and clears the spot of what is there.
     fn clear(&mut self, entry: &str, spot: &Spot) -> Result<&mut Folder, BundleError> {
-        self.make_folders(&spot.folder)?;
+        self.add_folders(&spot.folder)?;
         let place = self.on_disk(&spot.folder).join(&spot.name);
         let folder = self
             .top
             .at_mut(&spot.folder)
             .ok_or_else(|| invalid_entry(entry, "needs a folder that is none"))?;
         match folder.children.remove(&spot.name).map(|node| node.kind) {
-            Some(Kind::Folder(_)) => fs::remove_dir_all(place)?,
+            Some(Kind::Folder(there)) if there.is_made => fs::remove_dir_all(place)?,
             Some(Kind::File) => fs::remove_file(place)?,
-            Some(Kind::Link(_) | Kind::Special) | None => {}
+            Some(Kind::Folder(_) | Kind::Link(_) | Kind::Special) | None => {}
         }
         Ok(folder)
     }
@@ -318,18 +323,21 @@ impl<'a> Root<'a> {
             )));
         }
         let layer = self.layer;
+        let is_written = matches!(kind, Kind::File);
         let folder = self.clear(entry, spot)?;
         folder
             .children
             .insert(spot.name.clone(), Node { layer, kind });
+        if is_written {
+            self.make_way(&spot.folder)?;
+        }
         Ok(self.on_disk(&spot.folder).join(&spot.name))
     }
 
-    fn make_folders(&mut self, path: &[String]) -> Result<(), BundleError> {
+    fn add_folders(&mut self, path: &[String]) -> Result<(), BundleError> {
         let most = self.budget.limits().files;
-        let (mut at, mut place) = (&mut self.top, self.place.clone());
+        let mut at = &mut self.top;
         for name in path {
-            place.push(name);
             let node = match at.children.entry(name.clone()) {
                 Entry::Occupied(there) => there.into_mut(),
                 Entry::Vacant(free) => {
@@ -339,7 +347,6 @@ impl<'a> Root<'a> {
                             "has more than {most} folders in all layers"
                         )));
                     }
-                    make_folder(&place)?;
                     free.insert(Node {
                         layer: self.layer,
                         kind: Kind::Folder(Folder::default()),
@@ -356,8 +363,29 @@ impl<'a> Root<'a> {
         Ok(())
     }
 
-    /// Completes the root when all layers are applied: what the sandbox needs, and the links. Returns the
-    /// agent's folder, which is one, with a file `manifest`: no link leads to either.
+    /// Makes the folders of a path that are not on the disk yet.
+    fn make_way(&mut self, path: &[String]) -> Result<(), BundleError> {
+        let (mut at, mut place) = (&mut self.top, self.place.clone());
+        for name in path {
+            place.push(name);
+            let Some(Node {
+                kind: Kind::Folder(folder),
+                ..
+            }) = at.children.get_mut(name)
+            else {
+                return Err(invalid(format_args!("needs {name:?} to be a folder")));
+            };
+            if !folder.is_made {
+                make_folder(&place)?;
+                folder.is_made = true;
+            }
+            at = folder;
+        }
+        Ok(())
+    }
+
+    /// Completes the root when all layers are applied: what the sandbox needs, the folders that hold no file, and
+    /// the links. Returns the agent's folder, which is one, with a file `manifest`: no link leads to either.
     pub(super) fn finish(mut self, manifest: &str) -> Result<PathBuf, BundleError> {
         self.begin_layer();
         let agent = match self.top.children.get(AGENT).map(|node| &node.kind) {
@@ -408,8 +436,9 @@ impl<'a> Root<'a> {
                 name: name.to_owned(),
             };
             self.clear(name, &spot)?;
-            self.make_folders(&[name.to_owned()])?;
+            self.add_folders(&[name.to_owned()])?;
         }
+        make_folders(&mut self.top, &self.place, self.budget)?;
         make_links(&self.top, &self.place)?;
         Ok(self.place.join(AGENT))
     }
@@ -432,7 +461,7 @@ impl Sink for Root<'_> {
             return Ok(());
         }
         self.clear(entry, &spot)?;
-        self.make_folders(&path)
+        self.add_folders(&path)
     }
 
     /// Set-id bits are left out: they would do nothing in the sandbox, and many images have some.
@@ -522,12 +551,20 @@ fn parts(path: &str) -> Vec<String> {
     path.rsplit('/').filter_map(part).collect()
 }
 
-fn make_folder(place: &Path) -> Result<(), BundleError> {
-    fs::create_dir(place)?;
-    Ok(fs::set_permissions(
-        place,
-        Permissions::from_mode(FOLDER_MODE),
-    )?)
+/// Makes the folders in `folder` that are not on the disk yet.
+fn make_folders(folder: &mut Folder, place: &Path, budget: &Budget<'_>) -> Result<(), BundleError> {
+    for (name, node) in &mut folder.children {
+        if let Kind::Folder(folder) = &mut node.kind {
+            let place = place.join(name);
+            if !folder.is_made {
+                budget.check()?;
+                make_folder(&place)?;
+                folder.is_made = true;
+            }
+            make_folders(folder, &place, budget)?;
+        }
+    }
+    Ok(())
 }
 
 fn make_links(folder: &Folder, place: &Path) -> Result<(), BundleError> {
