@@ -1,20 +1,17 @@
-//! No agent thinks before its clock runs: what it does with its input pipe costs its own time.
+//! No agent thinks before its clock runs: what it does with its channel costs its own time.
 
 use crate::{
     agents::{Agent, sandboxed, unconfined},
     recording::{read, seconds},
     shard::{run, spec},
 };
-use faceoff_runner::AgentEnvironment;
-use faceoff_sandbox::{Isolation, Layer};
 use faceoff_types::{AgentFaultKind, Task};
 use std::path::Path;
 
-/// Reads its standard input by itself and leaves the end of each question unread, so that sooner or later
-/// the next one does not fit into a pipe that was made small; then it thinks, and says so in its log.
+/// Answers without taking the questions, until the next one does not fit; then it does what MODE says, says so in
+/// its log, and takes all of them. With MODE `drains` it takes every byte by a thread, slowly.
 const LEAVES_UNREAD: &str = r#"
 import array, fcntl, json, os, sys, termios, threading, time
-SHRINK, LEFT = 1031, 0 if WHO == "drains" else 1
 THOUGHTS = 6
 
 def unread():
@@ -26,38 +23,45 @@ def say(answer):
     sys.stdout.write(json.dumps(answer) + "\n")
     sys.stdout.flush()
 
+def act(step):
+    say({"type": "act", "step": step, "action": [held, [0.0] * 7]})
+
+def line():
+    text = b""
+    while not text.endswith(b"\n"):
+        text += os.read(0, 1)
+    return json.loads(text)
+
 def think():
-    """The next question does not come although it is due: it does not fit."""
-    if WHO == "sleeps":
+    if MODE == "sleeps":
         time.sleep(0.3)
     else:
         until = time.monotonic() + 0.3
         while time.monotonic() < until: pass
     print("thought", file=sys.stderr, flush=True)
-    global THOUGHTS, LEFT
-    THOUGHTS -= 1
-    if THOUGHTS == 0:
-        LEFT = 0
 
-def question():
-    """All but the last byte of the next question; the last one of the question before goes first."""
-    global left
-    waited = time.monotonic()
-    while unread() <= left:
-        if left and time.monotonic() > waited + 0.2:
-            think()
-            os.read(0, left)
-            left = 0
-        time.sleep(0.0005)
-    text = b""
-    while not text.rstrip(b"\n").endswith(b"}"):
-        text += os.read(0, max(unread() - LEFT, 1))
-    left = 0 if text.endswith(b"\n") else LEFT
-    return json.loads(text.lstrip(b"\n"))
+def without_taking(step):
+    """Answers what it does not take, until the next question does not come although it is due."""
+    taken = step
+    while True:
+        before, waited = unread(), time.monotonic()
+        act(step)
+        step += 1
+        while unread() <= before:
+            if time.monotonic() > waited + 0.2:
+                if MODE == "answers":
+                    act(step)
+                    time.sleep(3600)
+                think()
+                # All that lies there, and what follows it.
+                while taken < step:
+                    message = line()
+                    taken = message["step"]
+                return message
+            time.sleep(0.0002)
 
 def drained():
     """The next question, which a thread takes byte by byte."""
-    global THOUGHTS
     text = []
     def drain():
         while text[-1:] != [b"\n"]:
@@ -67,35 +71,34 @@ def drained():
     reader.start()
     reader.join()
     print("thought", file=sys.stderr, flush=True)
-    THOUGHTS -= 1
     return json.loads(b"".join(text))
 
-left, held = 0, None
+held, message, takes = None, None, MODE == "drains"
 while True:
-    if WHO == "drains" and held and THOUGHTS > 0:
+    if MODE == "drains" and held and THOUGHTS > 0:
+        THOUGHTS -= 1
         message = drained()
     else:
-        message = question()
+        message = message or line()
     kind = message["type"]
     if kind == "hello":
-        if SHRINKS:
-            print("shrunk", fcntl.fcntl(0, SHRINK, 4096), file=sys.stderr, flush=True)
         say({"type": "ready", "protocol": 1, "interpolation": 3})
     elif kind == "reset":
         held = None
         say({"type": "ready", "episode": message["episode"]})
     elif kind == "step":
         held = held or message["obs"][6:13]
-        say({"type": "act", "step": message["step"], "action": [held, [0.0] * 7]})
+        if not takes:
+            takes, message = True, without_taking(message["step"])
+            continue
+        act(message["step"])
     elif kind == "bye":
         break
+    message = None
 "#;
 
-fn leaves_unread(shrinks: bool, who: &str) -> Agent {
-    let shrinks = if shrinks { "True" } else { "False" };
-    Agent::script(&format!(
-        "SHRINKS, WHO = {shrinks}, {who:?}\n{LEAVES_UNREAD}"
-    ))
+fn leaves_unread(mode: &str) -> Agent {
+    Agent::script(&format!("MODE = {mode:?}\n{LEAVES_UNREAD}"))
 }
 
 /// How many of the recorded answers took 0.3 s or more, whoever's time that was.
@@ -110,84 +113,61 @@ fn slow_answers(recording: &Path) -> usize {
     took.filter(|took| *took >= 0.3).count()
 }
 
-/// Without the filter that keeps the pipe's size.
-fn without_filter() -> AgentEnvironment {
-    let mut env = sandboxed();
-    env.isolation = Isolation::Sandboxed {
-        given_up: vec![Layer::Seccomp],
-    };
-    env
-}
-
+/// An episode that nobody ends has 500 steps, more than the channel has room for.
 #[test]
 fn a_question_that_does_not_fit_is_on_the_agents_time() {
-    for (env, who) in [
-        (without_filter(), "computes"),
-        (without_filter(), "sleeps"),
+    for (env, mode) in [
+        (sandboxed(), "computes"),
+        (sandboxed(), "sleeps"),
         (unconfined(), "computes"),
     ] {
         let out = tempfile::tempdir().unwrap();
-        let agent = leaves_unread(true, who);
-        let report = run(&spec(Task::Hit, 0..1), &agent, &env, out.path()).unwrap();
-        assert!(report.log.contains("shrunk 4096"), "{}", report.log);
-        assert_eq!(report.outcomes[0].fault, None);
+        let agent = leaves_unread(mode);
+        let report = run(&spec(Task::Prepare, 0..1), &agent, &env, out.path()).unwrap();
+        assert_eq!(report.outcomes[0].fault, None, "{}", report.log);
         let thoughts = report.log.matches("thought").count();
         let slow = slow_answers(out.path());
-        // Some may have been thought while the evaluator itself was slow to ask; before, none showed.
-        assert_eq!(thoughts, 6, "{}", report.log);
-        assert!(slow >= 1, "{slow} of {thoughts}");
+        assert_eq!(thoughts, 1, "{}", report.log);
+        assert!(slow >= 1, "it thought, and nothing shows it");
     }
 }
 
 #[test]
-fn in_the_sandbox_the_pipe_keeps_its_size_and_an_unread_byte_delays_nothing() {
+fn no_agent_makes_its_channel_smaller() {
     let out = tempfile::tempdir().unwrap();
-    let spec = spec(Task::Hit, 0..1);
-    let refused = run(&spec, &leaves_unread(true, ""), &sandboxed(), out.path()).unwrap();
-    let fault = &refused.outcomes[0].fault.as_ref().unwrap().fault;
-    assert_eq!(*fault, AgentFaultKind::Exited { code: 1 });
-    assert!(refused.log.contains("PermissionError"), "{}", refused.log);
-
-    let left = run(&spec, &leaves_unread(false, ""), &sandboxed(), out.path()).unwrap();
-    assert_eq!(left.outcomes[0].fault, None);
+    let shrinks = Agent::with(
+        "import fcntl\n\
+         def on_hello(hello):\n    \
+         for fd in range(3):\n        \
+         try: fcntl.fcntl(fd, 1031, 4096)\n        \
+         except OSError as error: print('refused', error.errno, file=sys.stderr)",
+    );
+    for env in [sandboxed(), unconfined()] {
+        let report = run(&spec(Task::Hit, 0..1), &shrinks, &env, out.path()).unwrap();
+        assert_eq!(report.outcomes[0].fault, None);
+        assert_eq!(report.log.matches("refused").count(), 3, "{}", report.log);
+    }
 }
 
 #[test]
 fn a_question_that_a_thread_takes_slowly_is_on_the_agents_time() {
-    for (env, shrinks) in [(sandboxed(), false), (without_filter(), true)] {
-        let out = tempfile::tempdir().unwrap();
-        let agent = leaves_unread(shrinks, "drains");
-        let report = run(&spec(Task::Hit, 0..1), &agent, &env, out.path()).unwrap();
-        assert_eq!(report.outcomes[0].fault, None, "{}", report.log);
-        assert_eq!(report.log.matches("thought").count(), 6);
-        // A millisecond for each byte of a question, of which there are some hundred.
-        assert_eq!(slow_answers(out.path()), 6);
-    }
+    let out = tempfile::tempdir().unwrap();
+    let agent = leaves_unread("drains");
+    let report = run(&spec(Task::Hit, 0..1), &agent, &sandboxed(), out.path()).unwrap();
+    assert_eq!(report.outcomes[0].fault, None, "{}", report.log);
+    assert_eq!(report.log.matches("thought").count(), 6);
+    // A millisecond for each byte of a question, of which there are some hundred.
+    assert_eq!(slow_answers(out.path()), 6);
 }
 
 #[test]
 fn an_answer_before_the_whole_question_was_read_is_a_fault() {
     let out = tempfile::tempdir().unwrap();
-    // Fills its pipe by way of the end that a developer's agent can open, and answers at once.
-    let agent = Agent::with(
-        "import fcntl\n\
-         def on_step(step, answer):\n    \
-         if step == 1:\n        \
-         fcntl.fcntl(0, 1031, 4096)\n        \
-         end = os.open('/proc/self/fd/0', os.O_WRONLY | os.O_NONBLOCK)\n        \
-         try:\n            \
-         while True: os.write(end, b' ' * 64)\n        \
-         except BlockingIOError: pass\n        \
-         say(json.dumps(answer))\n        \
-         time.sleep(0.2)\n        \
-         answer['step'] = 2\n    \
-         return json.dumps(answer)",
-    );
-    let report = run(&spec(Task::Hit, 0..1), &agent, &unconfined(), out.path()).unwrap();
-    let fault = report.outcomes[0].fault.as_ref().unwrap();
+    let agent = leaves_unread("answers");
+    let report = run(&spec(Task::Prepare, 0..1), &agent, &sandboxed(), out.path()).unwrap();
+    let fault = &report.outcomes[0].fault.as_ref().unwrap();
     assert!(
         matches!(&fault.fault, AgentFaultKind::WrongMessage { got, .. } if got.contains("not asked for")),
         "{fault:?}"
     );
-    assert_eq!(fault.step, Some(2));
 }

@@ -355,7 +355,36 @@ fn without_a_cgroup_there_is_no_evidence_and_no_excuse() {
     assert!(seconds(&steps, "computation_time_ns")[1] >= 0.15);
 }
 
-/// A program of the host's, outside of the agent's cgroup, on the agent's CPU.
+/// Programs of the host's, outside of the agent's cgroup, that never sleep.
+struct Burners(Vec<std::process::Child>);
+
+impl Burners {
+    fn on(cpu: usize) -> Self {
+        let burn = format!(
+            "import os\nos.sched_setaffinity(0, [{cpu}])\n\
+             print(flush=True)\nwhile os.getppid() != 1: sum(range(1000))"
+        );
+        let burner = |_| {
+            let burner = std::process::Command::new("python3")
+                .args(["-c", &burn])
+                .stdout(std::process::Stdio::null())
+                .spawn();
+            burner.unwrap()
+        };
+        Self((0..3).map(burner).collect())
+    }
+}
+
+impl Drop for Burners {
+    fn drop(&mut self) {
+        for burner in &mut self.0 {
+            // One that has ended is fine.
+            let _ = burner.kill();
+            let _ = burner.wait();
+        }
+    }
+}
+
 #[test]
 fn what_others_run_on_the_agents_cpu_is_told_apart() {
     let out = tempfile::tempdir().unwrap();
@@ -363,19 +392,7 @@ fn what_others_run_on_the_agents_cpu_is_told_apart() {
     let mut env = sandboxed();
     env.agent_cpus = vec![cpu];
     // More of them than the agent's share: each of its steps needs 0.1 s of a CPU that it has a part of.
-    let burn = format!(
-        "import os\nos.sched_setaffinity(0, [{cpu}])\n\
-         print(flush=True)\nwhile os.getppid() != 1: sum(range(1000))"
-    );
-    let mut burners: Vec<_> = (0..3)
-        .map(|_| {
-            let burner = std::process::Command::new("python3")
-                .args(["-c", &burn])
-                .stdout(std::process::Stdio::null())
-                .spawn();
-            burner.unwrap()
-        })
-        .collect();
+    let burners = Burners::on(cpu);
     let agent = Agent::with(
         "def on_step(step, answer):\n    \
          until = time.thread_time() + 0.1\n    \
@@ -383,10 +400,7 @@ fn what_others_run_on_the_agents_cpu_is_told_apart() {
          return json.dumps(answer)",
     );
     let report = run(&spec(Task::Hit, 0..1), &agent, &env, out.path());
-    for burner in &mut burners {
-        burner.kill().unwrap();
-        burner.wait().unwrap();
-    }
+    drop(burners);
     report.unwrap();
     let steps = read(&out.path().join("steps.parquet"));
     let [host, counted, cpu] =
@@ -400,6 +414,61 @@ fn what_others_run_on_the_agents_cpu_is_told_apart() {
             counted[step] + 0.02 >= cpu[step],
             "{step}: {counted:?} {cpu:?}"
         );
+    }
+}
+
+/// Helpers that wait for the CPU in the sleeping main thread's place: of lowest priority, in no hurry, always or for
+/// an instant each, or as anybody.
+const HELPERS: [(&str, &str); 4] = [
+    (
+        "idle",
+        "os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))\n        while True: time.sleep(2e-5)",
+    ),
+    (
+        "batch",
+        "os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))\n        while True: time.sleep(2e-5)",
+    ),
+    (
+        "idle that never sleep",
+        "os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))\n        while True: pass",
+    ),
+    ("ordinary", "while True: time.sleep(2e-5)"),
+];
+
+#[test]
+fn waits_of_helpers_are_not_the_sleeping_agents() {
+    let cpu = *affinity::allowed().unwrap().last().unwrap();
+    for (name, body) in HELPERS {
+        let agent = Agent::with(&format!(
+            "def help():\n        {body}\n\
+             def on_hello(hello):\n    \
+             for _ in range(8):\n        \
+             if os.fork() == 0: help()\n\
+             def on_step(step, answer):\n    \
+             if step in range(1, 4): time.sleep(0.5)\n    \
+             return json.dumps(answer)",
+        ));
+        let mut env = with_reruns(sandboxed(), 2, 100);
+        env.agent_cpus = vec![cpu];
+        let out = tempfile::tempdir().unwrap();
+        let burners = Burners::on(cpu);
+        let report = run(&spec(Task::Hit, 0..1), &agent, &env, out.path());
+        drop(burners);
+        let report = report.unwrap();
+        assert_eq!(report.outcomes[0].fault, None, "{name}: {}", report.log);
+        assert_eq!(report.timing.host_noise_reruns, 0, "{name}");
+        let steps = read(&out.path().join("steps.parquet"));
+        let [host, counted] =
+            ["host_time_ns", "computation_time_ns"].map(|name| seconds(&steps, name));
+        for step in 1..4 {
+            // To be woken at the end of its sleep it may have to wait for others' turn.
+            assert!(
+                host[step] <= 0.3 * (host[step] + counted[step]),
+                "{name}: of {} s the host is said to have taken {} s",
+                host[step] + counted[step],
+                host[step]
+            );
+        }
     }
 }
 

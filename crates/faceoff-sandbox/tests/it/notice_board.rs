@@ -2,7 +2,7 @@
 //! Nothing that one agent does to what agents share is seen by another, beside it or after it. The program
 //! knows the numbers of this architecture only.
 
-use crate::harness::{PATIENCE, Subject, expect_echo, expect_line, is_root};
+use crate::harness::{PATIENCE, Subject, expect_echo, expect_line};
 use std::{
     collections::BTreeMap,
     fs::{self, File, FileTimes},

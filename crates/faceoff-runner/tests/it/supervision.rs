@@ -1,0 +1,134 @@
+//! Whatever holds an evaluator ends with the agent.
+
+use crate::{
+    agents::{Agent, sandboxed},
+    shard::{Watcher, spec},
+};
+use faceoff_runner::{
+    AgentEnvironment, HostWatch, PlatformFault, Supervision, run_shard, run_shard_watched,
+    standing_still,
+};
+use faceoff_types::{AgentFaultKind, Phase, Task};
+use std::{
+    fs,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread,
+    time::{Duration, Instant},
+};
+
+/// Says nothing at its second step, and calls itself so that it is seen from outside.
+fn silent(name: &str) -> Agent {
+    const PR_SET_NAME: u32 = 15;
+    Agent::with(&format!(
+        "import ctypes\n\
+         def on_step(step, answer):\n    \
+         if step == 1:\n        \
+         ctypes.CDLL(None).prctl({PR_SET_NAME}, b'{name}', 0, 0, 0)\n        \
+         time.sleep(10_000)\n    \
+         return json.dumps(answer)"
+    ))
+}
+
+/// Is there a process of this name, which is not dead?
+fn is_silent(name: &str) -> bool {
+    let named = format!("({name}) ");
+    let processes = fs::read_dir("/proc").unwrap().flatten();
+    processes
+        .filter_map(|entry| fs::read_to_string(entry.path().join("stat")).ok())
+        .any(|stat| {
+            let state = stat.split_once(&named).map(|(_, rest)| rest);
+            state.is_some_and(|state| !state.starts_with(['Z', 'X']))
+        })
+}
+
+/// An evaluator that waits for something which the agent holds until it dies.
+#[derive(Debug)]
+struct Held(&'static str);
+
+impl HostWatch for Held {
+    fn taken(&self, _: Instant, _: Instant, _: Option<Duration>) -> Duration {
+        while is_silent(self.0) {
+            thread::sleep(Duration::from_millis(5));
+        }
+        Duration::ZERO
+    }
+}
+
+fn impatient(supervision: Supervision) -> AgentEnvironment {
+    let mut env = sandboxed();
+    env.time.step_s = 0.2;
+    env.time.bye_s = 0.1;
+    env.supervision = supervision.with_slack(Duration::from_millis(100));
+    env
+}
+
+#[test]
+fn agent_that_holds_its_evaluator_is_ended_and_blamed() {
+    const NAME: &str = "holds-evaluator";
+    let agent = silent(NAME);
+    let out = tempfile::tempdir().unwrap();
+    let mut spec = spec(Task::Hit, 0..2);
+    spec.max_faults = 10;
+    let report = run_shard_watched(
+        &spec,
+        &agent.bundle,
+        &impatient(Supervision::default()),
+        out.path(),
+        &mut Watcher::default(),
+        &Held(NAME),
+    )
+    .unwrap();
+    assert_eq!(report.outcomes.len(), 2);
+    for outcome in &report.outcomes {
+        let fault = &outcome.fault.as_ref().unwrap().fault;
+        assert!(
+            matches!(
+                fault,
+                AgentFaultKind::TimedOut {
+                    phase: Phase::Step,
+                    ..
+                }
+            ),
+            "{fault:?}"
+        );
+    }
+    assert_eq!(standing_still(), [] as [String; 0]);
+}
+
+#[test]
+fn cancelled_job_does_not_wait_for_its_agent() {
+    let agent = silent("waits-cancelled");
+    let out = tempfile::tempdir().unwrap();
+    let cancelled = Arc::new(AtomicBool::new(false));
+    let mut env = sandboxed();
+    // Which it would never meet.
+    env.time.step_s = 3600.0;
+    env.supervision = Supervision::of({
+        let cancelled = Arc::clone(&cancelled);
+        move || cancelled.load(Ordering::Relaxed)
+    });
+    let played = thread::scope(|scope| {
+        let played = scope.spawn(|| {
+            run_shard(
+                &spec(Task::Hit, 0..1),
+                &agent.bundle,
+                &env,
+                out.path(),
+                &mut Watcher::default(),
+            )
+        });
+        while !is_silent("waits-cancelled") {
+            thread::yield_now();
+        }
+        cancelled.store(true, Ordering::Relaxed);
+        played.join().unwrap()
+    });
+    assert!(
+        matches!(played, Err(PlatformFault::Cancelled)),
+        "{played:?}"
+    );
+    assert!(!is_silent("waits-cancelled"));
+}
