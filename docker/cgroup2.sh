@@ -22,19 +22,20 @@ if [ "$(uname -m)" != x86_64 ]; then
     exit 1
 fi
 program=$(realpath "$TARGET_DIR/debug/faceoff")
-tests=''
-# Every crate's integration tests are called `it`.
-for candidate in $(find "$(realpath "$TARGET_DIR/debug/deps")" -name 'it-*' ! -name '*.*' -type f -perm -u+x -printf '%T@ %p\n' |
-    sort -rn | cut -d' ' -f2); do
-    if "$candidate" --list 2>/dev/null | grep -q '^multiplies::.*: test$'; then
-        tests=$candidate
-        break
-    fi
-done
-if [ -z "$tests" ]; then
-    echo "error: no tests of faceoff-sandbox in $TARGET_DIR/debug/deps: cargo build --locked --workspace --bins --tests" >&2
+# Every crate's integration tests are called `it`: the newest that have this module.
+tests_with() { # tests_with MODULE CRATE
+    for candidate in $(find "$(realpath "$TARGET_DIR/debug/deps")" -name 'it-*' ! -name '*.*' -type f -perm -u+x -printf '%T@ %p\n' |
+        sort -rn | cut -d' ' -f2); do
+        if "$candidate" --list 2>/dev/null | grep -q "^$1::.*: test\$"; then
+            echo "$candidate"
+            return
+        fi
+    done
+    echo "error: no tests of $2 in $TARGET_DIR/debug/deps: cargo build --locked --workspace --bins --tests" >&2
     exit 1
-fi
+}
+tests=$(tests_with multiplies faceoff-sandbox)
+runner_tests=$(tests_with head_start faceoff-runner)
 work=$(mkdir -p "$TARGET_DIR/cgroup2" && realpath "$TARGET_DIR/cgroup2")
 
 # The kernel is unpacked, not installed: nothing of it reaches this host's /boot.
@@ -91,7 +92,7 @@ END
 chmod 755 "$initramfs/init"
 
 {
-    printf "program='%s'\ntests='%s'\nrepository='%s'\n" "$program" "$tests" "$(dirname "$folder")"
+    printf "program='%s'\ntests='%s'\nrunner_tests='%s'\nrepository='%s'\n" "$program" "$tests" "$runner_tests" "$(dirname "$folder")"
     cat <<'END'
 set -u
 export PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/tmp TMPDIR=/tmp
@@ -105,7 +106,12 @@ expect() { # expect NAME COMMAND…
 }
 # The sandbox's own tests that meet a cgroup: limits, ends, CPUs, and what a killed service leaves.
 limits() {
-    "$tests" --test-threads 1 hoards:: multiplies:: moves_cpu:: counts_cpus:: clings:: killed_service:: ends:: probe:: well_behaved::
+    "$tests" --test-threads 1 hoards:: multiplies:: moves_cpu:: counts_cpus:: clings:: killed_service:: ends:: probe:: well_behaved:: \
+        holds::
+}
+# The evaluator's, attacked by agents that hold it, or that compute while nobody waits for them.
+attacks() {
+    "$runner_tests" --test-threads 1 head_start:: supervision:: free_time:: waits_of_helpers
 }
 # All of doctor's layers, with version 2 in three of them. The exit status alone would leave out by which version.
 doctor() {
@@ -127,7 +133,7 @@ echo "controllers: $(cat $top/cgroup.controllers)"
 # An agent that asks for more than this machine has is to meet its limit, not a kernel that gives nothing out at all.
 echo 1 >/proc/sys/vm/overcommit_memory
 # An ordinary user has no way into a home folder; here it does, in memory.
-for path in "$tests" "$program" "$repository/tests/agents/hoards.py"; do
+for path in "$tests" "$runner_tests" "$program" "$repository/tests/agents/hoards.py"; do
     while path=$(dirname "$path") && [ "$path" != / ]; do chmod a+x "$path"; done
 done
 
@@ -146,6 +152,10 @@ sh -c "echo 0 >$top/leaf/cgroup.procs; echo +memory >$top/leaf/cgroup.subtree_co
 expect leaf-doctor sh -c "echo 0 >$top/leaf/cgroup.procs; exec sh '$0' run doctor"
 mkdir $top/leaf-tests
 expect leaf-tests sh -c "echo 0 >$top/leaf-tests/cgroup.procs; exec sh '$0' run limits"
+
+case_is "leaf: agents that attack the evaluator's clock, as root in a busy cgroup"
+mkdir $top/leaf-attacks
+expect leaf-attacks sh -c "echo 0 >$top/leaf-attacks/cgroup.procs; exec sh '$0' run attacks"
 
 case_is "container: the same in the top of a cgroup namespace"
 mkdir $top/container

@@ -5,7 +5,11 @@ use prometheus_client::{
     metrics::{counter::Counter, family::Family, gauge::Gauge, histogram::Histogram},
     registry::{Registry, Unit},
 };
-use std::{fmt, time::Duration};
+use std::{
+    fmt,
+    sync::{Arc, Mutex, PoisonError},
+    time::Duration,
+};
 
 /// Upper bounds, seconds: a smoke run takes seconds, a shard up to minutes, a game many.
 const UNITS_S: [f64; 10] = [0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 180.0, 600.0, 1800.0];
@@ -26,6 +30,9 @@ pub struct Slots {
     round_trips: Family<RoundTrip, Latest>,
     stall: Family<OfSlot, Latest>,
     reruns: Counter,
+    still: Gauge,
+    /// Their threads' names.
+    standing_still: Arc<Mutex<Vec<String>>>,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
@@ -92,11 +99,18 @@ impl Slots {
             round_trips: Family::default(),
             stall: Family::default(),
             reruns: Counter::default(),
+            still: Gauge::default(),
+            standing_still: Arc::default(),
         };
         all.register(
             "slots_busy",
             "Slots that work on a unit",
             slots.busy.clone(),
+        );
+        all.register(
+            "slots_standing_still",
+            "Slots that something holds although their agent was ended",
+            slots.still.clone(),
         );
         all.register(
             "units",
@@ -153,6 +167,22 @@ impl Slots {
             slots: self.clone(),
             work,
         }
+    }
+
+    /// The slots that something holds although their agent was ended, by the names of their threads.
+    pub fn set_standing_still(&self, names: Vec<String>) {
+        self.still.set(i64::try_from(names.len()).unwrap_or(i64::MAX));
+        *self
+            .standing_still
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner) = names;
+    }
+
+    /// Those of [`Self::set_standing_still`].
+    #[must_use]
+    pub fn standing_still(&self) -> Vec<String> {
+        let names = self.standing_still.lock();
+        names.unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// A slot has played episodes, and they are committed.

@@ -118,10 +118,30 @@ fn cgroup(layer: Layer, controller: &str) -> Result<String, String> {
             };
             // On a hybrid host the unified line is there too, but the agent is not in it.
             path.contains("/agent-")
-                .then(|| format!("cgroup {version}, limits accepted"))
+                .then(|| format!("cgroup {version}, limits accepted{}", freezer(layer, version, text)))
         })
     };
     shown(layer, "/proc/self/cgroup", own)
+}
+
+/// What stops an agent is no layer, but told with the one beside which it matters: without it a game needs CPUs apart.
+fn freezer(layer: Layer, version: &str, own_cgroups: &str) -> &'static str {
+    let in_one = |line: &str| {
+        let mut parts = line.splitn(3, ':').skip(1);
+        let named = parts
+            .next()
+            .is_some_and(|names| names.split(',').any(|name| name == "freezer"));
+        named && parts.next().is_some_and(|path| path.contains("/agent-"))
+    };
+    match layer {
+        Layer::CgroupCpu if version == "v2" || own_cgroups.lines().any(in_one) => {
+            "; agents can be frozen"
+        }
+        Layer::CgroupCpu => {
+            "; agents cannot be frozen, so games need CPUs for each side: hand the service a cgroup of the freezer, too"
+        }
+        _ => "",
+    }
 }
 
 fn shown(
@@ -234,7 +254,7 @@ fn cure_cgroups() -> String {
         )
     } else {
         format!(
-            "run the service as root, or have root hand it a cgroup: for c in memory pids cpu cpuacct; do mkdir \
+            "run the service as root, or have root hand it a cgroup: for c in memory pids cpu cpuacct freezer; do mkdir \
              -p /sys/fs/cgroup/$c/agents; chown -R USER /sys/fs/cgroup/$c/agents; echo PID > \
              /sys/fs/cgroup/$c/agents/cgroup.procs; done; {CONTAINER}"
         )

@@ -182,6 +182,7 @@ pub(crate) async fn run_slots(
     let stop = shutdown.child_token();
     // However this function ends, its threads do, too.
     let _stop = stop.clone().drop_guard();
+    tokio::spawn(tell_who_stands_still(config.metrics.clone(), stop.clone()));
     let mut slots = JoinSet::new();
     let all = config.cpus.slots.into_iter().zip(servers);
     for (index, (cpus, SlotServer { slot: name, server })) in all.enumerate() {
@@ -258,6 +259,20 @@ async fn wait_for(
         () = overdue => {
             tracing::warn!("a slot is still in the middle of something; its unit was given back");
             Ok(())
+        }
+    }
+}
+
+/// Keeps the numbers, and with them the server's health, up to date about slots that something holds.
+async fn tell_who_stands_still(metrics: Metrics, stop: CancellationToken) {
+    const EVERY: Duration = Duration::from_secs(1);
+    loop {
+        metrics
+            .slots()
+            .set_standing_still(faceoff_runner::standing_still());
+        tokio::select! {
+            () = stop.cancelled() => return,
+            () = tokio::time::sleep(EVERY) => {}
         }
     }
 }

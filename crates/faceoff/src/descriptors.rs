@@ -9,9 +9,9 @@ use serde::Serialize;
 const MOST: u64 = 1 << 16;
 /// What the service itself holds open: database, log, runtime, listener.
 const SERVICE: u64 = 64;
-/// What a slot holds open at most: pipes and counters of an agent and its supervisor, a bundle that is
-/// unpacked, recordings and datasets that are written.
-const PER_SLOT: u64 = 64;
+/// What a slot holds open at most: of each of two agents the sockets, the kernel's counters (two files for each of
+/// its first 16 threads) and what ends it; a bundle that is unpacked, recordings and datasets that are written.
+const PER_SLOT: u64 = 160;
 /// A connection, and the file that is sent over it, or received by one handle and stored by another.
 const PER_CONNECTION: u64 = 3;
 /// Fewer connections than this are no service.

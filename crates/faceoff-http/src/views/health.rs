@@ -86,6 +86,11 @@ impl HealthView {
             QueueHealth::Unknown => missing.push("the queue cannot be read".to_owned()),
             QueueHealth::Moving { .. } | QueueHealth::Held { .. } | QueueHealth::Paused { .. } => {}
         }
+        for slot in app.config.metrics.slots().standing_still() {
+            missing.push(format!(
+                "{slot} stands still: something on this host holds it although its agent was ended; restart the server"
+            ));
+        }
         if app.config.capacity.slots == 0 {
             missing.extend(elsewhere(app, waiting));
         }

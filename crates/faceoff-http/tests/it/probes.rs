@@ -33,6 +33,18 @@ async fn a_server_that_is_not_ready_is_alive() {
 }
 
 #[tokio::test]
+async fn slot_that_stands_still_is_named() {
+    let site = Site::start().await;
+    let slots = site.metrics().slots();
+    site.get("/readyz", None).await.json(200);
+    slots.set_standing_still(vec!["faceoff-slot-1".to_owned()]);
+    let ready = site.get("/readyz", None).await;
+    ready.problem(503, "not-ready", &["faceoff-slot-1 stands still"]);
+    slots.set_standing_still(Vec::new());
+    site.get("/readyz", None).await.json(200);
+}
+
+#[tokio::test]
 async fn a_server_at_its_limit_is_alive() {
     let limits = HttpLimits {
         requests: 0,

@@ -293,6 +293,11 @@ impl Site {
         }
     }
 
+    /// What the server counts of itself.
+    pub fn metrics(&self) -> &Metrics {
+        &self.config.metrics
+    }
+
     /// Another server on the same folder, which remembers nothing.
     pub async fn restart(&mut self) {
         self.server.abort();
