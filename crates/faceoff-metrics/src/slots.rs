@@ -171,7 +171,8 @@ impl Slots {
 
     /// The slots that something holds although their agent was ended, by the names of their threads.
     pub fn set_standing_still(&self, names: Vec<String>) {
-        self.still.set(i64::try_from(names.len()).unwrap_or(i64::MAX));
+        self.still
+            .set(i64::try_from(names.len()).unwrap_or(i64::MAX));
         *self
             .standing_still
             .lock()

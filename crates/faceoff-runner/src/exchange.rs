@@ -22,8 +22,8 @@ use std::{
 };
 
 /// Who answered within this time is looked out for as long at the next question, where that costs the agent
-/// nothing: to sleep and be woken takes longer than such an answer.
-const QUICK: Duration = Duration::from_micros(50);
+/// nothing: to sleep and be woken takes about as long as such an answer, an interpreter's included.
+const QUICK: Duration = Duration::from_micros(100);
 
 /// The running process.
 #[derive(Debug)]
@@ -211,10 +211,10 @@ impl<'w> Exchange<'w> {
         match &self.glance {
             Some(glance) if glance.at.elapsed() < GLANCE_LASTS => glance.clone(),
             _ => {
-                let own = self.own_cpus.as_deref().map(OwnWait::now);
+                let glance = self.process.glance_at_cpus(self.own_cpus.as_deref());
                 let glance = Glance {
-                    own: own.map(Arc::new),
-                    cpus: self.process.glance_at_cpus().map(Arc::new),
+                    own: glance.own.map(Arc::new),
+                    cpus: glance.cpus.map(Arc::new),
                     at: Instant::now(),
                 };
                 self.glance.insert(glance).clone()

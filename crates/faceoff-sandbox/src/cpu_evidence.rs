@@ -7,7 +7,7 @@
 //! of 10 ms. What such a tick leaves open is always read in the host's disfavour.
 
 use crate::{
-    cpu_clock,
+    OwnWait, cpu_clock,
     cpu_counters::{Ticks, of_cpus, text, throttled, ticks, ticks_of, usage},
     cpu_waits::{KnownThreads, Ledger, Outcome, Waits},
 };
@@ -19,6 +19,16 @@ use std::{
 /// How far counters may lag behind: who runs is charged at the kernel's next tick, of which there are 100 in
 /// a second at least.
 const LAG: Duration = Duration::from_millis(10);
+
+/// What is read right before a question, in some microseconds.
+#[derive(Debug, Clone, Default)]
+pub struct Glance {
+    /// The counters of the agent's CPUs, without what its threads want; `None` without a cgroup, and where the kernel
+    /// counts in ticks alone.
+    pub cpus: Option<CpuReading>,
+    /// Those of the calling thread, if they were asked for.
+    pub own: Option<OwnWait>,
+}
 
 /// Where the counters of one agent are.
 #[derive(Debug)]
@@ -140,7 +150,7 @@ impl CpuEvidence {
 
     /// The counters now as far as they are read in some microseconds, as the beginning of a span: of known
     /// threads only. `None` if the host does not tell, or in ticks alone.
-    pub(crate) fn glance(&self, agent: &KnownThreads) -> Option<CpuReading> {
+    pub(crate) fn glance(&self, agent: &KnownThreads, stat: &str) -> Option<CpuReading> {
         let RunTime::PerCpu { all, .. } = &self.run_time else {
             return None;
         };
@@ -149,7 +159,7 @@ impl CpuEvidence {
             clocks: Duration::ZERO,
             all: of_cpus(&text(all)?, &self.cpus)?,
             throttled: self.throttled(),
-            ticks: ticks_of(&fs::read_to_string("/proc/stat").ok()?, &self.cpus)?,
+            ticks: ticks_of(stat, &self.cpus)?,
             waits: Some(agent.glance()?),
             at: Instant::now(),
         })

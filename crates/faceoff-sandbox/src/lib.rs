@@ -45,7 +45,7 @@ mod status_pipe;
 mod stderr_tail;
 mod sweep;
 
-pub use cpu_evidence::{CpuReading, Looks, Taken};
+pub use cpu_evidence::{CpuReading, Glance, Looks, Taken};
 pub use cpu_waits::Outcome;
 pub use error::{SandboxError, SpawnError, WriteError};
 pub use faceoff_types::ResourceLimits as Limits;

@@ -27,12 +27,15 @@ impl OwnWait {
     /// The counters now; `cpus` are those that the thread may use.
     #[must_use]
     pub fn now(cpus: &[usize]) -> Self {
-        let stat = fs::read_to_string("/proc/stat").ok();
+        let stat = fs::read_to_string("/proc/stat").unwrap_or_default();
+        Self::with(&stat, cpus)
+    }
+
+    /// [`Self::now`], where `/proc/stat` has just been read: that costs more than all the rest.
+    pub(crate) fn with(stat: &str, cpus: &[usize]) -> Self {
         Self {
             waited: SCHEDULE.with_borrow(|file| file.as_ref().and_then(waited).unwrap_or_default()),
-            ticks: stat
-                .and_then(|stat| ticks_of(&stat, cpus))
-                .unwrap_or_default(),
+            ticks: ticks_of(stat, cpus).unwrap_or_default(),
         }
     }
 

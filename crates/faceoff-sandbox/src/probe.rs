@@ -117,8 +117,12 @@ fn cgroup(layer: Layer, controller: &str) -> Result<String, String> {
                 _ => return None,
             };
             // On a hybrid host the unified line is there too, but the agent is not in it.
-            path.contains("/agent-")
-                .then(|| format!("cgroup {version}, limits accepted{}", freezer(layer, version, text)))
+            path.contains("/agent-").then(|| {
+                format!(
+                    "cgroup {version}, limits accepted{}",
+                    freezer(layer, version, text)
+                )
+            })
         })
     };
     shown(layer, "/proc/self/cgroup", own)

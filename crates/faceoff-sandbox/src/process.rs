@@ -1,6 +1,6 @@
 use crate::{
-    CpuReading, Isolation, Killer, Limits, Looks, Outcome, ReadLine, SandboxError, SpawnError,
-    SpawnSpec, Taken, WriteError,
+    CpuReading, Glance, Isolation, Killer, Limits, Looks, Outcome, OwnWait, ReadLine, SandboxError,
+    SpawnError, SpawnSpec, Taken, WriteError,
     cgroup::AgentCgroup,
     command_check::check_command,
     cpu_waits::KnownThreads,
@@ -275,11 +275,18 @@ impl AgentProcess {
         evidence.begin(&self.threads)
     }
 
-    /// [`Self::read_cpus`] in some microseconds, without what threads want. `None` also where the kernel counts in
-    /// ticks alone.
-    pub fn glance_at_cpus(&self) -> Option<CpuReading> {
-        let evidence = self.tree.cgroup.as_ref()?.cpu_evidence.as_ref()?;
-        evidence.glance(&self.threads)
+    /// The counters before a question, with those of the calling thread if it keeps off the agent's CPUs on `own_cpus`.
+    pub fn glance_at_cpus(&self, own_cpus: Option<&[usize]>) -> Glance {
+        let cgroup = self.tree.cgroup.as_ref();
+        let evidence = cgroup.and_then(|cgroup| cgroup.cpu_evidence.as_ref());
+        if evidence.is_none() && own_cpus.is_none() {
+            return Glance::default();
+        }
+        let stat = fs::read_to_string("/proc/stat").unwrap_or_default();
+        Glance {
+            cpus: evidence.and_then(|evidence| evidence.glance(&self.threads, &stat)),
+            own: own_cpus.map(|cpus| OwnWait::with(&stat, cpus)),
+        }
     }
 
     /// For how much of the time since `asked`, or since `looks` at it began, or by the `glance` before it was

@@ -142,6 +142,10 @@ fn wait_for_both(
     }
 }
 
+/// For so long nobody is frozen for the other's sake: to freeze and thaw takes longer than most answers, and
+/// the little that can be computed meanwhile counts as the next step's, as in any game.
+const FREEZES_AFTER: Duration = Duration::from_micros(200);
+
 /// Waits for the side that is late, whose other has answered.
 fn wait_for_last(
     late: &mut SidePlayer<'_>,
@@ -149,6 +153,10 @@ fn wait_for_last(
     answered: OnceAnswered,
 ) -> Result<(), PlatformFault> {
     if answered == OnceAnswered::IsFrozen {
+        late.look(Instant::now() + FREEZES_AFTER)?;
+        if late.due().is_none() {
+            return Ok(());
+        }
         other.freeze();
     }
     late.look(Instant::now() + TimeLimits::LONGEST)

@@ -84,7 +84,7 @@ fn make(call: Call, agent: &mut AgentProcess) {
         Call::Counters => {
             agent.know_threads();
             drop((
-                agent.glance_at_cpus(),
+                agent.glance_at_cpus(Some(&[0])),
                 agent.read_cpus(),
                 agent.cpu_time_s(),
             ));
