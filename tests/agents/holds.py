@@ -7,6 +7,7 @@ import array
 import ctypes
 import mmap
 import os
+import select
 import signal
 import socket
 import sys
@@ -128,6 +129,15 @@ def hold():
         thread(lambda: [os.write(2, b"x" * 9999) for _ in iter(int, 1)])
     elif KIND == "dribbles":
         thread(lambda: [(os.write(1, b"x"), os.write(2, b"x"), time.sleep(0.0005)) for _ in iter(int, 1)])
+    elif KIND == "watches":
+        # Whoever reads a byte of it wakes all of these.
+        for fd in (1, 2):
+            ends = [os.dup(fd) for _ in range(100)]
+            for _ in range(100):
+                kept.append(select.epoll())
+                for end in ends:
+                    kept[-1].register(end, select.EPOLLOUT | select.EPOLLET)
+        thread(lambda: [(os.write(1, b"x"), os.write(2, b"x")) for _ in iter(int, 1)])
     elif KIND == "out-of-band":
         send(b"x", socket.MSG_OOB)
         send(b"yz", socket.MSG_OOB)

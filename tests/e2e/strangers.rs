@@ -22,7 +22,7 @@ use std::{
 
 /// As many as there were when evaluations failed for want of a descriptor.
 const STRANGERS: usize = 190;
-const DESCRIPTORS: u32 = 200;
+const DESCRIPTORS: u32 = 300;
 /// The addresses that they come from: each gets a share of the places, and together they want all.
 const ADDRESSES: u8 = 5;
 

@@ -368,7 +368,7 @@ impl<'w> Exchange<'w> {
             kept: taken.map(|taken| taken.kept),
             stolen: taken.map_or(Duration::ZERO, |taken| taken.stolen),
             agent_ran: self.cpu.since_question_s().map(TimeLimits::duration),
-            own_wait: own.map(|(cpus, before)| OwnWait::now(cpus).since(before)),
+            own_wait: own.map(|(cpus, before)| self.process.own_wait(cpus).since(before)),
         };
         sent.wait.taken(self.watch, evidence)
     }

@@ -4,7 +4,7 @@
 //! that an agent holds, no deadline of that thread can end it; the death of the agent does. The same thread ends
 //! agents of jobs that were cancelled, so that nobody waits for an answer that nobody wants.
 
-use faceoff_sandbox::Killer;
+use faceoff_sandbox::{Killer, affinity};
 use std::{
     fmt,
     sync::{
@@ -17,6 +17,8 @@ use std::{
 
 /// How often the thread looks; what was cancelled ends no later than that.
 const LOOK_EVERY: Duration = Duration::from_millis(250);
+/// A look that comes later says nothing about evaluators: this host, or the process, stood still.
+const LATE_LOOK: Duration = Duration::from_secs(1);
 /// For how long past the sum of a job's limits its evaluator may make no progress.
 const SLACK: Duration = Duration::from_secs(10);
 /// A thread that is held for so long after the agent's death stands still: something else holds it.
@@ -84,6 +86,8 @@ struct Agent {
     /// 0, or an [`Ended`].
     ended: AtomicU8,
     ended_ns: AtomicU64,
+    /// What was overdue at the last look.
+    overdue_ns: AtomicU64,
 }
 
 static EPOCH: LazyLock<Instant> = LazyLock::new(Instant::now);
@@ -103,6 +107,7 @@ impl Supervised {
             due_ns: AtomicU64::new(0),
             ended: AtomicU8::new(0),
             ended_ns: AtomicU64::new(0),
+            overdue_ns: AtomicU64::new(0),
         });
         let supervisor = &*SUPERVISOR;
         supervisor.agents().push(Arc::downgrade(&agent));
@@ -142,14 +147,19 @@ impl Agent {
         }
     }
 
-    fn look(&self, now: Instant) {
+    /// `in_time`: the last look was not long ago.
+    fn look(&self, now: Instant, in_time: bool) {
         let due_ns = self.due_ns.load(Ordering::Relaxed);
         if due_ns == 0 || self.ended().is_some() {
             return;
         }
+        let is_overdue = in_time && nanoseconds(now) > due_ns;
+        // Twice in a row: what kept the evaluator from going on may have been a host that stood still.
+        let seen = if is_overdue { due_ns } else { 0 };
+        let was_overdue = self.overdue_ns.swap(seen, Ordering::Relaxed) == due_ns;
         let why = if (self.supervision.cancelled)() {
             Ended::Cancelled
-        } else if nanoseconds(now) > due_ns {
+        } else if is_overdue && was_overdue {
             tracing::error!(
                 thread = self.thread,
                 "an agent holds its evaluator: it is ended"
@@ -209,6 +219,9 @@ impl Supervisor {
     }
 
     fn run(&self) {
+        // Started by the first slot, which keeps to CPUs of its own: should it be held there, this must not be.
+        affinity::as_the_process();
+        let mut last_look = Instant::now();
         loop {
             let mut agents = self.agents();
             agents.retain(|agent| agent.strong_count() > 0);
@@ -221,8 +234,10 @@ impl Supervisor {
             let all = agents.clone();
             drop(agents);
             let now = Instant::now();
+            let in_time = now.saturating_duration_since(last_look) < LATE_LOOK;
+            last_look = now;
             for agent in all.iter().filter_map(Weak::upgrade) {
-                agent.look(now);
+                agent.look(now, in_time);
             }
             thread::sleep(LOOK_EVERY);
         }

@@ -41,6 +41,15 @@ pub fn pin_current_thread(cpus: &[usize]) -> io::Result<()> {
     Ok(())
 }
 
+/// Lets the calling thread run wherever the process's main thread may, whatever it has inherited. Where the host does not
+/// allow that it stays where it is.
+pub fn as_the_process() {
+    let main_thread = rustix::process::getpid();
+    if let Ok(set) = sched_getaffinity(Some(main_thread)) {
+        let _ = sched_setaffinity(None, &set);
+    }
+}
+
 /// By how much the nice value is raised of what gives way on CPUs that are no agent's: beside a simulator that is never idle it
 /// has a third of a CPU. A simulator's time costs nobody points; with less, whoever looks on waits for ten milliseconds and more
 /// at each of a request's turns.

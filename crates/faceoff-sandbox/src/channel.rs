@@ -4,7 +4,8 @@
 //! it, and an agent can stay inside for as long as it likes: in a `splice` from an empty socket, or in a `write`
 //! of memory whose page fault waits for another of its threads. Reading, writing, closing, and even asking how
 //! much there is, would wait for that lock, whether the pipe blocks or not. The two ends of a pair of sockets
-//! have a lock each, and what both touch, a queue, is held for an instant only.
+//! have a lock each, under which nobody sleeps. What one end does can still be made dear for the other (each piece that is
+//! read wakes all who poll for room), which is why no read takes much, and all of it is on the agent's time.
 //!
 //! Neither end can be opened by name through `/proc/*/fd`, by itself or a child, and the room for a question is
 //! the writer's to decide, so that no agent can make it smaller.
@@ -24,6 +25,8 @@ use std::{
 
 /// Room for questions: none is longer, and `end` with the `reset` after it fits as well.
 const ROOM_BYTES: usize = 64 << 10;
+/// Room for a log that nobody has read yet: what lies there is read at one go, byte by byte if need be.
+const LOG_BYTES: usize = 16 << 10;
 
 /// Our ends and the agent's.
 pub(crate) struct Channel {
@@ -47,6 +50,7 @@ impl Channel {
             let why = format!("it holds {room} bytes, {ROOM_BYTES} are needed");
             return Err(SandboxError::other(WHAT, why));
         }
+        set_socket_send_buffer_size(&stderr, LOG_BYTES).context(WHAT)?;
         // What an agent writes to its standard input would lie there unread. (The other two ways stay open in
         // both directions: programs that watch their output for a hang-up would see one.)
         shutdown(&input, Shutdown::Read).context(WHAT)?;

@@ -4,7 +4,6 @@
 
 use memchr::memchr;
 use rustix::{
-    buffer::spare_capacity,
     event::{PollFd, PollFlags, Timespec, poll},
     io::{Errno, ioctl_fionread},
     net::{RecvFlags, SendFlags, Shutdown, recv, send, shutdown},
@@ -15,8 +14,9 @@ use std::{
     time::Instant,
 };
 
-/// One read: the longest answer, so that it costs one system call.
-const READ_BYTES: usize = 64 << 10;
+/// One read: nearly every answer, so that it costs one system call. A read goes on as long as an agent adds bytes one
+/// by one, so it must not take many.
+const READ_BYTES: usize = 16 << 10;
 /// How much of an oversized line is handed back.
 const HEAD_BYTES: usize = 1024;
 
@@ -54,6 +54,8 @@ pub(crate) struct LineSocket {
     /// What there was no room for yet.
     unsent: Vec<u8>,
     output: OwnedFd,
+    /// What one read brings.
+    chunk: Box<[u8]>,
     /// What has been read and not yet been handed out, from `start` on.
     buffer: Vec<u8>,
     start: usize,
@@ -69,6 +71,7 @@ impl LineSocket {
             is_shut: false,
             unsent: Vec::new(),
             output,
+            chunk: vec![0; READ_BYTES].into(),
             buffer: Vec::with_capacity(2 * READ_BYTES),
             start: 0,
             searched: 0,
@@ -233,16 +236,14 @@ impl LineSocket {
             self.searched -= self.start;
             self.start = 0;
         }
-        // Bounded: `take_line` refuses before more than the cap and one read have gathered.
-        self.buffer.reserve(READ_BYTES);
-        let result = recv(
-            &self.output,
-            spare_capacity(&mut self.buffer),
-            RecvFlags::DONTWAIT,
-        );
+        let result = recv(&self.output, &mut self.chunk[..], RecvFlags::DONTWAIT);
         self.last_read_at = Instant::now();
         match result {
-            Ok((count, _)) => Ok(count > 0),
+            Ok((count, _)) => {
+                // Bounded: `take_line` refuses before more than the cap and one read have gathered.
+                self.buffer.extend_from_slice(&self.chunk[..count]);
+                Ok(count > 0)
+            }
             // It closed its end with something of ours unread.
             Err(Errno::CONNRESET) => Ok(false),
             Err(Errno::AGAIN | Errno::INTR) => Ok(true),

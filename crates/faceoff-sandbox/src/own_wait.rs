@@ -1,18 +1,16 @@
 //! How long the calling thread itself was kept from running: of what holds up an evaluator between asking and
-//! hearing, this alone no agent can bring about on CPUs that are not its own.
+//! hearing, this alone no agent can bring about on CPUs that are not its own. But for one thing: the thread that reads
+//! an agent's log runs on the evaluator's CPUs, as long as the agent writes. What that ran is taken off.
 
 use crate::cpu_counters::{Ticks, ticks, ticks_of};
-use std::{
-    cell::RefCell,
-    fs::{self, File},
-    os::unix::fs::FileExt,
-    time::Duration,
-};
+use std::{cell::RefCell, fs::File, os::unix::fs::FileExt, time::Duration};
 
 /// The counters of the calling thread at one time. Only the difference of two of the same thread says something.
 #[derive(Debug, Clone, Default)]
 pub struct OwnWait {
     waited: Duration,
+    /// What the thread ran that reads the agent's log.
+    log_reader_ran: Duration,
     /// Of the CPUs that it may use.
     ticks: Vec<Ticks>,
 }
@@ -24,17 +22,12 @@ thread_local! {
 }
 
 impl OwnWait {
-    /// The counters now; `cpus` are those that the thread may use.
-    #[must_use]
-    pub fn now(cpus: &[usize]) -> Self {
-        let stat = fs::read_to_string("/proc/stat").unwrap_or_default();
-        Self::with(&stat, cpus)
-    }
-
-    /// [`Self::now`], where `/proc/stat` has just been read: that costs more than all the rest.
-    pub(crate) fn with(stat: &str, cpus: &[usize]) -> Self {
+    /// The counters now, where `/proc/stat` has just been read (that costs more than all the rest); `cpus` are those that
+    /// the thread may use.
+    pub(crate) fn now(stat: &str, cpus: &[usize], log_reader_ran: Duration) -> Self {
         Self {
             waited: SCHEDULE.with_borrow(|file| file.as_ref().and_then(waited).unwrap_or_default()),
+            log_reader_ran,
             ticks: ticks_of(stat, cpus).unwrap_or_default(),
         }
     }
@@ -45,17 +38,30 @@ impl OwnWait {
     pub fn since(&self, before: &Self) -> Duration {
         let each = std::iter::zip(&before.ticks, &self.ticks);
         let stolen = each.map(|(before, now)| now.stolen.saturating_sub(before.stolen));
-        self.waited.saturating_sub(before.waited) + ticks(stolen.min().unwrap_or_default())
+        let log_reader_ran = self.log_reader_ran.saturating_sub(before.log_reader_ran);
+        self.waited
+            .saturating_sub(before.waited)
+            .saturating_sub(log_reader_ran)
+            + ticks(stolen.min().unwrap_or_default())
     }
 }
 
-/// The second number of `schedstat`: nanoseconds of waiting to run.
+/// What `schedstat` tells: nanoseconds of running.
+pub(crate) fn ran(file: &File) -> Option<Duration> {
+    number(file, 0)
+}
+
+/// … and of waiting to run.
 fn waited(file: &File) -> Option<Duration> {
+    number(file, 1)
+}
+
+fn number(file: &File, position: usize) -> Option<Duration> {
     let mut bytes = [0; 128];
     let count = file.read_at(&mut bytes, 0).ok()?;
     let text = std::str::from_utf8(&bytes[..count]).ok()?;
-    let waited = text.split_ascii_whitespace().nth(1)?.parse().ok()?;
-    Some(Duration::from_nanos(waited))
+    let number = text.split_ascii_whitespace().nth(position)?.parse().ok()?;
+    Some(Duration::from_nanos(number))
 }
 
 #[cfg(test)]
@@ -74,9 +80,10 @@ mod tests {
         thread::scope(|scope| {
             let pinned = scope.spawn(|| {
                 affinity::pin_current_thread(&[cpu]).unwrap();
-                let before = OwnWait::now(&[cpu]);
+                let now = || OwnWait::now("", &[], Duration::ZERO);
+                let before = now();
                 // With another thread that never sleeps on the same CPU.
-                while OwnWait::now(&[cpu]).since(&before) < Duration::from_millis(20) {}
+                while now().since(&before) < Duration::from_millis(20) {}
                 over.store(true, Ordering::Relaxed);
             });
             scope.spawn(|| {
@@ -85,13 +92,25 @@ mod tests {
             });
             pinned.join().unwrap();
         });
-        assert_eq!(OwnWait::default().since(&OwnWait::now(&[])), Duration::ZERO);
+    }
+
+    #[test]
+    fn time_of_the_logs_reader_is_no_excuse() {
+        let at = |waited_ms, ran_ms| OwnWait {
+            waited: Duration::from_millis(waited_ms),
+            log_reader_ran: Duration::from_millis(ran_ms),
+            ticks: Vec::new(),
+        };
+        assert_eq!(at(50, 0).since(&at(10, 0)), Duration::from_millis(40));
+        assert_eq!(at(50, 35).since(&at(10, 5)), Duration::from_millis(10));
+        assert_eq!(at(50, 95).since(&at(10, 5)), Duration::ZERO);
     }
 
     #[test]
     fn only_what_was_stolen_of_all_cpus_held_it_up() {
         let stolen = |each: &[u64]| OwnWait {
             waited: Duration::ZERO,
+            log_reader_ran: Duration::ZERO,
             ticks: each
                 .iter()
                 .map(|stolen| Ticks {

@@ -285,8 +285,14 @@ impl AgentProcess {
         let stat = fs::read_to_string("/proc/stat").unwrap_or_default();
         Glance {
             cpus: evidence.and_then(|evidence| evidence.glance(&self.threads, &stat)),
-            own: own_cpus.map(|cpus| OwnWait::with(&stat, cpus)),
+            own: own_cpus.map(|cpus| OwnWait::now(&stat, cpus, self.stderr.ran())),
         }
+    }
+
+    /// The counters of the calling thread, which may use `cpus`, after a [`Self::glance_at_cpus`].
+    pub fn own_wait(&self, cpus: &[usize]) -> OwnWait {
+        let stat = fs::read_to_string("/proc/stat").unwrap_or_default();
+        OwnWait::now(&stat, cpus, self.stderr.ran())
     }
 
     /// For how much of the time since `asked`, or since `looks` at it began, or by the `glance` before it was

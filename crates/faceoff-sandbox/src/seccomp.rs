@@ -190,6 +190,15 @@ impl Filters {
         let mut unheeded = whatever_arguments(&[UNHEEDED]);
         unheeded.insert(libc::SYS_madvise, one_of(2, &UNHEEDED_ADVICE)?);
         unheeded.insert(libc::SYS_fcntl, one_of(1, &[libc::F_GETLK])?);
+        // How much of its log may lie unread is not an agent's to say. Libraries ask for room, and do not look.
+        let room = [libc::SO_SNDBUF, libc::SO_SNDBUFFORCE].map(|option| {
+            rule([
+                argument(1, SeccompCmpOp::Eq, libc::SOL_SOCKET),
+                argument(2, SeccompCmpOp::Eq, option),
+            ])
+        });
+        let room = room.into_iter().collect::<Result<Vec<_>, _>>()?;
+        unheeded.insert(libc::SYS_setsockopt, room);
         let mut unknown_requests = Rules::new();
         unknown_requests.insert(libc::SYS_fcntl, one_of(1, &UNKNOWN_REQUESTS)?);
         // Collapsing pages of a file changes what others find of it.

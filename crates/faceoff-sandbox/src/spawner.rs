@@ -4,7 +4,7 @@
 //! (a pool's thread may end while its agent plays on), so the fork happens on a thread that lives as
 //! long as the process.
 
-use rustix::thread;
+use crate::affinity;
 use std::{
     io,
     process::{Child, Command},
@@ -45,10 +45,7 @@ fn spawner() -> io::Result<mpsc::Sender<Job>> {
 fn run(jobs: &mpsc::Receiver<Job>) {
     // This thread may descend from a worker slot that is pinned to its own CPUs; children must not
     // inherit that. The main thread's set is the service's.
-    let main_thread = rustix::process::getpid();
-    if let Ok(set) = thread::sched_getaffinity(Some(main_thread)) {
-        let _ = thread::sched_setaffinity(None, &set);
-    }
+    affinity::as_the_process();
     for (mut command, answer) in jobs {
         let child = command.spawn();
         drop(command);

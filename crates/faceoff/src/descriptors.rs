@@ -103,13 +103,13 @@ mod tests {
         let divide = |limit, slots| Descriptors::divide(limit, slots, &wanted);
         let plenty = divide(65_536, 4).unwrap();
         assert_eq!((plenty.connections, plenty.per_address), (1024, 64));
-        let few = divide(200, 1).unwrap();
+        let few = divide(300, 1).unwrap();
         assert_eq!(
             (few.reserved, few.connections, few.per_address),
-            (128, 24, 6)
+            (224, 25, 6)
         );
-        let error = divide(140, 1).unwrap_err().to_string();
+        let error = divide(240, 1).unwrap_err().to_string();
         assert!(error.contains("ulimit -n"), "{error}");
-        assert!(divide(200, 2).is_err());
+        assert!(divide(300, 2).is_err());
     }
 }

@@ -1,7 +1,7 @@
 //! Both sides are asked before either is waited for, and whatever one does, the other's clock is its own. Where both
 //! share CPUs, who has answered is frozen until it is asked again: it would compute in the other's time.
 
-use super::side_player::{SidePlayer, Started};
+use super::side_player::SidePlayer;
 use crate::{calibration::Calibration, fault::PlatformFault, session::Session};
 use faceoff_episode::{GameCourse, GameSink, Question};
 use faceoff_sandbox::{Layer, SandboxError};
@@ -40,6 +40,7 @@ pub(super) fn play<S: GameSink>(
         }
         for side in &mut *sides {
             side.tell_end(rally, steps)?;
+            rest(side, answered);
         }
         for calibration in &mut *calibrations {
             calibration.between_episodes()?;
@@ -59,7 +60,10 @@ fn get_ready<S: GameSink>(
 ) -> Result<(), PlatformFault> {
     let rally = course.rally();
     let [first, second] = sides;
-    let started: [Started; 2] = [first.start()?, second.start()?];
+    rest(second, answered);
+    let first_started = first.start()?;
+    rest(first, answered);
+    let second_started = second.start()?;
     if answered == OnceAnswered::IsFrozen && !(first.can_freeze() && second.can_freeze()) {
         return Err(no_freezer().into());
     }
@@ -68,11 +72,17 @@ fn get_ready<S: GameSink>(
     })?;
     wait_for_both(sides, answered)?;
     let [first, second] = sides;
-    let [first_started, second_started] = started;
     let entries = [first.entry(first_started), second.entry(second_started)];
     course.start_rally(entries)?;
     end_faulty(course, sides);
     Ok(())
+}
+
+/// Stops a side that is asked nothing, until it is asked again.
+fn rest(side: &mut SidePlayer<'_>, answered: OnceAnswered) {
+    if answered == OnceAnswered::IsFrozen {
+        side.freeze();
+    }
 }
 
 /// Asks both for one step and plays it.

@@ -179,9 +179,11 @@ impl<'a> SidePlayer<'a> {
         Ok(())
     }
 
-    /// Stops the agent, if it has answered, until it is asked again.
+    /// Stops the agent, if it runs and no answer of it is due, until it is asked again.
     pub fn freeze(&mut self) {
-        if let (Some(session), Some(Ok(_))) = (&mut self.session, &self.came) {
+        if self.due().is_none()
+            && let Some(session) = &mut self.session
+        {
             session.freeze();
         }
     }

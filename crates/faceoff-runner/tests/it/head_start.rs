@@ -52,48 +52,37 @@ impl GameObserver for Nobody {
     }
 }
 
-/// One side answers at once and goes on computing; the other one sleeps at each step.
+/// One side answers at once and goes on computing; the other one sleeps at each step. An evaluator that is kept from its
+/// own CPU freezes late, so the best of many steps tells.
 #[test]
 fn side_that_has_answered_is_frozen_on_shared_cpus() {
     let hog = Agent::with(&format!(
         "import atexit\n{SPINS}\n\
-         began = None\n\
+         answered, computed = None, []\n\
          def on_step(step, answer):\n    \
-         global began\n    \
-         began = began or time.process_time()\n    \
+         global answered\n    \
+         now = time.process_time()\n    \
+         if answered: computed.append(now - answered)\n    \
+         answered = now\n    \
          return json.dumps(answer)\n\
-         atexit.register(lambda: print('computed', time.process_time() - began, file=sys.stderr))"
+         atexit.register(lambda: print('least', min(computed), file=sys.stderr))"
     ));
-    let sleeper = Agent::with(
-        "import atexit\n\
-         slept = 0\n\
-         def on_step(step, answer):\n    \
-         global slept\n    \
-         now = time.monotonic()\n    \
-         time.sleep(0.01)\n    \
-         slept += time.monotonic() - now\n    \
-         return json.dumps(answer)\n\
-         atexit.register(lambda: print('slept', slept, file=sys.stderr))",
-    );
+    let sleeper =
+        Agent::with("def on_step(step, answer): time.sleep(0.1); return json.dumps(answer)");
     let out = tempfile::tempdir().unwrap();
     let env = on_last_cpu();
     let played = run_game(
-        &game::spec(300),
+        &game::spec(40),
         [&hog.bundle, &sleeper.bundle],
         [&env; 2],
         out.path(),
         &mut Nobody,
     );
     let logs = played.unwrap().logs;
-    let number = |log: &str| -> f64 {
-        let line = log.lines().find(|line| line.contains(' '));
-        line.and_then(|line| line.split(' ').nth(1)?.parse().ok())
-            .unwrap_or_else(|| panic!("{log}"))
-    };
-    let (computed_s, slept_s) = (number(&logs[0]), number(&logs[1]));
-    // Until it is frozen, and while a step is simulated, it may.
+    let least = logs[0].lines().find_map(|line| line.strip_prefix("least "));
+    let least_s: f64 = least.unwrap_or_else(|| panic!("{logs:?}")).parse().unwrap();
     assert!(
-        computed_s < 0.5 * slept_s,
-        "it computed for {computed_s} s while the other slept for {slept_s} s"
+        least_s < 0.05,
+        "it computed for {least_s} s and more while the other slept for 0.1 s"
     );
 }

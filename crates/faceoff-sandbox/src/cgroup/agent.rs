@@ -44,7 +44,7 @@ pub(crate) struct AgentCgroup {
     memory: Option<(Version, PathBuf)>,
     pids: Option<PathBuf>,
     /// Where its quota is.
-    cpu: Option<PathBuf>,
+    cpu: Option<(Version, PathBuf)>,
     cpu_usage: Option<(Version, File)>,
     /// What else ran on its CPUs; `None` where the host does not tell.
     pub(crate) cpu_evidence: Option<CpuEvidence>,
@@ -127,7 +127,11 @@ impl AgentCgroup {
             Version::V2 => &[],
         };
         let leaf = self.leaf(&home, controllers, name).ok()?;
-        Freezer::open(home.version, &leaf)
+        let cpu = self
+            .cpu
+            .as_ref()
+            .map(|(version, leaf)| (*version, leaf.as_path()));
+        Freezer::open(home.version, &leaf, cpu)
     }
 
     /// Stops and starts the tree; `None` where the host has nothing for it.
@@ -199,7 +203,7 @@ impl AgentCgroup {
                     }
                     Version::V2 => set("cpu.max", format!("{quota_us} {CPU_PERIOD_US}"))?,
                 }
-                self.cpu = Some(leaf.to_path_buf());
+                self.cpu = Some((version, leaf.to_path_buf()));
             }
             (Layer::Namespaces | Layer::Seccomp | Layer::Rlimits, _) => {}
         }
@@ -237,7 +241,7 @@ impl AgentCgroup {
             }
             Version::V2 => open(leaf.join(file)).map(|agent| RunTime::Whole { agent }),
         };
-        let limited = self.cpu.as_ref().map(|leaf| leaf.join("cpu.stat"));
+        let limited = self.cpu.as_ref().map(|(_, leaf)| leaf.join("cpu.stat"));
         self.cpu_evidence = run_time
             .filter(|_| !cpus.is_empty())
             .map(|run_time| CpuEvidence {

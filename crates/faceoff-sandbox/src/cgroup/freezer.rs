@@ -7,25 +7,67 @@ use std::{
     path::Path,
 };
 
-/// What stops the tasks of one cgroup. They stop where they next leave the kernel; nobody waits for that.
+/// What stops the tasks of one cgroup. They stop where they next leave the kernel, which can take a call that lasts;
+/// until then they have next to no weight beside others.
 #[derive(Debug)]
 pub(crate) struct Freezer {
     version: Version,
     state: File,
+    /// Where the weight of its CPU time is, if it has one.
+    weight: Option<Weight>,
+}
+
+#[derive(Debug)]
+struct Weight {
+    file: File,
+    ordinary: &'static str,
+    least: &'static str,
+}
+
+impl Weight {
+    fn open(version: Version, leaf: &Path) -> Option<Self> {
+        let (name, ordinary, least) = match version {
+            Version::V1 => ("cpu.shares", "1024", "2"),
+            Version::V2 => ("cpu.weight", "100", "1"),
+        };
+        let file = fs::OpenOptions::new().write(true).open(leaf.join(name));
+        Some(Self {
+            file: file.ok()?,
+            ordinary,
+            least,
+        })
+    }
+
+    fn set(&self, weight: &str) {
+        if let Err(error) = self.file.write_at(weight.as_bytes(), 0) {
+            tracing::warn!(%error, weight, "an agent's weight cannot be set");
+        }
+    }
 }
 
 impl Freezer {
-    /// That of `leaf`; `None` where the kernel has none or this user may not use it.
-    pub(super) fn open(version: Version, leaf: &Path) -> Option<Self> {
+    /// That of `leaf`, with the weight that `cpu` has; `None` where the kernel has none or this user may not use it.
+    pub(super) fn open(
+        version: Version,
+        leaf: &Path,
+        cpu: Option<(Version, &Path)>,
+    ) -> Option<Self> {
         let state = fs::OpenOptions::new()
             .write(true)
             .open(leaf.join(file(version)))
             .ok()?;
-        Some(Self { version, state })
+        Some(Self {
+            version,
+            state,
+            weight: cpu.and_then(|(version, leaf)| Weight::open(version, leaf)),
+        })
     }
 
     /// Tells whether it did.
     pub(crate) fn freeze(&self) -> bool {
+        if let Some(weight) = &self.weight {
+            weight.set(weight.least);
+        }
         self.set(match self.version {
             Version::V1 => "FROZEN",
             Version::V2 => "1",
@@ -34,10 +76,14 @@ impl Freezer {
 
     /// Tells whether it did. Of what is not frozen nothing changes.
     pub(crate) fn thaw(&self) -> bool {
-        self.set(match self.version {
+        let thawed = self.set(match self.version {
             Version::V1 => "THAWED",
             Version::V2 => "0",
-        })
+        });
+        if let Some(weight) = &self.weight {
+            weight.set(weight.ordinary);
+        }
+        thawed
     }
 
     fn set(&self, state: &str) -> bool {

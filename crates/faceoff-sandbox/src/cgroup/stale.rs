@@ -2,7 +2,7 @@
 
 use super::{
     hierarchy::{FOLDER, Hierarchies},
-    leaf::{LEAF_PREFIX, remove_leaf},
+    leaf::{LEAF_PREFIX, end_all, remove_leaf},
 };
 use crate::owner::Owner;
 use std::{collections::BTreeSet, fs, path::PathBuf};
@@ -17,19 +17,24 @@ pub(crate) fn sweep() -> usize {
         .filter_map(|controller| hierarchies.find(controller))
         .map(|home| home.own.join(FOLDER))
         .collect();
-    let mut removed = 0;
-    for folder in folders {
-        for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
-            let name = entry.file_name();
-            let owner = name
-                .to_str()
-                .and_then(|name| Owner::of_name(name, LEAF_PREFIX));
-            if owner.is_some_and(Owner::is_dead) {
-                tracing::info!(cgroup = %entry.path().display(), "removing the cgroup of a dead service's agent");
-                remove_leaf(&entry.path());
-                removed += 1;
-            }
-        }
+    let entries = folders
+        .into_iter()
+        .flat_map(|folder| fs::read_dir(folder).into_iter().flatten().flatten());
+    let of_the_dead = entries.filter(|entry| {
+        let name = entry.file_name();
+        let owner = name
+            .to_str()
+            .and_then(|name| Owner::of_name(name, LEAF_PREFIX));
+        owner.is_some_and(Owner::is_dead)
+    });
+    let leaves: Vec<PathBuf> = of_the_dead.map(|entry| entry.path()).collect();
+    // All before one is waited for: an agent that is frozen in one hierarchy dies in none.
+    for leaf in &leaves {
+        tracing::info!(cgroup = %leaf.display(), "removing the cgroup of a dead service's agent");
+        end_all(leaf);
     }
-    removed
+    for leaf in &leaves {
+        remove_leaf(leaf);
+    }
+    leaves.len()
 }

@@ -10,7 +10,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-const KINDS: [&str; 14] = [
+const KINDS: [&str; 15] = [
     "splice-output",
     "splice-input",
     "splice-log",
@@ -23,6 +23,7 @@ const KINDS: [&str; 14] = [
     "close-input",
     "close-output",
     "fills",
+    "watches",
     "dribbles",
     "passes-files",
 ];

@@ -1,7 +1,7 @@
 //! A service that is killed takes its agents with it, and the next one cleans up.
 
 use crate::harness::{PATIENCE, Subject, agent_cgroups, expect_line, processes_marked};
-use faceoff_sandbox::sweep_stale;
+use faceoff_sandbox::{AgentProcess, sweep_stale};
 use rustix::{
     event::{PollFd, PollFlags, Timespec, poll},
     process::{Pid, PidfdFlags, pidfd_open},
@@ -11,15 +11,23 @@ use std::{
     process::{Command, Stdio},
 };
 
+/// Version 1 of the cgroup interface lets nobody die who is frozen.
+#[test]
+fn frozen_agent_of_a_killed_service_is_swept() {
+    is_ended_with_its_service(
+        "killed_service::a_service_that_waits_with_a_frozen_agent",
+        true,
+    );
+}
+
 #[test]
 fn an_agent_dies_with_a_killed_service_and_its_cgroup_is_swept() {
+    is_ended_with_its_service("killed_service::a_service_that_waits", false);
+}
+
+fn is_ended_with_its_service(service: &str, by_the_sweep: bool) {
     let mut service = Command::new(std::env::current_exe().unwrap())
-        .args([
-            "--exact",
-            "killed_service::a_service_that_waits",
-            "--ignored",
-            "--nocapture",
-        ])
+        .args(["--exact", service, "--ignored", "--nocapture"])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()
@@ -44,6 +52,9 @@ fn an_agent_dies_with_a_killed_service_and_its_cgroup_is_swept() {
 
     service.kill().unwrap();
     service.wait().unwrap();
+    if by_the_sweep {
+        sweep_stale();
+    }
     let patience = Timespec {
         tv_sec: PATIENCE.as_secs().try_into().unwrap(),
         tv_nsec: 0,
@@ -66,10 +77,21 @@ fn an_agent_dies_with_a_killed_service_and_its_cgroup_is_swept() {
 #[test]
 #[ignore = "the service that the test above starts and kills"]
 fn a_service_that_waits() {
+    wait_with_an_agent(|_| {});
+}
+
+#[test]
+#[ignore = "the service that a test above starts and kills"]
+fn a_service_that_waits_with_a_frozen_agent() {
+    wait_with_an_agent(|agent| drop(agent.freeze()));
+}
+
+fn wait_with_an_agent(then: impl FnOnce(&mut AgentProcess)) {
     let subject = Subject::new("clings", &["daemon-stays"]);
     // The agent must not be tied to the thread that happened to start it.
     let mut agent = std::thread::scope(|scope| scope.spawn(|| subject.spawn()).join().unwrap());
     assert_eq!(expect_line(&mut agent), "ready");
+    then(&mut agent);
     println!("the mark is {}", subject.mark);
     // Until it is killed, or its parent is.
     let _ = std::io::stdin().read_line(&mut String::new());
