@@ -88,7 +88,9 @@ mod tests {
             });
             scope.spawn(|| {
                 affinity::pin_current_thread(&[cpu]).unwrap();
-                while !over.load(Ordering::Relaxed) {}
+                while !over.load(Ordering::Relaxed) {
+                    std::hint::spin_loop();
+                }
             });
             pinned.join().unwrap();
         });

@@ -77,7 +77,9 @@ fn make(call: Call, agent: &mut AgentProcess) {
             line.push(b'\n');
             let _ = agent.send_line(&line);
         }
-        Call::IsPending => drop(agent.has_pending_output().unwrap()),
+        Call::IsPending => {
+            agent.has_pending_output().unwrap();
+        }
         Call::Read { within_ms } => drop(agent.read_line(LINE_CAP, soon(within_ms)).unwrap()),
         Call::LookOut => agent.look_out(soon(1)).unwrap(),
         Call::WaitForAny => AgentProcess::wait_for_any(&[agent], soon(5)).unwrap(),

@@ -83,7 +83,10 @@ fn a_service_that_waits() {
 #[test]
 #[ignore = "the service that a test above starts and kills"]
 fn a_service_that_waits_with_a_frozen_agent() {
-    wait_with_an_agent(|agent| drop(agent.freeze()));
+    wait_with_an_agent(|agent| {
+        // A host without a freezer shows the same without.
+        agent.freeze();
+    });
 }
 
 fn wait_with_an_agent(then: impl FnOnce(&mut AgentProcess)) {
