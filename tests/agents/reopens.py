@@ -1,10 +1,11 @@
 """Tries to open its standard input and output anew by every name that `/proc` has for them, in this process
-and in a child, and to make the input smaller. Reports each error's name, or `ok`.
+and in a child, to make the input smaller, and the room for its log larger. Reports each error's name, or `ok`.
 """
 import errno
 import fcntl
 import json
 import os
+import socket
 import threading
 
 SHRINK = 1031
@@ -54,6 +55,11 @@ if os.fstat(0).st_mode & 0o170000 == 0o010000:
 copy = os.dup(0)
 for label, fd in (("input", 0), ("output", 1), ("copy", copy)):
     found[f"shrink {label}"] = attempt(lambda: fcntl.fcntl(fd, SHRINK, 4096))
+with socket.socket(fileno=os.dup(2)) as log:
+    before = log.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF)
+    found["room"] = attempt(lambda: log.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4 * before))
+    if log.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF) == before:
+        found["room"] = "stays"
 stop.set()
 other.join()
 print(json.dumps(found), flush=True)

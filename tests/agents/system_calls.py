@@ -53,6 +53,7 @@ calls = {
     "sethostname": (170, at, 1),
     "settimeofday": (164, at, 0),
     "personality": (135, 0xFFFFFFFF),
+    "sched_setattr": (314, 0, at, 1 << 30),
     "seccomp": (317, 2, 0, at),
     "modify_ldt": (154, 0, at, 0),
     "iopl": (172, 3),

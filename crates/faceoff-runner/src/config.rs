@@ -23,7 +23,7 @@ pub struct AgentEnvironment {
 }
 
 impl AgentEnvironment {
-    /// Is the agent's CPU time counted at little cost, and does it have to be?
+    /// Has the agent a cgroup that counts and limits its CPU time?
     pub(crate) fn counts_cpus(&self) -> bool {
         self.isolation.enforces(Layer::CgroupCpu)
     }

@@ -16,11 +16,9 @@ pub(crate) struct CpuUse {
     answered_at: Instant,
     /// At the last question.
     asked_s: Option<f64>,
-    /// Now.
-    now_s: Option<f64>,
     /// At the answer before the last question.
     before_s: Option<f64>,
-    /// As many CPUs as it can use at a time; `None` where reading the clock costs too much, or it is not to count.
+    /// As many CPUs as it can use at a time; `None` without a cgroup that counts: to add up processes costs too much.
     cpus: Option<f64>,
 }
 
@@ -31,7 +29,6 @@ impl CpuUse {
             answered_s: now_s,
             answered_at: Instant::now(),
             asked_s: now_s,
-            now_s,
             before_s: now_s,
             cpus: env.counts_cpus().then_some(env.limits.cpus),
         }
@@ -42,11 +39,7 @@ impl CpuUse {
     pub fn asked(&mut self, asked: Instant, read: impl FnOnce() -> Option<f64>) -> Duration {
         let gap = asked.saturating_duration_since(self.answered_at);
         self.before_s = self.answered_s;
-        if gap < SHORTEST_GAP {
-            self.asked_s = self.answered_s;
-            return Duration::ZERO;
-        }
-        let Some(cpus) = self.cpus else {
+        let Some(cpus) = self.cpus.filter(|_| gap >= SHORTEST_GAP) else {
             self.asked_s = self.answered_s;
             return Duration::ZERO;
         };
@@ -58,24 +51,18 @@ impl CpuUse {
 
     /// It has answered at `at`.
     pub fn answered(&mut self, at: Instant, now_s: Option<f64>) {
-        self.now_s = now_s;
         self.answered_s = now_s;
         self.answered_at = at;
     }
 
-    /// It has not answered yet.
-    pub fn looked(&mut self, now_s: Option<f64>) {
-        self.now_s = now_s;
-    }
-
     /// Used since the last question, seconds.
-    pub fn since_question_s(&self) -> Option<f64> {
-        used(self.asked_s, self.now_s)
+    pub fn since_question_s(&self, now_s: Option<f64>) -> Option<f64> {
+        used(self.asked_s, now_s)
     }
 
     /// Used since the answer before the last question, seconds.
-    pub fn since_answer_s(&self) -> Option<f64> {
-        used(self.before_s, self.now_s)
+    pub fn since_answer_s(&self, now_s: Option<f64>) -> Option<f64> {
+        used(self.before_s, now_s)
     }
 }
 
@@ -92,7 +79,6 @@ mod tests {
             answered_s: Some(1.0),
             answered_at: Instant::now(),
             asked_s: Some(1.0),
-            now_s: Some(1.0),
             before_s: Some(1.0),
             cpus,
         }
@@ -106,9 +92,10 @@ mod tests {
         let asked = cpu.answered_at + MS(10);
         let close = |a: Duration, b: Duration| a.abs_diff(b) < Duration::from_micros(1);
         assert!(close(cpu.asked(asked, || Some(1.007)), MS(7)));
-        cpu.answered(asked + MS(5), Some(1.009));
-        assert!((cpu.since_question_s().unwrap() - 0.002).abs() < 1e-9);
-        assert!((cpu.since_answer_s().unwrap() - 0.009).abs() < 1e-9);
+        let now_s = Some(1.009);
+        assert!((cpu.since_question_s(now_s).unwrap() - 0.002).abs() < 1e-9);
+        assert!((cpu.since_answer_s(now_s).unwrap() - 0.009).abs() < 1e-9);
+        cpu.answered(asked + MS(5), now_s);
         // What the kernel charges later cannot have been used in between.
         let asked = cpu.answered_at + MS(1);
         assert!(close(cpu.asked(asked, || Some(1.5)), MS(2)));

@@ -11,8 +11,8 @@ use crate::{
     waited::Waited,
 };
 use faceoff_sandbox::{
-    AgentProcess, CpuReading, Layer, Outcome, OwnWait, ReadLine, Runtime, SpawnError, SpawnSpec,
-    WriteError, affinity,
+    AgentProcess, AnswerState, Glance, Layer, ReadLine, Runtime, SpawnError, SpawnSpec, WriteError,
+    affinity,
 };
 use faceoff_types::{AgentFaultKind, Phase, TimeLimits};
 use faceoff_wire::{MAX_LINE_BYTES, Message, answer, quote_line};
@@ -36,22 +36,12 @@ pub(crate) struct Exchange<'w> {
     /// Was its last answer a quick one?
     is_quick: bool,
     /// What the counters said at the last glance.
-    glance: Option<Glance>,
+    glance: Option<Arc<Glance>>,
     /// The message being sent; its memory is reused.
     line: Vec<u8>,
     cpu: CpuUse,
     /// How long it may take to exit once it has closed its output, so that its status can be told.
     exit_grace: Duration,
-}
-
-/// Counters right before a question.
-#[derive(Debug, Clone)]
-struct Glance {
-    at: Instant,
-    /// Of the agent's CPUs, where the host tells.
-    cpus: Option<Arc<CpuReading>>,
-    /// Of the calling thread, where it keeps off the agent's CPUs.
-    own: Option<Arc<OwnWait>>,
 }
 
 /// A question that waits for its answer.
@@ -60,7 +50,6 @@ pub(crate) struct Sent {
     phase: Phase,
     limit_s: f64,
     wait: Wait,
-    own: Option<Arc<OwnWait>>,
     /// CPU time that the agent used between its last answer and this question.
     head_start: Duration,
 }
@@ -151,8 +140,7 @@ impl<'w> Exchange<'w> {
         let sent = sent.map(|head_start| Sent {
             phase,
             limit_s,
-            wait: Wait::begin(glance.cpus, asked, Instant::now(), limit),
-            own: glance.own,
+            wait: Wait::begin(Some(glance), asked, Instant::now(), limit),
             head_start,
         });
         self.unless_ended(sent, phase, limit_s, asked)
@@ -203,21 +191,16 @@ impl<'w> Exchange<'w> {
 
     /// The counters before a question, which may be as old as [`GLANCE_LASTS`]: to read them for each of an
     /// instant agent's questions would cost more than the answer. They are the kernel's: no agent holds one.
-    fn glance(&mut self, phase: Phase) -> Glance {
+    fn glance(&mut self, phase: Phase) -> Arc<Glance> {
         if phase != Phase::Step {
             self.process.know_threads();
             self.glance = None;
         }
         match &self.glance {
-            Some(glance) if glance.at.elapsed() < GLANCE_LASTS => glance.clone(),
+            Some(glance) if glance.at.elapsed() < GLANCE_LASTS => Arc::clone(glance),
             _ => {
                 let glance = self.process.glance_at_cpus(self.own_cpus.as_deref());
-                let glance = Glance {
-                    own: glance.own.map(Arc::new),
-                    cpus: glance.cpus.map(Arc::new),
-                    at: Instant::now(),
-                };
-                self.glance.insert(glance).clone()
+                Arc::clone(self.glance.insert(Arc::new(glance)))
             }
         }
     }
@@ -308,8 +291,9 @@ impl<'w> Exchange<'w> {
     }
 
     fn answer(&mut self, sent: &Sent, bytes: Vec<u8>, at: Instant) -> Answer {
-        self.cpu.answered(at, self.process.cpu_time_s());
-        let waited = self.waited(sent, at, Outcome::Answered);
+        let used_s = self.process.cpu_time_s();
+        let waited = self.waited(sent, at, used_s, AnswerState::Taken);
+        self.cpu.answered(at, used_s);
         self.is_quick = waited.wall < QUICK;
         Answer { bytes, waited }
     }
@@ -318,8 +302,8 @@ impl<'w> Exchange<'w> {
     fn look(&mut self, sent: &mut Sent) -> Result<(), Trouble> {
         let now = Instant::now();
         if now >= sent.wait.deadline {
-            self.cpu.looked(self.process.cpu_time_s());
-            let waited = self.waited(sent, now, Outcome::Pending);
+            let used_s = self.process.cpu_time_s();
+            let waited = self.waited(sent, now, used_s, AnswerState::Pending);
             let fault = AgentFaultKind::TimedOut {
                 phase: sent.phase,
                 limit_s: sent.limit_s,
@@ -344,33 +328,45 @@ impl<'w> Exchange<'w> {
         Ok(())
     }
 
-    /// The wait for an answer until `now`.
-    fn waited(&self, sent: &Sent, now: Instant, outcome: Outcome) -> Waited {
+    /// The wait for an answer until `now`, when the agent had used `used_s` of CPU time.
+    fn waited(
+        &self,
+        sent: &Sent,
+        now: Instant,
+        used_s: Option<f64>,
+        answer: AnswerState,
+    ) -> Waited {
+        let ran_s = self.cpu.since_question_s(used_s);
         Waited {
             wall: now.saturating_duration_since(sent.wait.asked),
-            host: self.taken_by_host(sent, now, outcome),
+            host: self.taken_by_host(&sent.wait, now, ran_s, answer),
             head_start: sent.head_start,
-            cpu_time_s: self.cpu.since_answer_s(),
+            cpu_time_s: self.cpu.since_answer_s(used_s),
         }
     }
 
-    fn taken_by_host(&self, sent: &Sent, now: Instant, outcome: Outcome) -> Duration {
-        if !sent.wait.is_late(now) {
+    fn taken_by_host(
+        &self,
+        wait: &Wait,
+        now: Instant,
+        ran_s: Option<f64>,
+        answer: AnswerState,
+    ) -> Duration {
+        if !wait.is_late(now) {
             return Duration::ZERO;
         }
-        let wait = &sent.wait;
         let taken =
             self.process
-                .taken_from_it_since(wait.asked, wait.looks(), wait.before(), outcome);
-        let own = self.own_cpus.as_deref().zip(sent.own.as_deref());
+                .taken_from_it_since(wait.asked, wait.looks(), wait.cpus_before(), answer);
+        let own = self.own_cpus.as_deref().zip(wait.own_before());
         let evidence = Evidence {
             now,
             kept: taken.map(|taken| taken.kept),
             stolen: taken.map_or(Duration::ZERO, |taken| taken.stolen),
-            agent_ran: self.cpu.since_question_s().map(TimeLimits::duration),
+            agent_ran: ran_s.map(TimeLimits::duration),
             own_wait: own.map(|(cpus, before)| self.process.own_wait(cpus).since(before)),
         };
-        sent.wait.taken(self.watch, evidence)
+        wait.taken(self.watch, evidence)
     }
 
     /// Gives the agent `grace` to exit, then kills it; returns the end of its standard error.

@@ -2,7 +2,7 @@
 //! answers that are late: before that there is no more than a glance at them, which costs some
 //! microseconds.
 
-use faceoff_sandbox::{CpuReading, Looks};
+use faceoff_sandbox::{CpuReading, Glance, Looks, OwnWait};
 use std::{
     sync::Arc,
     time::{Duration, Instant},
@@ -46,7 +46,7 @@ pub(crate) struct Wait {
     pub asked: Instant,
     limit: Duration,
     /// What the counters said before, at a glance, [`GLANCE_LASTS`] ago at most.
-    before: Option<Arc<CpuReading>>,
+    before: Option<Arc<Glance>>,
     /// By how much too long it took the evaluator to write the question.
     held_up: Duration,
     /// The answer is late, and this is what the counters said since.
@@ -78,7 +78,7 @@ impl Wait {
     /// The wait for an answer to what was asked at `asked`, whose limit runs from then on; the attempt to
     /// write it, which waits for nothing, was over at `written`.
     pub fn begin(
-        before: Option<Arc<CpuReading>>,
+        before: Option<Arc<Glance>>,
         asked: Instant,
         written: Instant,
         limit: Duration,
@@ -110,17 +110,22 @@ impl Wait {
     pub fn look(&mut self, reading: Option<CpuReading>) {
         match (&mut self.late, reading) {
             (None, reading) => {
-                let before = self.before.as_deref();
-                self.late = Some(reading.map(|now| Looks::begin(now, before, self.asked)));
+                let begin = |now| Looks::begin(now, self.cpus_before(), self.asked);
+                self.late = Some(reading.map(begin));
             }
             (Some(Some(looks)), Some(reading)) => looks.add(reading),
             (Some(_), _) => {}
         }
     }
 
-    /// What the counters said at a glance before the question.
-    pub fn before(&self) -> Option<&CpuReading> {
-        self.before.as_deref()
+    /// What the counters of the agent's CPUs said at a glance before the question.
+    pub fn cpus_before(&self) -> Option<&CpuReading> {
+        self.before.as_ref()?.cpus.as_ref()
+    }
+
+    /// … and those of the evaluator's own thread.
+    pub fn own_before(&self) -> Option<&OwnWait> {
+        self.before.as_ref()?.own.as_ref()
     }
 
     /// What the counters said since the answer was found to be late.

@@ -3,6 +3,7 @@
 //!
 //! Only a bounded number of threads is looked at, so that a look costs the same however many an agent has.
 
+use crate::sched_stat::SchedStat;
 use rustix::process::Pid;
 use std::{
     collections::BTreeMap,
@@ -75,11 +76,11 @@ struct Account {
     was_asleep: bool,
 }
 
-/// What the end of a wait says about whoever waits.
+/// Whether the answer is there for which a late agent was looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome {
+pub enum AnswerState {
     /// The answer is there: who was not let run since has not contributed to it.
-    Answered,
+    Taken,
     /// It may still come.
     Pending,
 }
@@ -119,11 +120,11 @@ impl Ledger {
     }
 
     /// For how long one and the same thread was seen waiting.
-    pub(crate) fn longest_unlet(&self, now: &Waits, outcome: Outcome) -> Duration {
+    pub(crate) fn longest_unlet(&self, now: &Waits, answer: AnswerState) -> Duration {
         let each = self.0.iter().filter_map(|(id, account)| {
             let thread = now.threads.get(id)?;
             let ran_since = thread.slices != account.slices;
-            (!thread.gives_way && (ran_since || outcome == Outcome::Pending))
+            (!thread.gives_way && (ran_since || answer == AnswerState::Pending))
                 .then_some(account.unlet)
         });
         each.max().unwrap_or_default()
@@ -153,7 +154,7 @@ impl Waits {
         before: &Self,
         wall: Duration,
         ledger: &Ledger,
-        outcome: Outcome,
+        answer: AnswerState,
     ) -> Duration {
         let since = |(id, now): (&u32, &Thread)| {
             // Of a thread that was not known nothing follows.
@@ -165,7 +166,7 @@ impl Waits {
             if now.slices == then.slices {
                 // The wait that it is in is added to the counter when it ends.
                 let waits = now.wants_to_run && now.ran == then.ran && from == then.waited;
-                return (waits && outcome == Outcome::Pending).then_some(wall);
+                return (waits && answer == AnswerState::Pending).then_some(wall);
             }
             Some(now.waited.saturating_sub(from))
         };
@@ -258,34 +259,32 @@ impl KnownThread {
 
     /// `None` of a thread that has ended.
     fn counters(&self) -> Option<Thread> {
-        counters(&read::<128>(&self.schedule)?)
+        SchedStat::read(&self.schedule).map(Thread::of)
     }
 
     fn look(&self) -> Option<Thread> {
         // The state first: one that is let run, sleeps and is woken has another number of slices then.
-        let status = read::<1024>(&self.status)?;
-        let counters = self.counters()?;
-        wishes(&status, counters)
+        let mut status = [0; 1024];
+        let count = self.status.read_at(&mut status, 0).ok()?;
+        wishes(&String::from_utf8_lossy(&status[..count]), self.counters()?)
     }
 }
 
-fn read<const SIZE: usize>(file: &File) -> Option<String> {
-    let mut bytes = [0; SIZE];
-    let count = file.read_at(&mut bytes, 0).ok()?;
-    Some(String::from_utf8_lossy(&bytes[..count]).into_owned())
-}
-
-/// What `schedstat` tells: nanoseconds of running and of waiting, and the number of slices.
-fn counters(schedule: &str) -> Option<Thread> {
-    let mut numbers = schedule.split_ascii_whitespace().map(str::parse);
-    let mut next = || numbers.next()?.ok();
-    Some(Thread {
-        ran: Duration::from_nanos(next()?),
-        waited: Duration::from_nanos(next()?),
-        slices: next()?,
-        wants_to_run: false,
-        gives_way: false,
-    })
+impl Thread {
+    const fn of(counters: SchedStat) -> Self {
+        let SchedStat {
+            ran,
+            waited,
+            slices,
+        } = counters;
+        Self {
+            ran,
+            waited,
+            slices,
+            wants_to_run: false,
+            gives_way: false,
+        }
+    }
 }
 
 /// What `stat` tells of it: number, name, state, and much later the policy.
@@ -318,7 +317,10 @@ mod tests {
         let of = |&(id, schedule, state, policy): &(u32, &str, &str, &str)| {
             let between = "0 ".repeat(37);
             let status = format!("{id} (a) b) {state} {between}{policy} 0");
-            (id, wishes(&status, counters(schedule).unwrap()).unwrap())
+            {
+                let counters = Thread::of(SchedStat::parse(schedule).unwrap());
+                (id, wishes(&status, counters).unwrap())
+            }
         };
         Waits {
             threads: threads.iter().map(of).collect(),
@@ -329,13 +331,13 @@ mod tests {
     fn only_threads_that_ran_towards_the_answer_were_kept_from_it() {
         let before = waits(&[(1, "500 100 3", "S", "0"), (2, "70 0 1", "R", "0")]);
         let ledger = Ledger::default();
-        let longest = |threads, outcome| {
+        let longest = |threads, answer| {
             let now = waits(threads);
-            now.longest_since(&before, WALL, &ledger, outcome)
+            now.longest_since(&before, WALL, &ledger, answer)
         };
-        use Outcome::{Answered, Pending};
-        for outcome in [Answered, Pending] {
-            let longest = |threads| longest(threads, outcome).as_nanos();
+        use AnswerState::{Pending, Taken};
+        for answer in [Taken, Pending] {
+            let longest = |threads| longest(threads, answer).as_nanos();
             assert_eq!(longest(&[(1, "500 100 3", "S", "0")]), 0, "it slept");
             assert_eq!(longest(&[(1, "510 400 4", "S", "0")]), 300);
             assert_eq!(longest(&[(1, "510 9000 4", "S", "0")]), 1000);
@@ -355,11 +357,7 @@ mod tests {
         }
         let waiting: &[_] = &[(2, "70 0 1", "R", "0")];
         assert_eq!(longest(waiting, Pending), WALL, "not once let run");
-        assert_eq!(
-            longest(waiting, Answered),
-            NS(0),
-            "the answer came without it"
-        );
+        assert_eq!(longest(waiting, Taken), NS(0), "the answer came without it");
     }
 
     #[test]
@@ -373,8 +371,8 @@ mod tests {
         let answer = waits(&[(1, "530 470 6", "S", "0")]);
         let mut ledger = Ledger::default();
         let counts = |ledger: &Ledger| {
-            let waited = answer.longest_since(&looks[0], WALL, ledger, Outcome::Answered);
-            let unlet = ledger.longest_unlet(&answer, Outcome::Answered);
+            let waited = answer.longest_since(&looks[0], WALL, ledger, AnswerState::Taken);
+            let unlet = ledger.longest_unlet(&answer, AnswerState::Taken);
             (waited.as_nanos(), unlet.as_nanos())
         };
         ledger.add(&looks[0], &looks[1], NS(50));
@@ -406,7 +404,7 @@ mod tests {
         for number in 0..100 {
             ledger.add(&look(number), &look(number + 1), NS(5));
         }
-        assert!(ledger.longest_unlet(&look(200), Outcome::Answered) <= NS(10));
+        assert!(ledger.longest_unlet(&look(200), AnswerState::Taken) <= NS(10));
     }
 
     #[test]
@@ -416,7 +414,7 @@ mod tests {
             let mut ledger = Ledger::default();
             let now = waits(threads);
             ledger.begin(&glance, &now, NS(40));
-            ledger.longest_unlet(&now, Outcome::Pending).as_nanos()
+            ledger.longest_unlet(&now, AnswerState::Pending).as_nanos()
         };
         assert_eq!(now(&[(1, "500 100 3", "R", "0")]), 40);
         assert_eq!(now(&[(1, "500 100 3", "S", "0")]), 0, "it sleeps");

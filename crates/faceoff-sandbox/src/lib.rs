@@ -38,6 +38,7 @@ mod probe;
 mod process;
 mod process_tree;
 mod runtime;
+mod sched_stat;
 mod seccomp;
 mod spawn_spec;
 mod spawner;
@@ -46,7 +47,7 @@ mod stderr_tail;
 mod sweep;
 
 pub use cpu_evidence::{CpuReading, Glance, Looks, Taken};
-pub use cpu_waits::Outcome;
+pub use cpu_waits::AnswerState;
 pub use error::{SandboxError, SpawnError, WriteError};
 pub use faceoff_types::ResourceLimits as Limits;
 pub use isolation::{Isolation, Layer};

@@ -2,8 +2,11 @@
 //! hearing, this alone no agent can bring about on CPUs that are not its own. But for one thing: the thread that reads
 //! an agent's log runs on the evaluator's CPUs, as long as the agent writes. What that ran is taken off.
 
-use crate::cpu_counters::{Ticks, ticks, ticks_of};
-use std::{cell::RefCell, fs::File, os::unix::fs::FileExt, time::Duration};
+use crate::{
+    cpu_counters::{Ticks, ticks, ticks_of},
+    sched_stat::SchedStat,
+};
+use std::{cell::RefCell, fs::File, time::Duration};
 
 /// The counters of the calling thread at one time. Only the difference of two of the same thread says something.
 #[derive(Debug, Clone, Default)]
@@ -26,7 +29,10 @@ impl OwnWait {
     /// the thread may use.
     pub(crate) fn now(stat: &str, cpus: &[usize], log_reader_ran: Duration) -> Self {
         Self {
-            waited: SCHEDULE.with_borrow(|file| file.as_ref().and_then(waited).unwrap_or_default()),
+            waited: SCHEDULE
+                .with_borrow(|file| file.as_ref().and_then(SchedStat::read))
+                .unwrap_or_default()
+                .waited,
             log_reader_ran,
             ticks: ticks_of(stat, cpus).unwrap_or_default(),
         }
@@ -44,24 +50,6 @@ impl OwnWait {
             .saturating_sub(log_reader_ran)
             + ticks(stolen.min().unwrap_or_default())
     }
-}
-
-/// What `schedstat` tells: nanoseconds of running.
-pub(crate) fn ran(file: &File) -> Option<Duration> {
-    number(file, 0)
-}
-
-/// … and of waiting to run.
-fn waited(file: &File) -> Option<Duration> {
-    number(file, 1)
-}
-
-fn number(file: &File, position: usize) -> Option<Duration> {
-    let mut bytes = [0; 128];
-    let count = file.read_at(&mut bytes, 0).ok()?;
-    let text = std::str::from_utf8(&bytes[..count]).ok()?;
-    let number = text.split_ascii_whitespace().nth(position)?.parse().ok()?;
-    Some(Duration::from_nanos(number))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 use crate::{
-    CpuReading, Glance, Isolation, Killer, Limits, Looks, Outcome, OwnWait, ReadLine, SandboxError,
-    SpawnError, SpawnSpec, Taken, WriteError,
+    AnswerState, CpuReading, Glance, Isolation, Killer, Limits, Looks, OwnWait, ReadLine,
+    SandboxError, SpawnError, SpawnSpec, Taken, WriteError,
     cgroup::AgentCgroup,
     command_check::check_command,
     cpu_waits::KnownThreads,
@@ -161,24 +161,24 @@ impl AgentProcess {
         max_bytes: usize,
         deadline: Instant,
     ) -> Result<ReadLine, SandboxError> {
-        let outcome = loop {
+        let answer = loop {
             let until = self.until_next_look(deadline);
-            let outcome = self
+            let answer = self
                 .lines
                 .read_line(max_bytes, until)
                 .context("cannot read from the agent")?;
-            if !matches!(outcome, ReadLine::TimedOut) || until == deadline {
-                break outcome;
+            if !matches!(answer, ReadLine::TimedOut) || until == deadline {
+                break answer;
             }
             if self.output_is_abandoned()? {
                 break ReadLine::Closed;
             }
             self.next_look.after_a_longer_pause(Instant::now());
         };
-        if matches!(outcome, ReadLine::Closed) {
+        if matches!(answer, ReadLine::Closed) {
             self.diagnose_end(END_PATIENCE)?;
         }
-        Ok(outcome)
+        Ok(answer)
     }
 
     /// Looks for the agent's next line until `until` without giving the CPU away, for [`Self::read_line`] to
@@ -279,11 +279,13 @@ impl AgentProcess {
     pub fn glance_at_cpus(&self, own_cpus: Option<&[usize]>) -> Glance {
         let cgroup = self.tree.cgroup.as_ref();
         let evidence = cgroup.and_then(|cgroup| cgroup.cpu_evidence.as_ref());
-        if evidence.is_none() && own_cpus.is_none() {
-            return Glance::default();
-        }
-        let stat = fs::read_to_string("/proc/stat").unwrap_or_default();
+        let stat = if evidence.is_some() || own_cpus.is_some() {
+            fs::read_to_string("/proc/stat").unwrap_or_default()
+        } else {
+            String::new()
+        };
         Glance {
+            at: Instant::now(),
             cpus: evidence.and_then(|evidence| evidence.glance(&self.threads, &stat)),
             own: own_cpus.map(|cpus| OwnWait::now(&stat, cpus, self.stderr.ran())),
         }
@@ -308,13 +310,13 @@ impl AgentProcess {
         asked: Instant,
         looks: Option<&Looks>,
         glance: Option<&CpuReading>,
-        outcome: Outcome,
+        answer: AnswerState,
     ) -> Option<Taken> {
         let evidence = self.tree.cgroup.as_ref()?.cpu_evidence.as_ref()?;
         if looks.is_none() && glance.is_none() {
             return Some(Taken::default());
         }
-        evidence.taken_since(asked, looks, glance, &self.threads, outcome)
+        evidence.taken_since(asked, looks, glance, &self.threads, answer)
     }
 
     /// Ends the agent's input, waits up to `grace` for it to exit, then kills the tree; always reaps.

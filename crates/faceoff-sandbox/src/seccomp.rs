@@ -184,7 +184,7 @@ impl Filters {
         // Pushing input into a terminal.
         let terminal = [libc::TIOCSTI, libc::TIOCLINUX].map(|request| request as libc::c_int);
         rules.insert(libc::SYS_ioctl, one_of(1, &terminal)?);
-        // A question that does not fit into a smaller pipe would come late.
+        // Pages of pipes are counted by user, which an ordinary user's agents share.
         rules.insert(libc::SYS_fcntl, one_of(1, &[libc::F_SETPIPE_SZ])?);
 
         let mut unheeded = whatever_arguments(&[UNHEEDED]);

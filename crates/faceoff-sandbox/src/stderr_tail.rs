@@ -1,6 +1,6 @@
 //! Standard error: drained by a thread, the end of it kept.
 
-use crate::own_wait;
+use crate::sched_stat::SchedStat;
 use rustix::{
     event::{PollFd, PollFlags, poll},
     io::{Errno, ioctl_fionread},
@@ -71,7 +71,7 @@ impl StderrTail {
     /// For how long the thread has run: on the evaluator's CPU, and because of what the agent writes.
     pub(crate) fn ran(&self) -> Duration {
         let file = self.schedule.as_ref();
-        file.and_then(own_wait::ran).unwrap_or_default()
+        file.and_then(SchedStat::read).unwrap_or_default().ran
     }
 
     /// Takes what is still there and ends the thread. Call when the tree is dead.

@@ -25,8 +25,7 @@ const MEMBERS: u64 = 1 << 16;
 /// What compressors add to a stream, in bytes: its header, and what some note there. Beyond this and
 /// [`BESIDE_BYTES`] nothing that is compressed is larger than what it holds.
 const PACKED_BYTES_PER_MEMBER: u64 = 1 << 10;
-/// How much of names may be compared to follow all links, in bytes. Fifty thousand links of ordinary paths come to a
-/// quarter of it.
+/// How much of names may be compared to follow all links, in bytes.
 const LINK_BYTES: u64 = 128 << 20;
 /// How much of names may be looked up to place the entries of an image's layers, in bytes. A hundred thousand
 /// entries of ordinary paths come to a tenth of it.

@@ -44,6 +44,7 @@ fn it_is_the_filter_that_refuses_them() {
         "kcmp",
         "keyctl",
         "personality",
+        "sched_setattr",
         "name_to_handle_at",
         "seccomp",
         "socket_inet",
