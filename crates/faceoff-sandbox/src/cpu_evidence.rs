@@ -7,13 +7,15 @@
 //! of 10 ms. What such a tick leaves open is always read in the host's disfavour.
 
 mod judge;
+mod reading;
 
 use crate::{
     OwnWait, cpu_clock,
-    cpu_counters::{Ticks, of_cpus, text, throttled, ticks_of, usage},
-    cpu_waits::{AnswerState, KnownThreads, Ledger, Waits},
+    cpu_counters::{of_cpus, text, throttled, ticks_of, usage},
+    cpu_waits::{AnswerState, KnownThreads, Ledger},
 };
 use judge::{Judge, most, stolen};
+pub use reading::CpuReading;
 use std::{
     fs::{self, File},
     time::{Duration, Instant},
@@ -54,22 +56,6 @@ pub(crate) enum RunTime {
     Whole { agent: File },
 }
 
-/// The counters at one time. Only the difference of two says something.
-#[derive(Debug, Clone)]
-pub struct CpuReading {
-    at: Instant,
-    agent: Duration,
-    /// The same by the clocks of its processes, which do not lag behind but miss those that ended; zero at a
-    /// glance.
-    clocks: Duration,
-    /// Run time of everything on the agent's CPUs; zero where only ticks tell.
-    all: Duration,
-    throttled: Duration,
-    ticks: Vec<Ticks>,
-    /// Of the agent's threads, where the kernel tells.
-    waits: Option<Waits>,
-}
-
 /// What was taken of a span of an agent's time.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Taken {
@@ -85,23 +71,6 @@ pub struct Taken {
 enum First {
     Agent,
     Others,
-}
-
-impl CpuReading {
-    /// For how long since `before` the agent could have run and did not: none of its threads ran, and its own quota did
-    /// not hold it up.
-    fn idle_since(&self, before: &Self) -> Duration {
-        self.at
-            .saturating_duration_since(before.at)
-            .saturating_sub(self.ran_since(before))
-            .saturating_sub(self.throttled.saturating_sub(before.throttled))
-    }
-
-    /// What the agent ran, the most that either count tells.
-    fn ran_since(&self, before: &Self) -> Duration {
-        let by_clocks = self.clocks.saturating_sub(before.clocks);
-        by_clocks.max(self.agent.saturating_sub(before.agent))
-    }
 }
 
 /// What looks at the CPUs of an agent whose answer is late have found. A thread that was woken on a CPU which the

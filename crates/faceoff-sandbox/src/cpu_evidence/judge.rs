@@ -1,6 +1,6 @@
 //! What two readings of the counters prove.
 
-use super::CpuReading;
+use super::reading::CpuReading;
 use crate::{
     cpu_counters::ticks,
     cpu_waits::{AnswerState, Ledger},
