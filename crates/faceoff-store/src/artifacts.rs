@@ -1,4 +1,7 @@
-use crate::error::{Result, StoreError};
+use crate::{
+    boxed,
+    error::{Result, StoreError},
+};
 use bytes::Bytes;
 use faceoff_types::{AblationId, Profile, Task};
 use futures::{StreamExt, TryStreamExt, stream::BoxStream};
@@ -54,6 +57,7 @@ impl Artifacts {
 
     /// Stores a copy of a file under `key`, replacing what was there. It appears whole or not at all,
     /// whenever the process is killed.
+    #[boxed]
     pub async fn put_file(&self, key: &str, file: &Path) -> Result<()> {
         let failed = |error: std::io::Error| StoreError::artifact(file.display(), &error);
         let mut source = tokio::fs::File::open(file).await.map_err(failed)?;
@@ -82,6 +86,7 @@ impl Artifacts {
     }
 
     /// Stores bytes under `key`, replacing what was there; they appear whole or not at all.
+    #[boxed]
     pub async fn put_bytes(&self, key: &str, bytes: Vec<u8>) -> Result<()> {
         let key = parse(key)?;
         let put = self.objects.put(&key, bytes.into());
@@ -90,6 +95,7 @@ impl Artifacts {
     }
 
     /// Stores a dataset, and first what its replays are drawn from: whoever finds the dataset finds them.
+    #[boxed]
     pub async fn put_dataset(&self, key: &str, archive: &Path, clips: Option<&Path>) -> Result<()> {
         if let Some(clips) = clips {
             self.put_file(&Self::clips_of(key), clips).await?;
@@ -104,6 +110,7 @@ impl Artifacts {
     }
 
     /// Removes a dataset and what its replays are drawn from; what does not exist is no error.
+    #[boxed]
     pub async fn delete_dataset(&self, key: &str) -> Result<()> {
         self.delete(&Self::clips_of(key)).await?;
         self.delete(key).await
@@ -136,6 +143,7 @@ impl Artifacts {
     }
 
     /// The ablations of which parts are there.
+    #[boxed]
     pub async fn ablations_in_parts(&self) -> Result<Vec<AblationId>> {
         let folder = parse(ABLATION_PARTS)?;
         let listed = self.objects.list_with_delimiter(Some(&folder));
@@ -147,6 +155,7 @@ impl Artifacts {
     }
 
     /// The parts of an ablation: each profile with a key.
+    #[boxed]
     pub async fn parts_of_ablation(&self, id: AblationId) -> Result<Vec<(Profile, String)>> {
         let folder = parse(&Self::ablation_parts(id))?;
         let listed = self.objects.list_with_delimiter(Some(&folder));
@@ -159,6 +168,7 @@ impl Artifacts {
     }
 
     /// Copies an artifact to a new file and flushes it to disk.
+    #[boxed]
     pub async fn get_to_file(&self, key: &str, file: &Path) -> Result<()> {
         let (bytes, mut stream) = self.read(key).await?;
         let failed = |error: std::io::Error| StoreError::artifact(file.display(), &error);
@@ -187,6 +197,7 @@ impl Artifacts {
     }
 
     /// Length of an artifact, in bytes; `None` if there is none of this key.
+    #[boxed]
     pub async fn bytes_of(&self, key: &str) -> Result<Option<u64>> {
         match self.objects.head(&parse(key)?).await {
             Ok(found) => Ok(Some(found.size)),
@@ -196,6 +207,7 @@ impl Artifacts {
     }
 
     /// Length and bytes of an artifact, for a download.
+    #[boxed]
     pub async fn read(&self, key: &str) -> Result<(u64, ArtifactStream)> {
         let found = self
             .objects
@@ -207,6 +219,7 @@ impl Artifacts {
     }
 
     /// Some of an artifact's bytes, for a download: the others are not read.
+    #[boxed]
     pub async fn read_range(&self, key: &str, range: Range<u64>) -> Result<ArtifactStream> {
         let wanted = GetOptions::new().with_range(Some(range));
         let found = self
@@ -218,6 +231,7 @@ impl Artifacts {
     }
 
     /// Removes an artifact; one that does not exist is no error, so that a removal can be repeated.
+    #[boxed]
     pub async fn delete(&self, key: &str) -> Result<()> {
         match self.objects.delete(&parse(key)?).await {
             Ok(()) | Err(object_store::Error::NotFound { .. }) => Ok(()),
@@ -226,6 +240,7 @@ impl Artifacts {
     }
 
     /// Stores every file directly in `folder` as `prefix/NAME`.
+    #[boxed]
     pub async fn put_folder(&self, prefix: &str, folder: &Path) -> Result<()> {
         let failed = |error: std::io::Error| StoreError::artifact(folder.display(), &error);
         let mut entries = tokio::fs::read_dir(folder).await.map_err(failed)?;
@@ -242,6 +257,7 @@ impl Artifacts {
 
     /// Copies every artifact `prefix/NAME` to `folder/NAME`. [`StoreError::NotFound`] if there is
     /// none.
+    #[boxed]
     pub async fn get_folder(&self, prefix: &str, folder: &Path) -> Result<()> {
         let listing = self
             .objects
@@ -274,12 +290,14 @@ impl Artifacts {
     }
 
     /// Removes every artifact under `prefix/`.
+    #[boxed]
     pub async fn delete_folder(&self, prefix: &str) -> Result<()> {
         self.delete_others(prefix, "").await
     }
 
     /// Removes every artifact under `prefix/` but the one with the key `kept`, or those under `kept/`, or the clips of a
     /// dataset of that key.
+    #[boxed]
     pub async fn delete_others(&self, prefix: &str, kept: &str) -> Result<()> {
         let listed: Vec<_> = self
             .objects
@@ -302,6 +320,7 @@ impl Artifacts {
 
     /// Removes what a killed process has left half written, if it was begun before `before`. Returns
     /// how many files.
+    #[boxed]
     pub async fn remove_abandoned(&self, before: Timestamp) -> Result<usize> {
         let folder = Arc::clone(&self.folder);
         tokio::task::spawn_blocking(move || remove_staged(&folder, before.into()))

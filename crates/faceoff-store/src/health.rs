@@ -1,6 +1,7 @@
 //! Is the store fit for work? Asked by whoever watches the server.
 
 use crate::{
+    boxed,
     error::Result,
     queue::{self, Standing},
     store::Store,
@@ -71,6 +72,7 @@ impl Store {
     }
 
     /// How the store stands. Nothing that anybody can see is changed by the question.
+    #[boxed]
     pub async fn health(&self, now: Timestamp) -> Health {
         Health {
             database_writable: self.is_writable(now).await,

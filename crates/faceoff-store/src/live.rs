@@ -1,5 +1,6 @@
 //! Games as they are played, for those who watch: in memory alone, since what counts is stored in the end.
 
+use crate::boxed;
 use faceoff_types::{GameHappening, GameId, LiveGame, LiveHappening, LivePosition};
 use std::{
     collections::VecDeque,
@@ -199,6 +200,7 @@ impl LiveWatch {
 
     /// Waits until something was told since the last [`news`](Self::news). False: nothing will be, the game is
     /// forgotten. After the end of an attempt another one may begin.
+    #[boxed]
     pub async fn changed(&mut self) -> bool {
         self.told.changed().await.is_ok()
     }

@@ -1,5 +1,5 @@
 use crate::{
-    artifacts::Artifacts, database::Database, error::Result, event::Change, live::LiveGames,
+    artifacts::Artifacts, boxed, database::Database, error::Result, event::Change, live::LiveGames,
     pulse::Pulse, room::Room, schema::Upgrade, signals::Signals, tables::archived::Archived,
     workers::Workers,
 };
@@ -51,6 +51,7 @@ impl Store {
 
     /// Copies the database's log into the database, as far as nobody must wait for it. Run it now and
     /// then; a log that grows too long is emptied without it.
+    #[boxed]
     pub async fn checkpoint(&self) -> Result<()> {
         self.database.checkpoint().await
     }
@@ -97,6 +98,7 @@ impl Store {
 
     /// Waits for running queries and closes the database. Dropping the handle is as safe, but does
     /// not wait.
+    #[boxed]
     pub async fn close(&self) {
         self.database.close().await;
     }

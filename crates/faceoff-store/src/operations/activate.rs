@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     store::Store,
@@ -49,6 +50,7 @@ impl Store {
     /// [`StoreError::Conflict`] if the submission is not valid (yet), or its archive was removed;
     /// [`StoreError::Disqualified`] if its team is;
     /// [`StoreError::SeasonClosed`] once the season is over.
+    #[boxed]
     pub async fn activate_submission(
         &self,
         actor: Actor,

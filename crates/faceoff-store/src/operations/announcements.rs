@@ -1,6 +1,7 @@
 //! What is told to everybody, and what teams ask.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     store::Store,
@@ -17,6 +18,7 @@ pub const MAX_OPEN_QUESTIONS: i64 = 10;
 
 impl Store {
     /// Tells everybody.
+    #[boxed]
     pub async fn announce(
         &self,
         actor: Actor,
@@ -41,11 +43,13 @@ impl Store {
     }
 
     /// The newest announcements first, at most so many.
+    #[boxed]
     pub async fn announcements(&self, limit: u32) -> Result<Vec<Announcement>> {
         announcements::newest(&mut *self.database.read.acquire().await?, limit).await
     }
 
     /// A team asks. [`StoreError::Conflict`] if too many of its questions wait for an answer.
+    #[boxed]
     pub async fn ask(
         &self,
         actor: Actor,
@@ -74,6 +78,7 @@ impl Store {
     }
 
     /// Answers a question, or answers it anew: to the team, or to everybody, who then read the question too.
+    #[boxed]
     pub async fn answer(
         &self,
         actor: Actor,
@@ -98,6 +103,7 @@ impl Store {
     }
 
     /// All questions, the newest first.
+    #[boxed]
     pub async fn questions(&self) -> Result<Vec<Question>> {
         questions::all(&mut *self.database.read.acquire().await?).await
     }

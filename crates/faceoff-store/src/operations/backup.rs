@@ -1,6 +1,7 @@
 //! A copy of the whole database, beside servers that go on, and what it needs of the artifacts.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     operations::{scrub::check_references, snapshot::copy},
     schema::{self, MIGRATIONS},
@@ -33,6 +34,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::NotFound`] if there is none; if it cannot be read, or the copy not be written.
+    #[boxed]
     pub async fn copy_database(data_dir: &Path, to: &Path) -> Result<()> {
         let from = data_dir.join("faceoff.sqlite3");
         let failed = |error| StoreError::artifact(from.display(), &error);
@@ -47,6 +49,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::Damaged`] with what is wrong, [`StoreError::NewerDatabase`].
+    #[boxed]
     pub async fn check_database(file: &Path, scratch: &Path) -> Result<CheckedDatabase> {
         let options = SqliteConnectOptions::new()
             .filename(file)
@@ -65,6 +68,7 @@ impl Store {
     ///
     /// # Errors
     /// If the database, which nobody has open, cannot be written.
+    #[boxed]
     pub async fn skip_event_ids(file: &Path) -> Result<()> {
         let options = SqliteConnectOptions::new()
             .filename(file)

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::Actor,
     operations::ends,
@@ -12,6 +13,7 @@ use jiff::Timestamp;
 impl Store {
     /// Stops an evaluation that is not over. Workers that play its shards learn of it at their next
     /// heartbeat. If it was the last of its day, that is released.
+    #[boxed]
     pub async fn cancel_evaluation(
         &self,
         actor: Actor,

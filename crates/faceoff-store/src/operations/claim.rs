@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Subject},
     operations::{
@@ -33,6 +34,7 @@ impl Store {
     /// shards of evaluations share the slots half and half, and the teams that wait for either share
     /// that half equally, by slot time; shards of ablations have what is left. A unit whose lease is
     /// over is leased again. `None`: nothing to do now (see [`Store::work_signal`]), or the queue is paused.
+    #[boxed]
     pub async fn claim(
         &self,
         worker: &str,
@@ -43,6 +45,7 @@ impl Store {
     }
 
     /// [`claim`](Self::claim), of some of the work alone.
+    #[boxed]
     pub async fn claim_of(
         &self,
         lot: Lot,

@@ -1,6 +1,7 @@
 //! What playing leaves in the database and nobody asks for when it is over.
 
 use crate::{
+    boxed,
     error::Result,
     event::Actor,
     operations::{runs as run_owners, tidy::RECORDINGS_KEPT},
@@ -17,6 +18,7 @@ use jiff::Timestamp;
 impl Store {
     /// The runs whose owners have been over for [`RECORDINGS_KEPT`] and which still have their shards, the oldest
     /// first.
+    #[boxed]
     pub async fn clearable_runs(
         &self,
         summary_version: u32,
@@ -30,6 +32,7 @@ impl Store {
     }
 
     /// The runs whose owners are over and whose episodes nobody has summed up, the oldest first.
+    #[boxed]
     pub async fn unsummed_runs(&self, summary_version: u32) -> Result<Vec<RunId>> {
         let mut connection = self.database.read.acquire().await?;
         let over = runs::clearable(&mut connection, summary_version, Timestamp::MAX).await?;
@@ -39,6 +42,7 @@ impl Store {
 
     /// Removes the shards of a run without agent faults, their units of work, and the events that told of them. Those
     /// with faults stay: they tell what the agent did wrong. From then on [`Store::outcomes`] refuses.
+    #[boxed]
     pub async fn clear_run(&self, run: RunId, now: Timestamp) -> Result<()> {
         self.write(Actor::Server, now, async |tx| {
             shards::remove_faultless(tx, run).await?;

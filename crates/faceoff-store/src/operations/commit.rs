@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event},
     operations::{
@@ -72,6 +73,7 @@ impl Store {
     /// run, end an evaluation as [`AgentFailed`](crate::EvaluationState::AgentFailed) and an ablation
     /// without a result; the last shard of an evaluation queues the finalisation, that of an
     /// ablation's last run ends it.
+    #[boxed]
     pub async fn commit_shard(
         &self,
         claim: &Claim,

@@ -2,6 +2,7 @@
 //! capacity, which costs nobody a turn.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::ends,
@@ -63,6 +64,7 @@ impl Store {
     /// Ends what is left of days that are past their deadline, and releases those days, except that what is
     /// played to its end is scored first. The days that had something left, each with how many evaluations. Whoever
     /// calls it, and however often.
+    #[boxed]
     pub async fn end_overdue_days(&self, now: Timestamp) -> Result<Vec<(StageDay, u32)>> {
         let overdue = days::overdue(&mut *self.database.read.acquire().await?, now).await?;
         if overdue.is_empty() {

@@ -1,6 +1,7 @@
 //! A team, or an organiser, has the archive of a submission removed.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     store::Store,
@@ -100,6 +101,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::Conflict`] says what it waits for.
+    #[boxed]
     pub async fn check_deletable(&self, id: SubmissionId, now: Timestamp) -> Result<Submission> {
         // It writes nothing, but what it finds belongs together.
         self.write(Actor::Server, now, async |tx| {
@@ -113,6 +115,7 @@ impl Store {
     /// Has the archive of a valid submission removed, for good: nobody is promised it from now on, and its file goes
     /// later, by [`Store::remove_files_of_removed`]. What it has played, its log and its hash stay. `reason` is in
     /// words for its team. [`StoreError::Conflict`] if the archive is gone, is needed, or is evidence.
+    #[boxed]
     pub async fn delete_submission(
         &self,
         actor: Actor,

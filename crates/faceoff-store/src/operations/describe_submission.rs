@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::Result,
     event::{Actor, Event, Subject},
     store::Store,
@@ -18,6 +19,7 @@ pub struct SubmissionWords<'w> {
 
 impl Store {
     /// Changes what a team says of a submission, to itself and the organiser.
+    #[boxed]
     pub async fn describe_submission(
         &self,
         actor: Actor,

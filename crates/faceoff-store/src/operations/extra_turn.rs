@@ -1,6 +1,7 @@
 //! One more evaluation of a day for one team: one that had none, or whose counting one is to be replaced.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
@@ -42,6 +43,7 @@ impl Store {
     /// [`StoreError::Conflict`] if the team has nothing active, has one of the day under way, or one that counts and is
     /// not to be replaced, or if the day's rules do not take what it has active; [`StoreError::Disqualified`], [`StoreError::StageNotOpen`],
     /// [`StoreError::SeasonClosed`].
+    #[boxed]
     pub async fn extra_turn(
         &self,
         actor: Actor,

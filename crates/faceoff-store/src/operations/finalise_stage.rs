@@ -1,6 +1,7 @@
 //! What comes after a stage's close: its final day, where it has one, and the signing off of its result.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::start_day::{self, CutOf},
@@ -93,6 +94,7 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::Conflict`] says what it waits for.
+    #[boxed]
     pub async fn check_stage_settled(&self, id: StageId, now: Timestamp) -> Result<Stage> {
         // It writes nothing, but what it finds belongs together.
         self.write(Actor::Server, now, async |tx| {
@@ -105,6 +107,7 @@ impl Store {
 
     /// Signs a stage's result off: nothing of the stage changes any more. [`StoreError::Conflict`] while neither it
     /// nor the season has closed, evaluations of it are under way, it is blind, or its final day is owed; and if it is signed off.
+    #[boxed]
     pub async fn finalise_stage(&self, actor: Actor, id: StageId, now: Timestamp) -> Result<Stage> {
         self.write(actor.clone(), now, async |tx| {
             let stage = stages::find(tx, id).await?;
@@ -120,6 +123,7 @@ impl Store {
     /// active then plays it. [`StoreError::Conflict`] if it has no such day, has had it, has not closed or is signed
     /// off, or no team has anything to play (the day keeps its cut); [`StoreError::DayHasCut`] if a day of the stage
     /// had its cut on the same date; [`StoreError::SeasonClosed`] once the season is over.
+    #[boxed]
     pub async fn start_final_day(
         &self,
         actor: Actor,

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::Result,
     event::{Event, Subject},
     operations::{
@@ -19,6 +20,7 @@ impl Store {
     /// digits), and the end in one transaction, with the release of the day if this was its last
     /// evaluation. Idempotent, as [`Store::commit_shard`] is. After
     /// [`StoreError::Database`](crate::StoreError::Database) the dataset may be the evaluation's: leave it.
+    #[boxed]
     pub async fn finish_evaluation(
         &self,
         claim: &Claim,

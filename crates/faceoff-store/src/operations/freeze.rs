@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     store::Store,
@@ -10,6 +11,7 @@ use jiff::Timestamp;
 impl Store {
     /// Has the boards of a stage show what they show at `now`, until they are unfrozen: days go on, and what is
     /// finished later is on none of them. [`StoreError::Conflict`] if they stand still already.
+    #[boxed]
     pub async fn freeze_boards(
         &self,
         actor: Actor,
@@ -38,6 +40,7 @@ impl Store {
     }
 
     /// Has the boards of a stage show everything again. [`StoreError::Conflict`] if they do.
+    #[boxed]
     pub async fn unfreeze_boards(
         &self,
         actor: Actor,
@@ -59,11 +62,13 @@ impl Store {
     }
 
     /// All stages whose boards stand still: since when, and why.
+    #[boxed]
     pub async fn frozen_boards(&self) -> Result<Vec<(StageId, Ruling)>> {
         freezes::all(&mut *self.database.read.acquire().await?).await
     }
 
     /// Since when the boards of a stage stand still, and why; `None` if they do not.
+    #[boxed]
     pub async fn boards_frozen(&self, stage: StageId) -> Result<Option<Ruling>> {
         freezes::find(&mut *self.database.read.acquire().await?, stage).await
     }

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
@@ -106,6 +107,7 @@ impl Store {
     /// [`PlatformFailed`](crate::EvaluationState::PlatformFailed) and is played again, for some times
     /// ([`RERUN_PAUSES_S`](crate::RERUN_PAUSES_S)); a smoke run ends as
     /// [`ValidationError`](crate::SubmissionState::ValidationError), an ablation without a result. Of a lost lease nothing is recorded.
+    #[boxed]
     pub async fn release_failed(&self, claim: &Claim, reason: &str, now: Timestamp) -> Result<()> {
         let actor = Actor::Worker(claim.worker.clone());
         self.write(actor, now, async |tx| {
@@ -134,12 +136,14 @@ impl Store {
 
     /// Shutdown: gives the unit back at once; the attempt does not count. Of a lost lease nothing is
     /// recorded.
+    #[boxed]
     pub async fn release(&self, claim: &Claim, now: Timestamp) -> Result<()> {
         self.release_resting(claim, 0, false, now).await
     }
 
     /// Gives a unit back that was given out and that nobody has begun: it is still `claim.worker`'s. False if it is another's, or
     /// nobody's any more; the attempt does not count.
+    #[boxed]
     pub async fn take_back(&self, claim: &Claim, now: Timestamp) -> Result<bool> {
         let actor = Actor::Worker(claim.worker.clone());
         self.write(actor, now, async |tx| {
@@ -158,6 +162,7 @@ impl Store {
     /// A full disk: the unit goes back to the queue to rest for a while. That is nobody's failure: the
     /// attempt does not count. Of a lost lease nothing is recorded. What finds no room again and again on a
     /// disk that is not short of it is told by [`health`](Self::health).
+    #[boxed]
     pub async fn release_full(&self, claim: &Claim, now: Timestamp) -> Result<()> {
         let without_room = !self.room.is_short();
         self.release_resting(claim, FULL_DISK_REST_S, without_room, now)
@@ -166,6 +171,7 @@ impl Store {
 
     /// Gives all leases `lease_s` seconds from now on: they may have run out only because nothing could
     /// be written.
+    #[boxed]
     pub async fn renew_all_leases(&self, lease_s: u32, now: Timestamp) -> Result<()> {
         self.write(Actor::Server, now, async |tx| {
             queue::renew_all(tx, lease_s, now).await
@@ -191,6 +197,7 @@ impl Store {
     }
 
     /// Gives all back that `holder` and those below it have, of whom nobody works at it. Returns how many; the attempts do not count.
+    #[boxed]
     pub async fn give_back_all_of(&self, holder: &str, now: Timestamp) -> Result<u64> {
         let actor = Actor::Worker(holder.to_owned());
         self.write(actor, now, async |tx| give_back_all(tx, holder).await)
@@ -200,6 +207,7 @@ impl Store {
     /// Ends the leases of a worker that is known to be dead, and of its slots, so that nobody waits
     /// for them to run out: `worker` itself and every name `worker/…`. Returns how many. The attempts
     /// stay counted.
+    #[boxed]
     pub async fn end_leases_of(&self, worker: &str, now: Timestamp) -> Result<u64> {
         let actor = Actor::Worker(worker.to_owned());
         self.write(actor, now, async |tx| {

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::Result,
     event::Actor,
     operations::{
@@ -14,6 +15,7 @@ use jiff::Timestamp;
 impl Store {
     /// Extends the lease to `lease_s` seconds from now and stores the progress. False: the lease was
     /// lost or the work was cancelled, stop.
+    #[boxed]
     pub async fn heartbeat(
         &self,
         claim: &Claim,
@@ -37,6 +39,7 @@ impl Store {
     /// What was claimed in advance, by `claim.worker`, is begun by another, with a new lease of `lease_s` seconds. False: the
     /// lease was lost, or another one has begun. So of several who are given the same order one works at it; that one may ask again, since
     /// an answer may get lost.
+    #[boxed]
     pub async fn hand_over(
         &self,
         claim: &Claim,
@@ -62,6 +65,7 @@ impl Store {
 
     /// Gives the leases of `holder` and of all below it at least `lease_s` seconds from now on: they may have run out while nobody could
     /// renew them. Returns how many.
+    #[boxed]
     pub async fn renew_leases_of(&self, holder: &str, lease_s: u32, now: Timestamp) -> Result<u64> {
         self.write(Actor::Server, now, async |tx| {
             queue::renew_of(tx, holder, lease_s).await

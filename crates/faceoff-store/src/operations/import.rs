@@ -1,6 +1,7 @@
 //! A database that came with an archive, taken in: whatever a stranger has put into it.
 
 use crate::{
+    boxed,
     column::Instant,
     error::{Result, StoreError},
     operations::scrub::check_references,
@@ -31,6 +32,7 @@ fn refused(why: impl std::fmt::Display) -> StoreError {
 impl Store {
     /// Is the season of a data folder an archive's? Nothing is made or changed; `None` also where there is no
     /// database yet, or one from before there were archives.
+    #[boxed]
     pub async fn archived_in(data_dir: &Path) -> Result<Option<Archived>> {
         let file = file_of(data_dir);
         if !file.exists() {
@@ -49,6 +51,7 @@ impl Store {
     /// Takes the database in that lies as `faceoff.sqlite3` in `data_dir`, unpacked from an archive: migrates it, makes
     /// sure that it is whole and nothing but our tables, and that no key of anybody's is in it. Run it on a folder that
     /// counts only afterwards. [`StoreError::Conflict`] if it is refused, with the reason.
+    #[boxed]
     pub async fn import(data_dir: &Path, now: Timestamp) -> Result<Archived> {
         let options = SqliteConnectOptions::new()
             .filename(file_of(data_dir))

@@ -1,6 +1,7 @@
 //! Links by which people join: made, taken back, and followed once.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::tokens::{NewToken, add, revoke_all},
@@ -307,6 +308,7 @@ async fn code(
 impl Store {
     /// Makes an invitation. [`StoreError::Conflict`] if it would be worth nothing, if the team has as many open as it
     /// may have, or the person has left; [`StoreError::NotFound`] if there is no such team or person.
+    #[boxed]
     pub async fn invite(
         &self,
         actor: Actor,
@@ -347,6 +349,7 @@ impl Store {
     }
 
     /// Takes an invitation back. [`StoreError::Conflict`] if somebody has followed it.
+    #[boxed]
     pub async fn revoke_invitation(
         &self,
         actor: Actor,
@@ -379,6 +382,7 @@ impl Store {
     }
 
     /// What a code is good for. [`StoreError::InvitationSpent`] says why it is good for nothing.
+    #[boxed]
     pub async fn code(&self, hash: [u8; 32], now: Timestamp) -> Result<Code> {
         code(&mut *self.database.read.acquire().await?, hash, now).await
     }
@@ -386,12 +390,14 @@ impl Store {
     /// Follows a link: a person joins, or comes back, and has a key or a session from now on.
     /// [`StoreError::InvitationSpent`] if it is worth nothing (any more), [`StoreError::PersonNameTaken`],
     /// [`StoreError::TeamNameTaken`], [`StoreError::Conflict`] if something is missing that the text names.
+    #[boxed]
     pub async fn join(&self, joining: Joining, now: Timestamp) -> Result<Joined> {
         self.write(Actor::Visitor, now, async |tx| join(tx, joining).await)
             .await
     }
 
     /// All invitations that were ever made, the newest first.
+    #[boxed]
     pub async fn invitations(&self) -> Result<Vec<Invitation>> {
         invitations::all(&mut *self.database.read.acquire().await?).await
     }

@@ -1,5 +1,6 @@
 use crate::{
     artifacts::Artifacts,
+    boxed,
     database::Database,
     error::{Result, StoreError},
     live::LiveGames,
@@ -15,6 +16,7 @@ use std::{fs::File, path::Path, sync::Arc};
 impl Store {
     /// Opens `data_dir/faceoff.sqlite3` and `data_dir/artifacts`, creating and migrating them as
     /// needed, and draws the season's secret on the first time.
+    #[boxed]
     pub async fn open(data_dir: &Path) -> Result<Self> {
         // Two processes that start together must not both migrate.
         let _opening = lock_folder(data_dir.to_owned()).await?;

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{purpose, runs},
@@ -19,6 +20,7 @@ impl Store {
     /// Orders an ablation of a valid submission: every task in every profile, `plan` otherwise.
     /// [`StoreError::Conflict`] if the submission is not valid, or one of it is under way;
     /// [`StoreError::SeasonClosed`] once the season is over.
+    #[boxed]
     pub async fn create_ablation(
         &self,
         actor: Actor,

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     queue,
@@ -10,6 +11,7 @@ use jiff::Timestamp;
 impl Store {
     /// Holds the queue: no unit of work is begun, what is begun is played to its end, days start and wait.
     /// [`StoreError::Conflict`] if it is held.
+    #[boxed]
     pub async fn pause_queue(&self, actor: Actor, reason: &str, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
             if season::is_paused(tx).await? {
@@ -28,6 +30,7 @@ impl Store {
     }
 
     /// Lets the queue go on. [`StoreError::Conflict`] if it is not held.
+    #[boxed]
     pub async fn resume_queue(&self, actor: Actor, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
             if !season::is_paused(tx).await? {

@@ -1,6 +1,7 @@
 //! What people do with their accounts, and organisers with people.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::tokens::revoke_all,
@@ -16,27 +17,32 @@ use jiff::Timestamp;
 
 impl Store {
     /// Everybody who has ever joined, by name.
+    #[boxed]
     pub async fn people(&self) -> Result<Vec<Person>> {
         people::all(&mut *self.database.read.acquire().await?).await
     }
 
     /// The members that a team has and has had, by name.
+    #[boxed]
     pub async fn members_of(&self, team: TeamId) -> Result<Vec<Person>> {
         people::of_team(&mut *self.database.read.acquire().await?, team).await
     }
 
     /// The person with this id.
+    #[boxed]
     pub async fn person(&self, id: PersonId) -> Result<Person> {
         people::find(&mut *self.database.read.acquire().await?, id).await
     }
 
     /// The PHC string of the password of whoever has this name, if they are there and have one.
+    #[boxed]
     pub async fn password_of(&self, name: &str) -> Result<Option<(PersonId, String)>> {
         people::with_password(&mut *self.database.read.acquire().await?, name).await
     }
 
     /// Gives a person another password, as a PHC string. All that they have is revoked but the token with which they
     /// do it.
+    #[boxed]
     pub async fn set_password(
         &self,
         actor: Actor,
@@ -57,6 +63,7 @@ impl Store {
     /// Lets a person do nothing any more, at once: their keys and sessions are revoked. Their name stays with what they
     /// did. [`StoreError::Conflict`] if they have left, or are the last who can organise: no other organiser, and no
     /// good token of the host's.
+    #[boxed]
     pub async fn remove_person(
         &self,
         actor: Actor,
@@ -85,12 +92,14 @@ impl Store {
     }
 
     /// All versions of the terms, the newest first.
+    #[boxed]
     pub async fn terms(&self) -> Result<Vec<Terms>> {
         terms::all(&mut *self.database.read.acquire().await?).await
     }
 
     /// Publishes other terms. Who has accepted older ones neither uploads nor chooses submissions until somebody of the
     /// team accepts these. [`StoreError::Conflict`] if they are what they were.
+    #[boxed]
     pub async fn publish_terms(&self, actor: Actor, text: &str, now: Timestamp) -> Result<Terms> {
         self.write(actor, now, async |tx| {
             let newest = terms::all(tx).await?.into_iter().next();
@@ -113,6 +122,7 @@ impl Store {
     }
 
     /// A person accepts the terms. [`StoreError::Conflict`] unless `version` is the newest.
+    #[boxed]
     pub async fn accept_terms(
         &self,
         actor: Actor,

@@ -1,6 +1,7 @@
 //! What is tried without counting, and re-evaluations, which count once the organiser has seen what they change.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{drafts as draft_ends, purpose, rulings::void, runs},
@@ -140,6 +141,7 @@ impl Store {
     /// Plays what is active in a stage, or one submission that is valid, by the stage's rules on episodes that nothing
     /// else plays: without a turn, without a board, behind everything that counts. [`StoreError::Conflict`] if there
     /// is nothing to play or the stage has closed; [`StoreError::SeasonClosed`].
+    #[boxed]
     pub async fn propose_trial(
         &self,
         actor: Actor,
@@ -204,6 +206,7 @@ impl Store {
     /// Plays results that count once more, beside them, behind everything that counts: the same submissions on the
     /// same episodes. [`StoreError::Conflict`] if nothing of it counts, or its day is under way; of other rules, if
     /// there are none.
+    #[boxed]
     pub async fn propose_reevaluation(
         &self,
         actor: Actor,
@@ -273,6 +276,7 @@ impl Store {
     /// other rules, whose board is another. What we broke of it changes nothing. [`StoreError::Conflict`] if it is a
     /// trial, is settled or under way, if the boards of its stage are frozen, or if what it would replace counts no
     /// more.
+    #[boxed]
     pub async fn apply_proposal(
         &self,
         actor: Actor,
@@ -314,6 +318,7 @@ impl Store {
 
     /// Has what a proposal has played never count; what is under way of it is stopped. [`StoreError::Conflict`] if it
     /// is settled.
+    #[boxed]
     pub async fn drop_proposal(
         &self,
         actor: Actor,

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     reads,
@@ -14,6 +15,7 @@ use jiff::Timestamp;
 impl Store {
     /// Makes an evaluation and its dataset public before its stage does; once that is done it stays.
     /// [`StoreError::Conflict`] unless it is finished, its day is released and its stage is not blind.
+    #[boxed]
     pub async fn publish_evaluation(
         &self,
         actor: Actor,

@@ -1,6 +1,7 @@
 //! Teams that want to take part, and what the organisers say to it.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::invitations::{NewInvitation, add_team, check_terms, invite},
@@ -52,6 +53,7 @@ async fn waiting(tx: &mut Tx, id: RegistrationId) -> Result<Registration> {
 impl Store {
     /// A team registers. [`StoreError::Conflict`] if none is taken, too many wait, or something is missing that the
     /// text names; [`StoreError::TeamNameTaken`] if a team has the name, or one that waits.
+    #[boxed]
     pub async fn register(&self, new: NewRegistration, now: Timestamp) -> Result<Registration> {
         self.write(Actor::Visitor, now, async |tx| {
             season::check_open(tx).await?;
@@ -98,6 +100,7 @@ impl Store {
 
     /// Lets a registered team take part: it exists from now on, and the code of its registration is an invitation of
     /// its first member's, until `expires_at`. [`StoreError::Conflict`] if it was decided about.
+    #[boxed]
     pub async fn approve_registration(
         &self,
         actor: Actor,
@@ -135,6 +138,7 @@ impl Store {
     }
 
     /// Refuses a registration. [`StoreError::Conflict`] if it was decided about.
+    #[boxed]
     pub async fn refuse_registration(
         &self,
         actor: Actor,
@@ -156,11 +160,13 @@ impl Store {
     }
 
     /// All registrations, the newest first.
+    #[boxed]
     pub async fn registrations(&self) -> Result<Vec<Registration>> {
         registrations::all(&mut *self.database.read.acquire().await?).await
     }
 
     /// The divisions, in their order.
+    #[boxed]
     pub async fn divisions(&self) -> Result<Vec<DivisionName>> {
         divisions::all(&mut *self.database.read.acquire().await?).await
     }
@@ -168,6 +174,7 @@ impl Store {
     /// Lets anybody register a team, or nobody, and sets the divisions; `None` stays as it is. [`StoreError::Conflict`]
     /// if a team is in a division that is left out, or one is there twice; [`StoreError::SeasonClosed`] once the season
     /// is over.
+    #[boxed]
     pub async fn change_season(
         &self,
         actor: Actor,

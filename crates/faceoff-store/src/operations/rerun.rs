@@ -2,6 +2,7 @@
 //! organiser asks for. What plays stays what was active at the cut.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::Actor,
     operations::enter::{Entrant, Turn, enter},
@@ -62,6 +63,7 @@ impl Store {
     /// same episodes, whether the day is released or not. [`StoreError::Conflict`] if it ended otherwise,
     /// the team has another one of the day that counts, or the stage is signed off; [`StoreError::Disqualified`] if
     /// it is; [`StoreError::SeasonClosed`] once the season is over.
+    #[boxed]
     pub async fn rerun_evaluation(
         &self,
         actor: Actor,

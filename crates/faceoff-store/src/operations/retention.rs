@@ -1,6 +1,7 @@
 //! What is kept of a stage's large files: said by the organiser, applied by the server by its clock.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::tidy::RECORDINGS_KEPT,
@@ -170,12 +171,14 @@ pub(super) async fn change(tx: &mut Tx, stage: StageId, retention: Retention) ->
 
 impl Store {
     /// What a stage keeps.
+    #[boxed]
     pub async fn stage_retention(&self, stage: StageId) -> Result<Retention> {
         retentions::of_stage(&mut *self.database.read.acquire().await?, stage).await
     }
 
     /// What would go of a stage if it had this retention, of what is there at `now`: at once or as soon as nothing of it is
     /// under way, to be decided, or blind; and what goes later by a date that is known.
+    #[boxed]
     pub async fn would_remove(
         &self,
         stage: StageId,
@@ -200,6 +203,7 @@ impl Store {
     /// Has go what the stages' retentions do not keep: first nobody is promised it any more, with the reason, and
     /// [`FILES_KEPT`] later its files are removed. How much is no longer promised. Run it now and then; a kill half way is
     /// made up for by the next call.
+    #[boxed]
     pub async fn apply_retentions(&self, now: Timestamp) -> Result<Removed> {
         let mut all = Removed::default();
         let mut connection = self.database.read.acquire().await?;
@@ -233,6 +237,7 @@ impl Store {
 
     /// Removes the files that nobody has been promised for [`FILES_KEPT`]: datasets that a retention took, archives that
     /// it or somebody's wish took; none that have become evidence meanwhile. How many.
+    #[boxed]
     pub async fn remove_files_of_removed(&self, now: Timestamp) -> Result<usize> {
         let before = now.saturating_sub(FILES_KEPT).unwrap_or(Timestamp::MIN);
         let mut connection = self.database.read.acquire().await?;
@@ -257,6 +262,7 @@ impl Store {
     }
 
     /// Measures the datasets that were stored before their sizes were noted. How many.
+    #[boxed]
     pub async fn measure_datasets(&self, now: Timestamp) -> Result<usize> {
         let mut connection = self.database.read.acquire().await?;
         let unmeasured = retentions::unmeasured(&mut connection).await?;

@@ -1,6 +1,7 @@
 //! What the organiser decides against results and teams, each at once and with a reason.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
@@ -57,6 +58,7 @@ async fn leave_tournaments(tx: &mut Tx, team: TeamId, reason: &str) -> Result<()
 impl Store {
     /// Takes a result off the board, or a failure of the agent off its team's day: it stays to be read, counts no
     /// more, and can be played again. [`StoreError::Conflict`] unless it has ended by the agent's doing and counts, and once its stage is signed off.
+    #[boxed]
     pub async fn void_evaluation(
         &self,
         actor: Actor,
@@ -84,6 +86,7 @@ impl Store {
     /// Voids all that has ended of a day and cancels the rest, so that it is released. The evaluations that counted.
     /// [`StoreError::NotFound`] if the day has had no cut, [`StoreError::Conflict`] if nothing of it counts, or its stage
     /// is signed off.
+    #[boxed]
     pub async fn void_day(
         &self,
         actor: Actor,
@@ -121,6 +124,7 @@ impl Store {
     /// Disqualifies a team at once: what it plays is cancelled, it is on no board, at no cut, and uploads nothing; out of
     /// tournaments that are not closed it is for good.
     /// [`StoreError::Conflict`] if it is disqualified.
+    #[boxed]
     pub async fn disqualify_team(
         &self,
         actor: Actor,
@@ -153,6 +157,7 @@ impl Store {
 
     /// Lets a disqualified team play and be ranked again; what was cancelled can be played again.
     /// [`StoreError::Conflict`] if it is not disqualified.
+    #[boxed]
     pub async fn reinstate_team(
         &self,
         actor: Actor,

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::finalise_stage::final_is_owed,
@@ -9,6 +10,7 @@ use jiff::Timestamp;
 
 impl Store {
     /// Names the season. Its name before is no event.
+    #[boxed]
     pub async fn name_season(&self, actor: Actor, name: &str, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
             if season::rename(tx, name).await? {
@@ -23,6 +25,7 @@ impl Store {
     /// Closes the season for good: nothing more is uploaded or evaluated, and its secret is public.
     /// [`StoreError::SeasonClosed`] if it is closed already, [`StoreError::Conflict`] while
     /// evaluations are under way or a stage is blind or waits for its final day.
+    #[boxed]
     pub async fn close_season(&self, actor: Actor, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::Result,
     event::{Event, Subject},
     operations::{
@@ -18,6 +19,7 @@ use jiff::Timestamp;
 impl Store {
     /// Stores what a smoke run found. The newest upload that is valid becomes its team's active one,
     /// unless the team has chosen one since it was uploaded, or has withdrawn it. Idempotent, as [`Store::commit_shard`] is.
+    #[boxed]
     pub async fn commit_smoke(
         &self,
         claim: &Claim,

@@ -1,6 +1,7 @@
 //! A copy of the database for an archive, while the server goes on.
 
 use crate::{
+    boxed,
     database::Database,
     error::{Result, StoreError},
     live::LiveGames,
@@ -40,6 +41,7 @@ impl Store {
     /// what is under way, the secret of a season that runs; for everybody also people, submissions, logs, and scores
     /// that are hidden. `program` is noted in it. Takes room and time in proportion to the database; writers go on.
     /// [`StoreError::Conflict`] where an archive that is public is to become an organiser's.
+    #[boxed]
     pub async fn snapshot(
         &self,
         folder: &Path,
@@ -102,11 +104,13 @@ impl Snapshot {
     }
 
     /// What the organiser's archive holds beside the datasets of evaluations.
+    #[boxed]
     pub async fn kept_artifacts(&self) -> Result<Vec<KeptArtifact>> {
         archived::kept_artifacts(&mut *self.store.database.read.acquire().await?).await
     }
 
     /// Writes it to a new file, in which nothing is left of what was taken out, and removes the copy.
+    #[boxed]
     pub async fn finish(self, file: &Path) -> Result<()> {
         copy(&self.file, file).await?;
         self.store.close().await;

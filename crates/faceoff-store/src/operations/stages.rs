@@ -1,6 +1,7 @@
 //! Stages: made, changed as far as they may be, and told by the configuration.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{deadlines, retention},
@@ -233,12 +234,14 @@ async fn set_rules(tx: &mut Tx, stage: &Stage, rules: StageRules) -> Result<()> 
 impl Store {
     /// Makes a stage. [`StoreError::StageNameTaken`] if another has its name, [`StoreError::Conflict`] if its times
     /// or its rules cannot be, [`StoreError::SeasonClosed`] once the season is over.
+    #[boxed]
     pub async fn create_stage(&self, actor: Actor, new: NewStage, now: Timestamp) -> Result<Stage> {
         self.create_stage_keeping(actor, new, Retention::default(), now)
             .await
     }
 
     /// The same of a stage that does not keep all of its files for ever.
+    #[boxed]
     pub async fn create_stage_keeping(
         &self,
         actor: Actor,
@@ -276,6 +279,7 @@ impl Store {
 
     /// Changes a stage as far as it may be; other rules of one that is open are another revision.
     /// [`StoreError::Conflict`] says what may not be changed; [`StoreError::SeasonClosed`] once the season is over.
+    #[boxed]
     pub async fn change_stage(
         &self,
         actor: Actor,
@@ -301,6 +305,7 @@ impl Store {
     /// Gives the season its first stage, or the stage that follows the configuration what that says now: other rules
     /// are another revision. A stage that was changed by hand, has closed, or belongs to a closed season stays as it
     /// is. [`StoreError::Conflict`] if the zone is another than that of days that have been.
+    #[boxed]
     pub async fn configure_stage(
         &self,
         rules: StageRules,

@@ -1,6 +1,7 @@
 //! The cut: a day of a stage starts, with what each team has active.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
@@ -146,6 +147,7 @@ impl Store {
     /// upload first. [`StoreError::DayHasCut`] if the day has had it, [`StoreError::StageNotOpen`] before and
     /// after the stage, [`StoreError::Conflict`] if no team has anything to play (the day keeps its cut),
     /// [`StoreError::SeasonClosed`] once the season is over.
+    #[boxed]
     pub async fn start_day(
         &self,
         actor: Actor,
@@ -162,6 +164,7 @@ impl Store {
     /// The cut of a day that was missed, on a date of the stage that has passed: as [`start_day`](Self::start_day),
     /// with what is active at `now`. [`StoreError::DayHasCut`] if the day has had its own, [`StoreError::Conflict`] if
     /// the date has not passed or is none of the stage's.
+    #[boxed]
     pub async fn start_missed_day(
         &self,
         actor: Actor,
@@ -179,6 +182,7 @@ impl Store {
 
     /// The cut of a stage's day at `now` by the schedule, whoever asks and however often: also of a day that
     /// nobody has anything to play on. `None` if the day has had its cut, or stage or season are not open.
+    #[boxed]
     pub async fn start_scheduled_day(
         &self,
         stage: StageId,

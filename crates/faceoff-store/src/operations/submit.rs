@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::Result,
     event::{Actor, Event, Subject},
     operations::purpose,
@@ -23,6 +24,7 @@ fn day_of(now: Timestamp) -> Timestamp {
 
 impl Store {
     /// What a team has used of its quota by `now`.
+    #[boxed]
     pub async fn upload_usage(&self, team: TeamId, now: Timestamp) -> Result<UploadUsage> {
         bundles::usage(&mut *self.database.read.acquire().await?, team, day_of(now)).await
     }
@@ -32,6 +34,7 @@ impl Store {
     /// [`StoreError::SeasonClosed`](crate::StoreError::SeasonClosed) once the season is over;
     /// [`DayQuotaSpent`](crate::StoreError::DayQuotaSpent) or
     /// [`StoredQuotaSpent`](crate::StoreError::StoredQuotaSpent) beyond the team's quota.
+    #[boxed]
     pub async fn create_submission(
         &self,
         actor: Actor,

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
@@ -45,6 +46,7 @@ pub struct TeamChange {
 impl Store {
     /// Creates a team. `token_hash` is the hash of its bearer token; the token itself is never
     /// stored. [`StoreError::TeamNameTaken`](crate::StoreError::TeamNameTaken) if the name exists, whatever its case.
+    #[boxed]
     pub async fn create_team(
         &self,
         actor: Actor,
@@ -61,6 +63,7 @@ impl Store {
     }
 
     /// Gives a team another token of its own; all that it had are void from now on. Its members' stay.
+    #[boxed]
     pub async fn set_team_token(
         &self,
         actor: Actor,
@@ -80,6 +83,7 @@ impl Store {
 
     /// Changes a team's name, or what it tells of itself. [`StoreError::TeamNameTaken`] if another has the name,
     /// [`StoreError::Conflict`] if there is no such division, or a signed-off board would rank it otherwise, [`StoreError::SeasonClosed`] once the season is over.
+    #[boxed]
     pub async fn change_team(
         &self,
         actor: Actor,
@@ -135,6 +139,7 @@ impl Store {
     /// Takes a team out of all days to come, by its own wish or an organiser's: it neither uploads nor enters a day. What
     /// had its cut goes on, and its results stay; if it was an organiser's, its files, too.
     /// [`StoreError::Conflict`] if it has retired.
+    #[boxed]
     pub async fn retire_team(&self, actor: Actor, id: TeamId, now: Timestamp) -> Result<Team> {
         self.write(actor.clone(), now, async |tx| {
             let by_organiser = match actor {
@@ -153,6 +158,7 @@ impl Store {
     }
 
     /// Lets a team that has retired play again. [`StoreError::Conflict`] if it has not.
+    #[boxed]
     pub async fn return_team(&self, actor: Actor, id: TeamId, now: Timestamp) -> Result<Team> {
         self.write(actor, now, async |tx| {
             if teams::find(tx, id).await?.retired_at.is_none() {

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::Result,
     event::Actor,
     queue::Claim,
@@ -35,6 +36,7 @@ impl Store {
     /// Removes the shard recordings of evaluations that have been over for [`RECORDINGS_KEPT`]: a
     /// finished one has them in its dataset, the others need them no more. Returns of how many
     /// runs. Run it now and then; a kill half way is made up for by the next run.
+    #[boxed]
     pub async fn remove_old_recordings(&self, now: Timestamp) -> Result<usize> {
         let before = now
             .saturating_sub(RECORDINGS_KEPT)
@@ -54,6 +56,7 @@ impl Store {
 
     /// Removes the datasets of proposals that were dropped [`RECORDINGS_KEPT`] ago; their results stay to be read. Returns
     /// how many. A kill half way is made up for by the next call.
+    #[boxed]
     pub async fn remove_dropped_datasets(&self, now: Timestamp) -> Result<usize> {
         let before = now
             .saturating_sub(RECORDINGS_KEPT)
@@ -74,6 +77,7 @@ impl Store {
     /// Removes the archives of uploads that were refused: at once those that are invalid, after
     /// [`UNCHECKED_KEPT`] those that we failed to check. Reason and log stay. Returns how many. A kill half
     /// way is made up for by the next call, and so is what older programs kept.
+    #[boxed]
     pub async fn remove_refused_bundles(&self, now: Timestamp) -> Result<usize> {
         let before = now.saturating_sub(UNCHECKED_KEPT).unwrap_or(Timestamp::MIN);
         let mut connection = self.database.read.acquire().await?;
@@ -91,6 +95,7 @@ impl Store {
 
     /// Removes archives that no submission names and that were stored at `before` or earlier: a process
     /// was killed between the one and the other. Returns how many.
+    #[boxed]
     pub async fn remove_orphaned_bundles(&self, before: Timestamp) -> Result<usize> {
         // In this order: what is named after the first look is none of those that it found.
         let stored = self.artifacts().stored_until("bundles", before).await?;

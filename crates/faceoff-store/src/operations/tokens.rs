@@ -1,6 +1,7 @@
 //! Keys and sessions: who holds which, and what it is worth.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     store::Store,
@@ -169,6 +170,7 @@ pub enum Refusal {
 
 impl Store {
     /// Who holds the token of this hash, as of `now`: what is revoked or expired is refused from that moment on.
+    #[boxed]
     pub async fn holder(
         &self,
         hash: [u8; 32],
@@ -187,6 +189,7 @@ impl Store {
 
     /// Who holds the token with this id, as of `now`, for whoever has something that was signed with its
     /// [hash](Store::token_hash).
+    #[boxed]
     pub async fn holder_of(&self, id: TokenId, now: Timestamp) -> Result<Result<Holder, Refusal>> {
         let mut connection = self.database.read.acquire().await?;
         let token = tokens::find(&mut connection, id).await?;
@@ -195,11 +198,13 @@ impl Store {
 
     /// The hash of a token's text, which another secret changes. It is a key to sign with: nobody but the server and
     /// whoever has the token knows it.
+    #[boxed]
     pub async fn token_hash(&self, id: TokenId) -> Result<[u8; 32]> {
         tokens::hash_of(&mut *self.database.read.acquire().await?, id).await
     }
 
     /// Notes that a token was used. Often enough is once in [`LAST_USE`].
+    #[boxed]
     pub async fn token_used(&self, token: &Token, now: Timestamp) -> Result<()> {
         self.keep(Actor::Server, now, async |tx| {
             tokens::set_last_used(tx, token.id, now).await
@@ -209,6 +214,7 @@ impl Store {
 
     /// Makes a token. [`StoreError::Conflict`] if its owner has as many as one may have, or it would be worth
     /// nothing.
+    #[boxed]
     pub async fn create_token(&self, actor: Actor, new: NewToken, now: Timestamp) -> Result<Token> {
         self.write(actor, now, async |tx| {
             if let Ok(long_ago) = now.checked_sub(SESSION_SHOWN) {
@@ -221,6 +227,7 @@ impl Store {
 
     /// Gives a token another secret; from now on the old one is worth nothing. [`StoreError::Conflict`] if the token
     /// is not a key, is worth nothing, or is the one of the host's file, which would still have the old secret.
+    #[boxed]
     pub async fn rotate_token(
         &self,
         actor: Actor,
@@ -260,6 +267,7 @@ impl Store {
     }
 
     /// Ends a token: from now on it is worth nothing. One that is worth nothing stays as it is.
+    #[boxed]
     pub async fn revoke_token(&self, actor: Actor, id: TokenId, now: Timestamp) -> Result<Token> {
         self.write(actor, now, async |tx| {
             let token = tokens::find(tx, id).await?;
@@ -278,6 +286,7 @@ impl Store {
 
     /// Lets the token of this hash be the host's, and none that was the host's file's before. False if it is revoked:
     /// the host needs another one.
+    #[boxed]
     pub async fn set_host_token(&self, hash: [u8; 32], now: Timestamp) -> Result<bool> {
         self.keep(Actor::Server, now, async |tx| {
             let known = tokens::by_hash(tx, hash).await?;
@@ -308,11 +317,13 @@ impl Store {
     }
 
     /// All keys and sessions, the newest first.
+    #[boxed]
     pub async fn tokens(&self) -> Result<Vec<Token>> {
         tokens::all(&mut *self.database.read.acquire().await?).await
     }
 
     /// The token with this id.
+    #[boxed]
     pub async fn token(&self, id: TokenId) -> Result<Token> {
         tokens::find(&mut *self.database.read.acquire().await?, id).await
     }

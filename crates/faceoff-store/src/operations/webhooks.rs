@@ -1,6 +1,7 @@
 //! Webhooks: who has which, what they are told, and what came of it.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     store::Store,
@@ -129,22 +130,26 @@ async fn die(tx: &mut Tx, mut webhook: Webhook, reason: String) -> Result<()> {
 
 impl Store {
     /// All webhooks, the oldest first.
+    #[boxed]
     pub async fn webhooks(&self) -> Result<Vec<Webhook>> {
         webhooks::all(&mut *self.database.read.acquire().await?).await
     }
 
     /// The webhook with this id.
+    #[boxed]
     pub async fn webhook(&self, id: WebhookId) -> Result<Webhook> {
         webhooks::find(&mut *self.database.read.acquire().await?, id).await
     }
 
     /// With what a webhook is signed at `now`.
+    #[boxed]
     pub async fn webhook_keys(&self, id: WebhookId, now: Timestamp) -> Result<WebhookKeys> {
         webhooks::keys(&mut *self.database.read.acquire().await?, id, now).await
     }
 
     /// Makes a webhook, which is told of what happens from now on. [`StoreError::Conflict`] if its owner has as many as
     /// one may have.
+    #[boxed]
     pub async fn create_webhook(
         &self,
         actor: Actor,
@@ -186,6 +191,7 @@ impl Store {
     }
 
     /// Changes a webhook. One that is revived is told of what happens from now on.
+    #[boxed]
     pub async fn change_webhook(
         &self,
         actor: Actor,
@@ -222,6 +228,7 @@ impl Store {
     }
 
     /// Gives a webhook another secret; for [`OLD_SECRET`] the old one signs, too.
+    #[boxed]
     pub async fn rotate_webhook(
         &self,
         actor: Actor,
@@ -249,6 +256,7 @@ impl Store {
     }
 
     /// Removes a webhook with its deliveries.
+    #[boxed]
     pub async fn remove_webhook(&self, actor: Actor, id: WebhookId, now: Timestamp) -> Result<()> {
         self.write(actor, now, async |tx| {
             let webhook = webhooks::find(tx, id).await?;
@@ -264,6 +272,7 @@ impl Store {
     }
 
     /// Those that are alive, have not seen what happened last, and have room for deliveries.
+    #[boxed]
     pub async fn webhooks_behind(&self) -> Result<Vec<Webhook>> {
         let mut connection = self.database.read.acquire().await?;
         let newest = events::newest_id(&mut connection).await?;
@@ -271,6 +280,7 @@ impl Store {
     }
 
     /// Notes what events have become; what another has planned meanwhile stays as it is.
+    #[boxed]
     pub async fn plan_deliveries(
         &self,
         planned: Vec<PlannedDeliveries>,
@@ -303,6 +313,7 @@ impl Store {
     }
 
     /// Tells a webhook something that has not happened. [`StoreError::Conflict`] if it is dead, or as much waits as may.
+    #[boxed]
     pub async fn test_webhook(
         &self,
         id: WebhookId,
@@ -339,21 +350,25 @@ impl Store {
     }
 
     /// Of each webhook what has been due for longest at `now`, the longest first.
+    #[boxed]
     pub async fn due_deliveries(&self, now: Timestamp) -> Result<Vec<Delivery>> {
         deliveries::due(&mut *self.database.read.acquire().await?, now).await
     }
 
     /// When something is to be sent next, if anything waits.
+    #[boxed]
     pub async fn next_delivery(&self) -> Result<Option<Timestamp>> {
         deliveries::next_due(&mut *self.database.read.acquire().await?).await
     }
 
     /// What a webhook was told, the newest first.
+    #[boxed]
     pub async fn deliveries(&self, id: WebhookId, limit: u32) -> Result<Vec<Delivery>> {
         deliveries::of(&mut *self.database.read.acquire().await?, id, limit).await
     }
 
     /// Notes what came of sending something. A webhook that takes nothing for [`FAILING_FOR`], or wants nothing, is dead.
+    #[boxed]
     pub async fn note_attempt(
         &self,
         id: DeliveryId,
@@ -418,6 +433,7 @@ impl Store {
     }
 
     /// Forgets deliveries that were over [`DELIVERIES_KEPT`] ago. How many.
+    #[boxed]
     pub async fn forget_deliveries(&self, now: Timestamp) -> Result<u64> {
         let before = now
             .saturating_sub(DELIVERIES_KEPT)

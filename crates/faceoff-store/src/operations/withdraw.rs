@@ -1,6 +1,7 @@
 //! What a team does with its submissions beside choosing one.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     store::Store,
@@ -16,6 +17,7 @@ impl Store {
     /// Takes a submission back: it enters no further day. If it was active, nothing of its team is, until that chooses
     /// one or uploads another. A day that had its cut goes on. [`StoreError::Conflict`] if it could not play, or was
     /// withdrawn; [`StoreError::SeasonClosed`] once the season is over.
+    #[boxed]
     pub async fn withdraw_submission(
         &self,
         actor: Actor,

@@ -1,6 +1,7 @@
 //! What a worker on another machine did is not believed any more, or again.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::give_back::give_back_all,
@@ -18,6 +19,7 @@ impl Store {
     /// Takes nothing of a worker any more. What it has under way is given to others at once, and what it played of runs that are not over is
     /// played again; how many shards that is. What is over stays, to be judged by people ([`played_by`](Self::played_by)).
     /// [`StoreError::Conflict`] if it is banned already.
+    #[boxed]
     pub async fn ban_worker(
         &self,
         actor: Actor,
@@ -68,6 +70,7 @@ impl Store {
     }
 
     /// Takes a worker's work again. [`StoreError::Conflict`] if it is not banned.
+    #[boxed]
     pub async fn readmit_worker(
         &self,
         actor: Actor,

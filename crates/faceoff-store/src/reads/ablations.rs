@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::Result,
     reads::progress,
     store::Store,
@@ -58,6 +59,7 @@ async fn of_row(connection: &mut SqliteConnection, row: AblationRow) -> Result<A
 
 impl Store {
     /// An ablation; [`StoreError::NotFound`](crate::StoreError::NotFound) if there is none of this id.
+    #[boxed]
     pub async fn ablation(&self, id: AblationId) -> Result<Ablation> {
         let mut connection = self.database.read.begin().await?;
         let row = ablations::find(&mut connection, id).await?;
@@ -65,6 +67,7 @@ impl Store {
     }
 
     /// The newest ablation of a submission, if there was one.
+    #[boxed]
     pub async fn newest_ablation(&self, submission: SubmissionId) -> Result<Option<Ablation>> {
         newest(&mut *self.database.read.begin().await?, submission).await
     }

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     column::{Instant, Json},
     error::Result,
     store::Store,
@@ -126,12 +127,14 @@ pub struct BoardScope {
 
 impl Store {
     /// The newest of a stage's rules that an evaluation is finished under; those of now before there is any.
+    #[boxed]
     pub async fn board_revision(&self, stage: &Stage) -> Result<u32> {
         self.board_revision_within(stage, &BoardScope::default())
             .await
     }
 
     /// The same of what is within the times of `scope`.
+    #[boxed]
     pub async fn board_revision_within(&self, stage: &Stage, scope: &BoardScope) -> Result<u32> {
         let (id, until) = (Text(stage.id), scope.until.map(Instant));
         let until_day = scope.until_day.map(Text);
@@ -148,6 +151,7 @@ impl Store {
     }
 
     /// The days of a stage with results by one revision of its rules within the times of `scope`, the earlier first.
+    #[boxed]
     pub async fn board_days(
         &self,
         stage: StageId,
@@ -171,6 +175,7 @@ impl Store {
     }
 
     /// What the board of a stage is made of by one revision of its rules, with nothing left out.
+    #[boxed]
     pub async fn board(&self, stage: StageId, revision: u32) -> Result<Vec<BoardRecord>> {
         let scope = BoardScope::default();
         self.board_within(stage, revision, &scope).await
@@ -179,6 +184,7 @@ impl Store {
     /// What the board of a stage is made of, by one revision of its rules: each team's newest evaluation that is
     /// finished under it and was not voided, of teams that are not disqualified (once the stage is signed off: were not
     /// then), in the teams' order of names, but for what `scope` leaves out. Ranks and tiers are the scoring's.
+    #[boxed]
     pub async fn board_within(
         &self,
         stage: StageId,

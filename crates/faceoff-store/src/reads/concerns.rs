@@ -1,6 +1,6 @@
 //! Whom an event concerns: its subject, as far as it says who may be told of it.
 
-use crate::{column::Instant, error::Result, event::Subject, store::Store};
+use crate::{boxed, column::Instant, error::Result, event::Subject, store::Store};
 use faceoff_types::{
     AblationId, EvaluationId, GameId, PersonId, QuestionId, StageId, SubmissionId, TeamId,
     TournamentId,
@@ -170,6 +170,7 @@ async fn of_question(connection: &mut SqliteConnection, id: QuestionId) -> Resul
 
 impl Store {
     /// Whom an event about this concerns, as things are now.
+    #[boxed]
     pub async fn concern(&self, subject: Subject) -> Result<Concern> {
         Ok(match subject {
             Subject::Season | Subject::Announcement(_) => Concern::Season,

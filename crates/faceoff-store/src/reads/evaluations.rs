@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::{Result, StoreError},
     reads::progress,
     store::Store,
@@ -48,6 +49,7 @@ pub enum EvaluationsOf {
 
 impl Store {
     /// Some of a list: the first ones, or those behind another one. `None` if there is no such.
+    #[boxed]
     pub async fn evaluations_after(
         &self,
         of: EvaluationsOf,
@@ -76,11 +78,13 @@ impl Store {
     }
 
     /// The evaluation with this id.
+    #[boxed]
     pub async fn evaluation(&self, id: EvaluationId) -> Result<Evaluation> {
         find(&mut *self.database.read.begin().await?, id).await
     }
 
     /// A team's evaluations, newest first.
+    #[boxed]
     pub async fn evaluations_of(&self, team: TeamId) -> Result<Vec<Evaluation>> {
         let mut tx = self.database.read.begin().await?;
         let rows = evaluations::of_team(&mut tx, team).await?;
@@ -88,6 +92,7 @@ impl Store {
     }
 
     /// The evaluations of a stage's day, in the order in which they were queued.
+    #[boxed]
     pub async fn evaluations_of_day(&self, of: StageDay) -> Result<Vec<Evaluation>> {
         let mut tx = self.database.read.begin().await?;
         let rows = evaluations::of_day(&mut tx, of).await?;
@@ -95,6 +100,7 @@ impl Store {
     }
 
     /// The evaluations of all stages' days of this date, in the order in which they were queued.
+    #[boxed]
     pub async fn evaluations_on(&self, date: Date) -> Result<Vec<Evaluation>> {
         let mut tx = self.database.read.begin().await?;
         let first = (Timestamp::UNIX_EPOCH, None);

@@ -1,6 +1,6 @@
 //! How much is under way, for whoever watches the server.
 
-use crate::{error::Result, queue, store::Store};
+use crate::{boxed, error::Result, queue, store::Store};
 use jiff::Timestamp;
 
 /// How much is under way.
@@ -22,6 +22,7 @@ pub struct Numbers {
 
 impl Store {
     /// How much is under way.
+    #[boxed]
     pub async fn numbers(&self, now: Timestamp) -> Result<Numbers> {
         let held = self.season().await?.paused.is_some();
         let mut connection = self.database.read.acquire().await?;

@@ -2,6 +2,7 @@
 //! times that such work took of late. Nothing is invented: what was never measured has no time.
 
 use crate::{
+    boxed,
     column::Instant,
     error::Result,
     queue::forecast::{Duration, End, Forecast, Holder, Job, Waiting},
@@ -240,6 +241,7 @@ impl OpenUnit {
 
 impl Store {
     /// Where everything that waits stands, if so many slots work, and when it will be over if nothing is added.
+    #[boxed]
     pub async fn outlook(&self, slots: u32, now: Timestamp) -> Result<Outlook> {
         let mut tx = self.database.read.begin().await?;
         let units = open_units(&mut tx).await?;
@@ -284,6 +286,7 @@ impl Store {
     }
 
     /// What is left to play of evaluations that are under way, and how long such work took of late.
+    #[boxed]
     pub async fn open_work(&self, now: Timestamp) -> Result<(Vec<OpenWork>, Measured)> {
         let mut tx = self.database.read.begin().await?;
         let open = measured::open(&mut tx).await?;

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::Result,
     reads::progress,
     store::Store,
@@ -28,12 +29,14 @@ pub(crate) async fn drafts_of(
 
 impl Store {
     /// All proposals and trials, the newest first.
+    #[boxed]
     pub async fn proposals(&self) -> Result<Vec<Proposal>> {
         proposals::all(&mut *self.database.read.acquire().await?).await
     }
 
     /// One evaluation of a proposal or a trial, with this. [`StoreError::NotFound`](crate::StoreError::NotFound) of
     /// those that never were of one.
+    #[boxed]
     pub async fn draft(&self, id: EvaluationId) -> Result<(Proposal, Draft)> {
         let mut tx = self.database.read.begin().await?;
         let row = drafts::find(&mut tx, id).await?;
@@ -44,6 +47,7 @@ impl Store {
     }
 
     /// A proposal with its evaluations.
+    #[boxed]
     pub async fn proposal(&self, id: ProposalId) -> Result<(Proposal, Vec<Draft>)> {
         let mut tx = self.database.read.begin().await?;
         let proposal = proposals::find(&mut tx, id).await?;

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::{Result, StoreError},
     store::Store,
     tables::{
@@ -23,11 +24,13 @@ pub struct RunFaults {
 
 impl Store {
     /// The shards of a run in (task, first episode) order, with recording keys.
+    #[boxed]
     pub async fn shards(&self, run: RunId) -> Result<Vec<Shard>> {
         shards::of_run(&mut *self.database.read.acquire().await?, run).await
     }
 
     /// What a run is played and scored by otherwise than its ruleset has it.
+    #[boxed]
     pub async fn run_variation(&self, run: RunId) -> Result<Variation> {
         let found = run_rows::find(&mut *self.database.read.acquire().await?, run).await?;
         Ok(found.plan.variation)
@@ -35,6 +38,7 @@ impl Store {
 
     /// The outcomes of a run's committed shards in (task, episode) order: all that scoring needs,
     /// without opening a recording. Of a run that was cleared they are gone.
+    #[boxed]
     pub async fn outcomes(&self, run: RunId) -> Result<Vec<EpisodeOutcome>> {
         // In one look: between two it may be cleared, and would seem to have had none.
         let mut look = self.database.read.begin().await?;
@@ -45,6 +49,7 @@ impl Store {
     }
 
     /// What the agent did wrong in a run, and what it said.
+    #[boxed]
     pub async fn run_faults(&self, run: RunId) -> Result<RunFaults> {
         let faulty = shards::faulty(&mut *self.database.read.acquire().await?, run).await?;
         let mut faults = Vec::new();

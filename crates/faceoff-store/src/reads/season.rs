@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::Result,
     store::Store,
     tables::{
@@ -12,6 +13,7 @@ use std::collections::BTreeMap;
 
 impl Store {
     /// The season with its secret.
+    #[boxed]
     pub async fn season(&self) -> Result<Season> {
         season::read(&mut *self.database.read.acquire().await?).await
     }

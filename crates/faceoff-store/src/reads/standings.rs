@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     column::{Instant, Json},
     error::Result,
     reads::board::{BoardRecord, BoardScope, select_board},
@@ -23,11 +24,13 @@ pub enum BoardDays {
 
 impl Store {
     /// When a stage's final day had its cut; `None` before.
+    #[boxed]
     pub async fn final_cut(&self, stage: StageId) -> Result<Option<Timestamp>> {
         crate::tables::finalised::final_cut(&mut *self.database.read.acquire().await?, stage).await
     }
 
     /// As [`Store::board_within`], with several days of a team: in the teams' order of names, the earlier day first.
+    #[boxed]
     pub async fn board_of_days(
         &self,
         stage: StageId,

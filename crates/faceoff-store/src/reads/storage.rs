@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::{Result, StoreError},
     store::Store,
 };
@@ -68,6 +69,7 @@ impl TryFrom<Row> for TeamStorage {
 
 impl Store {
     /// How much room the files of a team take, or of all teams by name. No file is looked at.
+    #[boxed]
     pub async fn storage(
         &self,
         team: Option<TeamId>,

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::Result,
     store::Store,
     tables::submissions::{self, Submission},
@@ -8,16 +9,19 @@ use jiff::Timestamp;
 
 impl Store {
     /// The submission with this id.
+    #[boxed]
     pub async fn submission(&self, id: SubmissionId) -> Result<Submission> {
         submissions::find(&mut *self.database.read.acquire().await?, id).await
     }
 
     /// A team's submissions, newest first.
+    #[boxed]
     pub async fn submissions_of(&self, team: TeamId) -> Result<Vec<Submission>> {
         submissions::of_team(&mut *self.database.read.acquire().await?, team).await
     }
 
     /// Some of them: the first ones, or those behind another one. `None` if there is no such.
+    #[boxed]
     pub async fn submissions_after(
         &self,
         team: TeamId,
@@ -38,12 +42,14 @@ impl Store {
     }
 
     /// What each team that may play has active, the earliest upload first.
+    #[boxed]
     pub async fn active_submissions(&self) -> Result<Vec<Submission>> {
         submissions::active(&mut *self.database.read.acquire().await?).await
     }
 
     /// The tail of the agent's standard error in its smoke run; `None` until that is over, and where
     /// our fault ended it.
+    #[boxed]
     pub async fn submission_log(&self, id: SubmissionId) -> Result<Option<String>> {
         submissions::log(&mut *self.database.read.acquire().await?, id).await
     }

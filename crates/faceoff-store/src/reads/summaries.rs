@@ -1,10 +1,11 @@
-use crate::{error::Result, store::Store, tables::episode_summaries};
+use crate::{boxed, error::Result, store::Store, tables::episode_summaries};
 use faceoff_types::RunId;
 use std::collections::HashMap;
 
 impl Store {
     /// The episode summaries (JSON) of these runs, as they were stored under `version`; those of
     /// another version are left out, as if there were none.
+    #[boxed]
     pub async fn episode_summaries(
         &self,
         runs: &[RunId],

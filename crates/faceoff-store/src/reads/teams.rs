@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::Result,
     store::Store,
     tables::teams::{self, Team},
@@ -7,11 +8,13 @@ use faceoff_types::TeamId;
 
 impl Store {
     /// The team with this id.
+    #[boxed]
     pub async fn team(&self, id: TeamId) -> Result<Team> {
         teams::find(&mut *self.database.read.acquire().await?, id).await
     }
 
     /// All teams, by name.
+    #[boxed]
     pub async fn teams(&self) -> Result<Vec<Team>> {
         teams::all(&mut *self.database.read.acquire().await?).await
     }

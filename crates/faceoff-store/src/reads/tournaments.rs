@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::Result,
     store::Store,
     tables::{
@@ -38,16 +39,19 @@ pub struct TournamentRecord {
 
 impl Store {
     /// All tournaments, the first one first.
+    #[boxed]
     pub async fn tournaments(&self) -> Result<Vec<Tournament>> {
         tournaments::all(&mut *self.database.read.acquire().await?).await
     }
 
     /// One.
+    #[boxed]
     pub async fn tournament(&self, id: TournamentId) -> Result<Tournament> {
         tournaments::find(&mut *self.database.read.acquire().await?, id).await
     }
 
     /// One with its teams, rounds and their games, all of one moment.
+    #[boxed]
     pub async fn tournament_record(&self, id: TournamentId) -> Result<TournamentRecord> {
         let mut tx = self.database.read.begin().await?;
         Ok(TournamentRecord {
@@ -59,6 +63,7 @@ impl Store {
     }
 
     /// Its games.
+    #[boxed]
     pub async fn games(&self, id: TournamentId, of: GamesOf) -> Result<Vec<Game>> {
         let mut connection = self.database.read.acquire().await?;
         match of {
@@ -69,21 +74,25 @@ impl Store {
     }
 
     /// One.
+    #[boxed]
     pub async fn game(&self, id: GameId) -> Result<Game> {
         games::find(&mut *self.database.read.acquire().await?, id).await
     }
 
     /// Every time that a slot began it, in order.
+    #[boxed]
     pub async fn game_attempts(&self, id: GameId) -> Result<Vec<GameAttempt>> {
         game_attempts::all(&mut *self.database.read.acquire().await?, id).await
     }
 
     /// The end of an agent's standard error in the attempt that counts; none without one.
+    #[boxed]
     pub async fn game_log(&self, id: GameId, side: Side) -> Result<Option<String>> {
         game_attempts::log(&mut *self.database.read.acquire().await?, id, side).await
     }
 
     /// Does a team play no friendly games that others ask for?
+    #[boxed]
     pub async fn declines_friendly_games(&self, team: TeamId) -> Result<bool> {
         friendly_games_declined::has(&mut *self.database.read.acquire().await?, team).await
     }

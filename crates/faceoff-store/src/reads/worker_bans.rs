@@ -1,6 +1,7 @@
 //! Who is not believed, and what they had a part in.
 
 use crate::{
+    boxed,
     error::Result,
     store::Store,
     tables::worker_bans::{self, WorkerBan},
@@ -20,11 +21,13 @@ pub struct PlayedBy {
 
 impl Store {
     /// All of whom nothing is taken, by name.
+    #[boxed]
     pub async fn worker_bans(&self) -> Result<Vec<WorkerBan>> {
         worker_bans::all(&mut *self.database.read.acquire().await?).await
     }
 
     /// What counts of what a worker elsewhere has played, `most` of each kind.
+    #[boxed]
     pub async fn played_by(&self, worker: &WorkerName, most: u32) -> Result<PlayedBy> {
         let holder = worker.holder();
         let mut connection = self.database.read.acquire().await?;

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     store::Store,
@@ -13,6 +14,7 @@ use jiff::Timestamp;
 impl Store {
     /// Closes a tournament: nothing of it changes any more. [`StoreError::Conflict`] while a game is open, or one of a
     /// round has no result and both its teams are in it.
+    #[boxed]
     pub async fn close_tournament(
         &self,
         actor: Actor,

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::tournament::play,
@@ -86,6 +87,7 @@ async fn round_under_way(tx: &mut Tx, id: TournamentId) -> Result<RoundNumber> {
 impl Store {
     /// Adds teams, from the next round on. [`StoreError::Conflict`] while a round is under way, once the groups of a tournament
     /// with groups were drawn, and of a team that is in it or has left it.
+    #[boxed]
     pub async fn enter_tournament(
         &self,
         actor: Actor,
@@ -120,6 +122,7 @@ impl Store {
     /// that is under way, or, between rounds, from the next; a disqualified one may lose earlier ones, too
     /// (`from_round`). Before the first round it is just out (`None`), and may enter again. Who withdrew may be disqualified afterwards.
     /// [`StoreError::Conflict`] if it has left otherwise, or is not in it, or the tournament is closed.
+    #[boxed]
     pub async fn leave_tournament(
         &self,
         actor: Actor,

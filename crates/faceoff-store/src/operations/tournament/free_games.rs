@@ -1,6 +1,7 @@
 //! Games that do not count: tests against the baseline, and friendly games.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
@@ -88,6 +89,7 @@ impl Store {
     /// Queues a game of a team's active submission against the baseline. `asked_by` none: the organiser, without a quota.
     /// [`StoreError::Conflict`] while a round is under way, without baseline or a valid submission, if the team is not in
     /// the tournament, or that is closed; [`StoreError::FreeGamesSpent`].
+    #[boxed]
     pub async fn order_test_game(
         &self,
         actor: Actor,
@@ -134,6 +136,7 @@ impl Store {
 
     /// Queues a game between what two teams have active; the asking one is at home. As
     /// [`order_test_game`](Self::order_test_game), and [`StoreError::Conflict`] if the opponent declines such games.
+    #[boxed]
     pub async fn order_friendly_game(
         &self,
         actor: Actor,
@@ -181,6 +184,7 @@ impl Store {
     }
 
     /// Calls off a game that does not count and is not over.
+    #[boxed]
     pub async fn cancel_game(
         &self,
         actor: Actor,
@@ -205,6 +209,7 @@ impl Store {
     }
 
     /// Does a team play no friendly games that others ask for?
+    #[boxed]
     pub async fn set_declines_friendly_games(
         &self,
         actor: Actor,
@@ -228,6 +233,7 @@ impl Store {
 
     /// How many games that do not count a team has asked for on the UTC day of `now`, in all tournaments, those that
     /// were called off included.
+    #[boxed]
     pub async fn free_games_used(&self, team: TeamId, now: Timestamp) -> Result<u32> {
         let mut connection = self.database.read.acquire().await?;
         games::count_asked(&mut connection, team, day_begins(now)).await

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     queue,
@@ -66,6 +67,7 @@ impl Store {
     /// Opens a tournament: entrants can be changed and games that do not count played, until its first round fixes the
     /// former. [`StoreError::TournamentNameTaken`] if another has its name, [`StoreError::NotFound`] for stage and teams,
     /// [`StoreError::SeasonClosed`].
+    #[boxed]
     pub async fn open_tournament(
         &self,
         actor: Actor,
@@ -109,6 +111,7 @@ impl Store {
     }
 
     /// Changes a tournament. [`StoreError::Conflict`] once it is closed, and of rules once a round was started.
+    #[boxed]
     pub async fn change_tournament(
         &self,
         actor: Actor,
@@ -164,6 +167,7 @@ impl Store {
 
     /// No game of it begins from now on; what is played meanwhile goes on to its end. [`StoreError::Conflict`] if it is
     /// paused, or closed.
+    #[boxed]
     pub async fn pause_tournament(
         &self,
         actor: Actor,
@@ -191,6 +195,7 @@ impl Store {
     }
 
     /// Its games begin again. [`StoreError::Conflict`] if it is not paused.
+    #[boxed]
     pub async fn resume_tournament(
         &self,
         actor: Actor,

@@ -1,6 +1,7 @@
 //! A game from the queue to its result, or to what kept it from one.
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Event, Subject},
     operations::{
@@ -184,6 +185,7 @@ pub(super) async fn end_round_if_over(
 
 impl Store {
     /// Stores what playing a game yielded. Idempotent, as [`Store::commit_shard`] is.
+    #[boxed]
     pub async fn commit_game(
         &self,
         claim: &Claim,

@@ -1,6 +1,7 @@
 //! The schedule played again: how sure is its champion?
 
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{purpose, tournament::play},
@@ -43,6 +44,7 @@ impl Store {
     /// Queues all games of all rounds `times` times more, with the same submissions and fresh seeds; they do not count and
     /// keep no recordings. Returns how many games. [`StoreError::Conflict`] if a round is to come or under way, or
     /// more than [`MAX_REPLAYS`], or [`MAX_REPLAYED_GAMES`], came of it.
+    #[boxed]
     pub async fn order_replays(
         &self,
         actor: Actor,
@@ -120,6 +122,7 @@ impl Store {
     }
 
     /// Calls off the replays that are not over. Returns how many games.
+    #[boxed]
     pub async fn cancel_replays(
         &self,
         actor: Actor,

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{
@@ -180,6 +181,7 @@ impl Store {
     /// nothing is changed, if the round is not the next one (two that start one at once: one does), a game of an earlier
     /// one has no result, a team has no valid submission that the tournament takes (it names them), the teams are not
     /// those that are in it, or it is closed.
+    #[boxed]
     pub async fn start_round(
         &self,
         actor: Actor,

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     error::{Result, StoreError},
     event::{Actor, Event, Subject},
     operations::{purpose, tournament::play},
@@ -17,6 +18,7 @@ use jiff::Timestamp;
 impl Store {
     /// A result counts no more; its attempt stays. The next round waits until the game is played again.
     /// [`StoreError::Conflict`] unless it is a round's game with a result.
+    #[boxed]
     pub async fn void_game(
         &self,
         actor: Actor,
@@ -45,6 +47,7 @@ impl Store {
 
     /// Queues a game again that was voided or broken by us: same submissions, same seed. [`StoreError::Conflict`] of any
     /// other, and if one of its teams had left by its round.
+    #[boxed]
     pub async fn rerun_game(&self, actor: Actor, id: GameId, now: Timestamp) -> Result<Game> {
         self.write(actor, now, async |tx| {
             season::check_open(tx).await?;
