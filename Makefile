@@ -92,7 +92,7 @@ test: setup-test
 # dependencies get the same features as in the run below, and are not built twice.
 tests-built:
 	+$(CARGO) build --locked --workspace --bins --tests
-	docker/runtime.sh "$(TARGET_DIR)/runtimes/python3-ml"
+	tests/runtimes.sh "$(TARGET_DIR)"
 tests-of-rust:
 	+if $(CARGO) nextest --version >/dev/null 2>&1; \
 	    then $(CARGO) nextest run --locked --workspace --no-fail-fast --test-threads $(TEST_THREADS); \
@@ -125,7 +125,7 @@ test-api: setup-test
 # The evaluator in Python is compared with the binary's, and the examples play in the sandbox.
 test-python: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
-	docker/runtime.sh "$(TARGET_DIR)/runtimes/python3-ml"
+	tests/runtimes.sh "$(TARGET_DIR)"
 	TARGET_DIR="$(TARGET_DIR)" crates/faceoff-py/test.sh test
 
 # What takes long and gigabytes: the examples learned anew, Stable-Baselines3 and LeRobot themselves.
