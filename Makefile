@@ -15,6 +15,8 @@ WHOLE    ?=
 TEST_THREADS ?= $(shell echo $$((2 * $$(nproc))))
 
 CARGO      ?= cargo
+# A folder's path may have spaces. So recipes quote each of these, and none is a target, a prerequisite or a word of one of make's functions,
+# which take a space for the end of a name.
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
 
@@ -61,20 +63,20 @@ agents: setup
 # The program in an archive; it refuses what only a newer system than the participants' could start.
 dist: setup
 	$(CARGO) build --release --locked --package faceoff
-	docker/dist.sh $(RELEASE)/faceoff $(TARGET_DIR)/dist
+	docker/dist.sh "$(RELEASE)/faceoff" "$(TARGET_DIR)/dist"
 
 define PACK_AGENTS
 for agent in striker baseline; do \
-    mkdir -p $(TARGET_DIR)/bundles/$$agent && \
-    cp agents/$$agent/agent.toml $(RELEASE)/$$agent $(TARGET_DIR)/bundles/$$agent/ || exit 1; \
+    mkdir -p "$(TARGET_DIR)/bundles/$$agent" && \
+    cp "agents/$$agent/agent.toml" "$(RELEASE)/$$agent" "$(TARGET_DIR)/bundles/$$agent/" || exit 1; \
 done
 endef
 
 demo: setup
 	$(CARGO) build --release --locked --package faceoff --package striker --package baseline
 	$(PACK_AGENTS)
-	$(RELEASE)/faceoff demo --episodes $(EPISODES) --listen $(LISTEN) --data-dir $(DEMO_DIR) \
-	    --bundle agents/hold --bundle $(TARGET_DIR)/bundles/striker --bundle agents/reckless \
+	"$(RELEASE)/faceoff" demo --episodes $(EPISODES) --listen $(LISTEN) --data-dir "$(DEMO_DIR)" \
+	    --bundle agents/hold --bundle "$(TARGET_DIR)/bundles/striker" --bundle agents/reckless \
 	    $(if $(filter 0,$(SERVE)),--no-serve)
 
 # Side by side what waits for much of its time: for a registry, for one program, for one of two CPUs. What Cargo says is told as it comes
@@ -90,7 +92,7 @@ test: setup-test
 # dependencies get the same features as in the run below, and are not built twice.
 tests-built:
 	+$(CARGO) build --locked --workspace --bins --tests
-	docker/runtime.sh $(TARGET_DIR)/runtimes/python3-ml
+	tests/runtimes.sh "$(TARGET_DIR)"
 tests-of-rust:
 	+if $(CARGO) nextest --version >/dev/null 2>&1; \
 	    then $(CARGO) nextest run --locked --workspace --no-fail-fast --test-threads $(TEST_THREADS); \
@@ -99,13 +101,13 @@ tests-of-rust:
 tests-of-release:
 	$(CARGO) test --release --locked --package faceoff-sim --test it golden
 tests-of-python:
-	TARGET_DIR=$(TARGET_DIR) crates/faceoff-py/test.sh test
+	TARGET_DIR="$(TARGET_DIR)" crates/faceoff-py/test.sh test
 tests-of-api:
-	TARGET_DIR=$(TARGET_DIR) tests/api/test.sh
+	TARGET_DIR="$(TARGET_DIR)" tests/api/test.sh
 tests-of-agents:
 	python3 agents/test_agents.py
 	web/client/build.sh test
-	TARGET_DIR=$(TARGET_DIR) tests/s3/setup.sh
+	TARGET_DIR="$(TARGET_DIR)" tests/s3/setup.sh
 
 # The script of the replay pages, from its sources; what it makes is committed.
 web:
@@ -113,41 +115,41 @@ web:
 
 # The Python package, for every CPython from 3.11 on: one wheel.
 wheel: setup
-	TARGET_DIR=$(TARGET_DIR) crates/faceoff-py/test.sh wheel
+	TARGET_DIR="$(TARGET_DIR)" crates/faceoff-py/test.sh wheel
 
 # The API as strangers' tools see it: a validator, a fuzzer and two generators of clients, against the debug server.
 test-api: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
-	TARGET_DIR=$(TARGET_DIR) tests/api/test.sh
+	TARGET_DIR="$(TARGET_DIR)" tests/api/test.sh
 
 # The evaluator in Python is compared with the binary's, and the examples play in the sandbox.
 test-python: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
-	docker/runtime.sh $(TARGET_DIR)/runtimes/python3-ml
-	TARGET_DIR=$(TARGET_DIR) crates/faceoff-py/test.sh test
+	tests/runtimes.sh "$(TARGET_DIR)"
+	TARGET_DIR="$(TARGET_DIR)" crates/faceoff-py/test.sh test
 
 # What takes long and gigabytes: the examples learned anew, Stable-Baselines3 and LeRobot themselves.
 test-learning: agents
 	$(CARGO) build --release --locked --package faceoff
-	TARGET_DIR=$(TARGET_DIR) crates/faceoff-py/test.sh learning
+	TARGET_DIR="$(TARGET_DIR)" crates/faceoff-py/test.sh learning
 
 # Most hosts have the one version of the interface or the other: here this one, whatever the host has. As root.
 test-cgroup2: setup
 	@docker/setup.sh cgroup2
 	$(CARGO) build --locked --workspace --bins --tests
-	TARGET_DIR=$(TARGET_DIR) docker/cgroup2.sh
+	TARGET_DIR="$(TARGET_DIR)" docker/cgroup2.sh
 
 # The steps of docker/Dockerfile, and the configurations of Compose and Kubernetes. As root.
 test-box: setup
 	@docker/setup.sh box
 	$(CARGO) build --locked --workspace --bins --tests
-	TARGET_DIR=$(TARGET_DIR) docker/test-box.sh
+	TARGET_DIR="$(TARGET_DIR)" docker/test-box.sh
 
 # The same by a real engine, a Docker of its own. As root. WHOLE=1: the program is compiled in an image, too, which takes long.
 test-engine: setup
 	@docker/setup.sh engine
 	$(CARGO) build --locked --workspace --bins --tests
-	WHOLE=$(WHOLE) TARGET_DIR=$(TARGET_DIR) docker/test-engine.sh
+	WHOLE=$(WHOLE) TARGET_DIR="$(TARGET_DIR)" docker/test-engine.sh
 
 # The fuzz targets, all at once for so many minutes; FUZZ_SEED=N for other inputs than last time.
 fuzz: setup-test
@@ -163,22 +165,22 @@ busy: setup-test
 load:
 	@docker/setup.sh load
 	$(CARGO) build --release --locked --package faceoff --package striker --package baseline
-	python3 tests/load/load.py $(RELEASE)/faceoff $(RELEASE)/striker
+	python3 tests/load/load.py "$(RELEASE)/faceoff" "$(RELEASE)/striker"
 
 # A slot of a worker against one of the server's own; nothing else should run.
 elsewhere: setup-test
 	$(CARGO) build --release --locked --package faceoff
-	python3 tests/load/elsewhere.py $(RELEASE)/faceoff
+	python3 tests/load/elsewhere.py "$(RELEASE)/faceoff"
 
 # Many workers that sleep in place of playing, for one server; nothing else should run. TMPDIR=FOLDER: on that disk.
 crowd: setup-test
 	$(CARGO) build --release --locked --package faceoff --package faceoff-tests --bin faceoff --example crowd
-	SHARDS=$(SHARDS) WORKERS=$(WORKERS) SLEEP_S=$(SLEEP_S) RECORDING_BYTES=$(RECORDING_BYTES) $(RELEASE)/examples/crowd
+	SHARDS=$(SHARDS) WORKERS=$(WORKERS) SLEEP_S=$(SLEEP_S) RECORDING_BYTES=$(RECORDING_BYTES) "$(RELEASE)/examples/crowd"
 
 # The same files by JetStream's object store and by HTTP, without a delay and with 200 ms there and back; some five minutes.
 objects: setup-test
 	$(CARGO) build --release --locked --package faceoff-tests --example objects
-	$(RELEASE)/examples/objects
+	"$(RELEASE)/examples/objects"
 
 # All disturbances at once; SOAK_SEED=N for other moments than last time.
 soak: setup-test

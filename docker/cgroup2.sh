@@ -24,15 +24,18 @@ fi
 program=$(realpath "$TARGET_DIR/debug/faceoff")
 # Every crate's integration tests are called `it`: the newest that have this module.
 tests_with() { # tests_with MODULE CRATE
-    for candidate in $(find "$(realpath "$TARGET_DIR/debug/deps")" -name 'it-*' ! -name '*.*' -type f -perm -u+x -printf '%T@ %p\n' |
-        sort -rn | cut -d' ' -f2); do
-        if "$candidate" --list 2>/dev/null | grep -q "^$1::.*: test\$"; then
+    found=$(find "$(realpath "$TARGET_DIR/debug/deps")" -name 'it-*' ! -name '*.*' -type f -perm -u+x -printf '%T@ %p\n' | sort -rn |
+        cut -d' ' -f2- | while IFS= read -r candidate; do
+        if "$candidate" --list </dev/null 2>/dev/null | grep -q "^$1::.*: test\$"; then
             echo "$candidate"
-            return
+            break
         fi
-    done
-    echo "error: no tests of $2 in $TARGET_DIR/debug/deps: cargo build --locked --workspace --bins --tests" >&2
-    exit 1
+    done)
+    if [ -z "$found" ]; then
+        echo "error: no tests of $2 in $TARGET_DIR/debug/deps: cargo build --locked --workspace --bins --tests" >&2
+        exit 1
+    fi
+    echo "$found"
 }
 tests=$(tests_with multiplies faceoff-sandbox)
 runner_tests=$(tests_with head_start faceoff-runner)
@@ -83,7 +86,8 @@ done
 /bin/busybox mount -t cgroup2 cgroup2 /root/sys/fs/cgroup
 /bin/busybox mkdir -p /root/dev/shm /root/dev/pts
 /bin/busybox mount -t devpts pts /root/dev/pts
-for folder in tmp run dev/shm; do
+# Not /tmp, which may hold the repository: the host's is as good, with the layer above it.
+for folder in run dev/shm; do
     /bin/busybox mount -t tmpfs -o mode=1777 memory "/root/$folder"
 done
 /bin/busybox cp /cases /root/run/cases
@@ -95,7 +99,8 @@ chmod 755 "$initramfs/init"
     printf "program='%s'\ntests='%s'\nrunner_tests='%s'\nrepository='%s'\n" "$program" "$tests" "$runner_tests" "$(dirname "$folder")"
     cat <<'END'
 set -u
-export PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/tmp TMPDIR=/tmp
+export PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/run/scratch TMPDIR=/run/scratch
+export entrypoint="$repository/docker/entrypoint.sh"
 top=/sys/fs/cgroup
 failed=''
 case_is() { printf '\n===== %s\n' "$*"; }
@@ -115,10 +120,10 @@ attacks() {
 }
 # All of doctor's layers, with version 2 in three of them. The exit status alone would leave out by which version.
 doctor() {
-    cd /tmp && "$program" doctor >/tmp/doctor.$$
+    cd "$TMPDIR" && "$program" doctor >doctor.$$
     status=$?
-    cat /tmp/doctor.$$
-    [ "$status" = 0 ] && [ "$(grep -c 'cgroup v2, limits accepted' /tmp/doctor.$$)" = 3 ]
+    cat doctor.$$
+    [ "$status" = 0 ] && [ "$(grep -c 'cgroup v2, limits accepted' doctor.$$)" = 3 ]
 }
 END
     cat <<'END'
@@ -126,6 +131,7 @@ if [ "${1:-}" = run ]; then
     "$2"
     exit
 fi
+mkdir -m 1777 "$TMPDIR"
 uname -sr
 grep cgroup /proc/mounts
 ip link set lo up 2>/dev/null || /bin/busybox ip link set lo up
@@ -174,20 +180,19 @@ useradd --system --user-group --uid 990 faceoff
 mkdir $top/image
 expect image sh -c "echo 0 >$top/image/cgroup.procs
     exec unshare --cgroup --mount sh -c 'umount $top && mount -t cgroup2 cgroup2 $top &&
-        $repository/docker/entrypoint.sh id -un && $repository/docker/entrypoint.sh sh $0 run doctor &&
-        $repository/docker/entrypoint.sh sh $0 run limits'"
+        \"\$entrypoint\" id -un && \"\$entrypoint\" sh $0 run doctor && \"\$entrypoint\" sh $0 run limits'"
 
 case_is "image: doctor in a busy cgroup without a namespace of its own, as in privileged pods"
 mkdir $top/pod
-expect image-pod sh -c "echo 0 >$top/pod/cgroup.procs; exec $repository/docker/entrypoint.sh sh $0 run doctor"
+expect image-pod sh -c "echo 0 >$top/pod/cgroup.procs; exec \"\$entrypoint\" sh $0 run doctor"
 
 case_is "partial: doctor in a busy cgroup that is offered pids and cpu, and no memory"
 mkdir $top/partial
 echo '+pids +cpu' >$top/partial/cgroup.subtree_control
 mkdir $top/partial/service
 # What is missing there is memory alone.
-expect partial sh -c "echo 0 >$top/partial/service/cgroup.procs; cd /tmp; '$program' doctor >/tmp/partial; cat /tmp/partial
-    [ \"\$(grep -c 'cgroup v2, limits accepted' /tmp/partial)\" = 2 ]"
+expect partial sh -c "echo 0 >$top/partial/service/cgroup.procs; cd $TMPDIR; '$program' doctor >partial; cat partial
+    [ \"\$(grep -c 'cgroup v2, limits accepted' partial)\" = 2 ]"
 
 case_is "what is left"
 find $top -type d -name 'agent-*' | grep . && failed="$failed left-behind"

@@ -111,13 +111,19 @@ if [ "${1:-}" = together ]; then
     exit
 fi
 
+# schema PROGRAM …: by its interpreter, for a path with a space names none in a program's first line.
+schema() {
+    checker=$1
+    shift
+    "$work/schemas/bin/python" "$work/schemas/bin/$checker" "$@"
+}
 # The files for engines that are not here: what their schemas say of them.
 [ -x "$work/schemas/bin/kubernetes-validate" ] || {
     python3 -m venv "$work/schemas"
-    "$work/schemas/bin/pip" install --quiet check-jsonschema==0.39.0 kubernetes-validate==1.37.0 pyyaml
+    "$work/schemas/bin/python" -m pip install --quiet check-jsonschema==0.39.0 kubernetes-validate==1.37.0 pyyaml
 }
-"$work/schemas/bin/check-jsonschema" --builtin-schema vendor.compose-spec "$repository/docker/compose.yaml"
-"$work/schemas/bin/kubernetes-validate" --strict --quiet "$repository"/docker/kubernetes/*.yaml
+schema check-jsonschema --builtin-schema vendor.compose-spec "$repository/docker/compose.yaml"
+schema kubernetes-validate --strict --quiet "$repository"/docker/kubernetes/*.yaml
 echo "the schemas of Compose and Kubernetes take the files"
 # Their configurations, as compose/ and kubernetes/; and every path that Compose mounts or builds from is there.
 "$work/schemas/bin/python" - "$repository/docker" "$work" <<'END'

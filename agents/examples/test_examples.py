@@ -66,8 +66,10 @@ def test_the_exported_network_answers_as_the_weights_do(name: str, tmp_path: Pat
 def test_the_bundle_plays_in_the_sandbox_with_onnx_runtime(tmp_path: Path) -> None:
     make_bundle.make(TRAINED["ppo"], tmp_path / "learned")
     config = tmp_path / "faceoff.toml"
-    runtime = f'[runtimes.python3-ml]\nfolder = "{TARGET / "runtimes" / "python3-ml"}"\n'
-    config.write_text(PATIENT.read_text() + runtime)
+    # Not always below the target folder: agents see nothing of the host's /tmp.
+    told = subprocess.run([ROOT / "tests" / "runtimes.sh", TARGET], check=True, stdout=subprocess.PIPE, text=True)
+    folder = Path(told.stdout.rstrip("\n")) / "python3-ml"
+    config.write_text(PATIENT.read_text() + f'[runtimes.python3-ml]\nfolder = "{folder}"\n')
     command: list[str | Path] = [PROGRAM, "eval", tmp_path / "learned", "--task", "defend", "--episodes", "20"]
     done = subprocess.run(
         [*command, "--config", config, "--out", tmp_path / "result"], capture_output=True, text=True

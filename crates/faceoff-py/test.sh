@@ -6,6 +6,8 @@
 #   test.sh learning    that wheel beside the libraries that need torch; the examples learn anew
 #   test.sh versions    the environments' tests, of the wheel in TARGET/wheels, by each interpreter of PYTHONS
 # TARGET_DIR (default: target), PYTHON (default: python3) and PYTHONS (default: PYTHON) may be set.
+#
+# Programs of an environment are started by its interpreter: their first lines name it, and a path with a space is none there.
 set -eu
 
 here=$(cd "$(dirname "$0")" && pwd)
@@ -21,7 +23,7 @@ environment() {
     if [ "$(cat "$1/made-of" 2>/dev/null)" != "$wanted" ]; then
         rm -rf "$1"
         "$python" -m venv "$1"
-        "$1/bin/pip" install --quiet --disable-pip-version-check -r "$2"
+        "$1/bin/python" -m pip install --quiet --disable-pip-version-check -r "$2"
         echo "$wanted" > "$1/made-of"
     fi
 }
@@ -33,8 +35,8 @@ wheel() {
     shift
     rm -rf "$out"
     # The interpreter is named so that one of an active environment is not taken; abi3 makes it one for all.
-    (cd "$here" && PATH=$target/python-build/bin:$PATH CARGO_TARGET_DIR=$target \
-        maturin build --quiet --locked --interpreter "$python" --out "$out" "$@")
+    (cd "$here" && PATH="$target/python-build/bin:$PATH" CARGO_TARGET_DIR="$target" \
+        "$target/python-build/bin/python" -m maturin build --quiet --locked --interpreter "$python" --out "$out" "$@")
     ls "$out"/*.whl
 }
 
@@ -46,14 +48,14 @@ case ${1:-} in
         shift
         wheel "$target/wheels-of-this-host"
         environment "$target/python-test" "$here/requirements-test.txt"
-        "$target/python-test/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps \
+        "$target/python-test/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps \
             "$target"/wheels-of-this-host/*.whl
         # Elsewhere than beside the sources, which would be imported in place of what is installed.
         cd "$target"
-        "$target/python-test/bin/mypy" --config-file "$here/pyproject.toml" "$here/python/faceoff"
-        "$target/python-test/bin/mypy" --config-file "$here/pyproject.toml" "$root"/agents/examples/*.py
+        "$target/python-test/bin/python" -m mypy --config-file "$here/pyproject.toml" "$here/python/faceoff"
+        "$target/python-test/bin/python" -m mypy --config-file "$here/pyproject.toml" "$root"/agents/examples/*.py
         export TARGET_DIR="$target" FACEOFF_BIN="${FACEOFF_BIN:-$target/debug/faceoff}"
-        FACEOFF_OLD_READERS=$target/python-old-readers FACEOFF_SKIP_NOTHING=1 \
+        FACEOFF_OLD_READERS="$target/python-old-readers" FACEOFF_SKIP_NOTHING=1 \
             "$target/python-test/bin/python" -m pytest -p no:cacheprovider -rs --durations 12 --rootdir "$here" \
             "$here/tests" "$root/agents/examples" "$@"
         ;;
@@ -61,17 +63,17 @@ case ${1:-} in
         shift
         wheel "$target/wheels-of-this-host" --release
         environment "$target/python-learning" "$here/tests_learning/requirements.txt"
-        "$target/python-learning/bin/pip" install --quiet --disable-pip-version-check --force-reinstall --no-deps \
+        "$target/python-learning/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps \
             "$target"/wheels-of-this-host/*.whl
         cd "$target"
-        TARGET_DIR=$target "$target/python-learning/bin/python" -m pytest -p no:cacheprovider -rs --durations 12 \
+        TARGET_DIR="$target" "$target/python-learning/bin/python" -m pytest -p no:cacheprovider -rs --durations 12 \
             --rootdir "$here" "$here/tests_learning" "$@"
         ;;
     versions)
         for one in ${PYTHONS:-$python}; do
             rm -rf "$target/python-version"
             "$one" -m venv "$target/python-version"
-            "$target/python-version/bin/pip" install --quiet --disable-pip-version-check \
+            "$target/python-version/bin/python" -m pip install --quiet --disable-pip-version-check \
                 "$target"/wheels/*.whl "gymnasium${GYMNASIUM:-}" pettingzoo pytest
             cd "$target"
             "$target/python-version/bin/python" -VV

@@ -46,8 +46,9 @@ engine_stop() {
         kill "$engine"
         wait "$engine" 2>/dev/null || true
     fi
-    awk -v a="$run/" -v b="$work/data/" 'index($5, a) == 1 || index($5, b) == 1 { print $5 }' /proc/self/mountinfo | sort -r |
-        while read -r mounted; do umount --lazy "$mounted" || true; done
+    # The kernel writes a space as \040.
+    awk -v a="$run/" -v b="$work/data/" '{ gsub(/\\040/, " ", $5) } index($5, a) == 1 || index($5, b) == 1 { print $5 }' /proc/self/mountinfo |
+        sort -r | while IFS= read -r mounted; do umount --lazy "$mounted" || true; done
     rm -rf "$run" "$work/data"
 }
 

@@ -16,7 +16,7 @@ wanted=$(cksum < "$here/requirements.txt")
 if [ "$(cat "$target/api-test/made-of" 2>/dev/null)" != "$wanted" ]; then
     rm -rf "$target/api-test"
     "$python" -m venv "$target/api-test"
-    "$target/api-test/bin/pip" install --quiet --disable-pip-version-check -r "$here/requirements.txt"
+    "$target/api-test/bin/python" -m pip install --quiet --disable-pip-version-check -r "$here/requirements.txt"
     echo "$wanted" > "$target/api-test/made-of"
 fi
 # The TypeScript client is made, checked and run beside its packages, which are installed when their list has changed.
@@ -32,5 +32,5 @@ fi
 export FACEOFF_BIN="${FACEOFF_BIN:-$target/debug/faceoff}" API_TYPESCRIPT="$target/api-typescript"
 # What schemathesis writes goes beside all else that is made.
 cd "$target/api-test"
-PATH=$target/api-test/bin:$PATH exec "$target/api-test/bin/python" -m pytest -p no:cacheprovider -rs --durations 8 \
+PATH="$target/api-test/bin:$PATH" exec "$target/api-test/bin/python" -m pytest -p no:cacheprovider -rs --durations 8 \
     --rootdir "$here" "$here" "$@"

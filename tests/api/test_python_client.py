@@ -15,9 +15,10 @@ HERE = Path(__file__).resolve().parent
 @pytest.fixture
 def client_package(document, tmp_path, monkeypatch):
     """The generated package, importable."""
-    generator = Path(sys.executable).with_name("openapi-python-client")
     command = [
-        generator,
+        sys.executable,
+        "-m",
+        "openapi_python_client",
         "generate",
         "--path",
         document,

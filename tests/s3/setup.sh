@@ -7,6 +7,6 @@ environment=$TARGET_DIR/s3-test
 if ! cmp --silent "$here/requirements.txt" "$environment/requirements.txt"; then
     rm -rf "$environment"
     "${PYTHON:-python3}" -m venv "$environment"
-    "$environment/bin/pip" install --quiet --disable-pip-version-check -r "$here/requirements.txt"
+    "$environment/bin/python" -m pip install --quiet --disable-pip-version-check -r "$here/requirements.txt"
     cp "$here/requirements.txt" "$environment/requirements.txt"
 fi

@@ -1,4 +1,4 @@
-//! Python packages for agents of tests, from the package index, kept below the target folder.
+//! Python packages for agents of tests, from the package index, kept for later runs.
 
 use crate::{bundle::copied, program, repository};
 use std::{
@@ -7,28 +7,28 @@ use std::{
     process::Command,
 };
 
-/// Where what was downloaded stays.
-fn kept() -> PathBuf {
+/// The target folder.
+fn target() -> PathBuf {
     let programs = program("faceoff");
     let target = programs.ancestors().nth(2);
     let target = target.expect("programs lie two folders below the target folder's");
-    if target.starts_with("/tmp") {
-        // Agents have a /tmp of their own in its place.
-        return PathBuf::from("/var/tmp/faceoff-test-runtimes");
-    }
-    target.join("runtimes")
+    target.to_owned()
 }
 
-/// The runtime `python3-ml`, made by `docker/runtime.sh` the first time.
+/// Where what was downloaded stays.
+fn kept() -> PathBuf {
+    target().join("runtimes")
+}
+
+/// The runtime `python3-ml`, made by `tests/runtimes.sh` the first time, where agents see it.
 ///
 /// # Panics
 /// If it cannot be made, as without a package index.
 #[must_use]
 pub fn python3_ml() -> PathBuf {
-    let folder = kept().join("python3-ml");
-    let script = repository().join("docker/runtime.sh");
-    run(Command::new(script).arg(&folder));
-    folder
+    let script = repository().join("tests/runtimes.sh");
+    let folder = run(Command::new(script).arg(target()));
+    Path::new(folder.trim_end_matches('\n')).join("python3-ml")
 }
 
 /// The bundle `tests/bundles/NAME`, complete.
@@ -86,7 +86,8 @@ pub fn vendor(bundle: &Path, version: &str) {
     run(install.args(["--no-index", "--find-links"]).arg(&wheels));
 }
 
-fn run(command: &mut Command) {
+/// What it prints; it must succeed.
+fn run(command: &mut Command) -> String {
     let output = command.output().expect("the program can be started");
     assert!(
         output.status.success(),
@@ -94,4 +95,5 @@ fn run(command: &mut Command) {
         String::from_utf8_lossy(&output.stdout),
         String::from_utf8_lossy(&output.stderr)
     );
+    String::from_utf8(output.stdout).expect("scripts and pip print text")
 }

@@ -12,7 +12,7 @@ use std::{
     fs,
     io::Read as _,
     net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream},
-    path::{Path, PathBuf},
+    path::Path,
     process::{Child, Command, Stdio},
     thread,
     time::{Duration, Instant},
@@ -41,14 +41,21 @@ fn free_port() -> u16 {
     address.port()
 }
 
-/// A certificate for `localhost` that it has signed itself, and where it and its key lie.
-fn certified(scratch: &Path) -> (rcgen::Certificate, PathBuf, PathBuf) {
+// Files of a proxy's scratch folder. Configurations name them relative to it: its own path may have spaces.
+const CERTIFICATE: &str = "certificate.pem";
+const KEY: &str = "key.pem";
+
+/// A certificate for `localhost` that it has signed itself, and its key, written to these files.
+fn certified(scratch: &Path) -> rcgen::Certificate {
     let made = rcgen::generate_simple_self_signed(["localhost".to_owned()]);
     let made = made.expect("a certificate can be made");
-    let [certificate, key] = ["certificate.pem", "key.pem"].map(|name| scratch.join(name));
-    fs::write(&certificate, made.cert.pem()).expect("a scratch file can be written");
-    fs::write(&key, made.signing_key.serialize_pem()).expect("a scratch file can be written");
-    (made.cert, certificate, key)
+    for (name, text) in [
+        (CERTIFICATE, made.cert.pem()),
+        (KEY, made.signing_key.serialize_pem()),
+    ] {
+        fs::write(scratch.join(name), text).expect("a scratch file can be written");
+    }
+    made.cert
 }
 
 fn example(name: &str) -> String {
@@ -66,7 +73,7 @@ fn changed(text: &str, changes: &[(&str, String)]) -> String {
 
 impl Proxy {
     fn nginx(server: &Server, scratch: &Path) -> Self {
-        let (certificate, file, key) = certified(scratch);
+        let certificate = certified(scratch);
         let (http, https) = (free_port(), free_port());
         let site = changed(
             &example("nginx.conf"),
@@ -74,24 +81,21 @@ impl Proxy {
                 ("listen 80;", format!("listen 127.0.0.1:{http};")),
                 ("listen 443 ", format!("listen 127.0.0.1:{https} ")),
                 ("faceoff.example.org", "localhost".to_owned()),
-                ("/var/log/nginx/", format!("{}/", scratch.display())),
+                ("/var/log/nginx/", String::new()),
                 ("127.0.0.1:8080", server.address().to_string()),
-                ("/etc/ssl/faceoff/fullchain.pem", file.display().to_string()),
-                ("/etc/ssl/faceoff/privkey.pem", key.display().to_string()),
+                ("/etc/ssl/faceoff/fullchain.pem", CERTIFICATE.to_owned()),
+                ("/etc/ssl/faceoff/privkey.pem", KEY.to_owned()),
             ],
         );
         fs::write(scratch.join("site.conf"), site).expect("a scratch file can be written");
-        let folder = scratch.display();
         // What a distribution's nginx.conf has around the files of conf.d.
-        let whole = format!(
-            "daemon off; master_process off; pid {folder}/pid; error_log stderr;\n\
-             events {{}}\n\
-             http {{\n\
-             access_log off; client_body_temp_path {folder}/body; proxy_temp_path {folder}/proxy;\n\
-             fastcgi_temp_path {folder}/fastcgi; uwsgi_temp_path {folder}/uwsgi; scgi_temp_path {folder}/scgi;\n\
-             include {folder}/site.conf;\n\
-             }}\n"
-        );
+        let whole = "daemon off; master_process off; pid pid; error_log stderr;\n\
+                     events {}\n\
+                     http {\n\
+                     access_log off; client_body_temp_path body; proxy_temp_path proxy;\n\
+                     fastcgi_temp_path fastcgi; uwsgi_temp_path uwsgi; scgi_temp_path scgi;\n\
+                     include site.conf;\n\
+                     }\n";
         let file = scratch.join("nginx.conf");
         fs::write(&file, whole).expect("a scratch file can be written");
         let mut nginx = Command::new("nginx");
@@ -103,16 +107,15 @@ impl Proxy {
     }
 
     fn caddy(server: &Server, scratch: &Path) -> Self {
-        let (certificate, file, key) = certified(scratch);
+        let certificate = certified(scratch);
         let (http, https) = (free_port(), free_port());
-        let [file, key] = [file, key].map(|path| path.display().to_string());
         let site = changed(
             &example("Caddyfile"),
             &[
                 (
                     "\nfaceoff.example.org {",
                     // It would ask for a certificate otherwise.
-                    format!("\nlocalhost {{\n\tbind 127.0.0.1\n\ttls {file} {key}\n"),
+                    format!("\nlocalhost {{\n\tbind 127.0.0.1\n\ttls {CERTIFICATE} {KEY}\n"),
                 ),
                 ("127.0.0.1:8080", server.address().to_string()),
             ],
@@ -124,6 +127,7 @@ impl Proxy {
         caddy
             .args(["run", "--adapter", "caddyfile", "--config"])
             .arg(&config)
+            .current_dir(scratch)
             .env("HOME", scratch)
             .env("XDG_DATA_HOME", scratch)
             .env("XDG_CONFIG_HOME", scratch);

@@ -16,16 +16,21 @@ use std::{
 
 const SERVER: &str = "faceoff.service";
 const WORKER: &str = "faceoff-worker.service";
+/// Where the units have the program.
+const PROGRAM: &str = "/usr/local/bin/faceoff";
 
 fn unit(name: &str) -> PathBuf {
     repository().join("docker/systemd").join(name)
 }
 
-/// The unit's text for the program that was built.
+fn text(name: &str) -> String {
+    fs::read_to_string(unit(name)).expect("there is a unit")
+}
+
+/// The unit's text for the program that was built, in quotes: its path may have spaces.
 fn with_program(name: &str) -> String {
-    let text = fs::read_to_string(unit(name)).expect("there is a unit");
-    let program = program("faceoff");
-    text.replace("/usr/local/bin/faceoff", &program.display().to_string())
+    let program = format!("\"{}\"", program("faceoff").display());
+    text(name).replace(PROGRAM, &program)
 }
 
 #[test]
@@ -87,22 +92,21 @@ impl Drop for Manager {
 
 /// The words of the unit's command, in a scratch folder in place of the system's.
 fn command(scratch: &Path) -> Command {
-    let text = with_program(SERVER);
-    let line = text
+    let unit = text(SERVER);
+    let line = unit
         .lines()
         .find_map(|line| line.strip_prefix("ExecStart="));
     let line = line.expect("a unit has a command");
     let config = scratch.join("faceoff.toml");
-    let line = line
-        .replace("/etc/faceoff/faceoff.toml", &config.display().to_string())
-        .replace(
-            "/var/lib/faceoff",
-            &scratch.join("data").display().to_string(),
-        );
     let text =
         "[server]\nlisten = \"127.0.0.1:0\"\n[workers]\nslots = 1\n[sandbox]\nresident_bytes = 0\n";
-    fs::write(config, text).expect("a scratch file can be written");
-    let mut words = line.split(' ');
+    fs::write(&config, text).expect("a scratch file can be written");
+    let mut words = line.split(' ').map(|word| match word {
+        PROGRAM => program("faceoff"),
+        "/etc/faceoff/faceoff.toml" => config.clone(),
+        "/var/lib/faceoff" => scratch.join("data"),
+        word => PathBuf::from(word),
+    });
     let mut command = Command::new(words.next().expect("a command has a program"));
     command.args(words);
     command
@@ -110,8 +114,7 @@ fn command(scratch: &Path) -> Command {
 
 #[test]
 fn the_units_command_tells_when_it_answers_and_when_it_ends() {
-    let text = with_program(SERVER);
-    assert!(text.lines().any(|line| line == "Type=notify"));
+    assert!(text(SERVER).lines().any(|line| line == "Type=notify"));
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let address = scratch.path().join("notify");
     let socket = UnixDatagram::bind(&address).expect("a socket can be made");

@@ -3,7 +3,7 @@
 use crate::{
     archives::{MANIFEST, Tar, write, zip},
     image_archives::{
-        IMAGE_MANIFEST, Packing, TestImage, agent_layer, digest, index, layout, list,
+        IMAGE_MANIFEST, Packing, TestImage, agent_layer, digest, host_folder, index, layout, list,
     },
 };
 use faceoff_runner::bundle::{Bundle, BundleError, BundleLimits, Image, open, unpack};
@@ -425,8 +425,7 @@ fn hard_links_keep_a_file_that_is_replaced() {
 
 #[test]
 fn links_of_the_image_never_lead_to_the_host() {
-    // Not in /tmp, of which an image has nothing.
-    let host = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
+    let host = host_folder();
     fs::write(host.path().join("mine"), "mine").unwrap();
     let there = host.path().to_str().unwrap();
     let up = format!("../../../../../../../../..{there}");

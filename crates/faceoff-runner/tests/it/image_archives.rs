@@ -17,6 +17,12 @@ fn blob(digest: &str) -> String {
     format!("blobs/{}", digest.replace(':', "/"))
 }
 
+/// A folder of the host whose path an image may have, too: not below `/tmp`, of which an image has nothing, nor below the
+/// target folder, which may lie there.
+pub fn host_folder() -> tempfile::TempDir {
+    tempfile::tempdir_in("/var/tmp").unwrap()
+}
+
 /// How a layer is packed in the archive.
 #[derive(Debug, Clone, Copy)]
 pub enum Packing {

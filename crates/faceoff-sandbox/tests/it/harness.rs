@@ -143,8 +143,9 @@ impl Subject {
             "processes are left"
         );
         let mounts = fs::read_to_string("/proc/self/mountinfo").unwrap();
-        let bundle = self.bundle.path().to_str().unwrap();
-        assert!(!mounts.contains(bundle), "a mount is left: {mounts}");
+        // The kernel writes a space so.
+        let bundle = self.bundle.path().to_str().unwrap().replace(' ', "\\040");
+        assert!(!mounts.contains(&bundle), "a mount is left: {mounts}");
         let ours = format!("agent-{}-", std::process::id());
         let cgroups: Vec<_> = agent_cgroups()
             .into_iter()

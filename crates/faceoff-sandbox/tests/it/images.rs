@@ -121,15 +121,16 @@ fn it_sees_its_own_files_and_nothing_of_the_hosts() {
         "/sys/fs",
         "/proc/sys/kernel",
     ];
+    // In quotes: a path may have spaces.
     let script = format!(
-        "echo $PWD\necho $PATH\nfor f in {}; do [ -e $f ] && echo host $f; done\n\
+        "echo $PWD\necho $PATH\nfor f in '{}'; do [ -e \"$f\" ] && echo \"host $f\"; done\n\
          while read -r l; do echo $l; done < /etc/passwd\n\
          while read -r l; do echo $l; done < /etc/group\n\
          read -r l < /etc/own; echo $l\n\
          while read -r a b c; do [ $a = Uid: ] && echo $b; done < /proc/self/status\n\
          read -r l < /sys/devices/system/cpu/online; echo cpus $l\n\
          [ -L /bin ] && echo link\necho /dev/shm/* /tmp/*",
-        host.join(" ")
+        host.join("' '")
     );
     let told = root.told(&script);
     assert_eq!(

@@ -50,8 +50,9 @@ fn a_script_finds_its_interpreter() {
 
 #[test]
 fn a_python_outside_of_usr_brings_its_own_prefix_and_nothing_beside_it() {
-    // A copy of the host's Python in a prefix of its own, as pyenv and the like lay it out.
-    let host = tempfile::tempdir().unwrap();
+    // A copy of the host's Python in a prefix of its own, as pyenv and the like lay it out. Not in /tmp, where the agent would not see
+    // it, and would be started by the Python behind it.
+    let host = tempfile::tempdir_in("/var/tmp").unwrap();
     fs::set_permissions(host.path(), fs::Permissions::from_mode(0o755)).unwrap();
     let prefix = host.path().join("python");
     fs::write(host.path().join("secret"), "secret").unwrap();
@@ -77,6 +78,13 @@ fn a_python_outside_of_usr_brings_its_own_prefix_and_nothing_beside_it() {
     subject.spec.runtime = runtime;
     let mut agent = subject.spawn();
     expect_echo(&mut agent, "hello");
+    subject.finish(agent);
+    let question = "import sys; print(sys.prefix)";
+    subject.spec.command = ["python3", "-c", question, subject.mark.as_str()]
+        .map(str::to_owned)
+        .to_vec();
+    let mut agent = subject.spawn();
+    assert_eq!(expect_line(&mut agent), prefix.to_str().unwrap());
     subject.finish(agent);
 }
 

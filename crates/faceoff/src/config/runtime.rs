@@ -5,7 +5,7 @@ use faceoff_sandbox::{Runtime, RuntimeFiles};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// What is below these folders of the host no agent sees.
+/// What is below these folders of the host no agent sees. `tests/runtimes.sh` has the same list.
 const COVERED: [&str; 4] = ["/tmp", "/dev", "/proc", "/agent"];
 
 /// A runtime that the organiser offers.

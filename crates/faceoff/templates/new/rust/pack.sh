@@ -2,5 +2,5 @@
 # Builds the agent and puts it into the bundle.
 set -eu
 cd "$(dirname "$0")"
-cargo build --release
+cargo build --release --target-dir target
 cp target/release/{{name}} bundle/agent
