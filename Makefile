@@ -10,6 +10,10 @@ SHARDS   ?= 10000
 WORKERS  ?= 200
 SLEEP_S  ?= 10
 WHOLE    ?=
+ONLY     ?=
+ROUNDS   ?= 1
+COMMIT   ?= HEAD
+JSON     ?=
 
 # Tests wait for much of their time, so there are more at a time than CPUs.
 TEST_THREADS ?= $(shell echo $$((2 * $$(nproc))))
@@ -20,13 +24,15 @@ CARGO      ?= cargo
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
 
-.PHONY: demo test tests-built tests-of-rust tests-of-release tests-of-python tests-of-api tests-of-agents web wheel pictures test-api test-python test-learning fuzz busy load elsewhere crowd objects soak steady frames test-cgroup2 test-box test-engine lint format fidelity setup setup-test agents dist clean-demo help
+.PHONY: demo test tests-built tests-of-rust tests-of-python tests-of-api tests-of-agents tests-of-scripts test-release costs web wheel pictures test-api test-python test-learning fuzz busy load elsewhere crowd objects soak steady frames test-cgroup2 test-box test-engine lint format fidelity setup setup-test agents dist clean-demo help
 
 help:
 	@echo "make demo   play a competition day: EPISODES=$(EPISODES) SERVE=$(SERVE) LISTEN=$(LISTEN)"
 	@echo "make agents   bundle striker and baseline: $(TARGET_DIR)/bundles"
 	@echo "make dist   pack the program for other Linux machines: $(TARGET_DIR)/dist"
 	@echo "make test   run everything that proves that it works"
+	@echo "make test-release   build the release program, and check its size, its symbols and the golden hashes"
+	@echo "make costs   what building and testing take, from fresh clones: ONLY=$(ONLY) ROUNDS=$(ROUNDS) COMMIT=$(COMMIT) JSON=$(JSON)"
 	@echo "make web    the script of the replay pages: web/client/dist"
 	@echo "make wheel  the Python package: $(TARGET_DIR)/wheels"
 	@echo "make test-api   validate the API's document, try every operation, make two clients of it"
@@ -65,6 +71,11 @@ dist: setup
 	$(CARGO) build --release --locked --package faceoff
 	docker/dist.sh "$(RELEASE)/faceoff" "$(TARGET_DIR)/dist"
 
+# The release program is built, checked and packed; first its check (docker/check-program.sh) is tested itself.
+test-release:
+	python3 docker/test_check_program.py
+	$(MAKE) --no-print-directory dist
+
 define PACK_AGENTS
 for agent in striker baseline; do \
     mkdir -p "$(TARGET_DIR)/bundles/$$agent" && \
@@ -84,8 +95,8 @@ demo: setup
 SIDE_BY_SIDE = $(MAKE) --no-print-directory --output-sync=target --keep-going --jobs
 
 test: setup-test
-	$(SIDE_BY_SIDE) tests-built tests-of-agents
-	$(SIDE_BY_SIDE) tests-of-rust tests-of-python tests-of-api tests-of-release
+	$(SIDE_BY_SIDE) tests-built tests-of-agents tests-of-scripts
+	$(SIDE_BY_SIDE) tests-of-rust tests-of-python tests-of-api
 
 # Parts of `make test`, in two rounds: Rust's tests use what those of the agents and pages install.
 # The programs first: the end-to-end tests run the real binary and the real agents. With --tests the
@@ -97,9 +108,6 @@ tests-of-rust:
 	+if $(CARGO) nextest --version >/dev/null 2>&1; \
 	    then $(CARGO) nextest run --locked --workspace --no-fail-fast --test-threads $(TEST_THREADS); \
 	    else $(CARGO) test --locked --workspace --no-fail-fast -- --test-threads $(TEST_THREADS); fi
-# The golden hashes again, as the released program computes them: the same bits.
-tests-of-release:
-	$(CARGO) test --release --locked --package faceoff-sim --test it golden
 tests-of-python:
 	TARGET_DIR="$(TARGET_DIR)" crates/faceoff-py/test.sh test
 tests-of-api:
@@ -108,6 +116,15 @@ tests-of-agents:
 	python3 agents/test_agents.py
 	web/client/build.sh test
 	TARGET_DIR="$(TARGET_DIR)" tests/s3/setup.sh
+# The scripts that check a release and measure builds, on small programs and a small project.
+tests-of-scripts:
+	python3 docker/test_check_program.py
+	python3 tests/costs/test_costs.py
+
+# Measures HEAD or COMMIT from fresh clones and prints a table; nothing else should run. ONLY: of demo, test, page, store, release,
+# crates, lines. ROUNDS: of demo, test and release. JSON=FILE: the numbers there, too. TMPDIR=FOLDER: clones are made there.
+costs: setup-test
+	@python3 tests/costs/costs.py --only '$(ONLY)' --rounds $(ROUNDS) --commit '$(COMMIT)' $(if $(JSON),--json '$(JSON)')
 
 # The script of the replay pages, from its sources; what it makes is committed.
 web:

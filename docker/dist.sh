@@ -1,5 +1,6 @@
 #!/bin/sh
 # Packs the program for other machines: any Linux of this architecture whose C library is not older than asked for.
+# What is packed has passed check-program.sh.
 # usage: dist.sh PROGRAM FOLDER      (PROGRAM: for example target/release/faceoff)
 set -eu
 if [ $# -ne 2 ]; then
@@ -23,9 +24,10 @@ if [ -n "$others" ]; then
     exit 1
 fi
 name="faceoff-$("$program" --version | cut -d' ' -f2)-$(uname -m)-linux"
+trap 'rm -rf "${folder:?}/$name"' EXIT
 mkdir -p "$folder/$name"
 install -m 755 "$program" "$folder/$name/faceoff"
+"$(dirname "$0")/check-program.sh" "$folder/$name/faceoff"
 tar -C "$folder" --owner=0 --group=0 -czf "$folder/$name.tar.gz" "$name"
-rm -r "${folder:?}/$name"
 (cd "$folder" && sha256sum "$name.tar.gz" | tee "$name.tar.gz.sha256")
 echo "needs glibc $needed or newer: $folder/$name.tar.gz"

@@ -21,6 +21,7 @@ pub mod dynamics;
 pub mod episode;
 pub mod export;
 pub mod game;
+pub mod golden;
 pub mod model;
 pub mod perturbation;
 pub mod robot;

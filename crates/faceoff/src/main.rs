@@ -50,7 +50,7 @@ enum Command {
     Dataset(commands::dataset::DatasetCommand),
     /// Score results by hand: a qualifying board or a tournament.
     Score(commands::score::ScoreCommand),
-    /// Simulate open loop, export the model, or measure the simulator.
+    /// Simulate open loop, export the model, measure the simulator, or check its bits.
     Sim(commands::sim::SimCommand),
     /// Upload a bundle and follow its validation.
     Submit(commands::submit::SubmitCommand),

@@ -1,8 +1,8 @@
 //! A substep allocates nothing: memory is set aside when a world is made.
 
-use crate::policy::strike;
 use faceoff_sim::{
-    Command, Episode, Game, GameSetup, Interpolation, PerturbationSettings, Plant, model::INITIAL_Q,
+    Command, Episode, Game, GameSetup, Interpolation, PerturbationSettings, Plant, golden::strike,
+    model::INITIAL_Q,
 };
 use faceoff_types::{Factors, Seed, Task};
 

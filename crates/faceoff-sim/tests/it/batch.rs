@@ -1,7 +1,8 @@
 //! Many worlds stepped together.
 
-use crate::policy::strike;
-use faceoff_sim::{Batch, BatchSetup, Episode, Interpolation, PerturbationSettings, Plant};
+use faceoff_sim::{
+    Batch, BatchSetup, Episode, Interpolation, PerturbationSettings, Plant, golden::strike,
+};
 use faceoff_types::{Factors, Seed, Task};
 
 const WORLDS: u32 = 10;

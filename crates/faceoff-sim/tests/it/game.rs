@@ -1,12 +1,10 @@
 //! Games between two agents (RULES, "Tournament"; REFERENCE, `game_rules`).
 
-use crate::{
-    policy,
-    reference::{array, max_difference, recording},
-};
+use crate::reference::{array, max_difference, recording};
 use faceoff_sim::{
     Command, Game, GameSetup, Interpolation, PerturbationSettings, Plant, RallyEnd, World,
     game::referee::Referee,
+    golden::game_hash,
     model::{EE_DESIRED_HEIGHT_M, INITIAL_Q},
 };
 use faceoff_types::{Factors, Seed, Violations, WINDOW_STEPS};
@@ -130,41 +128,11 @@ fn a_rally_starts_at_rest_on_the_side_that_serves() {
     assert!((5 * 752..35 * 752).contains(&first_sides));
 }
 
-/// Plays with the policy; hashes states, observations and judgements.
-fn play(game: &mut Game, steps: u32) -> String {
-    let mut hasher = blake3::Hasher::new();
-    for _ in 0..steps {
-        let actions = [0, 1].map(|robot| policy::strike(game.observation(robot), game.steps()));
-        for robot in 0..2 {
-            for number in game.observation(robot) {
-                hasher.update(&number.to_le_bytes());
-            }
-        }
-        let outcome = game.step(actions.each_ref().map(|action| Command::Act(action)));
-        for number in game.world().puck().state() {
-            hasher.update(&number.to_le_bytes());
-        }
-        hasher.update(format!("{:?} {:?}", outcome.rally_end, outcome.window).as_bytes());
-    }
-    hasher.finalize().to_hex()[..16].to_owned()
-}
-
-#[test]
-fn games_have_their_golden_hashes() {
-    let mut ideal = Game::new(setup(Factors::NONE, 1));
-    let mut perturbed = Game::new(setup(Factors::ALL, 1));
-    let hashes = [play(&mut ideal, 3000), play(&mut perturbed, 3000)];
-    println!("{:?} {:?}", ideal.referee(), perturbed.referee());
-    assert_eq!(hashes, ["aab408f333eb3f9d", "1f186173c23a9518"]);
-    // What the hashes are of: rallies in which something happens.
-    assert!(ideal.rally() >= 2 && ideal.referee().goals != [0; 2]);
-}
-
 #[test]
 fn a_saved_game_continues_as_if_never_stopped() {
     let mut game = Game::new(setup(Factors::ALL, 2));
-    play(&mut game, 700);
-    assert_eq!(play(&mut game.clone(), 900), play(&mut game, 900));
+    game_hash(&mut game, 700);
+    assert_eq!(game_hash(&mut game.clone(), 900), game_hash(&mut game, 900));
 }
 
 #[test]

@@ -1,9 +1,8 @@
 //! Episodes stepped together have the bits that they have alone, by every path.
 
-use crate::policy::strike;
 use faceoff_sim::{
     Bounds, Episode, Interpolation, JOINTS, LanePath, PerturbationSettings, Plant, StepOutcome,
-    model::INITIAL_Q, step_together, step_together_by,
+    golden::strike, model::INITIAL_Q, step_together, step_together_by,
 };
 use faceoff_types::{ACTION_LIMIT, EpisodeEnd, Factor, Factors, Seed, Task};
 

@@ -1,14 +1,15 @@
-//! `faceoff sim`: the simulator alone, for comparison with other simulators, for other programs, and for measuring it.
+//! `faceoff sim`: the simulator alone, for comparison with other simulators, for other programs, and for measuring and checking it.
 
 mod bench;
 mod export;
+mod golden;
 mod kinematics;
 mod scenario;
 mod trace;
 
 use clap::{Args, Subcommand};
 
-/// Simulate open loop, export the model, or measure the simulator.
+/// Simulate open loop, export the model, measure the simulator, or check its bits.
 #[derive(Debug, Args)]
 pub struct SimCommand {
     #[command(subcommand)]
@@ -31,6 +32,10 @@ enum What {
     Kinematics,
     /// Write the ideal model of robot, table and puck for other programs: URDF, MJCF, Python
     Export(export::ExportArgs),
+    /// Play the golden episodes and games and write their hashes, which are equal in every build of a ruleset
+    ///
+    /// tests/golden/simulator.txt in the sources has the hashes as they must be.
+    Golden,
     /// Measure control steps and substeps per second on one core: a held arm, no agent process
     Bench(bench::BenchArgs),
 }
@@ -46,6 +51,7 @@ impl SimCommand {
             What::Trace => trace::run(),
             What::Kinematics => kinematics::run(),
             What::Export(args) => args.run(),
+            What::Golden => golden::run(),
             What::Bench(args) => args.run(),
         }
     }

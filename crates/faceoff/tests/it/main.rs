@@ -10,6 +10,7 @@ mod init;
 mod new;
 mod play;
 mod replay;
+mod sim;
 
 /// A configuration that gives agents time: what is played again must not differ by a busy machine's faults.
 const PATIENT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/patient.toml");

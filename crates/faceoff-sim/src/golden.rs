@@ -1,0 +1,177 @@
+//! Golden episodes and games, in which pucks are hit, and the hashes of all that they show. A change of one
+//! hash is a change of the simulator's behaviour, and so of the ruleset.
+//!
+//! `tests/golden/simulator.txt` holds the hashes. This crate's tests compare what the library computes;
+//! `faceoff sim golden` prints what a program computes, so that a release can be asked, too.
+
+use crate::{
+    channel::Command,
+    episode::Episode,
+    game::{Game, GameSetup},
+    model::{EE_DESIRED_HEIGHT_M, JOINTS},
+    robot::{inverse_kinematics::inverse_kinematics, plant::Plant},
+};
+use faceoff_types::{Interpolation, PerturbationSettings, Profile, Seed, Task};
+use std::fmt;
+
+/// Without a perturbation, and with all that the evaluation has.
+const PROFILES: [Profile; 2] = [Profile::Ideal, Profile::Evaluation];
+
+/// Control steps of a golden game: several rallies, and goals.
+const GAME_STEPS: u32 = 3000;
+
+/// Control steps of one stroke.
+const STROKE_STEPS: u32 = 40;
+
+/// Seed of all golden episodes and games.
+const SEED: u64 = 1;
+
+/// A golden episode or game.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Golden {
+    /// The task or `game`, and the profile: `hit ideal`.
+    pub name: String,
+    /// The first 16 hexadecimal digits of the BLAKE3 hash of its numbers, little-endian.
+    pub hash: String,
+}
+
+/// A line of `tests/golden/simulator.txt`.
+impl fmt::Display for Golden {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.name, self.hash)
+    }
+}
+
+/// All of them, in the order of the file.
+pub fn all() -> impl Iterator<Item = Golden> {
+    let episodes = PROFILES
+        .into_iter()
+        .flat_map(|profile| Task::ALL.map(|task| play_episode(task, profile)));
+    let games = PROFILES.into_iter().map(|profile| play_game(profile).0);
+    episodes.chain(games)
+}
+
+/// Plays a golden episode to its end.
+#[must_use]
+pub fn play_episode(task: Task, profile: Profile) -> Golden {
+    Golden {
+        name: format!("{task} {profile}"),
+        hash: episode_hash(start_episode(task, profile)),
+    }
+}
+
+/// Plays a golden game; the second value is the game as it then stands.
+#[must_use]
+pub fn play_game(profile: Profile) -> (Golden, Game) {
+    let mut game = start_game(profile);
+    let golden = Golden {
+        name: format!("game {profile}"),
+        hash: game_hash(&mut game, GAME_STEPS),
+    };
+    (golden, game)
+}
+
+/// A golden episode at its start.
+#[must_use]
+pub fn start_episode(task: Task, profile: Profile) -> Episode {
+    let (factors, settings) = (profile.factors(), PerturbationSettings::default());
+    let root = Seed::from_number(SEED);
+    let plant = Plant::under(factors, &settings, root.model_mismatch());
+    Episode::new(
+        task,
+        Interpolation::Cubic,
+        factors,
+        &settings,
+        &plant,
+        root.episode(task, 0),
+    )
+}
+
+fn start_game(profile: Profile) -> Game {
+    let (factors, settings) = (profile.factors(), PerturbationSettings::default());
+    let seed = Seed::from_number(SEED);
+    Game::new(GameSetup {
+        interpolation: [Interpolation::Cubic; 2],
+        factors,
+        plant: Plant::under(factors, &settings, seed.model_mismatch()),
+        settings,
+        seed,
+    })
+}
+
+/// Plays an episode to its end with [`strike`]; the hash of every observation and state on the way.
+#[must_use]
+pub fn episode_hash(mut episode: Episode) -> String {
+    let mut hash = Hash::default();
+    loop {
+        hash.add(episode.observation());
+        let action = strike(episode.observation(), episode.steps());
+        let outcome = episode.step(&action);
+        let state = episode.state();
+        hash.add(&state.puck);
+        hash.add(&state.q);
+        hash.add(&state.dq);
+        hash.add(&state.universal);
+        hash.add(&state.opponent_q.unwrap_or_default());
+        if outcome.end.is_some() {
+            return hash.digits();
+        }
+    }
+}
+
+/// Plays on for so many control steps, both robots with [`strike`]; the hash of observations, pucks and
+/// judgements.
+pub fn game_hash(game: &mut Game, steps: u32) -> String {
+    let mut hash = Hash::default();
+    for _ in 0..steps {
+        let actions = [0, 1].map(|robot| strike(game.observation(robot), game.steps()));
+        for robot in 0..2 {
+            hash.add(game.observation(robot));
+        }
+        let outcome = game.step(actions.each_ref().map(|action| Command::Act(action)));
+        hash.add(&game.world().puck().state());
+        hash.add_text(&format!("{:?} {:?}", outcome.rally_end, outcome.window));
+    }
+    hash.digits()
+}
+
+/// A simple agent, so that the hashes cover contacts: it goes behind the puck and through it, again and again.
+/// `observation` is in the robot's own frame; the action is positions and velocities, rad and rad/s.
+#[must_use]
+pub fn strike(observation: &[f64], step: u32) -> [f64; 2 * JOINTS] {
+    let q: [f64; JOINTS] = std::array::from_fn(|i| observation[6 + i]);
+    let through = 0.35 * f64::from(step % STROKE_STEPS) / f64::from(STROKE_STEPS);
+    let target = [
+        (observation[0] - 0.15 + through).clamp(0.6, 1.35),
+        observation[1].clamp(-0.4, 0.4),
+        EE_DESIRED_HEIGHT_M,
+    ];
+    let next = inverse_kinematics(target, &q);
+    let mut action = [0.0; 2 * JOINTS];
+    for i in 0..JOINTS {
+        // Half way, so that the mallet stays at its height.
+        action[i] = q[i] + 0.2 * (next[i] - q[i]);
+        action[JOINTS + i] = 0.2 * (next[i] - q[i]) / 0.02;
+    }
+    action
+}
+
+/// BLAKE3 of numbers and words.
+#[derive(Default)]
+struct Hash(blake3::Hasher);
+
+impl Hash {
+    fn add(&mut self, numbers: &[f64]) {
+        for number in numbers {
+            self.0.update(&number.to_le_bytes());
+        }
+    }
+
+    fn add_text(&mut self, text: &str) {
+        self.0.update(text.as_bytes());
+    }
+
+    fn digits(&self) -> String {
+        self.0.finalize().to_hex()[..16].to_owned()
+    }
+}

@@ -1,0 +1,22 @@
+//! The golden episodes and games, held to their file.
+
+use faceoff_sim::golden;
+use faceoff_types::Profile;
+
+const FILE: &str = include_str!(concat!(
+    env!("CARGO_MANIFEST_DIR"),
+    "/../../tests/golden/simulator.txt"
+));
+
+#[test]
+fn golden_hashes_are_those_of_the_file() {
+    let computed: String = golden::all().map(|golden| format!("{golden}\n")).collect();
+    assert_eq!(computed, FILE);
+}
+
+#[test]
+fn golden_game_has_rallies_and_goals() {
+    let (_, game) = golden::play_game(Profile::Ideal);
+    println!("{:?}", game.referee());
+    assert!(game.rally() >= 2 && game.referee().goals != [0; 2]);
+}
