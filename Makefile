@@ -23,6 +23,7 @@ CARGO      ?= cargo
 # which take a space for the end of a name.
 TARGET_DIR := $(if $(CARGO_TARGET_DIR),$(CARGO_TARGET_DIR),target)
 RELEASE    := $(TARGET_DIR)/release
+DEMO       := $(TARGET_DIR)/demo
 
 .PHONY: demo test tests-built tests-of-rust tests-of-python tests-of-api tests-of-agents tests-of-scripts test-release costs web wheel pictures test-api test-python test-learning fuzz busy load elsewhere crowd objects soak steady frames test-cgroup2 test-box test-engine lint format fidelity setup setup-test agents dist clean-demo help
 
@@ -64,7 +65,7 @@ setup-test:
 # Built by themselves, they need other features of their dependencies than beside the server: the demo builds all at once.
 agents: setup
 	$(CARGO) build --release --locked --package striker --package baseline
-	$(PACK_AGENTS)
+	built="$(RELEASE)"; $(PACK_AGENTS)
 
 # The program in an archive; it refuses what only a newer system than the participants' could start.
 dist: setup
@@ -79,14 +80,14 @@ test-release:
 define PACK_AGENTS
 for agent in striker baseline; do \
     mkdir -p "$(TARGET_DIR)/bundles/$$agent" && \
-    cp "agents/$$agent/agent.toml" "$(RELEASE)/$$agent" "$(TARGET_DIR)/bundles/$$agent/" || exit 1; \
+    cp "agents/$$agent/agent.toml" "$$built/$$agent" "$(TARGET_DIR)/bundles/$$agent/" || exit 1; \
 done
 endef
 
 demo: setup
-	$(CARGO) build --release --locked --package faceoff --package striker --package baseline
-	$(PACK_AGENTS)
-	"$(RELEASE)/faceoff" demo --episodes $(EPISODES) --listen $(LISTEN) --data-dir "$(DEMO_DIR)" \
+	$(CARGO) build --profile demo --locked --package faceoff --package striker --package baseline
+	built="$(DEMO)"; $(PACK_AGENTS)
+	"$(DEMO)/faceoff" demo --episodes $(EPISODES) --listen $(LISTEN) --data-dir "$(DEMO_DIR)" \
 	    --bundle agents/hold --bundle "$(TARGET_DIR)/bundles/striker" --bundle agents/reckless \
 	    $(if $(filter 0,$(SERVE)),--no-serve)
 

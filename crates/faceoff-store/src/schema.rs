@@ -36,6 +36,15 @@ fn newest() -> i64 {
         .unwrap_or_default()
 }
 
+/// Of all migrations, in their order.
+pub(crate) fn digest() -> blake3::Hash {
+    let mut digest = blake3::Hasher::new();
+    for migration in MIGRATIONS.iter() {
+        digest.update(&migration.checksum);
+    }
+    digest.finalize()
+}
+
 /// What a database says of itself before it is migrated.
 #[derive(Debug)]
 pub(crate) struct Before {

@@ -197,7 +197,7 @@ impl Site {
         let folder = tempfile::tempdir().unwrap();
         let upload_dir = folder.path().join("uploads");
         std::fs::create_dir(&upload_dir).unwrap();
-        let store = Store::open(folder.path()).await.unwrap();
+        let store = faceoff_testkit::new_store(folder.path()).await;
         let start: Timestamp = "2026-03-01T10:00:00Z".parse().unwrap();
         assert!(
             store

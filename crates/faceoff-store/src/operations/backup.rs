@@ -36,7 +36,7 @@ impl Store {
     /// [`StoreError::NotFound`] if there is none; if it cannot be read, or the copy not be written.
     #[boxed]
     pub async fn copy_database(data_dir: &Path, to: &Path) -> Result<()> {
-        let from = data_dir.join("faceoff.sqlite3");
+        let from = data_dir.join(Self::DATABASE_FILE);
         let failed = |error| StoreError::artifact(from.display(), &error);
         if !from.try_exists().map_err(failed)? {
             return Err(StoreError::NotFound("the database faceoff.sqlite3"));
@@ -49,7 +49,6 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::Damaged`] with what is wrong, [`StoreError::NewerDatabase`].
-    #[boxed]
     pub async fn check_database(file: &Path, scratch: &Path) -> Result<CheckedDatabase> {
         let options = SqliteConnectOptions::new()
             .filename(file)

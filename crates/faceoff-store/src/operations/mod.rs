@@ -43,6 +43,7 @@ mod start_day;
 mod submit;
 mod summaries;
 pub(crate) mod teams;
+mod template;
 pub(crate) mod tidy;
 pub(crate) mod tokens;
 pub(crate) mod tournament;

@@ -21,7 +21,7 @@ impl Store {
         // Two processes that start together must not both migrate.
         let _opening = lock_folder(data_dir.to_owned()).await?;
         let artifacts = Artifacts::open(&data_dir.join("artifacts"))?;
-        let database = Database::open(&data_dir.join("faceoff.sqlite3")).await?;
+        let database = Database::open(&data_dir.join(Self::DATABASE_FILE)).await?;
         let mut tx = database.begin().await?;
         season::draw_secret_once(&mut tx).await?;
         let archived = archived::read(&mut tx).await?;

@@ -20,7 +20,7 @@ pub struct Fixture {
 impl Fixture {
     pub async fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let store = Store::open(folder.path()).await.unwrap();
+        let store = faceoff_testkit::new_store(folder.path()).await;
         Self {
             store,
             folder,

@@ -283,7 +283,7 @@ pub(super) const LEASE_S: u32 = 1800;
 impl Server {
     pub(super) async fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let store = Store::open(folder.path()).await.unwrap();
+        let store = faceoff_testkit::new_store(folder.path()).await;
         Self {
             store,
             folder,

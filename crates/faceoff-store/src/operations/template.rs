@@ -1,0 +1,42 @@
+//! An empty database, ready to be copied.
+
+use crate::{
+    boxed,
+    database::Database,
+    error::{Result, StoreError},
+    schema,
+    store::Store,
+};
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+};
+use uuid::Uuid;
+
+impl Store {
+    /// Name of the database in a data folder.
+    pub const DATABASE_FILE: &'static str = "faceoff.sqlite3";
+
+    /// A database with this program's schema and nothing in it, not even a season, in `folder`: the one that is there,
+    /// else one that is made. A copy of it in a new data folder spares [`Store::open`] the migrations.
+    ///
+    /// # Errors
+    /// [`StoreError::Database`] if it cannot be written.
+    #[boxed]
+    pub async fn template(folder: &Path) -> Result<PathBuf> {
+        let digest = schema::digest();
+        let template = folder.join(format!("{}.sqlite3", digest.to_hex()));
+        if template.exists() {
+            return Ok(template);
+        }
+        let failed = |error: io::Error| StoreError::Database(sqlx::Error::Io(error));
+        fs::create_dir_all(folder).map_err(failed)?;
+        // Several processes may make one at once, and none may find half of it.
+        let unfinished = folder.join(format!("{}.sqlite3", Uuid::now_v7()));
+        let database = Database::open(&unfinished).await?;
+        // The last connection to close puts what is in the log into the file.
+        database.close().await;
+        fs::rename(&unfinished, &template).map_err(failed)?;
+        Ok(template)
+    }
+}
