@@ -49,7 +49,6 @@ impl Store {
     ///
     /// # Errors
     /// [`StoreError::Damaged`] with what is wrong, [`StoreError::NewerDatabase`].
-    #[boxed]
     pub async fn check_database(file: &Path, scratch: &Path) -> Result<CheckedDatabase> {
         let options = SqliteConnectOptions::new()
             .filename(file)

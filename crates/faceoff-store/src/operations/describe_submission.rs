@@ -1,5 +1,4 @@
 use crate::{
-    boxed,
     error::Result,
     event::{Actor, Event, Subject},
     store::Store,
@@ -19,7 +18,6 @@ pub struct SubmissionWords<'w> {
 
 impl Store {
     /// Changes what a team says of a submission, to itself and the organiser.
-    #[boxed]
     pub async fn describe_submission(
         &self,
         actor: Actor,

@@ -51,7 +51,6 @@ impl Store {
     /// Takes the database in that lies as `faceoff.sqlite3` in `data_dir`, unpacked from an archive: migrates it, makes
     /// sure that it is whole and nothing but our tables, and that no key of anybody's is in it. Run it on a folder that
     /// counts only afterwards. [`StoreError::Conflict`] if it is refused, with the reason.
-    #[boxed]
     pub async fn import(data_dir: &Path, now: Timestamp) -> Result<Archived> {
         let options = SqliteConnectOptions::new()
             .filename(file_of(data_dir))
