@@ -26,7 +26,7 @@ class Change:
 # When files, crates or tests are renamed, these follow.
 PAGE = Change(
     what="a line in a page",
-    file="crates/faceoff-http/src/pages/help.rs",
+    file="crates/faceoff-pages/src/help.rs",
     line='            row("Scratch files in /tmp", |limits| {',
     becomes='            row("Scratch files in /tmp #", |limits| {',
     package="faceoff-http",

@@ -1,9 +1,7 @@
 //! Warns of days that do not fit into their time, in the log.
 
-use crate::{
-    config::Capacity,
-    views::capacity::{CapacityView, DayLoad, Fit},
-};
+use faceoff_api::views::capacity::{DayLoad, Fit};
+use faceoff_service::{config::Capacity, views::capacity};
 use faceoff_store::{Change, Event, Store, StoreError};
 use faceoff_types::{Clock, StageDay, StageName};
 use std::{collections::BTreeSet, time::Duration};
@@ -52,7 +50,7 @@ impl CapacityWatch {
         let now = self.clock.now();
         let (mut new, mut not_fitting) = (Vec::new(), BTreeSet::new());
         for stage in self.store.stages().await? {
-            let forecast = CapacityView::forecast(&self.store, &self.capacity, stage.id, now);
+            let forecast = capacity::forecast(&self.store, &self.capacity, stage.id, now);
             let overflows = forecast.await?.days.into_iter();
             for load in overflows.filter(|load| load.fit == Fit::Not) {
                 let day = StageDay {

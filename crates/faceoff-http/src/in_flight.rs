@@ -1,15 +1,15 @@
 //! How many requests are answered at a time, and which are refused when there are too many: quickly, and those first that
 //! only look on.
 
-use crate::{
-    app::AppState,
-    paths::LIVE_PATH,
-    problem::{Problem, ProblemKind},
-};
 use axum::{
     extract::{Request, State},
     middleware::Next,
     response::{IntoResponse, Response},
+};
+use faceoff_api::paths::LIVE_PATH;
+use faceoff_service::{
+    app::AppState,
+    problem::{Problem, ProblemKind},
 };
 use std::{
     sync::Arc,

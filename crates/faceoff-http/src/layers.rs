@@ -1,13 +1,8 @@
 //! What surrounds every request: id, log line, security headers, patience, and a net for panics.
 
 use crate::{
-    app::AppState,
-    conditions::Conditions,
     in_flight::{self, InFlight},
-    kept_answers, pages,
     peer::Peer,
-    problem::{Problem, ProblemKind},
-    watched::{REQUEST_ID, watch},
 };
 use axum::{
     Router,
@@ -17,7 +12,15 @@ use axum::{
     middleware::{self, Next},
     response::{IntoResponse, Response},
 };
-use std::{any::Any, sync::Arc, time::Duration};
+use faceoff_pages::Embeddable;
+use faceoff_service::{
+    app::AppState,
+    conditions::Conditions,
+    kept_answers,
+    problem::Problem,
+    watched::{REQUEST_ID, watch},
+};
+use std::{any::Any, sync::Arc};
 use tower_http::{
     catch_panic::CatchPanicLayer,
     compression::{
@@ -69,25 +72,6 @@ fn is_text(_: StatusCode, _: Version, headers: &HeaderMap, _: &Extensions) -> bo
     essence.is_some_and(|essence| texts.contains(&essence.trim()))
 }
 
-/// Answers `Busy` when a handler takes longer than `patience`.
-pub(crate) async fn time_out(
-    State(patience): State<Duration>,
-    request: Request,
-    next: Next,
-) -> Response {
-    match tokio::time::timeout(patience, next.run(request)).await {
-        Ok(response) => response,
-        Err(_) => Problem::new(
-            ProblemKind::Busy,
-            format!(
-                "the answer took longer than {} s; try again later",
-                patience.as_secs_f64()
-            ),
-        )
-        .into_response(),
-    }
-}
-
 /// Tells who has a board's page already that it still stands. Their condition goes no further, so that the page is made for
 /// them as for everybody, once (`kept_answers.rs`).
 async fn revalidate(mut request: Request, next: Next) -> Response {
@@ -130,7 +114,7 @@ async fn limit_rate(State(app): State<Arc<AppState>>, request: Request, next: Ne
         Ok(()) => next.run(request).await,
         Err(problem) => {
             app.config.metrics.web().refused("rate");
-            pages::for_whom(request.uri().path(), request.headers(), problem)
+            faceoff_pages::for_whom(request.uri().path(), request.headers(), problem)
         }
     }
 }
@@ -140,10 +124,6 @@ async fn drop_foreign_request_id(mut request: Request) -> Request {
     request.headers_mut().remove(REQUEST_ID);
     request
 }
-
-/// Marks an answer that pages of other sites may hold.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Embeddable;
 
 /// What a page may load and do, and who may hold it.
 macro_rules! policy {

@@ -1,22 +1,21 @@
 //! What watches the server asks here: does it live, is it ready, and its numbers. By the names that such programs look for,
 //! outside of the API's versions.
 
-use crate::{
-    app::{App, AppState},
-    auth::Organiser,
-    layers,
-    paths::LIVE_PATH,
-    problem::Problem,
-    views::{
-        health::{HealthView, LiveView},
-        queue,
-        workers::WorkersView,
-    },
-};
 use axum::{
     Json, Router, extract::State, http::header, middleware, response::IntoResponse, routing::get,
 };
+use faceoff_api::{
+    paths::LIVE_PATH,
+    views::health::{HealthView, LiveView},
+};
 use faceoff_metrics::{Disk, MEDIA_TYPE, Queue, Standing};
+use faceoff_service::{
+    app::{App, AppState},
+    auth::Organiser,
+    problem::Problem,
+    timeouts,
+    views::{health, queue, workers},
+};
 use std::time::Duration;
 
 /// For everybody, but the numbers: they tell how full the disks are, and so how much teams upload.
@@ -33,7 +32,7 @@ fn around(router: Router<App>, patience: Duration) -> Router<App> {
     router
         .route(LIVE_PATH, get(alive))
         .route("/readyz", get(ready))
-        .layer(middleware::from_fn_with_state(patience, layers::time_out))
+        .layer(middleware::from_fn_with_state(patience, timeouts::time_out))
 }
 
 async fn alive() -> Json<LiveView> {
@@ -41,7 +40,7 @@ async fn alive() -> Json<LiveView> {
 }
 
 async fn ready(State(app): State<App>) -> Result<Json<HealthView>, Problem> {
-    HealthView::now(&app).await.map(Json)
+    health::now(&app).await.map(Json)
 }
 
 async fn numbers(_: Organiser, app: State<App>) -> Result<impl IntoResponse, Problem> {
@@ -81,7 +80,7 @@ async fn standing(app: &AppState) -> Result<Standing, Problem> {
             .iter()
             .filter(|worker| worker.is_there(now))
             .count(),
-        remote_long: WorkersView::now(app).alarms.len(),
+        remote_long: workers::now(app).alarms.len(),
         disks: disks
             .filter_map(|(of, space)| {
                 space.map(|space| Disk {

@@ -7,14 +7,14 @@
 mod addresses;
 mod paced_stream;
 
-use crate::{
-    ending::Ending,
-    pace::LeastRate,
-    peer::Peer,
-    problem::{Problem, ProblemKind},
-};
+use crate::peer::Peer;
 use addresses::Addresses;
 use axum::{Extension, Router};
+use faceoff_service::{
+    ending::Ending,
+    pace::LeastRate,
+    problem::{Problem, ProblemKind},
+};
 use hyper::server::conn::http1;
 use hyper_util::{
     rt::{TokioIo, TokioTimer},

@@ -1,12 +1,6 @@
 //! Files for workers on other machines: the bundles that their orders name, and what they have recorded. An order opens nothing
 //! else (`Grant`), and nothing once it is not its holder's any more. No part of the API: both sides are this program.
 
-use crate::{
-    acts::bundle_stream,
-    app::App,
-    problem::{Problem, ProblemKind},
-    room,
-};
 use axum::{
     Router,
     body::Body,
@@ -16,6 +10,12 @@ use axum::{
     routing::{get, put},
 };
 use faceoff_dataset::files_of;
+use faceoff_service::{
+    acts::bundle_stream,
+    app::App,
+    problem::{Problem, ProblemKind},
+    room,
+};
 use faceoff_store::{Store, WorkerName};
 use faceoff_wire::grant::Grant;
 

@@ -3,6 +3,7 @@
 use crate::{
     about::About,
     address::WebhookRules,
+    boxed,
     feed::Feed,
     notice::{Notice, Reader},
     sender::Sender,
@@ -102,6 +103,7 @@ impl Deliverer {
     }
 
     /// Tells until `shutdown`. What fails of the database is tried again.
+    #[boxed]
     pub async fn run(self, shutdown: CancellationToken) {
         let mut under_way = UnderWay::default();
         let mut changes = self.store.events();
@@ -143,6 +145,7 @@ impl Deliverer {
     ///
     /// # Errors
     /// If the database fails.
+    #[boxed]
     pub async fn deliver_due(&self) -> Result<(), StoreError> {
         let mut under_way = UnderWay::default();
         loop {

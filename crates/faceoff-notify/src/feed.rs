@@ -1,6 +1,6 @@
 //! The log, read once for all who follow it.
 
-use crate::{notice::Notice, stages_told::StagesTold};
+use crate::{boxed, notice::Notice, stages_told::StagesTold};
 use faceoff_store::{Concern, Store, StoreError, Subject};
 use std::{
     collections::{HashMap, VecDeque},
@@ -48,6 +48,7 @@ impl Feed {
     ///
     /// # Errors
     /// If the log cannot be read.
+    #[boxed]
     pub async fn after(&self, id: i64) -> Result<Option<Arc<Page>>, StoreError> {
         let mut kept = self.kept.lock().await;
         // Nothing of it changes any more: what is newer comes after it.

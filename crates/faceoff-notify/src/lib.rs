@@ -19,6 +19,9 @@ mod sender;
 mod stages_told;
 mod topic;
 
+/// What others await is boxed, so that it is compiled here, once, and not by each crate that awaits it.
+pub(crate) use async_recursion::async_recursion as boxed;
+
 pub use about::{About, MAX_ITEMS, ParseAboutError};
 pub use address::{NotPublic, WebhookRules};
 pub use deliverer::{Deliverer, message};

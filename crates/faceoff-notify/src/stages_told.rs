@@ -1,5 +1,6 @@
 //! What stages keep from others.
 
+use crate::boxed;
 use faceoff_store::{Store, StoreError};
 use faceoff_types::StageId;
 use jiff::Timestamp;
@@ -22,6 +23,7 @@ impl StagesTold {
     ///
     /// # Errors
     /// If they cannot be read.
+    #[boxed]
     pub async fn read(store: &Store) -> Result<Self, StoreError> {
         let frozen: HashMap<StageId, Timestamp> = store
             .frozen_boards()

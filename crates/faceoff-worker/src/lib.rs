@@ -30,6 +30,9 @@ mod slot_threads;
 mod tests;
 mod tidying;
 
+/// What others await is boxed, so that it is compiled here, once, and not by each crate that awaits it.
+pub(crate) use async_recursion::async_recursion as boxed;
+
 pub use cpus::{CpuLayout, SlotCpus};
 pub use remote::{
     BucketConfig, Examined, NatsConfig, RemoteConfig, RemoteWorker, dispatch, examine, work,

@@ -1,3 +1,4 @@
+use crate::boxed;
 use anyhow::Context as _;
 use faceoff_store::{Actor, Evaluation, RunPlan, Stage, Store};
 use faceoff_types::Clock;
@@ -12,6 +13,7 @@ const LONGEST_SLEEP: Duration = Duration::from_secs(1);
 /// Ends the days whose deadline has come, and starts those of all stages that have a schedule, each once, at its
 /// time, until `shutdown` is cancelled. A day whose time passed while the server was down is started when it comes
 /// up, on the same date still. What a failing database keeps from ending or starting is tried again every second.
+#[boxed]
 pub async fn run_schedule(
     store: Store,
     clock: Clock,
@@ -49,6 +51,7 @@ pub async fn run_schedule(
 
 /// Ends and starts what is due at `now`; when the next day is, if one comes. [`run_schedule`] does so at the right
 /// times.
+#[boxed]
 pub async fn start_due(store: &Store, now: Timestamp) -> anyhow::Result<Option<Timestamp>> {
     // A day that cannot be ended keeps no other from starting.
     let ended = end_overdue(store, now).await;

@@ -1,4 +1,5 @@
 use crate::{
+    boxed,
     bundle_cache::BundleCache,
     cpus::{self, CpuLayout},
     evaluator::{Evaluator, Runner},
@@ -79,6 +80,7 @@ pub struct SlotsConfig {
 /// Runs a named thread per slot (`faceoff-slot-0` …) until `shutdown` is cancelled. On a shutdown every
 /// unit is given back at once, and the threads are waited for, for 20 s at most: an agent in the
 /// middle of an answer may take that long. Fails if the scratch folder cannot be had or a slot dies.
+#[boxed]
 pub async fn run(
     store: Store,
     clock: Clock,

@@ -1,6 +1,6 @@
 //! What is done now and then, so that the data folder holds what is asked for and little else.
 
-use crate::ablation_clips;
+use crate::{ablation_clips, boxed};
 use faceoff_scoring::EpisodeSummary;
 use faceoff_store::{Clearable, Store};
 use jiff::{SignedDuration, Timestamp};
@@ -10,6 +10,7 @@ const LONGEST_WRITE: SignedDuration = SignedDuration::from_hours(1);
 
 /// Removes recordings that are no longer needed, what is left of runs that are long over and what kills left half
 /// written, and keeps the database's log short. What fails is told and done by the next call.
+#[boxed]
 pub async fn tidy(store: &Store, now: Timestamp) {
     if let Err(error) = store.remove_old_recordings(now).await {
         tracing::warn!(%error, "old recordings could not be removed");

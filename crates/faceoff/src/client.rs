@@ -19,7 +19,7 @@ mod workers;
 
 use anyhow::{Context, anyhow, bail};
 pub use download::Downloaded;
-use faceoff_http::{
+use faceoff_api::{
     API_BASE,
     requests::{
         BoardFormat, BoardQuery, Cancellation, CloseSeason, ComparisonQuery, Confirmation,

@@ -1,6 +1,6 @@
 //! How many connections each address has.
 
-use crate::network::Network;
+use faceoff_service::network::Network;
 use std::{
     collections::HashMap,
     net::IpAddr,

@@ -1,6 +1,6 @@
 //! A connection whose reader must read.
 
-use crate::pace::{LeastRate, Pace};
+use faceoff_service::pace::{LeastRate, Pace};
 use std::{
     io::{self, IoSlice},
     pin::Pin,

@@ -126,7 +126,7 @@ impl Season {
             .secrets
             .push(("the secret", secret.as_bytes().to_vec()));
         for token in [&season.alpha.token, &text(&joined["secret"])] {
-            let hash = faceoff_http::token::hash_token(token);
+            let hash = faceoff_api::token::hash_token(token);
             season.secrets.push(("a token's hash", hash.to_vec()));
         }
         season

@@ -1,9 +1,10 @@
 //! A running site: axum on a loopback port, SQLite in a temporary folder, a clock that tests turn,
 //! and the steps that a worker would take.
 
+use faceoff_api::token::hash_token;
 use faceoff_http::{
     Capacity, CapacityWatch, ConnectionLimits, HttpConfig, HttpLimits, LeastRate, LinkKey, Offer,
-    RateLimits, router, token::hash_token,
+    RateLimits, router,
 };
 use faceoff_metrics::{Metrics, Process};
 use faceoff_notify::WebhookRules;

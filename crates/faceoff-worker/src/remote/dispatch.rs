@@ -12,6 +12,7 @@ use super::{
     taken_back::{AllGivenOut, GivenOut},
 };
 use crate::{
+    boxed,
     local::LocalServer,
     server::{Claimed, WorkServer},
     service::WorkerConfig,
@@ -77,6 +78,7 @@ impl RemoteConfig {
 ///
 /// # Errors
 /// If the configuration is none, or the database cannot be read at the start.
+#[boxed]
 pub async fn dispatch(
     store: Store,
     clock: Clock,

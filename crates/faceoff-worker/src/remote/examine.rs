@@ -4,6 +4,7 @@ use super::{
     connection::{ANSWER, NatsConfig},
     names::Names,
 };
+use crate::boxed;
 use anyhow::Context as _;
 use faceoff_wire::remote::{Answer, Ask, Introduction};
 use std::time::Duration;
@@ -21,6 +22,7 @@ pub struct Examined {
 const CONNECTS_WITHIN: Duration = Duration::from_secs(5);
 
 /// Asks NATS and the server, as a worker of this name would, and changes nothing.
+#[boxed]
 pub async fn examine(nats: &NatsConfig, name: &str, own: &Introduction) -> Examined {
     let connected = async {
         let options = nats.options(name).await?;

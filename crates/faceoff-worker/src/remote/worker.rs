@@ -8,6 +8,7 @@ use super::{
     transfer::{Carrier, Patience},
 };
 use crate::{
+    boxed,
     evaluator::Runner,
     scratch::Scratch,
     service::{Intervals, SlotServer, SlotsConfig, run_slots},
@@ -46,6 +47,7 @@ const LOOK: Duration = Duration::from_secs(1);
 ///
 /// # Errors
 /// If a name is none, the scratch folder cannot be had, or a slot dies.
+#[boxed]
 pub async fn work(config: RemoteWorker, shutdown: CancellationToken) -> anyhow::Result<()> {
     let names = Names::of(&config.nats.name)?;
     let name = config.name.parse::<WorkerName>().ok();

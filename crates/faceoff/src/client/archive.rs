@@ -2,8 +2,8 @@
 
 use super::Client;
 use anyhow::{Context, bail};
+use faceoff_api::requests::ArchiveQuery;
 use faceoff_archive::{Edition, Manifest, check};
-use faceoff_http::requests::ArchiveQuery;
 use futures::StreamExt;
 use reqwest::Method;
 use std::{

@@ -6,7 +6,7 @@ use super::{
     sse::{self, ServerEvent},
 };
 use anyhow::Context;
-use faceoff_http::{
+use faceoff_api::{
     requests::Decision,
     views::{attempt::AttemptView, game::GameView},
 };

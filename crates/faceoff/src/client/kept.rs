@@ -1,7 +1,7 @@
 //! Files that the server keeps: downloaded, deleted, and how much room they take.
 
 use super::{Client, download::Downloaded, read};
-use faceoff_http::{
+use faceoff_api::{
     requests::DeleteSubmission,
     views::{storage::StorageView, submission::SubmissionView, violations::ViolationsView},
 };

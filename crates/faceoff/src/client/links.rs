@@ -1,7 +1,7 @@
 //! Links that download a file without a token.
 
 use super::Client;
-use faceoff_http::{requests::NewLink, views::link::LinkView};
+use faceoff_api::{requests::NewLink, views::link::LinkView};
 use faceoff_types::{EvaluationId, GameId, Side, SubmissionId};
 use reqwest::Method;
 

@@ -2,7 +2,7 @@
 
 use super::{Client, read};
 use anyhow::Context;
-use faceoff_http::API_BASE;
+use faceoff_api::API_BASE;
 use reqwest::{
     Method, RequestBuilder,
     header::{HeaderMap, LINK},

@@ -1,7 +1,7 @@
 //! What a client asks about people, their teams and their tokens.
 
 use super::Client;
-use faceoff_http::{
+use faceoff_api::{
     requests::{
         Confirmation, Join, NewAnnouncement, NewAnswer, NewInvitation, NewPassword, NewQuestion,
         NewTerms, NewToken, Reason, Register, SeasonChange, TeamChange,

@@ -1,7 +1,7 @@
 //! Trials and re-evaluations.
 
 use super::{Client, read};
-use faceoff_http::{
+use faceoff_api::{
     requests::{Confirmation, NewProposal, Trial},
     views::proposal::ProposalView,
 };

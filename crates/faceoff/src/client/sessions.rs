@@ -2,7 +2,7 @@
 
 use super::{Client, Unreachable, read};
 use anyhow::{Context, anyhow};
-use faceoff_http::{
+use faceoff_api::{
     requests::{NewToken, SignIn},
     views::token::NewTokenView,
 };

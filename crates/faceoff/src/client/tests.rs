@@ -1,11 +1,13 @@
 //! The client against the real site on a loopback port.
 
 use super::*;
-use faceoff_http::{
-    Capacity, ConnectionLimits, HttpConfig, HttpLimits, LinkKey, Offer, RateLimits,
+use faceoff_api::{
     requests::DeleteSubmission,
     token::hash_token,
     views::{evaluation::EvaluationStatus, submission::SubmissionStatus},
+};
+use faceoff_http::{
+    Capacity, ConnectionLimits, HttpConfig, HttpLimits, LinkKey, Offer, RateLimits,
 };
 use faceoff_metrics::{Metrics, Process};
 use faceoff_store::{Claimed, Store, Work};

@@ -1,7 +1,7 @@
 //! What a client asks about tournaments.
 
 use super::Client;
-use faceoff_http::{
+use faceoff_api::{
     requests::{
         Confirmation, Decision, GamesQuery, NewDeparture, NewEntrants, NewFriendlyGame, NewReplays,
         NewTestGames, NewTournament, Reason, TournamentChange,

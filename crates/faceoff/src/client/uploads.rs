@@ -3,7 +3,7 @@
 use super::{Client, read};
 use crate::packing::BundleFile;
 use anyhow::{Context, bail};
-use faceoff_http::{
+use faceoff_api::{
     requests::{OrderAblation, SubmissionChange},
     views::{ablation::AblationView, submission::SubmissionView},
 };

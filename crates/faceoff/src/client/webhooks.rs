@@ -1,7 +1,7 @@
 //! Programs that are told of what happens.
 
 use super::Client;
-use faceoff_http::{
+use faceoff_api::{
     requests::{NewWebhook, WebhookChanges},
     views::webhook::{DeliveryView, NewWebhookView, WebhookView},
 };

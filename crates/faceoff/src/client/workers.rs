@@ -1,7 +1,7 @@
 //! Who plays on other machines.
 
 use super::Client;
-use faceoff_http::{requests::Reason, views::workers::WorkersView};
+use faceoff_api::{requests::Reason, views::workers::WorkersView};
 use faceoff_store::WorkerName;
 use reqwest::Method;
 

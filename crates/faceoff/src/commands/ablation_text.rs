@@ -1,4 +1,4 @@
-use faceoff_http::views::ablation::{AblationStatus, AblationView};
+use faceoff_api::views::ablation::{AblationStatus, AblationView};
 
 /// An ablation, in words.
 pub(super) fn ablation(view: &AblationView) -> String {

@@ -25,7 +25,7 @@ use super::{
 };
 use anyhow::bail;
 use clap::{Args, Subcommand};
-use faceoff_http::{
+use faceoff_api::{
     requests::Decision,
     views::{evaluation::EvaluationStatus, event::EventView},
 };

@@ -4,7 +4,7 @@ pub(super) mod table;
 
 use super::{find_stage::find_stage, output::print, server::ServerArgs};
 use clap::{Args, ValueEnum};
-use faceoff_http::requests::{BoardBy, BoardQuery};
+use faceoff_api::requests::{BoardBy, BoardQuery};
 use faceoff_types::{DivisionName, Task};
 use jiff::civil::Date;
 

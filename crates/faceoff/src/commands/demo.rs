@@ -6,8 +6,8 @@ use crate::{
 };
 use anyhow::{Context, bail, ensure};
 use clap::Args;
-use faceoff_http::requests::BoardQuery;
-use faceoff_http::views::{
+use faceoff_api::requests::BoardQuery;
+use faceoff_api::views::{
     board::BoardView,
     evaluation::{EvaluationStatus, EvaluationView},
     submission::{SubmissionStatus, SubmissionView},

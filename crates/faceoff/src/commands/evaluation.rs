@@ -7,7 +7,7 @@ use super::{
 };
 use crate::client::Client;
 use clap::Args;
-use faceoff_http::views::{
+use faceoff_api::views::{
     evaluation::{EvaluationStatus, EvaluationView},
     violations::ViolationsView,
 };

@@ -1,5 +1,5 @@
 use super::queue::in_queue;
-use faceoff_http::views::{
+use faceoff_api::views::{
     evaluation::{EvaluationStatus, EvaluationView},
     task::TaskView,
 };

@@ -1,6 +1,6 @@
 use crate::client::Client;
 use anyhow::bail;
-use faceoff_http::views::stage::StageView;
+use faceoff_api::views::stage::StageView;
 use faceoff_types::StageId;
 
 /// The stage of this name or id.

@@ -10,7 +10,7 @@ use super::{
 use crate::client::Client;
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
-use faceoff_http::views::game::GameView;
+use faceoff_api::views::game::GameView;
 use faceoff_types::{GameId, Side, TeamName};
 use std::path::PathBuf;
 

@@ -4,7 +4,7 @@ use super::{output::print, server::ServerArgs};
 use crate::client::ApiError;
 use anyhow::anyhow;
 use clap::Args;
-use faceoff_http::views::health::HealthView;
+use faceoff_api::views::health::HealthView;
 use reqwest::StatusCode;
 
 /// Says whether the server is fit for work: its database can be written, its queue moves, its disk has room.

@@ -7,7 +7,7 @@ use crate::{
 };
 use anyhow::{Context, bail};
 use clap::Args;
-use faceoff_http::{
+use faceoff_api::{
     requests::{FoundedTeam, Join},
     views::person::WhoView,
 };

@@ -3,7 +3,7 @@
 use super::{game::own_side, output::print, server::ServerArgs};
 use crate::client::Linked;
 use clap::{Args, Subcommand};
-use faceoff_http::requests::NewLink;
+use faceoff_api::requests::NewLink;
 use faceoff_types::{EvaluationId, GameId, Side, SubmissionId};
 
 /// Makes a link by which whoever has it downloads a file, without a token, until it expires or your token does.

@@ -4,7 +4,7 @@ use super::{game::own_side, output::print, server::ServerArgs};
 use crate::client::{ApiError, Client};
 use anyhow::{Context, bail};
 use clap::Args;
-use faceoff_http::views::{
+use faceoff_api::views::{
     evaluation::{EvaluationStatus, FaultView},
     submission::SubmissionStatus,
 };

@@ -7,7 +7,7 @@ use crate::{
 };
 use anyhow::{Context, ensure};
 use clap::Args;
-use faceoff_http::{requests::NewToken, views::person::WhoView};
+use faceoff_api::{requests::NewToken, views::person::WhoView};
 use serde::Serialize;
 use std::{
     fs,

@@ -1,4 +1,4 @@
-use faceoff_http::views::me::MeView;
+use faceoff_api::views::me::MeView;
 use faceoff_types::SubmissionId;
 
 /// When a submission of the team's plays.

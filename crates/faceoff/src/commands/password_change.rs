@@ -3,7 +3,7 @@
 use super::{output::print, password, people::person_line, server::ServerArgs};
 use anyhow::{Context, bail};
 use clap::Args;
-use faceoff_http::requests::NewPassword;
+use faceoff_api::requests::NewPassword;
 use std::io::IsTerminal;
 
 /// Sets the password by which you sign in; all your other tokens and sessions are worth nothing from then on. Asks for the old

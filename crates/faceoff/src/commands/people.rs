@@ -1,7 +1,7 @@
 //! How commands print people and invitations.
 
 use super::output::or_none;
-use faceoff_http::{
+use faceoff_api::{
     requests::InvitedRole,
     views::{
         invitation::{InvitationView, NewInvitationView},

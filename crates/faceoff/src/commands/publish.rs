@@ -2,7 +2,7 @@
 
 use super::{output::print, server::ServerArgs};
 use clap::Args;
-use faceoff_http::views::evaluation::EvaluationStatus;
+use faceoff_api::views::evaluation::EvaluationStatus;
 use faceoff_types::EvaluationId;
 
 /// Makes a finished evaluation of the team's public, with its dataset: everybody sees it from then on, without a

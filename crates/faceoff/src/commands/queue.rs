@@ -1,4 +1,4 @@
-use faceoff_http::views::queue::QueueView;
+use faceoff_api::views::queue::QueueView;
 
 /// Where something stands in the queue, in words.
 pub fn in_queue(queue: &QueueView) -> String {

@@ -2,7 +2,7 @@
 
 use super::{output::print, server::ServerArgs};
 use clap::Args;
-use faceoff_http::requests::{FoundedTeam, Register};
+use faceoff_api::requests::{FoundedTeam, Register};
 use faceoff_types::{DivisionName, TeamName};
 
 /// Registers a team, where the season takes registrations, and prints the link by which its first member joins once an

@@ -2,7 +2,7 @@
 
 use super::{output::print, server::ServerArgs};
 use clap::Args;
-use faceoff_http::views::runtimes::RuntimesView;
+use faceoff_api::views::runtimes::RuntimesView;
 use faceoff_types::{AgentLimits, RuntimeContent, RuntimeInventory};
 
 /// Shows what agents find on the server: runtimes with their packages, and the limits of each contest.

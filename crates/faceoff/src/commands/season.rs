@@ -2,7 +2,7 @@
 
 use super::{output::print, server::ServerArgs};
 use clap::Args;
-use faceoff_http::views::season::SeasonView;
+use faceoff_api::views::season::SeasonView;
 
 /// Shows the season: its name, its commitment, its state.
 #[derive(Debug, Args)]

@@ -8,7 +8,7 @@ use crate::{
 };
 use anyhow::Context;
 use clap::Args;
-use faceoff_http::views::{evaluation::EvaluationView, me::MeView};
+use faceoff_api::views::{evaluation::EvaluationView, me::MeView};
 use serde::Serialize;
 use std::time::Duration;
 

@@ -1,6 +1,6 @@
 //! How much room a team's files take, in words.
 
-use faceoff_http::views::storage::StorageView;
+use faceoff_api::views::storage::StorageView;
 
 /// Bytes as people read them; powers of 1000.
 pub(super) fn bytes(bytes: u64) -> String {

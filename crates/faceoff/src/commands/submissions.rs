@@ -9,7 +9,7 @@ use super::{
 };
 use crate::client::Client;
 use clap::{Args, Subcommand};
-use faceoff_http::{
+use faceoff_api::{
     requests::{DeleteSubmission, SubmissionChange},
     views::{
         me::MeView,

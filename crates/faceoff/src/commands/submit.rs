@@ -6,7 +6,7 @@ use super::{next_cut::next_cut, output::print, server::ServerArgs};
 use crate::{client::Client, packing::BundleFile};
 use anyhow::{Context, bail};
 use clap::Args;
-use faceoff_http::views::submission::{SubmissionStatus, SubmissionView};
+use faceoff_api::views::submission::{SubmissionStatus, SubmissionView};
 use faceoff_types::SmokeTiming;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::{path::PathBuf, time::Duration};

@@ -9,7 +9,7 @@ use super::{
 use crate::client::Client;
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
-use faceoff_http::{
+use faceoff_api::{
     requests::{InvitedRole, NewInvitation, TeamChange},
     views::team::TeamView,
 };

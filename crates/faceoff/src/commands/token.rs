@@ -7,7 +7,7 @@ use super::{
 use crate::client::Client;
 use anyhow::Context;
 use clap::{Args, Subcommand};
-use faceoff_http::{requests::NewToken, views::token::TokenView};
+use faceoff_api::{requests::NewToken, views::token::TokenView};
 use faceoff_types::{TeamId, TokenId};
 use jiff::{SignedDuration, Timestamp};
 

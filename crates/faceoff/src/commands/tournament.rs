@@ -6,7 +6,7 @@ pub(super) mod text;
 
 use super::{output::print, score::table, server::ServerArgs};
 use clap::{Args, Subcommand};
-use faceoff_http::requests::Decision;
+use faceoff_api::requests::Decision;
 use faceoff_types::RoundNumber;
 use find::{find, find_or_newest};
 

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::client::Client;
 use clap::{Args, Subcommand};
-use faceoff_http::{
+use faceoff_api::{
     requests::{NewWebhook, Revived, WebhookChanges},
     views::webhook::{DeliveryStateView, DeliveryView, NewWebhookView, WebhookState, WebhookView},
 };

@@ -5,7 +5,7 @@ use super::{
     server::{ServerArgs, Source},
 };
 use clap::Args;
-use faceoff_http::views::person::WhoView;
+use faceoff_api::views::person::WhoView;
 use serde::Serialize;
 
 /// Says whom the token speaks for, to which server, and where both come from.

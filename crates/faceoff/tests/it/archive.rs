@@ -1,9 +1,9 @@
 //! The season's archive as an organiser takes it along: exported from a site, imported, and served by the program.
 
+use faceoff_api::token::hash_token;
 use faceoff_archive::{Edition, Entry, FORMAT, Manifest, Writer};
 use faceoff_http::{
     Capacity, ConnectionLimits, HttpConfig, HttpLimits, LinkKey, Offer, RateLimits,
-    token::hash_token,
 };
 use faceoff_metrics::{Metrics, Process};
 use faceoff_store::{Actor, Claimed, Store, UploadQuota, Work};

@@ -1,7 +1,7 @@
 //! Downloads that break, against the real site.
 
 use super::*;
-use faceoff_http::views::submission::SubmissionView;
+use faceoff_api::views::submission::SubmissionView;
 use std::path::{Path, PathBuf};
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},

@@ -6,7 +6,7 @@ use crate::{
     commands::{find_stage::find_stage, output::print},
 };
 use clap::Subcommand;
-use faceoff_http::requests::{ExtraTurn, MissedDay};
+use faceoff_api::requests::{ExtraTurn, MissedDay};
 use faceoff_types::StageDay;
 use jiff::civil::Date;
 

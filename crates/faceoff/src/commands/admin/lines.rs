@@ -1,5 +1,5 @@
 use crate::commands::evaluation_text::state;
-use faceoff_http::views::evaluation::EvaluationView;
+use faceoff_api::views::evaluation::EvaluationView;
 
 /// An evaluation in a line.
 pub(super) fn line(evaluation: &EvaluationView) -> String {

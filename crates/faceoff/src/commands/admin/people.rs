@@ -10,7 +10,7 @@ use crate::{
 };
 use anyhow::bail;
 use clap::Subcommand;
-use faceoff_http::{
+use faceoff_api::{
     requests::{InvitedRole, NewInvitation, SeasonChange},
     views::invitation::RegistrationView,
 };

@@ -11,7 +11,7 @@ use crate::{
     },
 };
 use clap::Subcommand;
-use faceoff_http::requests::OrderAblation;
+use faceoff_api::requests::OrderAblation;
 use faceoff_types::{EvaluationId, SubmissionId};
 use std::path::PathBuf;
 

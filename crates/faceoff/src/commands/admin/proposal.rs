@@ -8,7 +8,7 @@ use crate::{
     },
 };
 use clap::Subcommand;
-use faceoff_http::{
+use faceoff_api::{
     requests::{NewProposal, Trial},
     views::proposal::{
         ChangeView, DraftStatus, DraftView, ProposalKindView, ProposalStateView, ProposalView,

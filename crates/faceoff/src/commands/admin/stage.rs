@@ -9,7 +9,7 @@ use crate::{
 };
 use anyhow::{Context, ensure};
 use clap::{Args, Subcommand};
-use faceoff_http::{
+use faceoff_api::{
     requests::{NewStage, StageChange},
     views::{
         capacity::Fit,

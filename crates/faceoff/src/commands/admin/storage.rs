@@ -8,7 +8,7 @@ use crate::{
     },
 };
 use clap::Subcommand;
-use faceoff_http::requests::DeleteSubmission;
+use faceoff_api::requests::DeleteSubmission;
 use faceoff_types::SubmissionId;
 use std::path::PathBuf;
 

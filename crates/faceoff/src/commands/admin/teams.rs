@@ -10,7 +10,7 @@ use crate::{
 };
 use anyhow::Context;
 use clap::Subcommand;
-use faceoff_http::requests::{Decision, TeamChange};
+use faceoff_api::requests::{Decision, TeamChange};
 use faceoff_types::{DivisionName, TeamName};
 
 #[derive(Debug, Subcommand)]

@@ -14,7 +14,7 @@ use crate::{
 };
 use anyhow::bail;
 use clap::Subcommand;
-use faceoff_http::requests::{Decision, NewDeparture, NewTournament, TournamentChange};
+use faceoff_api::requests::{Decision, NewDeparture, NewTournament, TournamentChange};
 use faceoff_types::{GameId, LeftAs, RoundNumber, SubmissionId, TeamName};
 use wanted::Wanted;
 

@@ -5,7 +5,7 @@ use crate::{
     commands::output::{or_none, print},
 };
 use clap::Subcommand;
-use faceoff_http::views::workers::{BusyView, WorkerBanView, WorkerState, WorkerView, WorkersView};
+use faceoff_api::views::workers::{BusyView, WorkerBanView, WorkerState, WorkerView, WorkersView};
 use faceoff_store::WorkerName;
 
 #[derive(Debug, Subcommand)]

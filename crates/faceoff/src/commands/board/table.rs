@@ -1,6 +1,6 @@
 //! The board as text, in tiers, with the columns of the paper's qualifying table.
 
-use faceoff_http::views::board::{BoardRow, BoardView};
+use faceoff_api::views::board::{BoardRow, BoardView};
 use faceoff_types::{Task, Tier};
 use std::fmt::Write as _;
 

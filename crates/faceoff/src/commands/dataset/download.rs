@@ -8,7 +8,7 @@ use crate::{
 };
 use anyhow::bail;
 use clap::Args;
-use faceoff_http::views::evaluation::EvaluationStatus;
+use faceoff_api::views::evaluation::EvaluationStatus;
 use faceoff_types::EvaluationId;
 use std::path::{Path, PathBuf};
 

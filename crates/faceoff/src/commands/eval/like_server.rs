@@ -3,7 +3,7 @@
 use super::differences;
 use crate::{client::Client, commands::block_on, config::Config, machine};
 use anyhow::{Context, bail, ensure};
-use faceoff_http::views::{
+use faceoff_api::views::{
     runtimes::{RuntimesView, StageOffer},
     stage::{PhaseView, StageView},
 };

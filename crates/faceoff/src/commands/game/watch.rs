@@ -2,7 +2,7 @@
 
 use crate::client::{ApiError, Client, ServerEvent};
 use anyhow::Context;
-use faceoff_http::views::{
+use faceoff_api::views::{
     game::GameView,
     live::{LiveEnd, LiveEndState},
 };

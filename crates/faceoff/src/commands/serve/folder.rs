@@ -2,10 +2,8 @@
 
 use super::super::staging::private;
 use anyhow::{Context, bail};
-use faceoff_http::{
-    LinkKey,
-    token::{Secret, SecretKind, hash_token},
-};
+use faceoff_api::token::{Secret, SecretKind, hash_token};
+use faceoff_http::LinkKey;
 use faceoff_store::Store;
 use jiff::Timestamp;
 use std::{

@@ -1,7 +1,7 @@
 //! Games of the server in tables and lines.
 
 use crate::commands::output::or_none;
-use faceoff_http::views::{
+use faceoff_api::views::{
     attempt::{AttemptEndView, AttemptView},
     game::{GameStatus, GameView, PurposeView, TestGamesView},
 };

@@ -1,7 +1,7 @@
 //! Tournaments in words.
 
 use crate::commands::{output::or_none, score::table};
-use faceoff_http::views::{
+use faceoff_api::views::{
     certainty::CertaintyView,
     tournament::{EntrantView, RoundView, TournamentHead, TournamentPhase, TournamentView},
 };

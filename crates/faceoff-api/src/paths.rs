@@ -1,0 +1,29 @@
+//! Where the API's resources are, for answers that lead to them.
+
+use faceoff_types::{EvaluationId, GameId, SubmissionId, TournamentId};
+
+/// Where the API lives.
+pub const API_BASE: &str = "/api/v1";
+
+/// The path of a submission.
+pub fn submission(id: SubmissionId) -> String {
+    format!("{API_BASE}/submissions/{id}")
+}
+
+/// The path of an evaluation.
+pub fn evaluation(id: EvaluationId) -> String {
+    format!("{API_BASE}/evaluations/{id}")
+}
+
+/// The path of a tournament.
+pub fn tournament(id: TournamentId) -> String {
+    format!("{API_BASE}/tournaments/{id}")
+}
+
+/// The path of a game.
+pub fn game(id: GameId) -> String {
+    format!("{API_BASE}/games/{id}")
+}
+
+/// Where the process says that it lives.
+pub const LIVE_PATH: &str = "/livez";

@@ -1,0 +1,14 @@
+//! Where an evaluation cost points, episode by episode: what its dataset says in `violations.json`.
+
+use faceoff_types::Task;
+use faceoff_wire::dataset::TaskViolations;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use utoipa::ToSchema;
+
+/// The violations of an evaluation whose day is released, by task and constraint.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ViolationsView {
+    /// By task: hit, defend, prepare.
+    pub tasks: BTreeMap<Task, TaskViolations>,
+}

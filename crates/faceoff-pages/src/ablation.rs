@@ -1,0 +1,202 @@
+//! `/submissions/{id}/ablation`: what each perturbation costs an agent, as a chart and as a table, and the episodes that it
+//! changes.
+
+pub(super) mod pair;
+
+use super::{
+    assets,
+    chart::{Bars, Rated},
+    figures,
+    frame::{Frame, PageProblem, render},
+};
+use askama::Template;
+use axum::{extract::State, response::Response};
+use faceoff_api::views::ablation::AblationStatus;
+use faceoff_scoring::{ProfileEffect, SIGNIFICANCE};
+use faceoff_service::{
+    app::App,
+    extract::PathParam,
+    problem::{Problem, ProblemKind},
+    viewer::Viewer,
+    views::{
+        ablation,
+        ablation_clips::{AblationClips, Differing},
+        season::SeasonHead,
+        submission, team,
+    },
+};
+use faceoff_types::{Profile, SubmissionId, Task};
+
+/// One row of the table.
+struct Row {
+    profile: Profile,
+    /// One letter, written under its bar in the chart.
+    letter: char,
+    percent: String,
+    low: String,
+    high: String,
+    successes: u32,
+    episodes: u32,
+    penalty_points: String,
+    /// Against `ideal`; none of `ideal` itself.
+    difference: Option<Difference>,
+}
+
+struct Difference {
+    points: String,
+    lost: u32,
+    gained: u32,
+    p: String,
+    /// Can it be told from chance?
+    clear: bool,
+}
+
+struct Group {
+    task: Task,
+    chart: Bars,
+    rows: Vec<Row>,
+}
+
+#[derive(Template)]
+#[template(path = "ablation.html")]
+struct Page {
+    frame: Frame,
+    team: String,
+    agent: Option<String>,
+    episodes_per_task: u32,
+    status: AblationStatus,
+    groups: Vec<Group>,
+    style: &'static str,
+    id: SubmissionId,
+    changed: Vec<Changed>,
+}
+
+/// The episodes of a profile that do not end as in the ideal simulator.
+struct Changed {
+    profile: Profile,
+    pairs: Vec<Differing>,
+}
+
+/// The newest ablation of a submission.
+pub(super) async fn page(
+    viewer: Result<Viewer, Problem>,
+    State(app): State<App>,
+    id: Result<PathParam<SubmissionId>, Problem>,
+) -> Result<Response, PageProblem> {
+    let PathParam(id) = id?;
+    let submission = submission::find(&app, id).await?;
+    let Some(view) = ablation::newest(&app, id).await? else {
+        let detail = "there is no ablation of this submission";
+        return Err(Problem::new(ProblemKind::NotFound, detail).into());
+    };
+    let team = team::find(&app, submission.team).await?;
+    let season = SeasonHead::now(&app).await?;
+    let groups = match &view.status {
+        AblationStatus::Finished { tasks, .. } => {
+            let groups = tasks.iter();
+            groups
+                .map(|(task, effects)| Group::of(*task, effects))
+                .collect()
+        }
+        AblationStatus::Open { .. } | AblationStatus::Failed { .. } => Vec::new(),
+    };
+    let clips = AblationClips::of(&app, viewer?, id).await?;
+    let changed = clips.differing(&app).await?.into_iter();
+    render(&Page {
+        frame: Frame::of(&app, season.name, ""),
+        style: assets::EPISODES_STYLE.url(),
+        id,
+        changed: changed
+            .map(|(profile, pairs)| Changed { profile, pairs })
+            .collect(),
+        team: team.name.to_string(),
+        agent: submission.agent_name,
+        episodes_per_task: view.episodes_per_task,
+        status: view.status,
+        groups,
+    })
+}
+
+impl Group {
+    fn of(task: Task, effects: &[ProfileEffect]) -> Self {
+        let rates: Vec<Rated> = effects
+            .iter()
+            .map(|effect| Rated {
+                name: effect.profile.as_str(),
+                letter: letter(effect.profile),
+                percent: 100.0 * effect.success_rate,
+                interval: effect.success_ci95.map(|end| 100.0 * end),
+            })
+            .collect();
+        Self {
+            task,
+            chart: Bars::of(task.as_str(), &rates),
+            rows: effects.iter().map(Row::of).collect(),
+        }
+    }
+}
+
+impl Row {
+    fn of(effect: &ProfileEffect) -> Self {
+        let [low, high] = effect.success_ci95;
+        Self {
+            profile: effect.profile,
+            letter: letter(effect.profile),
+            percent: figures::one(100.0 * effect.success_rate),
+            low: figures::one(100.0 * low),
+            high: figures::one(100.0 * high),
+            successes: effect.successes,
+            episodes: effect.episodes,
+            penalty_points: figures::one(effect.penalty_points),
+            difference: (effect.profile != Profile::Ideal).then(|| Difference {
+                points: figures::signed(100.0 * effect.difference),
+                lost: effect.lost,
+                gained: effect.gained,
+                p: figures::p_value(effect.p_value),
+                clear: effect.p_value <= SIGNIFICANCE,
+            }),
+        }
+    }
+}
+
+/// A letter for each profile, since colour alone must not carry it.
+const fn letter(profile: Profile) -> char {
+    match profile {
+        Profile::Ideal => 'I',
+        Profile::ModelMismatch => 'M',
+        Profile::ObservationNoise => 'N',
+        Profile::Disturbance => 'D',
+        Profile::TrackingLoss => 'T',
+        Profile::Delay => 'L',
+        Profile::Evaluation => 'E',
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_profile_has_a_letter_of_its_own_and_is_told_apart_by_its_p_value() {
+        let letters: BTreeSet<char> = Profile::ABLATION.into_iter().map(letter).collect();
+        assert_eq!(letters.len(), Profile::ABLATION.len());
+        let effect = ProfileEffect {
+            profile: Profile::Evaluation,
+            episodes: 4,
+            successes: 1,
+            success_rate: 0.25,
+            success_ci95: [0.05, 0.7],
+            penalty_points: 3.0,
+            difference: -0.5,
+            lost: 2,
+            gained: 0,
+            p_value: 0.5,
+        };
+        let difference = Row::of(&effect).difference.unwrap();
+        assert_eq!(
+            (difference.points.as_str(), difference.clear),
+            ("−50.0", false)
+        );
+    }
+}

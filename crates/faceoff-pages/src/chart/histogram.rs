@@ -1,0 +1,172 @@
+//! How often values lie where.
+
+use super::scale::{BOTTOM, GRID, LEFT, RIGHT, Scale, Tick, short};
+use crate::figures;
+
+/// The most words below the columns: more would run into each other on a phone.
+const MOST_EDGES: usize = 8;
+
+/// Columns of one width from zero on. Those that stand beside each other have one axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Bins {
+    /// In the values' unit.
+    pub(crate) width: f64,
+    pub(crate) count: usize,
+}
+
+/// Counts of values, ready to be drawn by `chart.html`.
+#[derive(Debug)]
+pub(crate) struct Histogram {
+    pub(crate) title: String,
+    pub(crate) unit: &'static str,
+    pub(crate) grid: Vec<Tick>,
+    /// Where columns begin and end.
+    pub(crate) edges: Vec<Tick>,
+    /// All columns, an SVG path.
+    pub(crate) columns: String,
+    /// What it shows in a sentence, for whoever does not see it.
+    pub(crate) told: String,
+}
+
+impl Bins {
+    /// Enough of this width for the largest of the values.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a small number of columns"
+    )]
+    pub(crate) fn for_all(width: f64, values: impl IntoIterator<Item = f64>) -> Self {
+        let largest = values.into_iter().fold(0.0, f64::max);
+        Self {
+            width,
+            count: (largest / width).floor() as usize + 1,
+        }
+    }
+
+    /// How many values lie in each; on an edge, a value lies in the column after it.
+    pub(crate) fn counts(self, values: &[f64]) -> Vec<usize> {
+        let mut counts = vec![0; self.count];
+        for value in values {
+            let column = (0..self.count).rev().find(|at| self.from(*at) <= *value);
+            counts[column.unwrap_or_default()] += 1;
+        }
+        counts
+    }
+
+    /// Where a column begins.
+    fn from(self, column: usize) -> f64 {
+        self.width * column as f64
+    }
+
+    /// Where a column begins and ends, in words.
+    pub(crate) fn words(self, column: usize) -> String {
+        let [from, to] = [column, column + 1].map(|edge| short(self.from(edge)));
+        format!("{from} to {to}")
+    }
+
+    fn x(self, edge: usize) -> f64 {
+        LEFT + (RIGHT - LEFT) * edge as f64 / self.count as f64
+    }
+
+    fn edges(self) -> Vec<Tick> {
+        let step = self.count.div_ceil(MOST_EDGES);
+        let edges = (0..=self.count).step_by(step).map(|edge| Tick {
+            at: figures::one(self.x(edge)),
+            word: short(self.from(edge)),
+        });
+        edges.collect()
+    }
+}
+
+impl Histogram {
+    /// `most`: the largest count of those beside it.
+    pub(crate) fn of(
+        title: &str,
+        unit: &'static str,
+        bins: Bins,
+        counts: &[usize],
+        most: usize,
+    ) -> Self {
+        let scale = Scale {
+            most: f64::from(GRID) * whole_step(most as f64 / f64::from(GRID)),
+        };
+        let filled = || counts.iter().enumerate().filter(|(_, count)| **count > 0);
+        let columns = filled().map(|(column, count)| {
+            let top = figures::one(scale.y(*count as f64));
+            let [left, right] = [bins.x(column) + 0.5, bins.x(column + 1) - 0.5].map(figures::one);
+            format!("M{left} {BOTTOM}V{top}H{right}V{BOTTOM}z")
+        });
+        let told: Vec<String> = filled()
+            .map(|(column, count)| format!("{} {unit}: {count}", bins.words(column)))
+            .collect();
+        Self {
+            title: title.to_owned(),
+            unit,
+            grid: scale.grid(),
+            edges: bins.edges(),
+            columns: columns.collect(),
+            told: match told.is_empty() {
+                true => format!("{title}: none"),
+                false => format!("{title}: {}", told.join(", ")),
+            },
+        }
+    }
+}
+
+/// The least of 1, 2 and 5 times a power of ten that is no less and whole: there is no half of a thing that is counted.
+fn whole_step(least: f64) -> f64 {
+    let power = 10_f64.powf(least.max(1.0).log10().floor());
+    let found = [1.0, 2.0, 5.0]
+        .into_iter()
+        .map(|factor| factor * power)
+        .find(|step| *step >= least);
+    found.unwrap_or(10.0 * power)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_counted_where_they_lie_and_columns_are_as_high() {
+        let values = [0.0, 0.4, 0.5, 1.9];
+        let bins = Bins::for_all(0.5, values.into_iter().chain([2.0]));
+        assert_eq!(bins.count, 5, "a value on the last edge has a column");
+        let counts = bins.counts(&values);
+        assert_eq!(counts, [2, 1, 0, 1, 0]);
+        let drawn = Histogram::of("Alpha", "m/s", bins, &counts, 4);
+        assert_eq!(
+            drawn.columns,
+            "M38.5 140V76.0H99.1V140zM100.1 140V108.0H160.7V140zM223.3 140V108.0H283.9V140z"
+        );
+        let edges: Vec<&str> = drawn.edges.iter().map(|edge| &*edge.word).collect();
+        assert_eq!(edges, ["0", "0.5", "1", "1.5", "2", "2.5"]);
+        assert_eq!(
+            drawn.told,
+            "Alpha: 0 to 0.5 m/s: 2, 0.5 to 1 m/s: 1, 1.5 to 2 m/s: 1"
+        );
+        let none = Histogram::of("Beta", "m/s", bins, &[0; 5], 0);
+        assert_eq!((&*none.columns, &*none.told), ("", "Beta: none"));
+    }
+
+    #[test]
+    fn the_axis_counts_in_whole_numbers() {
+        for (least, step) in [
+            (0.0, 1.0),
+            (0.5, 1.0),
+            (1.0, 1.0),
+            (2.5, 5.0),
+            (6.0, 10.0),
+            (13.0, 20.0),
+        ] {
+            assert!((whole_step(least) - step).abs() < 1e-12, "{least}");
+        }
+    }
+
+    #[test]
+    fn many_columns_have_few_words() {
+        let bins = Bins::for_all(0.5, [12.0]);
+        assert_eq!(bins.count, 25);
+        assert_eq!(bins.edges().len(), 7, "every fourth of 26 edges");
+    }
+}

@@ -1,0 +1,3 @@
+/// Marks an answer that pages of other sites may hold.
+#[derive(Debug, Clone, Copy)]
+pub struct Embeddable;

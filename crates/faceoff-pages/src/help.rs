@@ -1,0 +1,106 @@
+//! `/help`: what agents find on this server.
+
+use super::frame::{Frame, PageProblem, render};
+use askama::Template;
+use axum::{extract::State, response::Response};
+use faceoff_api::views::{runtimes::RuntimesView, stage::PhaseView};
+use faceoff_service::{app::App, views::runtimes};
+use faceoff_types::{AgentLimits, RuntimeContent};
+
+#[derive(Template)]
+#[template(path = "help.html")]
+struct Page {
+    frame: Frame,
+    view: RuntimesView,
+    contests: Vec<Contest>,
+}
+
+/// A column of the limits' table.
+struct Contest {
+    name: String,
+    runtimes: String,
+    limits: AgentLimits,
+}
+
+impl Page {
+    /// The limits as rows: what, and of each contest how much.
+    fn rows(&self) -> Vec<(&'static str, Vec<String>)> {
+        let row = |what, value: fn(&AgentLimits) -> String| {
+            let values = self.contests.iter().map(|one| value(&one.limits));
+            (what, values.collect())
+        };
+        vec![
+            row("CPU time per time", |limits| {
+                format!("{} CPU", limits.resources.cpus)
+            }),
+            row("Memory, with caches and scratch files", |limits| {
+                mebibytes(limits.resources.memory_bytes)
+            }),
+            row("Scratch files in /tmp", |limits| {
+                mebibytes(limits.resources.scratch_bytes)
+            }),
+            row("Processes and threads", |limits| {
+                limits.resources.pids.to_string()
+            }),
+            row("Largest file written", |limits| {
+                mebibytes(limits.resources.file_size_bytes)
+            }),
+            row("Open files of a process", |limits| {
+                limits.resources.open_files.to_string()
+            }),
+            row("Bundle, packed", |limits| {
+                mebibytes(limits.bundle.packed_bytes)
+            }),
+            row("Bundle, unpacked", |limits| {
+                mebibytes(limits.bundle.unpacked_bytes)
+            }),
+            row("To start", |limits| format!("{} s", limits.time.startup_s)),
+            row("To answer a reset", |limits| {
+                format!("{} s", limits.time.reset_s)
+            }),
+            row("To answer a step, at most", |limits| {
+                format!("{} s", limits.time.step_s)
+            }),
+            row(
+                "To answer a step, in the mean of an upload's check",
+                |limits| format!("{} s", limits.time.mean_s),
+            ),
+        ]
+    }
+}
+
+fn mebibytes(bytes: u64) -> String {
+    const MEBIBYTE: u64 = 1 << 20;
+    if bytes.is_multiple_of(MEBIBYTE) {
+        format!("{} MiB", bytes / MEBIBYTE)
+    } else {
+        format!("{bytes} bytes")
+    }
+}
+
+pub(super) async fn page(State(app): State<App>) -> Result<Response, PageProblem> {
+    let view = runtimes::now(&app).await?;
+    let season = app
+        .store
+        .season()
+        .await
+        .map_err(faceoff_service::problem::Problem::from)?;
+    let stages = view.stages.iter().map(|stage| Contest {
+        name: match stage.phase {
+            PhaseView::Upcoming => format!("{} (opens later)", stage.name),
+            PhaseView::Open | PhaseView::Closed => stage.name.to_string(),
+        },
+        runtimes: stage.runtimes.join(", "),
+        limits: stage.limits.clone(),
+    });
+    let tournaments = view.tournaments.iter().map(|tournament| Contest {
+        name: tournament.name.to_string(),
+        runtimes: tournament.runtimes.join(", "),
+        limits: tournament.limits.clone(),
+    });
+    render(&Page {
+        frame: Frame::of(&app, season.name, "/help"),
+        contests: stages.chain(tournaments).collect(),
+        view,
+    })
+}

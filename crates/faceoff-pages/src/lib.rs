@@ -1,0 +1,121 @@
+//! The pages: server-rendered, complete without JavaScript. One file per page; the templates are in
+//! `web/templates`, the styles in `web/static`, all compiled into the binary. What they show is in
+//! [`faceoff_api::views`], how that is made in [`faceoff_service::views`].
+
+mod ablation;
+mod account;
+mod announcements;
+mod assets;
+mod baselines;
+mod board;
+mod broken_places;
+mod chart;
+mod comparison;
+mod desk;
+mod desk_frame;
+mod docs;
+mod embeddable;
+mod entry;
+mod episode_words;
+mod episodes;
+mod evaluation;
+mod feed;
+mod figures;
+mod form_file;
+mod frame;
+mod game;
+mod game_row;
+mod head_to_head;
+mod help;
+mod join;
+mod organiser;
+mod problems;
+mod query;
+mod register;
+mod replay;
+mod replay_section;
+mod robots;
+mod season;
+mod side_by_side;
+mod sign_in;
+mod signed_in;
+mod spoilers;
+mod standing;
+mod table_drawing;
+mod tables;
+mod team;
+mod tournament;
+mod tournament_words;
+mod tournaments;
+mod unknown;
+
+use axum::{
+    Router,
+    extract::DefaultBodyLimit,
+    middleware,
+    routing::{get, post},
+};
+pub use embeddable::Embeddable;
+use faceoff_service::{app::App, extract::MAX_JSON_BYTES, timeouts};
+use serde_json::Value;
+pub use spoilers::SPOILERS_PATH;
+use std::{sync::Arc, time::Duration};
+pub use unknown::{for_whom, unknown_method, unknown_path};
+
+/// All pages and their assets. `api` is the API's OpenAPI document, which the documentation shows.
+pub fn router(patience: Duration, api: Arc<Value>) -> Router<App> {
+    Router::new()
+        .route("/", get(board::overall))
+        .route("/tasks/{task}", get(board::by_task))
+        .route("/teams/{id}", get(team::page))
+        .route("/evaluations/{id}", get(evaluation::page))
+        .route("/evaluations/{id}/compare/{other}", get(comparison::page))
+        .route(
+            "/evaluations/{id}/compare/{other}/{task}/{episode}",
+            get(comparison::pair::page),
+        )
+        .route("/evaluations/{id}/episodes", get(episodes::page))
+        .route("/evaluations/{id}/episodes.csv", get(tables::episodes))
+        .route(
+            "/evaluations/{id}/answer-times.csv",
+            get(tables::answer_times),
+        )
+        .route("/submissions/{id}/ablation.csv", get(tables::ablation))
+        .route(
+            "/evaluations/{id}/episodes/{task}/{episode}",
+            get(replay::page),
+        )
+        .route(
+            "/evaluations/{id}/episodes/{task}/{episode}/embed",
+            get(replay::embedded),
+        )
+        .route("/games/{id}", get(game::page))
+        .route("/tournaments", get(tournaments::page))
+        .route("/tournaments/{id}", get(tournament::page))
+        .route("/tournaments/{id}/teams/{a}/{b}", get(head_to_head::page))
+        .route(SPOILERS_PATH, post(spoilers::choose))
+        .route("/season", get(season::page))
+        .route("/submissions/{id}/ablation", get(ablation::page))
+        .route(
+            "/submissions/{id}/ablation/{profile}/{task}/{episode}",
+            get(ablation::pair::page),
+        )
+        .route("/help", get(help::page))
+        .route("/problems", get(problems::page))
+        .route("/announcements", get(announcements::page))
+        .route("/sign-in", get(sign_in::page).post(sign_in::submit))
+        .route("/sign-out", post(sign_in::sign_out))
+        .route("/account", get(account::page))
+        .route("/join/{code}", get(join::page).post(join::submit))
+        .route("/register", get(register::page).post(register::submit))
+        .merge(desk::router())
+        .merge(organiser::router())
+        .route(feed::FEED_PATH, get(feed::feed))
+        .route("/robots.txt", get(robots::robots))
+        .merge(docs::router(api))
+        .merge(assets::router())
+        .layer(middleware::from_fn_with_state(patience, timeouts::time_out))
+        .layer(DefaultBodyLimit::max(MAX_JSON_BYTES))
+        // It may take long as long as it moves, and is watched by what receives it.
+        .merge(desk::uploads())
+}

@@ -1,0 +1,51 @@
+//! `/organiser`: what an organiser looks after, and decides.
+
+mod attention;
+mod day;
+mod decide;
+mod log;
+mod messages;
+mod order;
+mod stage;
+mod stage_form;
+mod stages;
+mod storage;
+mod teams;
+mod workers;
+
+use super::desk::access;
+use axum::{
+    Router,
+    routing::{get, post},
+};
+use faceoff_service::app::App;
+
+/// All pages of the desk.
+pub(super) fn router() -> Router<App> {
+    Router::new()
+        .route("/organiser", get(attention::page))
+        .route("/organiser/day", get(day::page))
+        .route("/organiser/teams", get(teams::page))
+        .route("/organiser/teams/season", post(teams::change_season))
+        .route("/organiser/teams/{id}", post(teams::change))
+        .route("/organiser/stages", get(stages::page).post(stages::create))
+        .route(
+            "/organiser/stages/{id}",
+            get(stage::page).post(stage::change),
+        )
+        .route(
+            "/organiser/messages",
+            get(messages::page).post(messages::announce),
+        )
+        .route("/organiser/messages/terms", post(messages::publish_terms))
+        .route("/organiser/messages/{id}", post(messages::answer))
+        .route("/organiser/storage", get(storage::page))
+        .route("/organiser/workers", get(workers::page))
+        .route("/organiser/log", get(log::page))
+        .route("/log", get(log::moved))
+        .route(
+            "/organiser/decide/{*order}",
+            get(decide::page).post(decide::submit),
+        )
+        .merge(access::router("/organiser"))
+}

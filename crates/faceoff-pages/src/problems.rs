@@ -1,0 +1,20 @@
+//! `/problems`: what each kind of error means; the `type` of every problem points here.
+
+use super::frame::{Frame, PageProblem, render};
+use askama::Template;
+use axum::response::Response;
+use faceoff_service::problem::ProblemKind;
+
+#[derive(Template)]
+#[template(path = "problems.html")]
+struct Page {
+    frame: Frame,
+    kinds: &'static [ProblemKind],
+}
+
+pub(super) async fn page() -> Result<Response, PageProblem> {
+    render(&Page {
+        frame: Frame::new(String::new(), "/problems"),
+        kinds: ProblemKind::ALL,
+    })
+}

@@ -1,0 +1,107 @@
+//! `/register`: where a team says that it wants to take part.
+
+use super::{
+    frame::{Frame, PageProblem, render},
+    join::{accepted, founded},
+};
+use askama::Template;
+use axum::{
+    extract::State,
+    http::StatusCode,
+    response::{IntoResponse, Response},
+};
+use faceoff_api::{
+    requests::Register,
+    views::{announcement::TermsView, invitation::NewRegistrationView},
+};
+use faceoff_service::{
+    acts::registering::registered,
+    app::App,
+    extract::PageForm,
+    problem::Problem,
+    views::{announcement, season::SeasonHead},
+};
+use faceoff_types::DivisionName;
+use serde::Deserialize;
+
+#[derive(Template)]
+#[template(path = "register.html")]
+struct Page {
+    frame: Frame,
+    is_open: bool,
+    terms: Option<TermsView>,
+    divisions: Vec<DivisionName>,
+    form: Form,
+    refused: Option<String>,
+    done: Option<NewRegistrationView>,
+}
+
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Form {
+    team_name: String,
+    affiliation: String,
+    link: String,
+    division: String,
+    contact: String,
+    accepted_terms: String,
+}
+
+async fn page_with(
+    app: &App,
+    form: Form,
+    refused: Option<String>,
+    done: Option<NewRegistrationView>,
+) -> Result<Response, PageProblem> {
+    let season = app.store.season().await.map_err(Problem::from)?;
+    let terms = app.store.terms().await.map_err(Problem::from)?;
+    let name = SeasonHead::now(app).await?.name;
+    render(&Page {
+        frame: Frame::of(app, name, "/register"),
+        is_open: season.takes_registrations && season.closed_at.is_none(),
+        terms: terms.into_iter().next().map(announcement::terms),
+        divisions: app.store.divisions().await.map_err(Problem::from)?,
+        form,
+        refused,
+        done,
+    })
+}
+
+pub(super) async fn page(State(app): State<App>) -> Result<Response, PageProblem> {
+    page_with(&app, Form::default(), None, None).await
+}
+
+async fn register(app: &App, form: &Form) -> Result<NewRegistrationView, Problem> {
+    let team = founded(
+        &form.team_name,
+        &form.affiliation,
+        &form.link,
+        &form.division,
+    )?;
+    let request = Register {
+        team: team.ok_or_else(|| Problem::invalid("the team's name", "expected one, got none"))?,
+        contact: form.contact.clone(),
+        accepted_terms: accepted(&form.accepted_terms)?,
+    };
+    registered(app, request).await
+}
+
+/// Registers the team and shows its link, or says on the same page what is missing.
+pub(super) async fn submit(
+    State(app): State<App>,
+    PageForm(form): PageForm<Form>,
+) -> Result<Response, PageProblem> {
+    match register(&app, &form).await {
+        Ok(done) => {
+            let page = page_with(&app, Form::default(), None, Some(done)).await?;
+            Ok((StatusCode::CREATED, page).into_response())
+        }
+        Err(problem) if problem.kind().status().is_client_error() => {
+            let status = problem.kind().status();
+            let refused = Some(problem.detail().to_owned());
+            let page = page_with(&app, form, refused, None).await?;
+            Ok((status, page).into_response())
+        }
+        Err(problem) => Err(problem.into()),
+    }
+}

@@ -1,0 +1,82 @@
+//! `/season`: for sceptics. The commitment, the secret once it is public, and how every draw follows
+//! from it.
+
+use super::frame::{Frame, PageProblem, render};
+use askama::Template;
+use axum::{extract::State, response::Response};
+use faceoff_api::views::{
+    capacity::{DayLoad, Fit},
+    season::SeasonView,
+    stage::StageView,
+};
+use faceoff_service::{app::App, problem::Problem, viewer::Viewer, views::season};
+use faceoff_types::{StageId, StageName, TournamentId};
+use jiff::Timestamp;
+
+#[derive(Template)]
+#[template(path = "season.html")]
+struct Page {
+    frame: Frame,
+    season: SeasonView,
+    opened: String,
+    closed: Option<String>,
+    /// Ids and names.
+    tournaments: Vec<(TournamentId, StageName)>,
+}
+
+impl Page {
+    fn there(&self, stage: &StageView, at: &Timestamp) -> String {
+        let there = at.to_zoned(stage.zone.time_zone());
+        format!("{} {}", there.strftime("%Y-%m-%d %H:%M:%S"), stage.zone)
+    }
+
+    fn name(&self, id: &StageId) -> String {
+        let stage = self.season.stages.iter().find(|stage| stage.id == *id);
+        stage.map_or_else(|| id.to_string(), |stage| stage.name.to_string())
+    }
+
+    /// What is to be played, with the name of its stage; for organisers alone.
+    fn loads(&self) -> Vec<(&str, &DayLoad)> {
+        let stages = self.season.stages.iter();
+        stages
+            .flat_map(|stage| {
+                let loads = stage.capacity.iter().flatten();
+                loads.map(|load| (stage.name.as_str(), load))
+            })
+            .collect()
+    }
+
+    /// The stage whose id enters no seed, if there is one.
+    fn unnamed(&self) -> Option<&str> {
+        let stage = self.season.stages.iter().find(|stage| !stage.names_seeds);
+        stage.map(|stage| stage.name.as_str())
+    }
+
+    /// The hexadecimal digits of a stage's id.
+    fn example_stage(&self) -> String {
+        let stage = self.season.stages.iter().find(|stage| stage.names_seeds);
+        stage.map_or_else(
+            || "STAGE".to_owned(),
+            |stage| stage.id.as_uuid().simple().to_string(),
+        )
+    }
+}
+
+pub(super) async fn page(
+    viewer: Result<Viewer, Problem>,
+    State(app): State<App>,
+) -> Result<Response, PageProblem> {
+    let season = season::now(&app, viewer?).await?;
+    let instant = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M:%S UTC").to_string();
+    let tournaments = app.store.tournaments().await.map_err(Problem::from)?;
+    render(&Page {
+        tournaments: tournaments
+            .into_iter()
+            .map(|one| (one.id, one.name))
+            .collect(),
+        frame: Frame::of(&app, season.name.clone(), "/season"),
+        opened: instant(season.created_at),
+        closed: season.closed_at.map(instant),
+        season,
+    })
+}

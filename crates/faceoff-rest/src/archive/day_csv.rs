@@ -1,0 +1,112 @@
+//! The evaluations of a day, for spreadsheets.
+
+use faceoff_api::views::{
+    evaluation::{EvaluationStatus, EvaluationView},
+    task::TaskView,
+};
+use faceoff_service::csv::{Table, or_empty, words};
+use faceoff_types::Task;
+use std::collections::BTreeMap;
+
+const OF_TASK: [&str; 7] = [
+    "episodes",
+    "successes",
+    "success_rate",
+    "ci95_low",
+    "ci95_high",
+    "penalty_points",
+    "tier",
+];
+
+/// The columns of all tasks, whether a row has them or not.
+fn with_tasks(columns: &[&str]) -> Vec<String> {
+    let mut all: Vec<String> = columns.iter().map(|column| (*column).to_owned()).collect();
+    for task in Task::ALL {
+        all.extend(OF_TASK.map(|column| format!("{task}_{column}")));
+    }
+    all
+}
+
+fn of_tasks(tasks: Option<&BTreeMap<Task, TaskView>>) -> impl Iterator<Item = String> + '_ {
+    Task::ALL
+        .into_iter()
+        .flat_map(move |task| match tasks.and_then(|tasks| tasks.get(&task)) {
+            None => vec![String::new(); OF_TASK.len()],
+            Some(result) => vec![
+                result.episodes.to_string(),
+                result.successes.to_string(),
+                result.success_rate.to_string(),
+                result.success_ci95[0].to_string(),
+                result.success_ci95[1].to_string(),
+                result.penalty_points.to_string(),
+                result.tier.to_string(),
+            ],
+        })
+}
+
+/// A day, evaluation by evaluation.
+pub(super) fn day(evaluations: &[EvaluationView]) -> Vec<u8> {
+    let columns = with_tasks(&[
+        "evaluation",
+        "team",
+        "team_id",
+        "state",
+        "voided",
+        "extra_turn",
+        "finished_at",
+        "score",
+        "penalty_points",
+        "tier",
+        "dataset_blake3",
+    ]);
+    let names: Vec<&str> = columns.iter().map(String::as_str).collect();
+    let mut table = Table::new(&names);
+    for evaluation in evaluations {
+        let (state, finished_at) = match &evaluation.status {
+            EvaluationStatus::Queued => ("queued", None),
+            EvaluationStatus::Running => ("running", None),
+            EvaluationStatus::Finalising => ("finalising", None),
+            EvaluationStatus::Finished { finished_at, .. } => ("finished", Some(finished_at)),
+            EvaluationStatus::AgentFailed { finished_at, .. } => {
+                ("agent_failed", Some(finished_at))
+            }
+            EvaluationStatus::PlatformFailed { finished_at, .. } => {
+                ("platform_failed", Some(finished_at))
+            }
+            EvaluationStatus::NotPlayed { finished_at, .. } => ("not_played", Some(finished_at)),
+            EvaluationStatus::Cancelled { finished_at, .. } => ("cancelled", Some(finished_at)),
+        };
+        let (result, hash) = match &evaluation.status {
+            EvaluationStatus::Finished {
+                result,
+                dataset_blake3,
+                ..
+            } => (result.as_deref(), dataset_blake3.clone()),
+            _ => (None, None),
+        };
+        let fields = [
+            evaluation.id.to_string(),
+            words(evaluation.team_name.as_str()),
+            evaluation.team.to_string(),
+            state.to_owned(),
+            words(
+                evaluation
+                    .voided
+                    .as_ref()
+                    .map_or("", |ruling| ruling.reason.as_str()),
+            ),
+            words(evaluation.extra_turn.as_deref().unwrap_or_default()),
+            or_empty(finished_at),
+            or_empty(result.map(|result| result.score)),
+            or_empty(result.map(|result| result.penalty_points)),
+            or_empty(result.map(|result| result.tier)),
+            hash.unwrap_or_default(),
+        ];
+        table.row(
+            fields
+                .into_iter()
+                .chain(of_tasks(result.map(|result| &result.tasks))),
+        );
+    }
+    table.into_bytes()
+}

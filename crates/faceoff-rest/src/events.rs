@@ -1,0 +1,20 @@
+//! The log of all changes, for the organiser.
+
+use axum::{Json, extract::State};
+use faceoff_api::{requests::EventsQuery, views::event::EventsView};
+use faceoff_service::{
+    app::App, auth::Organiser, extract::QueryParams, problem::Problem, views::event,
+};
+
+/// What was changed, when and by whom, the newest first.
+#[utoipa::path(
+    get, path = "/events", tag = "organiser", security(("organiser" = [])),
+    params(EventsQuery), responses((status = 200, body = EventsView), (status = 422))
+)]
+pub(crate) async fn list_events(
+    _: Organiser,
+    State(app): State<App>,
+    QueryParams(query): QueryParams<EventsQuery>,
+) -> Result<Json<EventsView>, Problem> {
+    event::page(&app, query).await.map(Json)
+}

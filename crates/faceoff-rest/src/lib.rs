@@ -1,0 +1,238 @@
+//! The REST API: routes, parsing and their description. One file per resource; what it shows of one is in
+//! [`faceoff_api::views`], how that is made in [`faceoff_service::views`].
+
+mod ablations;
+mod announcements;
+mod archive;
+mod board;
+mod board_csv;
+mod capacity;
+mod clip_answer;
+mod clips;
+mod comparisons;
+mod datasets;
+mod days;
+mod document;
+mod downloads;
+mod entrants;
+mod episodes;
+mod evaluations;
+mod event_reader;
+mod event_stream;
+mod events;
+mod free_games;
+mod freezes;
+mod game_clips;
+mod game_files;
+mod games;
+mod health;
+mod invitations;
+mod links;
+mod live_game;
+mod live_reader;
+mod me;
+mod paging;
+mod people;
+mod proposals;
+mod ratings;
+mod recorded;
+mod registrations;
+mod replays;
+mod rounds;
+mod rulings;
+mod runtimes;
+mod season;
+mod season_archive;
+mod sessions;
+mod sign_off;
+mod stages;
+mod storage;
+mod submission_archives;
+mod submissions;
+mod teams;
+mod terms;
+mod tokens;
+mod told;
+mod tournaments;
+mod turns;
+mod upload;
+mod webhooks;
+mod workers;
+
+use axum::{Json, Router, extract::DefaultBodyLimit, middleware, routing::get};
+use document::Document;
+use faceoff_api::paths::API_BASE;
+use faceoff_service::{app::App, extract::MAX_JSON_BYTES, timeouts};
+use serde_json::Value;
+use std::{sync::Arc, time::Duration};
+use utoipa::OpenApi;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+/// All routes. `patience` bounds the time of every answer but an upload's.
+pub fn router(patience: Duration) -> (Router<App>, Arc<Value>) {
+    let resources = OpenApiRouter::with_openapi(Document::openapi())
+        .routes(routes!(health::health))
+        .routes(routes!(health::live))
+        .routes(routes!(season::season, season::change_season))
+        .routes(routes!(season::close_season))
+        .routes(routes!(runtimes::runtimes))
+        .routes(routes!(board::board))
+        .routes(routes!(board::board_history))
+        .routes(routes!(board::task_board))
+        .routes(routes!(me::me))
+        .routes(routes!(teams::create_team, teams::list_teams))
+        .routes(routes!(teams::replace_token))
+        .routes(routes!(teams::team, teams::change_team))
+        .routes(routes!(teams::retire_team))
+        .routes(routes!(teams::return_team))
+        .routes(routes!(tokens::whoami))
+        .routes(routes!(tokens::list_tokens, tokens::create_token))
+        .routes(routes!(tokens::revoke_token))
+        .routes(routes!(tokens::rotate_token))
+        .routes(routes!(webhooks::list_webhooks, webhooks::create_webhook))
+        .routes(routes!(
+            webhooks::webhook,
+            webhooks::change_webhook,
+            webhooks::remove_webhook
+        ))
+        .routes(routes!(webhooks::rotate_webhook))
+        .routes(routes!(webhooks::test_webhook))
+        .routes(routes!(webhooks::list_deliveries))
+        .routes(routes!(sessions::create_session))
+        .routes(routes!(sessions::end_session))
+        .routes(routes!(people::list_people))
+        .routes(routes!(people::remove_person))
+        .routes(routes!(people::set_password))
+        .routes(routes!(
+            invitations::list_invitations,
+            invitations::create_invitation
+        ))
+        .routes(routes!(invitations::accept_invitation))
+        .routes(routes!(invitations::revoke_invitation))
+        .routes(routes!(
+            registrations::list_registrations,
+            registrations::register
+        ))
+        .routes(routes!(registrations::approve_registration))
+        .routes(routes!(registrations::refuse_registration))
+        .routes(routes!(terms::list_terms, terms::publish_terms))
+        .routes(routes!(terms::accept_terms))
+        .routes(routes!(
+            announcements::list_announcements,
+            announcements::announce
+        ))
+        .routes(routes!(announcements::list_questions, announcements::ask))
+        .routes(routes!(announcements::answer))
+        .routes(routes!(stages::list_stages, stages::create_stage))
+        .routes(routes!(stages::stage, stages::change_stage))
+        .routes(routes!(capacity::capacity))
+        .routes(routes!(sign_off::start_final_day))
+        .routes(routes!(sign_off::finalise_stage))
+        .routes(routes!(days::start_day))
+        .routes(routes!(turns::start_missed_day))
+        .routes(routes!(turns::extra_turn))
+        .routes(routes!(freezes::freeze_boards))
+        .routes(routes!(freezes::unfreeze_boards))
+        .routes(routes!(proposals::list_proposals))
+        .routes(routes!(proposals::proposal))
+        .routes(routes!(proposals::start_trial))
+        .routes(routes!(proposals::propose))
+        .routes(routes!(proposals::apply_proposal))
+        .routes(routes!(proposals::drop_proposal))
+        .routes(routes!(events::list_events))
+        .routes(routes!(event_stream::follow_events))
+        .routes(routes!(submissions::list_submissions))
+        .routes(routes!(
+            submissions::submission,
+            submissions::describe_submission,
+            submission_archives::delete_submission
+        ))
+        .routes(routes!(submission_archives::submission_archive))
+        .routes(routes!(submission_archives::link_archive))
+        .routes(routes!(storage::storage))
+        .routes(routes!(workers::workers))
+        .routes(routes!(workers::ban_worker))
+        .routes(routes!(workers::readmit_worker))
+        .routes(routes!(storage::team_storage))
+        .routes(routes!(submissions::withdraw_submission))
+        .routes(routes!(submissions::activate_submission))
+        .routes(routes!(submissions::evaluate_submission))
+        .routes(routes!(ablations::ablation, ablations::order_ablation))
+        .routes(routes!(ablations::ablation_motion))
+        .routes(routes!(ablations::ablation_observed))
+        .routes(routes!(evaluations::list_evaluations))
+        .routes(routes!(evaluations::evaluation))
+        .routes(routes!(evaluations::cancel_evaluation))
+        .routes(routes!(evaluations::rerun_evaluation))
+        .routes(routes!(rulings::void_evaluation))
+        .routes(routes!(rulings::void_day))
+        .routes(routes!(rulings::disqualify_team))
+        .routes(routes!(rulings::pause_queue))
+        .routes(routes!(rulings::resume_queue))
+        .routes(routes!(rulings::reinstate_team))
+        .routes(routes!(datasets::dataset))
+        .routes(routes!(datasets::link_dataset))
+        .routes(routes!(datasets::violations))
+        .routes(routes!(clips::episodes))
+        .routes(routes!(clips::motion))
+        .routes(routes!(clips::observed))
+        .routes(routes!(game_clips::game_motion))
+        .routes(routes!(game_clips::game_observed))
+        .routes(routes!(datasets::publish_evaluation))
+        .routes(routes!(comparisons::compare))
+        .routes(routes!(
+            tournaments::list_tournaments,
+            tournaments::open_tournament
+        ))
+        .routes(routes!(
+            tournaments::tournament,
+            tournaments::change_tournament
+        ))
+        .routes(routes!(entrants::enter_teams))
+        .routes(routes!(entrants::depart))
+        .routes(routes!(entrants::withdraw_team))
+        .routes(routes!(rounds::start_round))
+        .routes(routes!(tournaments::pause_tournament))
+        .routes(routes!(tournaments::resume_tournament))
+        .routes(routes!(tournaments::close_tournament))
+        .routes(routes!(free_games::order_test_games))
+        .routes(routes!(free_games::order_friendly_game))
+        .routes(routes!(free_games::list_free_games))
+        .routes(routes!(replays::order_replays, replays::cancel_replays))
+        .routes(routes!(replays::certainty))
+        .routes(routes!(ratings::ratings))
+        .routes(routes!(ratings::head_to_head))
+        .routes(routes!(games::list_games))
+        .routes(routes!(games::game, games::cancel_game))
+        .routes(routes!(games::list_attempts))
+        .routes(routes!(games::void_game))
+        .routes(routes!(games::rerun_game))
+        .routes(routes!(game_files::side))
+        .routes(routes!(game_files::side_log))
+        .routes(routes!(game_files::recording))
+        .routes(routes!(game_files::link_side))
+        .routes(routes!(game_files::link_recording))
+        .routes(routes!(live_game::watch_game))
+        .layer(middleware::from_fn_with_state(patience, timeouts::time_out))
+        .layer(DefaultBodyLimit::max(MAX_JSON_BYTES));
+    // An upload may take long as long as it moves; `upload` itself watches size and pauses.
+    let uploads = OpenApiRouter::new()
+        .routes(routes!(upload::create_submission))
+        .layer(DefaultBodyLimit::disable());
+    // Neither can an archive's making be told in advance.
+    let archives = OpenApiRouter::new().routes(routes!(season_archive::season_archive));
+    let (router, mut document) = OpenApiRouter::new()
+        .nest(API_BASE, resources.merge(uploads).merge(archives))
+        .split_for_parts();
+    document.info = Document::openapi().info;
+    let document = Arc::new(document::told(document));
+    let answered = Arc::clone(&document);
+    let router = router.route(
+        &format!("{API_BASE}/openapi.json"),
+        get(move || {
+            let document = Arc::clone(&answered);
+            async move { Json((*document).clone()) }
+        }),
+    );
+    (router, document)
+}

@@ -1,0 +1,36 @@
+//! What games say of submissions beside the standings, and of each two teams.
+
+use axum::{Json, extract::State};
+use faceoff_scoring::tournament::{HeadToHead, rating::Ratings};
+use faceoff_service::{app::App, extract::PathParam, problem::Problem, views::ratings};
+use faceoff_types::TournamentId;
+
+/// Bradley–Terry ratings of the submissions that played, from results and from goals, with intervals. They stand beside
+/// the standings and never in their place.
+#[utoipa::path(
+    get, path = "/tournaments/{id}/ratings", tag = "public", params(("id" = TournamentId, Path)),
+    responses(
+        (status = 200, body = Ratings),
+        (status = 404),
+        (status = 409, description = "games connect more submissions than are rated together"),
+    )
+)]
+pub(crate) async fn ratings(
+    State(app): State<App>,
+    PathParam(id): PathParam<TournamentId>,
+) -> Result<Json<Ratings>, Problem> {
+    let rated = ratings::ratings(&app, id).await?;
+    Ok(Json((*rated).clone()))
+}
+
+/// The record of each two teams that met.
+#[utoipa::path(
+    get, path = "/tournaments/{id}/head-to-head", tag = "public", params(("id" = TournamentId, Path)),
+    responses((status = 200, body = Vec<HeadToHead>), (status = 404))
+)]
+pub(crate) async fn head_to_head(
+    State(app): State<App>,
+    PathParam(id): PathParam<TournamentId>,
+) -> Result<Json<Vec<HeadToHead>>, Problem> {
+    ratings::records(&app, id).await.map(Json)
+}

@@ -1,0 +1,88 @@
+//! Teams that want to take part.
+
+use crate::paging::{Page, PageQuery, Paged};
+use axum::{Json, extract::State, http::StatusCode};
+use faceoff_api::{
+    requests::{Reason, Register},
+    views::invitation::{NewRegistrationView, RegistrationView},
+};
+use faceoff_service::{
+    acts::registering,
+    app::App,
+    auth::Organiser,
+    extract::{Json as Body, PathParam},
+    problem::Problem,
+    views::invitation,
+};
+use faceoff_types::RegistrationId;
+
+/// Registers a team, if the season takes registrations: it waits for the organisers.
+#[utoipa::path(
+    post, path = "/registrations", tag = "public", request_body = Register,
+    responses(
+        (status = 201, body = NewRegistrationView),
+        (status = 409, description = "registration is closed, too many wait, the name is taken, or the terms are not accepted"),
+        (status = 422),
+    )
+)]
+pub(crate) async fn register(
+    State(app): State<App>,
+    Body(body): Body<Register>,
+) -> Result<(StatusCode, Json<NewRegistrationView>), Problem> {
+    let view = registering::registered(&app, body).await?;
+    Ok((StatusCode::CREATED, Json(view)))
+}
+
+/// All registrations, the newest first.
+#[utoipa::path(
+    get, path = "/registrations", tag = "organiser", security(("organiser" = [])),
+    params(PageQuery),
+    responses((status = 200, body = Vec<RegistrationView>))
+)]
+pub(crate) async fn list_registrations(
+    _: Organiser,
+    page: Page<RegistrationId>,
+    State(app): State<App>,
+) -> Result<Paged<RegistrationView>, Problem> {
+    let registrations = app.store.registrations().await?;
+    let page = page.cut(registrations, |registration| registration.id)?;
+    Ok(page.map(invitation::registration))
+}
+
+/// Lets a registered team take part: the link of its registration is its first member's for seven days from now on.
+#[utoipa::path(
+    post, path = "/registrations/{id}/approve", tag = "organiser", security(("organiser" = [])),
+    params(("id" = RegistrationId, Path)),
+    responses(
+        (status = 200, body = RegistrationView),
+        (status = 404),
+        (status = 409, description = "it was decided about, or the name is taken meanwhile"),
+    )
+)]
+pub(crate) async fn approve_registration(
+    organiser: Organiser,
+    State(app): State<App>,
+    PathParam(id): PathParam<RegistrationId>,
+) -> Result<Json<RegistrationView>, Problem> {
+    let approved = registering::approve_registration(&app, organiser.actor(), id);
+    approved.await.map(Json)
+}
+
+/// Refuses a registration.
+#[utoipa::path(
+    post, path = "/registrations/{id}/refuse", tag = "organiser", security(("organiser" = [])),
+    params(("id" = RegistrationId, Path)), request_body = Reason,
+    responses(
+        (status = 200, body = RegistrationView),
+        (status = 404), (status = 409, description = "it was decided about"), (status = 422),
+    )
+)]
+pub(crate) async fn refuse_registration(
+    organiser: Organiser,
+    State(app): State<App>,
+    PathParam(id): PathParam<RegistrationId>,
+    Body(Reason { reason }): Body<Reason>,
+) -> Result<Json<RegistrationView>, Problem> {
+    let refused = registering::refuse_registration(&app, organiser.actor(), id, &reason);
+    refused.await.map(Json)
+}

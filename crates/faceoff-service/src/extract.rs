@@ -1,0 +1,211 @@
+//! Extractors whose rejections are problems that name the place.
+
+use crate::{
+    problem::{Problem, ProblemKind},
+    session,
+};
+use axum::{
+    Form,
+    body::Bytes,
+    extract::{
+        FromRequest, FromRequestParts, Query, RawPathParams, Request, rejection::BytesRejection,
+    },
+    http::{StatusCode, header, request::Parts},
+};
+use faceoff_api::objects_only;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+use std::{fmt::Display, str::FromStr};
+
+/// Largest JSON body; the largest legitimate one has some hundred bytes.
+pub const MAX_JSON_BYTES: usize = 64 * 1024;
+
+/// A JSON body.
+#[derive(Debug)]
+pub struct Json<T>(pub T);
+
+impl<S, T> FromRequest<S> for Json<T>
+where
+    S: Send + Sync,
+    T: DeserializeOwned,
+{
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
+        parse(read(request, state).await?).map(Self)
+    }
+}
+
+/// A JSON body that may be left out altogether.
+#[derive(Debug)]
+pub struct OptionalJson<T>(pub T);
+
+impl<S, T> FromRequest<S> for OptionalJson<T>
+where
+    S: Send + Sync,
+    T: DeserializeOwned + Default,
+{
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
+        let (is_json, bytes) = read(request, state).await?;
+        if bytes.is_empty() {
+            return Ok(Self(T::default()));
+        }
+        parse((is_json, bytes)).map(Self)
+    }
+}
+
+async fn read<S: Send + Sync>(request: Request, state: &S) -> Result<(bool, Bytes), Problem> {
+    let is_json = request
+        .headers()
+        .get(header::CONTENT_TYPE)
+        .and_then(|value| value.to_str().ok())
+        .and_then(|value| value.split(';').next())
+        .is_some_and(|essence| essence.trim().eq_ignore_ascii_case("application/json"));
+    let bytes = Bytes::from_request(request, state)
+        .await
+        .map_err(|rejection| too_large(&rejection))?;
+    Ok((is_json, bytes))
+}
+
+fn too_large(rejection: &BytesRejection) -> Problem {
+    if rejection.status() == StatusCode::PAYLOAD_TOO_LARGE {
+        Problem::new(
+            ProblemKind::TooLarge,
+            format!("the body of this request is at most {MAX_JSON_BYTES} bytes of JSON"),
+        )
+        .with("limit_bytes", MAX_JSON_BYTES)
+    } else {
+        Problem::new(
+            ProblemKind::InvalidRequest,
+            format!(
+                "the body could not be read to its end: {}; send it again",
+                rejection.body_text()
+            ),
+        )
+    }
+}
+
+fn parse<T: DeserializeOwned>((is_json, bytes): (bool, Bytes)) -> Result<T, Problem> {
+    if !is_json {
+        return Err(Problem::new(
+            ProblemKind::UnsupportedMediaType,
+            "expected a JSON body; send it with the header “Content-Type: application/json”",
+        ));
+    }
+    let does_not_fit = |error| {
+        Problem::new(
+            ProblemKind::InvalidContent,
+            format!("the JSON does not fit: {error}"),
+        )
+    };
+    let mut deserializer = serde_json::Deserializer::from_slice(&bytes);
+    // Many a type's own message does not say which field it is about.
+    let parsed = serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
+        if error.inner().is_data() {
+            does_not_fit(error)
+        } else {
+            Problem::new(
+                ProblemKind::InvalidRequest,
+                format!("the body is not valid JSON: {}", error.inner()),
+            )
+        }
+    })?;
+    let rest = deserializer.end();
+    let value = rest.and_then(|()| serde_json::from_slice::<Value>(&bytes));
+    let value = value.map_err(|error| {
+        Problem::new(
+            ProblemKind::InvalidRequest,
+            format!("the body is not valid JSON: {error}"),
+        )
+    })?;
+    objects_only::check::<T>(&value).map_err(does_not_fit)?;
+    Ok(parsed)
+}
+
+/// A form of one of our own pages.
+#[derive(Debug)]
+pub struct PageForm<T>(pub T);
+
+impl<S, T> FromRequest<S> for PageForm<T>
+where
+    S: Send + Sync,
+    T: DeserializeOwned,
+{
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
+        session::check_own_page(request.headers())?;
+        let Form(form) = Form::from_request(request, state)
+            .await
+            .map_err(|rejection| {
+                let detail = format!("the form is not understood: {}", rejection.body_text());
+                Problem::new(ProblemKind::InvalidRequest, detail)
+            })?;
+        Ok(Self(form))
+    }
+}
+
+/// The parameters of the path, in its order.
+#[derive(Debug)]
+pub struct PathParams<T, const N: usize>(pub [T; N]);
+
+impl<S, T, const N: usize> FromRequestParts<S> for PathParams<T, N>
+where
+    S: Send + Sync,
+    T: FromStr<Err: Display>,
+{
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        // What cannot be an id is the id of nothing.
+        let not_found = |detail: String| Problem::new(ProblemKind::NotFound, detail);
+        let params = RawPathParams::from_request_parts(parts, state)
+            .await
+            .map_err(|rejection| not_found(rejection.body_text()))?;
+        let params = params.iter().map(|(_, text)| text.parse());
+        let params: Vec<T> = params
+            .collect::<Result<_, _>>()
+            .map_err(|error: T::Err| not_found(error.to_string()))?;
+        params.try_into().map(Self).map_err(|other: Vec<T>| {
+            Problem::internal(format_args!("a path of {N} parameters has {}", other.len()))
+        })
+    }
+}
+
+/// The single parameter of the path.
+#[derive(Debug)]
+pub struct PathParam<T>(pub T);
+
+impl<S, T> FromRequestParts<S> for PathParam<T>
+where
+    S: Send + Sync,
+    T: FromStr<Err: Display>,
+{
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        let PathParams([one]) = PathParams::from_request_parts(parts, state).await?;
+        Ok(Self(one))
+    }
+}
+
+/// The query string.
+#[derive(Debug)]
+pub struct QueryParams<T>(pub T);
+
+impl<S, T> FromRequestParts<S> for QueryParams<T>
+where
+    S: Send + Sync,
+    T: DeserializeOwned,
+{
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        Query::from_request_parts(parts, state)
+            .await
+            .map(|Query(query)| Self(query))
+            .map_err(|rejection| Problem::new(ProblemKind::InvalidRequest, rejection.body_text()))
+    }
+}

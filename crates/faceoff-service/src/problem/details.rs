@@ -1,0 +1,215 @@
+use super::kind::ProblemKind;
+use axum::{
+    Json,
+    http::{HeaderName, HeaderValue, header},
+    response::{IntoResponse, Response},
+};
+use faceoff_store::Ruling;
+use jiff::Timestamp;
+use serde::Serialize;
+use serde_json::{Map, Value};
+use std::fmt::Display;
+use utoipa::ToSchema;
+
+/// One problem, ready to be sent.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    kind: ProblemKind,
+    detail: String,
+    members: Map<String, Value>,
+    headers: Vec<(HeaderName, HeaderValue)>,
+}
+
+impl Problem {
+    /// Media type of RFC 9457.
+    pub const MEDIA_TYPE: &'static str = "application/problem+json";
+
+    /// A problem; `detail` says what was expected, what came and what to do.
+    #[must_use]
+    pub fn new(kind: ProblemKind, detail: impl Into<String>) -> Self {
+        let headers = match kind {
+            ProblemKind::Unauthenticated => vec![(
+                header::WWW_AUTHENTICATE,
+                HeaderValue::from_static("Bearer realm=\"faceoff\""),
+            )],
+            ProblemKind::Busy => vec![(header::RETRY_AFTER, HeaderValue::from_static("2"))],
+            ProblemKind::TooManyPending
+            | ProblemKind::NotYet
+            | ProblemKind::StorageFull
+            | ProblemKind::NotReady => {
+                vec![(header::RETRY_AFTER, HeaderValue::from_static("30"))]
+            }
+            ProblemKind::TooManyUploads | ProblemKind::TooManyConnections => {
+                vec![(header::RETRY_AFTER, HeaderValue::from_static("10"))]
+            }
+            _ => Vec::new(),
+        };
+        Self {
+            kind,
+            detail: detail.into(),
+            members: Map::new(),
+            headers,
+        }
+    }
+
+    /// With an extension member, for programs.
+    #[must_use]
+    pub fn with(mut self, name: &str, value: impl Into<Value>) -> Self {
+        self.members.insert(name.to_owned(), value.into());
+        self
+    }
+
+    /// With a header of the answer.
+    pub fn with_header(mut self, name: HeaderName, value: HeaderValue) -> Self {
+        self.headers.push((name, value));
+        self
+    }
+
+    /// To be tried again after so many seconds.
+    pub fn retry_after(mut self, seconds: u64) -> Self {
+        let value = (header::RETRY_AFTER, HeaderValue::from(seconds));
+        self.headers
+            .retain(|(name, _)| *name != header::RETRY_AFTER);
+        self.headers.push(value);
+        self
+    }
+
+    /// Decides status, title and `type`.
+    #[must_use]
+    pub const fn kind(&self) -> ProblemKind {
+        self.kind
+    }
+
+    /// What happened and what to do.
+    #[must_use]
+    pub fn detail(&self) -> &str {
+        &self.detail
+    }
+
+    /// A `field` of the request whose value cannot be used; `detail` says what was expected and what
+    /// came.
+    pub fn invalid(field: &str, detail: impl Display) -> Self {
+        Self::new(ProblemKind::InvalidContent, format!("{field}: {detail}")).with("field", field)
+    }
+
+    /// Refuses what is not `confirmed` by the name of what it is about, and says what it would do.
+    pub fn check_confirmed(confirmed: Option<&str>, name: &str, what: &str) -> Result<(), Self> {
+        if confirmed == Some(name) {
+            return Ok(());
+        }
+        let detail = format!("nothing is done yet: {what}. To do it, send “confirm” with {name:?}");
+        Err(Self::new(ProblemKind::NotConfirmed, detail).with("confirm", name))
+    }
+
+    /// A file that is kept no more.
+    pub fn removed(what: &str, removed: &Ruling) -> Self {
+        let at = removed.at.strftime("%Y-%m-%d at %H:%M:%S UTC");
+        let detail = format!("{what} was removed on {at} {}", removed.reason);
+        Self::new(ProblemKind::Removed, detail).with("removed_at", removed.at.to_string())
+    }
+
+    /// What would change the season of an archive.
+    pub fn archived(made_at: Timestamp, imported_at: Option<Timestamp>) -> Self {
+        let shown = |at: Timestamp| at.strftime("%Y-%m-%d %H:%M UTC").to_string();
+        let imported = imported_at.map_or_else(String::new, |at| {
+            format!(", which was imported at {}", shown(at))
+        });
+        Self::new(
+            ProblemKind::ReadOnly,
+            format!(
+                "this server shows the archive of a season as it was at {}{imported}: everything can be read, and nothing \
+                 changes any more",
+                shown(made_at)
+            ),
+        )
+        .with("made_at", made_at.to_string())
+        .with("imported_at", imported_at.map(|at| at.to_string()))
+    }
+
+    /// Our fault: `cause` goes to the log only.
+    pub fn internal(cause: impl Display) -> Self {
+        tracing::error!(%cause, "request failed");
+        Self::new(
+            ProblemKind::Internal,
+            "the server could not complete the request; nothing is wrong with what you sent. Try again; \
+             if it stays, send the organiser the x-request-id header of this answer",
+        )
+    }
+
+    /// No such `what` (or not the caller's: the two must look alike).
+    pub fn not_found(what: &str) -> Self {
+        Self::new(
+            ProblemKind::NotFound,
+            format!("there is no such {what} of yours; check the id and the token's team"),
+        )
+    }
+
+    /// The headers of the answer.
+    pub fn headers(&self) -> &[(HeaderName, HeaderValue)] {
+        &self.headers
+    }
+}
+
+/// Problem details (RFC 9457).
+#[derive(Serialize, ToSchema)]
+#[schema(as = Problem)]
+pub struct ProblemBody<'a> {
+    /// Kind of the problem, explained at that place of the server.
+    #[schema(example = "/problems#day-has-cut")]
+    r#type: String,
+    /// The kind in a few words.
+    title: &'a str,
+    /// The HTTP status.
+    status: u16,
+    /// What was expected, what came and what to do.
+    detail: &'a str,
+    #[serde(flatten)]
+    #[schema(ignore)]
+    members: &'a Map<String, Value>,
+}
+
+impl Problem {
+    fn body(&self) -> ProblemBody<'_> {
+        ProblemBody {
+            r#type: format!("/problems#{}", self.kind.slug()),
+            title: self.kind.title(),
+            status: self.kind.status().as_u16(),
+            detail: &self.detail,
+            members: &self.members,
+        }
+    }
+
+    /// The whole answer in bytes, for a connection that is closed before it has asked anything.
+    pub fn as_http1(&self) -> Vec<u8> {
+        let body = serde_json::to_string(&self.body()).unwrap_or_default();
+        let mut answer = format!(
+            "HTTP/1.1 {}\r\ncontent-type: {}\r\ncontent-length: {}\r\nconnection: close\r\n",
+            self.kind.status(),
+            Self::MEDIA_TYPE,
+            body.len()
+        )
+        .into_bytes();
+        for (name, value) in &self.headers {
+            answer.extend_from_slice(name.as_str().as_bytes());
+            answer.extend_from_slice(b": ");
+            answer.extend_from_slice(value.as_bytes());
+            answer.extend_from_slice(b"\r\n");
+        }
+        answer.extend_from_slice(b"\r\n");
+        answer.extend_from_slice(body.as_bytes());
+        answer
+    }
+}
+
+impl IntoResponse for Problem {
+    fn into_response(self) -> Response {
+        let body = self.body();
+        let media_type = (
+            header::CONTENT_TYPE,
+            HeaderValue::from_static(Self::MEDIA_TYPE),
+        );
+        let mut response = (self.kind.status(), [media_type], Json(body)).into_response();
+        response.headers_mut().extend(self.headers);
+        response
+    }
+}

@@ -1,0 +1,55 @@
+//! What people write: trimmed, bounded, and without what would make a page or a terminal do something.
+
+use crate::problem::Problem;
+
+/// A text of one line.
+pub fn line(field: &str, text: &str, most_chars: usize) -> Result<String, Problem> {
+    let text = text.trim();
+    let chars = text.chars().count();
+    if !(1..=most_chars).contains(&chars) {
+        let detail = format!("expected 1 to {most_chars} characters, got {chars}");
+        return Err(Problem::invalid(field, detail));
+    }
+    match text.chars().find(|c| !faceoff_types::is_harmless(*c)) {
+        Some(bad) => Err(Problem::invalid(
+            field,
+            format!("expected one line of text, got the character {bad:?}"),
+        )),
+        None => Ok(text.to_owned()),
+    }
+}
+
+/// A text of several lines.
+pub fn lines(field: &str, text: &str, most_chars: usize) -> Result<String, Problem> {
+    let text = text.replace("\r\n", "\n");
+    let text = text.trim();
+    let chars = text.chars().count();
+    if !(1..=most_chars).contains(&chars) {
+        let detail = format!("expected 1 to {most_chars} characters, got {chars}");
+        return Err(Problem::invalid(field, detail));
+    }
+    let is_fine = |c: char| matches!(c, '\n' | '\t') || faceoff_types::is_harmless(c);
+    match text.chars().find(|c| !is_fine(*c)) {
+        Some(bad) => Err(Problem::invalid(
+            field,
+            format!("expected plain text, got the character {bad:?}"),
+        )),
+        None => Ok(text.to_owned()),
+    }
+}
+
+/// An address that a page may lead to.
+pub fn link(field: &str, text: &str) -> Result<String, Problem> {
+    let text = line(field, text, 300)?;
+    let rest = text
+        .strip_prefix("https://")
+        .or_else(|| text.strip_prefix("http://"));
+    let is_address = rest.is_some_and(|rest| {
+        !rest.is_empty() && !rest.starts_with('/') && !rest.contains(char::is_whitespace)
+    });
+    if is_address {
+        return Ok(text);
+    }
+    let detail = format!("expected an address that begins with https:// or http://, got {text:?}");
+    Err(Problem::invalid(field, detail))
+}

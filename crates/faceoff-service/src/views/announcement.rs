@@ -1,0 +1,39 @@
+//! Announcements, questions and the terms.
+
+use faceoff_api::views::announcement::{AnnouncementView, QuestionView, TermsView};
+use faceoff_store::{Announcement, Question, Terms};
+
+/// An announcement.
+pub fn of(announcement: Announcement) -> AnnouncementView {
+    AnnouncementView {
+        id: announcement.id,
+        at: announcement.at,
+        title: announcement.title,
+        text: announcement.text,
+    }
+}
+
+/// For somebody who may know who asks, or may not.
+pub fn question(question: Question, tells_team: bool) -> QuestionView {
+    QuestionView {
+        id: question.id,
+        team: question.team.filter(|_| tells_team),
+        at: question.at,
+        text: question.text,
+        answered_at: question.answer.as_ref().map(|answer| answer.at),
+        public: question
+            .answer
+            .as_ref()
+            .is_some_and(|answer| answer.is_public),
+        answer: question.answer.map(|answer| answer.text),
+    }
+}
+
+/// The terms.
+pub fn terms(terms: Terms) -> TermsView {
+    TermsView {
+        version: terms.version,
+        since: terms.since,
+        text: terms.text,
+    }
+}

@@ -1,0 +1,104 @@
+//! What happened, as the organiser reads it.
+
+use crate::{app::AppState, boxed, problem::Problem};
+use faceoff_api::{
+    requests::EventsQuery,
+    views::event::{EventView, EventsView},
+};
+use faceoff_store::{Actor, Event, EventFilter, EventRecord, Subject};
+use serde_json::{Map, Value};
+use std::collections::BTreeMap;
+
+/// Events of a page, unless another number is asked for.
+const PAGE: u32 = 100;
+
+const LONGEST_PAGE: u32 = 1000;
+
+/// The events that a query asks for.
+#[boxed]
+pub async fn page(app: &AppState, query: EventsQuery) -> Result<EventsView, Problem> {
+    let limit = query.limit.unwrap_or(PAGE);
+    if !(1..=LONGEST_PAGE).contains(&limit) {
+        let detail = format!("expected 1 to {LONGEST_PAGE}, got {limit}");
+        return Err(Problem::invalid("limit", detail));
+    }
+    let subject = query.subject.map(|text| subject(&text)).transpose()?;
+    query.actor.as_deref().map(check_actor).transpose()?;
+    if let Some(kind) = &query.kind {
+        Event::check_kind(kind).map_err(|error| Problem::invalid("kind", error))?;
+    }
+    let filter = EventFilter {
+        before: query.before,
+        actor: query.actor,
+        subject,
+        kind: query.kind,
+    };
+    // One more tells whether there is another page.
+    let mut found = app.store.newest_events(&filter, limit + 1).await?;
+    let is_last = found.len() <= limit as usize;
+    found.truncate(limit as usize);
+    let next_before = found.last().filter(|_| !is_last).map(|event| event.id);
+    let names = names(app).await?;
+    let named = |record: EventRecord| {
+        let mut view = of(record);
+        view.actor_name = names.get(&view.actor).cloned();
+        view
+    };
+    Ok(EventsView {
+        events: found.into_iter().map(named).collect(),
+        next_before,
+    })
+}
+
+/// Of everybody who may have changed something, by how the log calls them.
+#[boxed]
+pub async fn names(app: &AppState) -> Result<BTreeMap<String, String>, Problem> {
+    let people = app.store.people().await?.into_iter();
+    let teams = app.store.teams().await?.into_iter();
+    let people = people.map(|person| {
+        (
+            Actor::Person(person.id).to_string(),
+            person.name.to_string(),
+        )
+    });
+    let teams = teams.map(|team| (Actor::Team(team.id).to_string(), team.name.to_string()));
+    Ok(people.chain(teams).collect())
+}
+
+fn subject(text: &str) -> Result<Subject, Problem> {
+    text.parse().map_err(|_| {
+        let expected = "season, stage:ID, day:STAGE/DATE, team:ID, submission:ID, evaluation:ID, ablation:ID, \
+                        person:ID, registration:ID, announcement:ID, question:ID, proposal:ID, tournament:ID or game:ID";
+        Problem::invalid("subject", format!("expected {expected}, got {text:?}"))
+    })
+}
+
+fn check_actor(text: &str) -> Result<(), Problem> {
+    if matches!(text, "team" | "person" | "worker") || text.parse::<Actor>().is_ok() {
+        return Ok(());
+    }
+    let expected = "organiser, person, person:ID, team, team:ID, visitor, schedule, worker, worker:NAME or server";
+    let detail = format!("expected {expected}, got {text:?}");
+    Err(Problem::invalid("actor", detail))
+}
+
+/// Without its actor's name.
+pub fn of(record: EventRecord) -> EventView {
+    let mut details = match serde_json::to_value(&record.event) {
+        Ok(Value::Object(details)) => details,
+        _ => Map::new(),
+    };
+    let kind = match details.remove("kind") {
+        Some(Value::String(kind)) => kind,
+        _ => String::new(),
+    };
+    EventView {
+        id: record.id,
+        at: record.at,
+        actor: record.actor.to_string(),
+        actor_name: None,
+        subject: record.subject.to_string(),
+        kind,
+        details,
+    }
+}

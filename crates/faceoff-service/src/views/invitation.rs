@@ -1,0 +1,58 @@
+//! Invitations and registrations.
+
+use faceoff_api::{
+    requests::InvitedRole,
+    views::invitation::{InvitationView, RegistrationView},
+};
+use faceoff_store::{Invitation, InvitationState, InvitedAs, Registration, RegistrationState};
+use jiff::Timestamp;
+
+/// An invitation, as it is at `now`.
+pub fn of(invitation: Invitation, now: Timestamp) -> InvitationView {
+    let (role, team, person) = match invitation.invited_as {
+        InvitedAs::Organiser => (InvitedRole::Organiser, None, None),
+        InvitedAs::Member(team) => (InvitedRole::Member, Some(team), None),
+        InvitedAs::Founder => (InvitedRole::Founder, None, None),
+        InvitedAs::Return(person) => (InvitedRole::Return, None, Some(person)),
+    };
+    let (state, accepted_by) = match invitation.state {
+        InvitationState::Accepted { by, .. } => ("accepted", Some(by)),
+        InvitationState::Revoked { .. } => ("revoked", None),
+        InvitationState::Open if invitation.expires_at <= now => ("expired", None),
+        InvitationState::Open => ("open", None),
+    };
+    InvitationView {
+        id: invitation.id,
+        role,
+        team,
+        person,
+        note: invitation.note,
+        created_at: invitation.created_at,
+        expires_at: invitation.expires_at,
+        state: state.into(),
+        accepted_by,
+    }
+}
+
+/// A registration.
+pub fn registration(registration: Registration) -> RegistrationView {
+    let (state, decided_at, reason, team) = match registration.state {
+        RegistrationState::Waiting => ("waiting", None, None, None),
+        RegistrationState::Approved { at, team } => ("approved", Some(at), None, Some(team)),
+        RegistrationState::Refused { at, reason } => ("refused", Some(at), Some(reason), None),
+    };
+    RegistrationView {
+        id: registration.id,
+        team_name: registration.team_name,
+        affiliation: registration.affiliation,
+        link: registration.link,
+        division: registration.division,
+        contact: registration.contact,
+        accepted_terms: registration.accepted_terms,
+        created_at: registration.created_at,
+        state: state.into(),
+        decided_at,
+        reason,
+        team,
+    }
+}

@@ -1,0 +1,64 @@
+//! How a team stands today.
+
+use crate::{
+    app::AppState,
+    boxed,
+    problem::Problem,
+    viewer::Viewer,
+    views::{day, evaluation, sight::Sight, stage, submission, team},
+};
+use faceoff_api::views::{
+    me::{MeView, TurnView, ValidatingView},
+    submission::SubmissionStatus,
+};
+use faceoff_store::{Evaluation, EvaluationState, Team};
+
+/// What there is to know for a team.
+#[boxed]
+pub async fn of(app: &AppState, team: Team) -> Result<MeView, Problem> {
+    let sight = Sight::of(app, Viewer::Team(team.id)).await?;
+    let today = stage::current(app).await?.day(app.config.clock.now());
+    let counts = |evaluation: &Evaluation| {
+        let stopped = matches!(
+            evaluation.state,
+            EvaluationState::PlatformFailed { .. }
+                | EvaluationState::NotPlayed { .. }
+                | EvaluationState::Cancelled { .. }
+        );
+        !stopped && evaluation.voided.is_none()
+    };
+    let evaluations = app.store.evaluations_of(team.id).await?;
+    let evaluation = evaluations
+        .iter()
+        .find(|evaluation| evaluation.of == today && counts(evaluation))
+        .cloned();
+    let evaluation = match evaluation {
+        Some(evaluation) => Some(evaluation::of(app, &sight, evaluation).await?),
+        None => None,
+    };
+    let submissions = submission::of_team(app, team.id).await?;
+    let validating = submissions
+        .iter()
+        .filter(|submission| submission.status == SubmissionStatus::Validating)
+        .map(|submission| ValidatingView {
+            submission: submission.id,
+            queue: submission.queue,
+            next: submission.next.clone(),
+        });
+    let active = submissions.iter().find(|submission| submission.active);
+    Ok(MeView {
+        team: team::of(team),
+        turn: TurnView {
+            stage: today.stage,
+            day: today.date,
+            evaluation: evaluation.as_ref().map(|evaluation| evaluation.id),
+            queue: evaluation.as_ref().and_then(|evaluation| evaluation.queue),
+            next: evaluation.map(|evaluation| evaluation.next),
+        },
+        validating: validating.collect(),
+        active_submission: active.map(|submission| submission.id),
+        not_taken: active.map_or_else(Vec::new, |active| active.not_taken.clone()),
+        next_cut: day::first_cut(app).await?,
+        max_bundle_bytes: app.config.max_bundle_bytes,
+    })
+}

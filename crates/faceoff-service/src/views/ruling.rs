@@ -1,0 +1,9 @@
+//! What the organiser has decided, and why.
+
+use faceoff_api::views::ruling::RulingView;
+use faceoff_store::Ruling;
+
+/// A ruling of the organisers.
+pub fn of(Ruling { at, reason }: Ruling) -> RulingView {
+    RulingView { at, reason }
+}

@@ -1,0 +1,27 @@
+//! Tokens and sessions, without what would open anything.
+
+use faceoff_api::views::token::TokenView;
+use faceoff_store::{Token, TokenKind, TokenOwner};
+
+/// A token, without its secret.
+pub fn of(token: Token) -> TokenView {
+    let (team, person) = match token.owner {
+        TokenOwner::Host => (None, None),
+        TokenOwner::Team(id) => (Some(id), None),
+        TokenOwner::Person(id) => (None, Some(id)),
+    };
+    TokenView {
+        id: token.id,
+        name: token.name,
+        kind: match token.kind {
+            TokenKind::Key => "key".into(),
+            TokenKind::Session => "session".into(),
+        },
+        team,
+        person,
+        created_at: token.created_at,
+        expires_at: token.expires_at,
+        last_used_at: token.last_used_at,
+        revoked_at: token.revoked_at,
+    }
+}
