@@ -227,6 +227,7 @@ frames: setup-test
 lint:
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --locked --workspace --all-targets -- -D warnings
+	$(CARGO) build --locked --workspace --benches --examples
 
 format:
 	$(CARGO) fmt --all
