@@ -9,9 +9,14 @@ mod people;
 mod tournaments;
 mod webhooks;
 
-use crate::objects_only;
 pub use boards::*;
 pub use episodes::*;
+pub use links::*;
+pub use people::*;
+pub use tournaments::*;
+pub use webhooks::*;
+
+use crate::objects_only;
 use faceoff_archive::Edition;
 use faceoff_types::{
     DayDeadline, EvaluationId, PerturbationSettings, Profile, Publishes, Retention, Runtimes,
@@ -20,15 +25,11 @@ use faceoff_types::{
 };
 use jiff::{Timestamp, civil::Date};
 use left_out::{given, given_or_null};
-pub use links::*;
-pub use people::*;
 use serde::{Deserialize, Deserializer, Serialize};
-pub use tournaments::*;
 use utoipa::{
     IntoParams, ToSchema,
     openapi::{Object, ObjectBuilder, Type},
 };
-pub use webhooks::*;
 
 /// A team to create.
 #[derive(Debug, Clone, Serialize, Deserialize, ToSchema)]

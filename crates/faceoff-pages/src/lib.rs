@@ -49,18 +49,19 @@ mod tournament_words;
 mod tournaments;
 mod unknown;
 
+pub use embeddable::Embeddable;
+pub use spoilers::SPOILERS_PATH;
+pub use unknown::{for_whom, unknown_method, unknown_path};
+
 use axum::{
     Router,
     extract::DefaultBodyLimit,
     middleware,
     routing::{get, post},
 };
-pub use embeddable::Embeddable;
 use faceoff_service::{app::App, extract::MAX_JSON_BYTES, timeouts};
 use serde_json::Value;
-pub use spoilers::SPOILERS_PATH;
 use std::{sync::Arc, time::Duration};
-pub use unknown::{for_whom, unknown_method, unknown_path};
 
 /// All pages and their assets. `api` is the API's OpenAPI document, which the documentation shows.
 pub fn router(patience: Duration, api: Arc<Value>) -> Router<App> {

@@ -71,6 +71,41 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 /// All routes. `patience` bounds the time of every answer but an upload's.
 pub fn router(patience: Duration) -> (Router<App>, Arc<Value>) {
     let resources = OpenApiRouter::with_openapi(Document::openapi())
+        .merge(of_season())
+        .merge(of_stages())
+        .merge(of_submissions())
+        .merge(of_evaluations())
+        .merge(of_tournaments())
+        .merge(of_games())
+        // Of two schemas of one name the first stands: `AttemptView` is a game's attempt, not a delivery's.
+        .merge(of_people())
+        .layer(middleware::from_fn_with_state(patience, timeouts::time_out))
+        .layer(DefaultBodyLimit::max(MAX_JSON_BYTES));
+    // An upload may take long as long as it moves; `upload` itself watches size and pauses.
+    let uploads = OpenApiRouter::new()
+        .routes(routes!(upload::create_submission))
+        .layer(DefaultBodyLimit::disable());
+    // Neither can an archive's making be told in advance.
+    let archives = OpenApiRouter::new().routes(routes!(season_archive::season_archive));
+    let (router, mut document) = OpenApiRouter::new()
+        .nest(API_BASE, resources.merge(uploads).merge(archives))
+        .split_for_parts();
+    document.info = Document::openapi().info;
+    let document = Arc::new(document::told(document));
+    let answered = Arc::clone(&document);
+    let router = router.route(
+        &format!("{API_BASE}/openapi.json"),
+        get(move || {
+            let document = Arc::clone(&answered);
+            async move { Json((*document).clone()) }
+        }),
+    );
+    (router, document)
+}
+
+/// The season as a whole: its boards, its log, and whoever calls.
+fn of_season() -> OpenApiRouter<App> {
+    OpenApiRouter::new()
         .routes(routes!(health::health))
         .routes(routes!(health::live))
         .routes(routes!(season::season, season::change_season))
@@ -80,6 +115,14 @@ pub fn router(patience: Duration) -> (Router<App>, Arc<Value>) {
         .routes(routes!(board::board_history))
         .routes(routes!(board::task_board))
         .routes(routes!(me::me))
+        .routes(routes!(capacity::capacity))
+        .routes(routes!(events::list_events))
+        .routes(routes!(event_stream::follow_events))
+}
+
+/// Teams, people, and what they are told.
+fn of_people() -> OpenApiRouter<App> {
+    OpenApiRouter::new()
         .routes(routes!(teams::create_team, teams::list_teams))
         .routes(routes!(teams::replace_token))
         .routes(routes!(teams::team, teams::change_team))
@@ -123,9 +166,13 @@ pub fn router(patience: Duration) -> (Router<App>, Arc<Value>) {
         ))
         .routes(routes!(announcements::list_questions, announcements::ask))
         .routes(routes!(announcements::answer))
+}
+
+/// Stages, their days, and what organisers decide.
+fn of_stages() -> OpenApiRouter<App> {
+    OpenApiRouter::new()
         .routes(routes!(stages::list_stages, stages::create_stage))
         .routes(routes!(stages::stage, stages::change_stage))
-        .routes(routes!(capacity::capacity))
         .routes(routes!(sign_off::start_final_day))
         .routes(routes!(sign_off::finalise_stage))
         .routes(routes!(days::start_day))
@@ -139,8 +186,17 @@ pub fn router(patience: Duration) -> (Router<App>, Arc<Value>) {
         .routes(routes!(proposals::propose))
         .routes(routes!(proposals::apply_proposal))
         .routes(routes!(proposals::drop_proposal))
-        .routes(routes!(events::list_events))
-        .routes(routes!(event_stream::follow_events))
+        .routes(routes!(rulings::void_evaluation))
+        .routes(routes!(rulings::void_day))
+        .routes(routes!(rulings::disqualify_team))
+        .routes(routes!(rulings::pause_queue))
+        .routes(routes!(rulings::resume_queue))
+        .routes(routes!(rulings::reinstate_team))
+}
+
+/// What teams have uploaded, and who checks it.
+fn of_submissions() -> OpenApiRouter<App> {
+    OpenApiRouter::new()
         .routes(routes!(submissions::list_submissions))
         .routes(routes!(
             submissions::submission,
@@ -160,26 +216,28 @@ pub fn router(patience: Duration) -> (Router<App>, Arc<Value>) {
         .routes(routes!(ablations::ablation, ablations::order_ablation))
         .routes(routes!(ablations::ablation_motion))
         .routes(routes!(ablations::ablation_observed))
+}
+
+/// What was played, and what is kept of it.
+fn of_evaluations() -> OpenApiRouter<App> {
+    OpenApiRouter::new()
         .routes(routes!(evaluations::list_evaluations))
         .routes(routes!(evaluations::evaluation))
         .routes(routes!(evaluations::cancel_evaluation))
         .routes(routes!(evaluations::rerun_evaluation))
-        .routes(routes!(rulings::void_evaluation))
-        .routes(routes!(rulings::void_day))
-        .routes(routes!(rulings::disqualify_team))
-        .routes(routes!(rulings::pause_queue))
-        .routes(routes!(rulings::resume_queue))
-        .routes(routes!(rulings::reinstate_team))
         .routes(routes!(datasets::dataset))
         .routes(routes!(datasets::link_dataset))
         .routes(routes!(datasets::violations))
         .routes(routes!(clips::episodes))
         .routes(routes!(clips::motion))
         .routes(routes!(clips::observed))
-        .routes(routes!(game_clips::game_motion))
-        .routes(routes!(game_clips::game_observed))
         .routes(routes!(datasets::publish_evaluation))
         .routes(routes!(comparisons::compare))
+}
+
+/// Tournaments, and what is reckoned from their games.
+fn of_tournaments() -> OpenApiRouter<App> {
+    OpenApiRouter::new()
         .routes(routes!(
             tournaments::list_tournaments,
             tournaments::open_tournament
@@ -202,6 +260,13 @@ pub fn router(patience: Duration) -> (Router<App>, Arc<Value>) {
         .routes(routes!(replays::certainty))
         .routes(routes!(ratings::ratings))
         .routes(routes!(ratings::head_to_head))
+}
+
+/// Games, and what is kept of them.
+fn of_games() -> OpenApiRouter<App> {
+    OpenApiRouter::new()
+        .routes(routes!(game_clips::game_motion))
+        .routes(routes!(game_clips::game_observed))
         .routes(routes!(games::list_games))
         .routes(routes!(games::game, games::cancel_game))
         .routes(routes!(games::list_attempts))
@@ -213,26 +278,4 @@ pub fn router(patience: Duration) -> (Router<App>, Arc<Value>) {
         .routes(routes!(game_files::link_side))
         .routes(routes!(game_files::link_recording))
         .routes(routes!(live_game::watch_game))
-        .layer(middleware::from_fn_with_state(patience, timeouts::time_out))
-        .layer(DefaultBodyLimit::max(MAX_JSON_BYTES));
-    // An upload may take long as long as it moves; `upload` itself watches size and pauses.
-    let uploads = OpenApiRouter::new()
-        .routes(routes!(upload::create_submission))
-        .layer(DefaultBodyLimit::disable());
-    // Neither can an archive's making be told in advance.
-    let archives = OpenApiRouter::new().routes(routes!(season_archive::season_archive));
-    let (router, mut document) = OpenApiRouter::new()
-        .nest(API_BASE, resources.merge(uploads).merge(archives))
-        .split_for_parts();
-    document.info = Document::openapi().info;
-    let document = Arc::new(document::told(document));
-    let answered = Arc::clone(&document);
-    let router = router.route(
-        &format!("{API_BASE}/openapi.json"),
-        get(move || {
-            let document = Arc::clone(&answered);
-            async move { Json((*document).clone()) }
-        }),
-    );
-    (router, document)
 }

@@ -1,6 +1,7 @@
 //! Extractors whose rejections are problems that name the place.
 
 use crate::{
+    boxed,
     problem::{Problem, ProblemKind},
     session,
 };
@@ -31,8 +32,8 @@ where
 {
     type Rejection = Problem;
 
-    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
-        parse(read(request, state).await?).map(Self)
+    async fn from_request(request: Request, _: &S) -> Result<Self, Problem> {
+        parse(read(request).await?).map(Self)
     }
 }
 
@@ -47,8 +48,8 @@ where
 {
     type Rejection = Problem;
 
-    async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
-        let (is_json, bytes) = read(request, state).await?;
+    async fn from_request(request: Request, _: &S) -> Result<Self, Problem> {
+        let (is_json, bytes) = read(request).await?;
         if bytes.is_empty() {
             return Ok(Self(T::default()));
         }
@@ -56,14 +57,16 @@ where
     }
 }
 
-async fn read<S: Send + Sync>(request: Request, state: &S) -> Result<(bool, Bytes), Problem> {
+/// The body, and whether it says that it is JSON.
+#[boxed]
+async fn read(request: Request) -> Result<(bool, Bytes), Problem> {
     let is_json = request
         .headers()
         .get(header::CONTENT_TYPE)
         .and_then(|value| value.to_str().ok())
         .and_then(|value| value.split(';').next())
         .is_some_and(|essence| essence.trim().eq_ignore_ascii_case("application/json"));
-    let bytes = Bytes::from_request(request, state)
+    let bytes = Bytes::from_request(request, &())
         .await
         .map_err(|rejection| too_large(&rejection))?;
     Ok((is_json, bytes))
@@ -158,20 +161,29 @@ where
 {
     type Rejection = Problem;
 
-    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
-        // What cannot be an id is the id of nothing.
-        let not_found = |detail: String| Problem::new(ProblemKind::NotFound, detail);
-        let params = RawPathParams::from_request_parts(parts, state)
-            .await
-            .map_err(|rejection| not_found(rejection.body_text()))?;
-        let params = params.iter().map(|(_, text)| text.parse());
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
+        let params = path_params(parts).await?;
+        let params = params.iter().map(|text| text.parse());
         let params: Vec<T> = params
             .collect::<Result<_, _>>()
-            .map_err(|error: T::Err| not_found(error.to_string()))?;
+            .map_err(|error: T::Err| no_such_path(&error))?;
         params.try_into().map(Self).map_err(|other: Vec<T>| {
             Problem::internal(format_args!("a path of {N} parameters has {}", other.len()))
         })
     }
+}
+
+#[boxed]
+async fn path_params(parts: &mut Parts) -> Result<Vec<String>, Problem> {
+    let params = RawPathParams::from_request_parts(parts, &())
+        .await
+        .map_err(|rejection| no_such_path(&rejection.body_text()))?;
+    Ok(params.iter().map(|(_, text)| text.to_owned()).collect())
+}
+
+/// What cannot be an id is the id of nothing.
+fn no_such_path(why: &dyn Display) -> Problem {
+    Problem::new(ProblemKind::NotFound, why.to_string())
 }
 
 /// The single parameter of the path.

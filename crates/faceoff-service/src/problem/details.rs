@@ -89,6 +89,10 @@ impl Problem {
     /// A `field` of the request whose value cannot be used; `detail` says what was expected and what
     /// came.
     pub fn invalid(field: &str, detail: impl Display) -> Self {
+        Self::invalid_text(field, &detail)
+    }
+
+    fn invalid_text(field: &str, detail: &dyn Display) -> Self {
         Self::new(ProblemKind::InvalidContent, format!("{field}: {detail}")).with("field", field)
     }
 
@@ -128,6 +132,10 @@ impl Problem {
 
     /// Our fault: `cause` goes to the log only.
     pub fn internal(cause: impl Display) -> Self {
+        Self::logged(&cause)
+    }
+
+    fn logged(cause: &dyn Display) -> Self {
         tracing::error!(%cause, "request failed");
         Self::new(
             ProblemKind::Internal,
