@@ -309,8 +309,9 @@ impl Server {
                 started.elapsed() < PATIENCE,
                 "still waiting for {path}: {answer:#}"
             );
-            // Polling is what a client of this API does; the pause keeps the CPU for the evaluation.
-            thread::sleep(Duration::from_millis(50));
+            // Polling is what a client of this API does; the pause keeps the CPU for the evaluation, and for other tests.
+            let waited = started.elapsed() / 10;
+            thread::sleep(waited.clamp(Duration::from_millis(20), Duration::from_millis(250)));
         }
     }
 }
