@@ -10,7 +10,7 @@ use season::{DAYS, Season};
 use serde_json::json;
 
 /// What a season may take in the database, datasets and archives apart.
-const MOST_BYTES: u64 = 500 << 20;
+const MOST_BYTES: u64 = 50 << 20;
 
 #[tokio::test]
 #[expect(clippy::print_stdout, reason = "a measurement tells what it measured")]

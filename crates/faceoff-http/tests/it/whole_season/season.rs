@@ -17,6 +17,7 @@ const TEAMS: usize = 40;
 /// So many are there on the first day; of the others one joins each day.
 const FIRST_TEAMS: usize = 30;
 const DAYS_PER_SUBMISSION: usize = 10;
+/// A tenth of a real stage's; so is the bound of the database.
 const EPISODES: u32 = 100;
 /// Of two tasks' episodes; a real stage cuts finer, which no row that stays depends on.
 const EPISODES_PER_SHARD: u32 = EPISODES;
