@@ -41,8 +41,7 @@ mod workers;
 mod write;
 
 /// What others await is boxed. The body of an `async fn` is compiled by each crate that awaits it, and by none
-/// before: the store's were a fifth of what the web side, the workers and every file of tests compiled. A box per
-/// call is nothing beside a statement.
+/// before: the web side, the workers and every file of tests compiled the store's again. A call costs an allocation.
 pub(crate) use async_recursion::async_recursion as boxed;
 
 pub use artifacts::{ArtifactStream, Artifacts};
