@@ -16,7 +16,7 @@ COMMIT   ?= HEAD
 JSON     ?=
 
 # Tests wait for much of their time, so there are more at a time than CPUs.
-TEST_THREADS ?= $(shell echo $$((2 * $$(nproc))))
+TEST_THREADS ?= $(shell echo $$((3 * $$(nproc))))
 
 CARGO      ?= cargo
 # A folder's path may have spaces. So recipes quote each of these, and none is a target, a prerequisite or a word of one of make's functions,

@@ -10,7 +10,7 @@ fi
 program=$(realpath "$1")
 golden=$(dirname "$(dirname "$(realpath "$0")")")/tests/golden/simulator.txt
 # A bound on what dependencies and generic code add; in this place alone.
-most_bytes=70000000
+most_bytes=40000000
 
 wrong=''
 refuse() {

@@ -46,7 +46,7 @@ case ${1:-} in
         ;;
     test)
         shift
-        wheel "$target/wheels-of-this-host"
+        wheel "$target/wheels-of-this-host" --features as-in-the-workspace
         environment "$target/python-test" "$here/requirements-test.txt"
         "$target/python-test/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps \
             "$target"/wheels-of-this-host/*.whl

@@ -23,14 +23,16 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Of each task.
-const EPISODES: u32 = 10;
+/// Of each task, each a shard.
+const EPISODES: u32 = 4;
+/// Where many shards are to be handed out, or much is to happen between them: see [`many_shards`].
+const MANY_EPISODES: u32 = 10;
 
 const COMMON: &str = concat!(
     include_str!("../patient.toml"),
     r#"
 [evaluation]
-episodes_per_task = 10
+episodes_per_task = 4
 episodes_per_shard = 1
 [sandbox]
 resident_bytes = 0
@@ -40,6 +42,11 @@ resident_bytes = 0
 /// Of a server whose own slots play.
 fn alone() -> String {
     format!("{COMMON}[workers]\nslots = 1\n")
+}
+
+/// With [`MANY_EPISODES`] of each task.
+fn many_shards(config: &str) -> String {
+    config.replace("episodes_per_task = 4", "episodes_per_task = 10")
 }
 
 /// Of a server for which others play, and which they reach at `files`.
@@ -56,8 +63,8 @@ fn taking(nats: SocketAddr, slots: usize) -> String {
 }
 
 /// An evaluation of striker that is queued and that nobody has begun, in a data folder: its path, and the team.
-fn queued(data: &Path, scratch: &Path) -> (String, Team) {
-    let server = Server::start(data, &alone());
+fn queued(data: &Path, scratch: &Path, config: &str) -> (String, Team) {
+    let server = Server::start(data, config);
     let team = Team::create(&server, "Phoenix");
     let submission = team.submit(&server, &bundle::reference("striker", scratch));
     assert_eq!(submission["state"], "valid", "{submission:#}");
@@ -80,14 +87,23 @@ struct Contest {
     evaluation: String,
     team: Team,
     expected: (Value, Archive),
+    episodes: usize,
 }
 
 impl Contest {
     fn prepare(scratch: &Path) -> Self {
+        Self::of(scratch, &alone(), 3 * EPISODES as usize)
+    }
+
+    fn of_many_shards(scratch: &Path) -> Self {
+        Self::of(scratch, &many_shards(&alone()), 3 * MANY_EPISODES as usize)
+    }
+
+    fn of(scratch: &Path, config: &str, episodes: usize) -> Self {
         let [data, calm] = ["data", "calm"].map(|name| scratch.join(name));
-        let (evaluation, team) = queued(&data, scratch);
+        let (evaluation, team) = queued(&data, scratch, config);
         copy_folder(&data, &calm);
-        let undisturbed = Server::start(&calm, &alone());
+        let undisturbed = Server::start(&calm, config);
         resume(&undisturbed);
         let expected = outcome(&undisturbed, &team, &evaluation);
         undisturbed.kill();
@@ -96,6 +112,7 @@ impl Contest {
             evaluation,
             team,
             expected,
+            episodes,
         }
     }
 
@@ -106,10 +123,7 @@ impl Contest {
         let submission = evaluation["submission"].as_str().expect("it names it");
         let submission = self.team.verdict_so_far(server, submission);
         assert_eq!(submission["state"], "valid", "{submission:#}");
-        assert_eq!(
-            assert_same(found, self.expected.clone()),
-            3 * EPISODES as usize
-        );
+        assert_eq!(assert_same(found, self.expected.clone()), self.episodes);
     }
 }
 

@@ -1,5 +1,6 @@
 //! Styles, scripts and icon, compiled in.
 
+use crate::packed::{Packed, packed};
 use axum::{
     Router,
     http::{HeaderValue, header},
@@ -14,7 +15,7 @@ use std::sync::OnceLock;
 pub(super) struct Asset {
     path: &'static str,
     media_type: &'static str,
-    content: &'static str,
+    content: Packed,
     url: OnceLock<String>,
 }
 
@@ -25,44 +26,32 @@ const JAVASCRIPT: &str = "text/javascript; charset=utf-8";
 pub(super) static STYLE: Asset = Asset::new(
     "/static/faceoff.css",
     CSS,
-    include_str!("../../../web/static/faceoff.css"),
+    packed!("web/static/faceoff.css"),
 );
 /// Of all pages: what follows a day under way, and tells times by the reader's clock.
-pub(super) static SCRIPT: Asset = Asset::new(
-    "/static/live.js",
-    JAVASCRIPT,
-    include_str!("../../../web/static/live.js"),
-);
+pub(super) static SCRIPT: Asset =
+    Asset::new("/static/live.js", JAVASCRIPT, packed!("web/static/live.js"));
 pub(super) static ICON: Asset = Asset::new(
     "/static/faceoff.svg",
     "image/svg+xml",
-    include_str!("../../../web/static/faceoff.svg"),
+    packed!("web/static/faceoff.svg"),
 );
-pub(super) static DESK_STYLE: Asset = Asset::new(
-    "/static/desk.css",
-    CSS,
-    include_str!("../../../web/static/desk.css"),
-);
-pub(super) static DESK_SCRIPT: Asset = Asset::new(
-    "/static/desk.js",
-    JAVASCRIPT,
-    include_str!("../../../web/static/desk.js"),
-);
+pub(super) static DESK_STYLE: Asset =
+    Asset::new("/static/desk.css", CSS, packed!("web/static/desk.css"));
+pub(super) static DESK_SCRIPT: Asset =
+    Asset::new("/static/desk.js", JAVASCRIPT, packed!("web/static/desk.js"));
 pub(super) static EPISODES_STYLE: Asset = Asset::new(
     "/static/episodes.css",
     CSS,
-    include_str!("../../../web/static/episodes.css"),
+    packed!("web/static/episodes.css"),
 );
-pub(super) static REPLAY_STYLE: Asset = Asset::new(
-    "/static/replay.css",
-    CSS,
-    include_str!("../../../web/static/replay.css"),
-);
+pub(super) static REPLAY_STYLE: Asset =
+    Asset::new("/static/replay.css", CSS, packed!("web/static/replay.css"));
 /// Made of `web/client` by `make web`.
 pub(super) static REPLAY_SCRIPT: Asset = Asset::new(
     "/static/replay.js",
     JAVASCRIPT,
-    include_str!("../../../web/client/dist/replay.js"),
+    packed!("web/client/dist/replay.js"),
 );
 
 static ALL: [&Asset; 8] = [
@@ -80,7 +69,7 @@ static ALL: [&Asset; 8] = [
 pub(super) const PREVIEW_PATH: &str = "/docs/images/board.png";
 
 impl Asset {
-    const fn new(path: &'static str, media_type: &'static str, content: &'static str) -> Self {
+    const fn new(path: &'static str, media_type: &'static str, content: Packed) -> Self {
         Self {
             path,
             media_type,
@@ -93,12 +82,12 @@ impl Asset {
     /// shows a new page with old styles.
     pub(super) fn url(&self) -> &str {
         self.url.get_or_init(|| {
-            let hash = blake3::hash(self.content.as_bytes()).to_hex();
+            let hash = blake3::hash(self.content.text().as_bytes()).to_hex();
             format!("{}?{}", self.path, &hash[..12])
         })
     }
 
-    fn answer(&self) -> Response {
+    fn answer(&'static self) -> Response {
         let headers = [
             (
                 header::CONTENT_TYPE,
@@ -109,7 +98,7 @@ impl Asset {
                 HeaderValue::from_static("public, max-age=31536000, immutable"),
             ),
         ];
-        (headers, self.content).into_response()
+        (headers, self.content.text()).into_response()
     }
 }
 

@@ -29,6 +29,7 @@ mod head_to_head;
 mod help;
 mod join;
 mod organiser;
+mod packed;
 mod problems;
 mod query;
 mod register;

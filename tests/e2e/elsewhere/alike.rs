@@ -1,6 +1,6 @@
 //! What comes of work elsewhere is what one slot of the server's own makes of it, to the bit.
 
-use super::{Contest, EPISODES, giving, resume, taking, wait_for_workers};
+use super::{Contest, EPISODES, giving, many_shards, resume, taking, wait_for_workers};
 use crate::{Team, kills::copy_folder};
 use async_nats::Message;
 use bytes::Bytes;
@@ -20,7 +20,7 @@ struct Company {
 #[test]
 fn what_others_play_is_what_one_slot_plays() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let contest = Contest::prepare(scratch.path());
+    let contest = Contest::of_many_shards(scratch.path());
     let nats = Nats::start(&scratch.path().join("nats"));
     let companies = [
         Company {
@@ -53,7 +53,7 @@ fn what_others_play_is_what_one_slot_plays() {
         let named = |config: String| {
             config.replace("[nats]", &format!("[nats]\nname = \"{}\"", company.name))
         };
-        let mut config = named(giving(&nats, files.address()));
+        let mut config = many_shards(&named(giving(&nats, files.address())));
         if company.server > 0 {
             config = config.replace("play = false", "play = true");
         }

@@ -59,7 +59,7 @@ fn what_is_being_played_goes_back_and_another_begins_it() {
     let files = Relay::start();
     // One shard of one task.
     let config = for_an_hour(&giving(&nats, files.address()))
-        .replace("episodes_per_task = 10", "episodes_per_task = 40")
+        .replace("episodes_per_task = 4", "episodes_per_task = 40")
         .replace("episodes_per_shard = 1", "episodes_per_shard = 40")
         .replace("[evaluation]", "[evaluation]\ntasks = [\"hit\"]");
     let server = Server::start(&scratch.path().join("data"), &config);
@@ -95,7 +95,7 @@ fn what_is_cancelled_stops_elsewhere_and_the_slot_goes_on() {
     let nats = Nats::start(&scratch.path().join("nats"));
     let files = Relay::start();
     let config = giving(&nats, files.address())
-        .replace("episodes_per_task = 10", "episodes_per_task = 40")
+        .replace("episodes_per_task = 4", "episodes_per_task = 40")
         .replace("episodes_per_shard = 1", "episodes_per_shard = 40");
     let server = Server::start(&scratch.path().join("data"), &config);
     files.lead_to(server.address().into());

@@ -1,6 +1,6 @@
 //! Everything that can be killed, at drawn moments.
 
-use super::{Contest, giving, resume, taking};
+use super::{Contest, giving, many_shards, resume, taking};
 use crate::kills::draw;
 use faceoff_tests::{nats::Nats, relay::Relay, server::Server, worker::Worker};
 use std::time::Duration;
@@ -28,12 +28,12 @@ enum Ends {
 )]
 fn whoever_is_killed_or_cut_off_nothing_is_lost_and_nothing_done_twice() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
-    let contest = Contest::prepare(scratch.path());
+    let contest = Contest::of_many_shards(scratch.path());
     let mut nats = Nats::start(&scratch.path().join("nats"));
     let nats_address = nats.address();
     let (files, link) = (Relay::start(), Relay::start());
     link.lead_to(nats_address);
-    let config = giving(&nats, files.address());
+    let config = many_shards(&giving(&nats, files.address()));
     let mut server = Server::start(&contest.data, &config);
     files.lead_to(server.address().into());
     let killed = || Worker::start(scratch.path(), "killed", &taking(nats_address, 1));

@@ -1,6 +1,6 @@
 //! A worker that lies: it takes an order as any other, and reports what it never played.
 
-use super::{Contest, EPISODES, giving, queued, resume, serving, taking};
+use super::{Contest, EPISODES, alone, giving, queued, resume, serving, taking};
 use crate::{Team, commands::admin};
 use async_nats::{
     Client, HeaderMap,
@@ -147,7 +147,7 @@ impl Honest {
     fn of_another_season(folder: &Path) -> Self {
         fs::create_dir_all(folder).expect("a scratch folder can be made");
         let data = folder.join("data");
-        let _ = queued(&data, folder);
+        let _ = queued(&data, folder, &alone());
         let nats = Nats::start(&folder.join("nats"));
         let files = Relay::start();
         let server = Server::start(&data, &giving(&nats, files.address()));

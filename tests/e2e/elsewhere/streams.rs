@@ -134,7 +134,7 @@ fn what_came_of_work_waits_for_a_stream_that_is_full() {
 /// So many episodes in one message, and none of the others so large.
 fn larger(config: &str) -> String {
     config
-        .replace("episodes_per_task = 10", "episodes_per_task = 60")
+        .replace("episodes_per_task = 4", "episodes_per_task = 60")
         .replace("episodes_per_shard = 1", "episodes_per_shard = 60")
         .replace("[evaluation]", "[evaluation]\ntasks = [\"hit\"]")
 }

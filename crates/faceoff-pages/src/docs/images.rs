@@ -1,5 +1,6 @@
 //! The documents' pictures, compiled in.
 
+use crate::packed::{Packed, packed};
 use axum::{
     http::{HeaderValue, header},
     response::{IntoResponse, Response},
@@ -15,33 +16,58 @@ const KEPT: &str = "public, max-age=3600";
 
 struct Image {
     name: &'static str,
-    media_type: &'static str,
-    content: &'static [u8],
+    content: Content,
+}
+
+enum Content {
+    Png(&'static [u8]),
+    Svg(Packed),
+}
+
+impl Image {
+    fn media_type(&self) -> &'static str {
+        match self.content {
+            Content::Png(_) => "image/png",
+            Content::Svg(_) => "image/svg+xml",
+        }
+    }
+
+    fn bytes(&self) -> &[u8] {
+        match &self.content {
+            Content::Png(bytes) => bytes,
+            Content::Svg(drawing) => drawing.text().as_bytes(),
+        }
+    }
 }
 
 /// A file of `docs/images/`.
 macro_rules! image {
-    ($name:literal, $media_type:literal) => {
+    (png $name:literal) => {
         Image {
             name: $name,
-            media_type: $media_type,
-            content: include_bytes!(concat!(
+            content: Content::Png(include_bytes!(concat!(
                 env!("CARGO_MANIFEST_DIR"),
                 "/../../docs/images/",
                 $name
-            )),
+            ))),
+        }
+    };
+    (svg $name:literal) => {
+        Image {
+            name: $name,
+            content: Content::Svg(packed!("docs/images/", $name)),
         }
     };
 }
 
 static IMAGES: [Image; 7] = [
-    image!("board.png", "image/png"),
-    image!("replay-page.png", "image/png"),
-    image!("robot.svg", "image/svg+xml"),
-    image!("fidelity/arm.svg", "image/svg+xml"),
-    image!("fidelity/contacts.svg", "image/svg+xml"),
-    image!("fidelity/episodes.svg", "image/svg+xml"),
-    image!("fidelity/paths.svg", "image/svg+xml"),
+    image!(png "board.png"),
+    image!(png "replay-page.png"),
+    image!(svg "robot.svg"),
+    image!(svg "fidelity/arm.svg"),
+    image!(svg "fidelity/contacts.svg"),
+    image!(svg "fidelity/episodes.svg"),
+    image!(svg "fidelity/paths.svg"),
 ];
 
 /// Where the picture of this name is, if there is one.
@@ -58,7 +84,7 @@ pub(super) async fn image(
         let detail = format!("the documentation has no picture {name}");
         return Err(Problem::new(ProblemKind::NotFound, detail));
     };
-    let tag = ETag::of("picture", &[blake3::hash(image.content).to_hex().as_str()]);
+    let tag = ETag::of("picture", &[blake3::hash(image.bytes()).to_hex().as_str()]);
     let kept = [
         (header::ETAG, tag.header()),
         (header::CACHE_CONTROL, HeaderValue::from_static(KEPT)),
@@ -68,7 +94,7 @@ pub(super) async fn image(
     }
     let media_type = [(
         header::CONTENT_TYPE,
-        HeaderValue::from_static(image.media_type),
+        HeaderValue::from_static(image.media_type()),
     )];
-    Ok((kept, media_type, image.content).into_response())
+    Ok((kept, media_type, image.bytes()).into_response())
 }

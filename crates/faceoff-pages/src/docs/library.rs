@@ -5,6 +5,7 @@ use super::{
     markdown::{self, Entry, Site},
     sections::Section,
 };
+use crate::packed::{Packed, packed};
 use std::sync::LazyLock;
 
 /// Documents for one purpose.
@@ -39,7 +40,7 @@ fn path(name: &str) -> String {
 struct Source {
     name: &'static str,
     about: &'static str,
-    markdown: &'static str,
+    markdown: Packed,
 }
 
 /// A file of `docs/`, by its name.
@@ -48,100 +49,97 @@ macro_rules! source {
         Source {
             name: $name,
             about: $about,
-            markdown: include_str!(concat!(
-                env!("CARGO_MANIFEST_DIR"),
-                "/../../docs/",
-                $name,
-                ".md"
-            )),
+            markdown: packed!("docs/", $name, ".md"),
         }
     };
 }
 
-const SOURCES: [(&str, &[Source]); 4] = [
-    (
-        "Take part",
-        &[
-            source!(
-                "start",
-                "From nothing to an agent on the board in an hour, and what to do next."
-            ),
-            source!(
-                "rules",
-                "Tasks, fouls, penalty points, tiers, boards, the tournament: what counts, and how."
-            ),
-            source!(
-                "protocol",
-                "The conversation between the evaluator and an agent, line by line, and the bundle."
-            ),
-            source!(
-                "robot",
-                "The arm, the table and the puck: frames, lengths, limits, what an agent observes."
-            ),
-            source!(
-                "python",
-                "Environments to train in, games, evaluation and kinematics, from Python."
-            ),
-            source!(
-                "sandbox",
-                "Runtimes, packages, memory, time: what an agent can use on the server."
-            ),
-            source!(
-                "tournament",
-                "How games between teams are drawn, played, counted and shown."
-            ),
-        ],
-    ),
-    (
-        "Results and data",
-        &[
-            source!(
-                "dataset",
-                "What is recorded of an evaluation or a game, file by file and column by column."
-            ),
-            source!(
-                "replay",
-                "What the pages of episodes and games show, who sees it, and the clips that it is drawn from."
-            ),
-            source!(
-                "verifying",
-                "How anybody computes a score again from its dataset."
-            ),
-            source!(
-                "archive",
-                "The files of a whole season, to keep and to show again."
-            ),
-        ],
-    ),
-    (
-        "Reference",
-        &[
-            source!(
-                "cli",
-                "The program's commands, their status and their files."
-            ),
-            source!(
-                "api",
-                "What programs can ask of the server, explained by topic."
-            ),
-            source!(
-                "simulator",
-                "The physics behind the scores, and how near to the reference it is."
-            ),
-            source!(
-                "security",
-                "What keeps agents from each other, from the server and from the episodes."
-            ),
-        ],
-    ),
-    (
-        "For organisers",
-        &[source!(
-            "operating",
-            "Setting up a server and running a season on it."
-        )],
-    ),
-];
+static SOURCES: LazyLock<[(&str, Vec<Source>); 4]> = LazyLock::new(|| {
+    [
+        (
+            "Take part",
+            vec![
+                source!(
+                    "start",
+                    "From nothing to an agent on the board in an hour, and what to do next."
+                ),
+                source!(
+                    "rules",
+                    "Tasks, fouls, penalty points, tiers, boards, the tournament: what counts, and how."
+                ),
+                source!(
+                    "protocol",
+                    "The conversation between the evaluator and an agent, line by line, and the bundle."
+                ),
+                source!(
+                    "robot",
+                    "The arm, the table and the puck: frames, lengths, limits, what an agent observes."
+                ),
+                source!(
+                    "python",
+                    "Environments to train in, games, evaluation and kinematics, from Python."
+                ),
+                source!(
+                    "sandbox",
+                    "Runtimes, packages, memory, time: what an agent can use on the server."
+                ),
+                source!(
+                    "tournament",
+                    "How games between teams are drawn, played, counted and shown."
+                ),
+            ],
+        ),
+        (
+            "Results and data",
+            vec![
+                source!(
+                    "dataset",
+                    "What is recorded of an evaluation or a game, file by file and column by column."
+                ),
+                source!(
+                    "replay",
+                    "What the pages of episodes and games show, who sees it, and the clips that it is drawn from."
+                ),
+                source!(
+                    "verifying",
+                    "How anybody computes a score again from its dataset."
+                ),
+                source!(
+                    "archive",
+                    "The files of a whole season, to keep and to show again."
+                ),
+            ],
+        ),
+        (
+            "Reference",
+            vec![
+                source!(
+                    "cli",
+                    "The program's commands, their status and their files."
+                ),
+                source!(
+                    "api",
+                    "What programs can ask of the server, explained by topic."
+                ),
+                source!(
+                    "simulator",
+                    "The physics behind the scores, and how near to the reference it is."
+                ),
+                source!(
+                    "security",
+                    "What keeps agents from each other, from the server and from the episodes."
+                ),
+            ],
+        ),
+        (
+            "For organisers",
+            vec![source!(
+                "operating",
+                "Setting up a server and running a season on it."
+            )],
+        ),
+    ]
+});
 
 /// Rendered when somebody reads for the first time.
 pub(super) static LIBRARY: LazyLock<Vec<Group>> = LazyLock::new(|| {
@@ -152,9 +150,9 @@ pub(super) static LIBRARY: LazyLock<Vec<Group>> = LazyLock::new(|| {
     groups.collect()
 });
 
-fn rendered(source: &Source) -> Page {
-    let title = markdown::title(source.markdown);
-    let rendered = markdown::document(source.markdown, &path(source.name), title, &Here);
+fn rendered(source: &'static Source) -> Page {
+    let title = markdown::title(source.markdown.text());
+    let rendered = markdown::document(source.markdown.text(), &path(source.name), title, &Here);
     Page {
         name: source.name,
         title,
@@ -178,7 +176,7 @@ impl Site for Here {
         let name = file.strip_suffix(".md")?;
         let mut sources = SOURCES.iter().flat_map(|(_, sources)| sources.iter());
         let source = sources.find(|source| source.name == name)?;
-        Some((markdown::title(source.markdown), path(name)))
+        Some((markdown::title(source.markdown.text()), path(name)))
     }
 
     fn picture(&self, file: &str) -> Option<String> {
