@@ -1,4 +1,4 @@
-//! Packs the texts that the program carries: documents, styles and scripts, drawings. They are a thirtieth of a release program otherwise.
+//! Packs the texts that the program carries: documents, styles and scripts, drawings. A release program has 0.9 MB of 40 less for it.
 
 use flate2::{Compression, write::GzEncoder};
 use std::{
@@ -17,7 +17,8 @@ const TEXTS: [(&str, &[&str]); 3] = [
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let repository = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    // Build scripts run in their package's folder.
+    let repository = Path::new("../..");
     let out = PathBuf::from(env::var("OUT_DIR")?).join("packed");
     for (folder, endings) in TEXTS {
         println!("cargo:rerun-if-changed=../../{folder}");

@@ -44,9 +44,17 @@ fn alone() -> String {
     format!("{COMMON}[workers]\nslots = 1\n")
 }
 
+/// With so many episodes of each task and in each shard.
+fn sized(config: &str, per_task: u32, per_shard: u32) -> String {
+    let usual = format!("episodes_per_task = {EPISODES}\nepisodes_per_shard = 1\n");
+    assert!(config.contains(&usual), "{config}");
+    let other = format!("episodes_per_task = {per_task}\nepisodes_per_shard = {per_shard}\n");
+    config.replace(&usual, &other)
+}
+
 /// With [`MANY_EPISODES`] of each task.
 fn many_shards(config: &str) -> String {
-    config.replace("episodes_per_task = 4", "episodes_per_task = 10")
+    sized(config, MANY_EPISODES, 1)
 }
 
 /// Of a server for which others play, and which they reach at `files`.

@@ -1,7 +1,7 @@
 //! Workers on other machines that are asked to end (SIGTERM) in the middle of something: it goes back at once, and counts for nothing. Leases
 //! last for an hour here, so that nobody else would have it if its end were waited for.
 
-use super::{Contest, giving, resume, taking};
+use super::{Contest, giving, resume, sized, taking};
 use crate::{Team, dataset, entry, path_of, start_day};
 use faceoff_tests::{bundle, nats::Nats, relay::Relay, repository, server::Server, worker::Worker};
 use serde_json::json;
@@ -58,9 +58,7 @@ fn what_is_being_played_goes_back_and_another_begins_it() {
     let nats = Nats::start(&scratch.path().join("nats"));
     let files = Relay::start();
     // One shard of one task.
-    let config = for_an_hour(&giving(&nats, files.address()))
-        .replace("episodes_per_task = 4", "episodes_per_task = 40")
-        .replace("episodes_per_shard = 1", "episodes_per_shard = 40")
+    let config = sized(&for_an_hour(&giving(&nats, files.address())), 40, 40)
         .replace("[evaluation]", "[evaluation]\ntasks = [\"hit\"]");
     let server = Server::start(&scratch.path().join("data"), &config);
     files.lead_to(server.address().into());
@@ -94,9 +92,7 @@ fn what_is_cancelled_stops_elsewhere_and_the_slot_goes_on() {
     let scratch = tempfile::tempdir().expect("a scratch folder can be made");
     let nats = Nats::start(&scratch.path().join("nats"));
     let files = Relay::start();
-    let config = giving(&nats, files.address())
-        .replace("episodes_per_task = 4", "episodes_per_task = 40")
-        .replace("episodes_per_shard = 1", "episodes_per_shard = 40");
+    let config = sized(&giving(&nats, files.address()), 40, 40);
     let server = Server::start(&scratch.path().join("data"), &config);
     files.lead_to(server.address().into());
     // No smoke run has so many control steps; each shard here has more.

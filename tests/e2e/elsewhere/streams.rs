@@ -1,6 +1,6 @@
 //! What NATS refuses, lacks or is: each has its words where one looks, and what waits for it goes on once it is mended.
 
-use super::{COMMON, Contest, giving, resume, serving, taking, wait_for_workers};
+use super::{COMMON, Contest, giving, resume, serving, sized, taking, wait_for_workers};
 use crate::Team;
 use async_nats::jetstream::{
     self,
@@ -133,10 +133,7 @@ fn what_came_of_work_waits_for_a_stream_that_is_full() {
 
 /// So many episodes in one message, and none of the others so large.
 fn larger(config: &str) -> String {
-    config
-        .replace("episodes_per_task = 4", "episodes_per_task = 60")
-        .replace("episodes_per_shard = 1", "episodes_per_shard = 60")
-        .replace("[evaluation]", "[evaluation]\ntasks = [\"hit\"]")
+    sized(config, 60, 60).replace("[evaluation]", "[evaluation]\ntasks = [\"hit\"]")
 }
 
 #[test]
