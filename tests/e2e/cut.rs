@@ -68,7 +68,6 @@ fn plays(server: &Server, day: &Value) -> Vec<(Value, Value)> {
         .collect()
 }
 
-/// A dataset's manifest.
 fn manifest(server: &Server, evaluation: &str, token: &str) -> Value {
     let answer = server.get(&format!("{evaluation}/dataset"), Some(token));
     assert_eq!(answer.status(), 200, "the dataset of {evaluation}");

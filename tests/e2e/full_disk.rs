@@ -82,7 +82,6 @@ impl Hold {
         Self(scratch.join("slot-0/bundle-1/unpacked/hold"))
     }
 
-    /// Appears whole.
     fn at(&self, episode: &str) {
         let beside = self.0.with_extension("new");
         fs::write(&beside, episode).expect("the agent is unpacked");

@@ -18,7 +18,6 @@ pub fn with_python3_ml(scratch: &Path) -> PathBuf {
     file
 }
 
-/// Its text.
 pub fn offering_python3_ml() -> String {
     format!(
         "{CONFIG}\n[limits]\ncpus = 64.0\n[runtimes.python3-ml]\nfolder = {:?}\n",

@@ -35,13 +35,10 @@ pub struct Browser {
 /// Through what a page is looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct View {
-    /// CSS pixels.
     pub width: u32,
-    /// CSS pixels.
     pub height: u32,
     /// The visitor prefers dark pages.
     pub dark: bool,
-    /// Scripts run.
     pub scripts: bool,
     /// Where the visitor's clock is.
     pub time_zone: &'static str,
@@ -56,7 +53,6 @@ impl View {
         scripts: true,
         time_zone: "UTC",
     };
-    /// A projector.
     pub const PROJECTOR: Self = Self {
         width: 2560,
         height: 1440,

@@ -13,7 +13,6 @@ pub mod worker;
 
 use std::path::PathBuf;
 
-/// The repository's root.
 #[must_use]
 pub fn repository() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))

@@ -61,7 +61,6 @@ impl Nats {
         self.process.0.id()
     }
 
-    /// Where it listens.
     #[must_use]
     pub const fn address(&self) -> SocketAddr {
         self.address

@@ -7,7 +7,6 @@ use std::{
     process::Command,
 };
 
-/// The target folder.
 fn target() -> PathBuf {
     let programs = program("faceoff");
     let target = programs.ancestors().nth(2);

@@ -53,7 +53,6 @@ struct Link {
     /// How long a piece takes.
     delay: Duration,
     breaks: Option<Breaks>,
-    /// Connections so far.
     connections: u64,
     /// Those of them that were broken.
     broken: u64,
@@ -81,7 +80,6 @@ impl Relay {
         Self { address, link }
     }
 
-    /// Where it listens.
     #[must_use]
     pub const fn address(&self) -> SocketAddr {
         self.address

@@ -43,7 +43,6 @@ pub enum LogTo {
 /// A running server and its disk.
 #[derive(Debug)]
 pub struct SmallDisk {
-    /// The server.
     pub server: Server,
     /// The data folder, as this process sees it.
     pub data_dir: PathBuf,

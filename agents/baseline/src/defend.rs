@@ -16,7 +16,6 @@ const PLAN_TIME: f64 = 0.6;
 /// Share of the puck's speed with which the mallet gives way.
 const GIVE: f64 = 0.0;
 
-/// A planned contact.
 #[derive(Debug, Clone, Copy)]
 struct Meeting {
     time: f64,
@@ -24,14 +23,12 @@ struct Meeting {
     velocity: Vec2,
 }
 
-/// The skill's memory.
 #[derive(Debug, Clone)]
 pub struct Defend {
     meeting: Option<Meeting>,
 }
 
 impl Defend {
-    /// Nothing planned yet.
     pub fn new() -> Self {
         Self { meeting: None }
     }

@@ -28,14 +28,12 @@ enum Phase {
     },
 }
 
-/// The skill's memory.
 #[derive(Debug, Clone)]
 pub struct Hit {
     phase: Phase,
 }
 
 impl Hit {
-    /// Nothing planned yet.
     pub fn new() -> Self {
         Self {
             phase: Phase::Approach,

@@ -43,14 +43,12 @@ enum Phase {
     },
 }
 
-/// The skill's memory.
 #[derive(Debug, Clone)]
 pub struct Prepare {
     phase: Phase,
 }
 
 impl Prepare {
-    /// Nothing planned yet.
     pub fn new() -> Self {
         Self { phase: Phase::Look }
     }

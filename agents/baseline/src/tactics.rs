@@ -36,7 +36,6 @@ pub struct Tactics {
 }
 
 impl Tactics {
-    /// Nothing seen yet.
     pub fn new(task: Task) -> Self {
         Self {
             task,

@@ -87,13 +87,11 @@ pub struct MalletState {
 /// The puck as observed: pose and velocity in the field frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PuckObservation {
-    /// x, y, yaw.
     pub pose: [f64; 3],
     /// ẋ, ẏ, yaw rate.
     pub velocity: [f64; 3],
 }
 
-/// The filter.
 #[derive(Debug, Clone)]
 pub struct Estimator {
     field: Field,
@@ -119,7 +117,6 @@ impl Estimator {
         }
     }
 
-    /// Forgets everything.
     pub fn reset(&mut self) {
         *self = Self::new(&self.field, self.dt);
     }
@@ -171,7 +168,6 @@ impl Estimator {
         self.estimate()
     }
 
-    /// The present estimate.
     fn estimate(&self) -> Puck {
         let [x, y] = self.axes.unwrap_or([Axis::new(0.0, 0.0, 1.0); 2]);
         Puck {

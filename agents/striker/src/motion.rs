@@ -66,7 +66,6 @@ impl Pace {
 }
 
 impl Motion {
-    /// At rest.
     pub fn rest(pos: Vec2) -> Self {
         Self {
             pos,

@@ -48,7 +48,6 @@ impl Opponent {
         c.x * (FREQUENCY * time).cos() + c.y * (FREQUENCY * time).sin()
     }
 
-    /// Its mean x.
     pub fn x(&self) -> f64 {
         self.x
     }

@@ -9,17 +9,14 @@ use crate::puck::Puck;
 /// What a skill sees at a control step. All in the field frame.
 #[derive(Debug)]
 pub struct Scene<'a> {
-    /// The playing field.
     pub field: &'a Field,
     /// Control period, seconds.
     pub dt: f64,
     /// Seconds since the episode's (or rally's) start.
     pub time: f64,
-    /// Estimated puck.
     pub puck: Puck,
     /// Standard deviation of its velocity components, m/s.
     pub puck_speed_deviation: Vec2,
-    /// The mallet's reference.
     pub mallet: Motion,
     /// The arm, for what it can do.
     pub arm: &'a Arm,

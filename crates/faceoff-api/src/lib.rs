@@ -4,6 +4,8 @@
 //! Server and command line share them. It knows no web server and no database: how an answer is made is
 //! `faceoff-service`'s.
 
+#![warn(missing_docs)]
+
 pub mod objects_only;
 pub mod paths;
 pub mod requests;

@@ -13,7 +13,6 @@ pub enum ArchiveError {
          ones: use the version of Faceoff that made it, or a later one"
     )]
     Newer {
-        /// Its format.
         format: u64,
         /// What its manifest says of the program that made it.
         program: String,

@@ -42,7 +42,6 @@ pub struct Manifest {
     pub format: u32,
     /// Name and version of that program.
     pub program: String,
-    /// The season's name.
     pub season: String,
     /// The moment that the archive shows.
     pub made_at: Timestamp,
@@ -59,7 +58,6 @@ pub struct Manifest {
 pub struct Entry {
     /// Relative, of ASCII letters, digits and `. _ -`, the parts separated by slashes.
     pub path: String,
-    /// Its length.
     pub bytes: u64,
     /// BLAKE3 of its content, 64 hexadecimal digits.
     pub blake3: String,

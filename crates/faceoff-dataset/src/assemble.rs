@@ -26,7 +26,6 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// An evaluation's dataset.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assembled {
     /// The score, which is also the dataset's `results.json`.

@@ -8,7 +8,6 @@ pub(crate) const STEPS_FILE: &str = "steps.parquet";
 pub(crate) const EPISODES_FILE: &str = "episodes.parquet";
 /// Where constraints were broken.
 pub(crate) const VIOLATIONS_FILE: &str = "violations.json";
-/// The score.
 pub(crate) const RESULTS_FILE: &str = "results.json";
 /// How evenly the slots kept time.
 pub(crate) const CALIBRATION_FILE: &str = "calibration.json";

@@ -41,7 +41,6 @@ const READ_AHEAD: usize = 8;
 /// What was found to be identical.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verified {
-    /// Episodes simulated again.
     pub episodes: u32,
     /// Control steps simulated again.
     pub steps: u64,
@@ -164,7 +163,6 @@ impl Totals {
         }
     }
 
-    /// Scores again.
     fn finish(self, ruleset: Ruleset, dataset: &Dataset) -> Result<Verified, VerifyError> {
         let manifest = dataset.manifest();
         let timing = dataset.calibration()?.worst();

@@ -220,7 +220,6 @@ impl<S: StepSink> Course<S> {
         self.diverged.as_ref()
     }
 
-    /// Control steps played.
     pub fn steps(&self) -> u32 {
         self.world.steps()
     }

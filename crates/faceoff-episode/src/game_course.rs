@@ -62,7 +62,6 @@ pub struct GameCourse<S> {
 #[derive(Debug, Clone, Copy)]
 struct RallyUnderWay {
     number: u32,
-    /// Control steps played.
     steps: u32,
 }
 

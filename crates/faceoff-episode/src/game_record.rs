@@ -7,7 +7,6 @@ use faceoff_types::{AgentFault, AgentFaultKind, Interpolation, Side};
 /// What a side did wrong, before anybody has said where.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SideFault {
-    /// What.
     pub kind: AgentFaultKind,
     /// The offending line, cut, where there was one.
     pub line: Option<String>,
@@ -17,31 +16,25 @@ pub struct SideFault {
 /// if it had to be started.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Entry {
-    /// It plays.
     Plays {
-        /// To start.
         startup_s: Option<f64>,
         /// What its actions mean.
         interpolation: Interpolation,
-        /// To get ready.
         reset_s: f64,
     },
     /// It did not start: its arm holds.
     FailedToStart {
         /// Until it was given up.
         startup_s: f64,
-        /// Why.
         fault: SideFault,
     },
     /// It did not get ready: its arm holds.
     FailedToReset {
-        /// To start.
         startup_s: Option<f64>,
         /// What its actions would have meant.
         interpolation: Interpolation,
         /// Until it was given up.
         reset_s: f64,
-        /// Why.
         fault: SideFault,
     },
 }
@@ -85,7 +78,6 @@ pub enum Response<'a> {
     },
     /// No answer that is one: from now on its arm holds, to the rally's end.
     Fault {
-        /// What it did.
         fault: SideFault,
         /// For how long it was waited for.
         answered: Answered,
@@ -97,7 +89,6 @@ pub enum Response<'a> {
 /// Which command took effect in a control step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effect {
-    /// The answer's.
     InTime,
     /// The answer came too late: the previous position, at rest.
     Late,
@@ -108,10 +99,8 @@ pub enum Effect {
 }
 
 impl Effect {
-    /// All of them.
     pub const ALL: [Self; 4] = [Self::InTime, Self::Late, Self::Fault, Self::Held];
 
-    /// As in files.
     #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
@@ -156,7 +145,6 @@ pub struct SideStep<'a> {
 pub struct GameStepRow<'a> {
     /// The game's control step, from 0.
     pub game_step: u32,
-    /// The rally.
     pub rally: u32,
     /// The rally's control step, from 0: the one that agents are told.
     pub step: u32,
@@ -180,7 +168,6 @@ pub enum RallyEnding {
 }
 
 impl RallyEnding {
-    /// As in files.
     #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
@@ -208,7 +195,6 @@ impl RallyEnding {
 pub struct RallyRow<'a> {
     /// From 0.
     pub rally: u32,
-    /// Its control steps.
     pub steps: u32,
     /// Why it is over.
     pub ending: RallyEnding,

@@ -85,7 +85,6 @@ impl SideCourse {
         self.fault = Some(fault);
     }
 
-    /// Counts an answer.
     pub fn answer(&mut self, answered: &Answered, is_late: bool) {
         self.late_answers += u32::from(is_late);
         self.window_times.add(answered.computation_time_s);

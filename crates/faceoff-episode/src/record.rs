@@ -53,9 +53,7 @@ pub struct StepRow<'a> {
 #[derive(Debug, thiserror::Error)]
 #[error("{what}: {source}")]
 pub struct RecordError {
-    /// What was attempted.
     pub what: String,
-    /// Why it failed.
     pub source: Box<dyn std::error::Error + Send + Sync>,
 }
 
@@ -89,7 +87,6 @@ impl<S: StepSink + ?Sized> StepSink for &mut S {
     }
 }
 
-/// Records nothing.
 #[derive(Debug, Clone, Copy)]
 pub struct Nowhere;
 

@@ -152,7 +152,6 @@ fn beside(value: f64, bound: f64) -> String {
     signed(&format!("{value:.decimals$}"))
 }
 
-/// With two decimals.
 fn about(value: f64) -> String {
     signed(&format!("{value:.2}"))
 }

@@ -13,7 +13,6 @@ const INTERVAL: Duration = Duration::from_secs(60);
 /// A day that does not fit, by what such episodes took of late.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Overflow {
-    /// Whose day.
     pub stage: StageName,
     /// What of it is to be played, and until when, with a sentence.
     pub load: DayLoad,

@@ -30,7 +30,6 @@ use tower_http::{
     request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer},
 };
 
-/// Wraps the site.
 pub(crate) fn around(site: Router, app: &Arc<AppState>) -> Router {
     // The last layer is the outermost: the id exists before the log line, and a panic or a refusal
     // carries the security headers as well.

@@ -68,7 +68,6 @@ impl Metrics {
         }
     }
 
-    /// Of requests.
     #[must_use]
     pub const fn web(&self) -> &Web {
         &self.web

@@ -31,7 +31,6 @@ pub struct Slots {
     stall: Family<OfSlot, Latest>,
     reruns: Counter,
     still: Gauge,
-    /// Their threads' names.
     standing_still: Arc<Mutex<Vec<String>>>,
 }
 

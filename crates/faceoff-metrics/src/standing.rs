@@ -10,7 +10,6 @@ use prometheus_client::{
 pub struct Standing {
     /// Could the database be written, a moment ago?
     pub database_writable: bool,
-    /// The queue.
     pub queue: Queue,
     /// Evaluations that are not over.
     pub open_evaluations: u32,
@@ -28,7 +27,6 @@ pub struct Standing {
     pub process: Process,
 }
 
-/// Units of work.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Queue {
     /// Under a lease that runs.
@@ -45,14 +43,12 @@ pub struct Queue {
     pub expected_s: f64,
 }
 
-/// A file system.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Disk {
     /// What it is for: `data` or `scratch`.
     pub of: &'static str,
     /// Bytes that are free.
     pub free_bytes: u64,
-    /// Bytes in all.
     pub size_bytes: u64,
 }
 

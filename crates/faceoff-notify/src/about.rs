@@ -96,7 +96,6 @@ impl About {
     }
 }
 
-/// Separated by commas.
 impl FromStr for About {
     type Err = ParseAboutError;
 

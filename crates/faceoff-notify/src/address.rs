@@ -5,7 +5,6 @@ use reqwest::Url;
 use serde::{Deserialize, Serialize};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 
-/// Longest URL.
 const MAX_URL: usize = 1000;
 
 /// Where webhooks may be.
@@ -36,7 +35,6 @@ impl Default for WebhookRules {
 /// Why nothing is sent to an address.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum NotPublic {
-    /// The host itself.
     #[error("a loopback address")]
     Loopback,
     /// The operator's or a neighbour's network.
@@ -45,7 +43,6 @@ pub enum NotPublic {
     /// What a network has for itself: routers, cloud metadata.
     #[error("a link-local address")]
     LinkLocal,
-    /// Many hosts.
     #[error("a multicast or broadcast address")]
     Multicast,
     /// Nobody's, or for documents, measurements and translation.

@@ -18,7 +18,6 @@ const KEPT: usize = 8;
 pub struct Page {
     /// After the event with this id.
     after: i64,
-    /// Whoever is told.
     pub notices: Vec<Notice>,
     /// What is kept from others, as of the end of the page or later.
     pub stages: StagesTold,
@@ -35,7 +34,6 @@ pub struct Feed {
 }
 
 impl Feed {
-    /// Of a store.
     #[must_use]
     pub fn new(store: Store) -> Self {
         Self {

@@ -6,29 +6,21 @@ use faceoff_types::TeamId;
 use jiff::Timestamp;
 use serde_json::{Map, Value, json};
 
-/// Who is told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reader {
-    /// Whoever asks.
     Anybody,
-    /// A team.
     Team(TeamId),
-    /// An organiser.
     Organiser,
 }
 
-/// A change.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Notice {
     /// Of the event: they rise.
     pub id: i64,
-    /// When.
     pub at: Timestamp,
     /// What happened, by name.
     pub kind: String,
-    /// What happened.
     pub event: Event,
-    /// To what.
     pub subject: Subject,
     /// With what belongs to it.
     pub concern: Concern,

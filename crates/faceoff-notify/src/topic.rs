@@ -16,28 +16,20 @@ pub enum Topic {
     Stages,
     /// Teams.
     Teams,
-    /// Uploads.
     Submissions,
-    /// Evaluations.
     Evaluations,
-    /// Ablations.
     Ablations,
-    /// Announcements and answers.
     Announcements,
-    /// People with accounts.
     People,
     /// Teams that want to take part.
     Registrations,
-    /// Trials and re-evaluations.
     Proposals,
     /// Tournaments and their rounds.
     Tournaments,
-    /// Games.
     Games,
 }
 
 impl Topic {
-    /// All of them.
     pub const ALL: [Self; 14] = [
         Self::Season,
         Self::Board,

@@ -22,7 +22,6 @@ pub(super) struct Asset {
 const CSS: &str = "text/css; charset=utf-8";
 const JAVASCRIPT: &str = "text/javascript; charset=utf-8";
 
-/// Of all pages.
 pub(super) static STYLE: Asset = Asset::new(
     "/static/faceoff.css",
     CSS,

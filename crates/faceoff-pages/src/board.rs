@@ -67,7 +67,6 @@ fn told<'a>(mut rows: impl Iterator<Item = (&'a str, &'a str)>) -> String {
     format!("The board has changed. Teams: {teams}. First in the list: {first}, {percent} percent.")
 }
 
-/// The overall board.
 pub(super) async fn overall(
     viewer: Result<Viewer, Problem>,
     State(app): State<App>,

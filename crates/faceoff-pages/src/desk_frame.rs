@@ -40,7 +40,6 @@ const ORGANISER: [(&str, &str); 9] = [
 pub(super) struct Head {
     pub(super) style: &'static str,
     pub(super) script: &'static str,
-    /// Whose desk.
     pub(super) desk: &'static str,
     /// Who has signed in.
     pub(super) who: String,

@@ -10,7 +10,6 @@ pub(super) struct Entry {
     pub(super) name: String,
     pub(super) file: String,
     pub(super) uploaded_at: String,
-    /// In a word.
     pub(super) state: &'static str,
     /// How that is coloured, beside its word.
     pub(super) class: &'static str,

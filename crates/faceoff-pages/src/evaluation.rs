@@ -81,7 +81,6 @@ impl TaskFigures {
 
 /// What one kind of violation came to.
 struct Broken {
-    /// Of the episodes.
     share: String,
     /// What it cost; `None` of nothing.
     points: Option<String>,
@@ -127,7 +126,6 @@ impl TaskDetails {
     }
 }
 
-/// A finished evaluation.
 struct Finished {
     score: Rate,
     penalty_points: String,
@@ -236,7 +234,6 @@ impl Page {
     }
 }
 
-/// One evaluation.
 pub(super) async fn page(
     viewer: Result<Viewer, Problem>,
     State(app): State<App>,

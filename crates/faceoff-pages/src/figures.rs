@@ -9,7 +9,6 @@ use std::collections::BTreeMap;
 /// A success rate with its interval.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Rate {
-    /// Percent, one decimal.
     pub(super) percent: String,
     /// Lower and upper bound in percent, one decimal.
     pub(super) low: String,

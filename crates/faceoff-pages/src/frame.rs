@@ -111,7 +111,6 @@ pub(super) fn render_tagged(page: &impl Template) -> Result<Response, PageProble
     Ok((headers, Html(html)).into_response())
 }
 
-/// Renders a page.
 pub(super) fn render(page: &impl Template) -> Result<Response, PageProblem> {
     match page.render() {
         Ok(html) => Ok(Html(html).into_response()),

@@ -102,7 +102,6 @@ impl Page {
     }
 }
 
-/// A game.
 pub(super) async fn page(
     viewer: Result<Viewer, Problem>,
     State(app): State<App>,

@@ -11,7 +11,6 @@ pub(super) struct GameRow {
     pub(super) round: RoundNumber,
     pub(super) matchday: u32,
     pub(super) is_second_half: bool,
-    /// Home and away.
     pub(super) teams: [TeamName; 2],
     pub(super) team_ids: [TeamId; 2],
     pub(super) stands: Stands,

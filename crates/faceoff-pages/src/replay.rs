@@ -54,7 +54,6 @@ struct Embedded {
     shown: Shown,
 }
 
-/// An episode's replay.
 pub(super) async fn page(
     viewer: Result<Viewer, Problem>,
     State(app): State<App>,

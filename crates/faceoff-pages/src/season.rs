@@ -20,7 +20,6 @@ struct Page {
     season: SeasonView,
     opened: String,
     closed: Option<String>,
-    /// Ids and names.
     tournaments: Vec<(TournamentId, StageName)>,
 }
 

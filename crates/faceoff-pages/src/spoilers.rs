@@ -19,7 +19,6 @@ use std::convert::Infallible;
 pub const SPOILERS_PATH: &str = "/spoilers";
 const NAME: &str = "spoilers";
 const HIDDEN: &str = "hidden";
-/// A year.
 const AGE_S: u32 = 365 * 24 * 3600;
 /// What asks for a game's result all the same.
 const RESULT: &str = "result";

@@ -99,7 +99,6 @@ impl Page {
     }
 }
 
-/// A tournament.
 pub(super) async fn page(
     viewer: Result<Viewer, Problem>,
     State(app): State<App>,

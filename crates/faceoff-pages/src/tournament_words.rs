@@ -5,7 +5,6 @@ use faceoff_api::views::tournament::{TournamentHead, TournamentPhase};
 use faceoff_replay::model::CONTROL_STEP_S;
 use faceoff_types::{RoundNumber, TournamentFormat, TournamentRules};
 
-/// Where it is.
 pub(super) fn phase(head: &TournamentHead) -> String {
     let phase = match head.phase {
         TournamentPhase::Open => "open, no round was started",

@@ -36,7 +36,6 @@ impl Page {
     }
 }
 
-/// The tournaments.
 pub(super) async fn page(
     State(app): State<App>,
     spoilers: Spoilers,

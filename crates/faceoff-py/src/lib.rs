@@ -4,6 +4,8 @@
 //! This crate turns arguments into the types of the other crates, and their results into arrays. It
 //! decides nothing about the simulation, and no panic of the other crates leaves it as one.
 
+#![warn(missing_docs)]
+
 mod actions;
 mod batch;
 mod errors;

@@ -32,7 +32,6 @@ pub struct GameAnalysis {
 /// How the puck came into a goal: in the last [`GOAL_WAY_STEPS`] control steps at most, and no further back than its rally.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GoalWay {
-    /// Who scored.
     pub side: usize,
     /// The rally's last sample.
     pub sample: u32,
@@ -46,7 +45,6 @@ pub const GOAL_WAY_STEPS: usize = 100;
 /// A mallet touched the puck, which crossed the middle line towards the other side before any mallet touched it again.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shot {
-    /// Whose.
     pub side: usize,
     /// When it was touched: s since sample 0.
     pub t: f64,
@@ -61,13 +59,10 @@ pub struct Shot {
 /// A limit was broken over some samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Breach {
-    /// Whose robot.
     pub side: usize,
-    /// Which limit.
     pub group: Group,
     /// The first sample.
     pub from: u32,
-    /// The last.
     pub to: u32,
     /// By how much at most: rad, rad/s or m.
     pub worst: f64,

@@ -14,7 +14,6 @@ use std::io::{self, Read};
 pub struct Clip {
     /// What it says of itself; the columns are filled in when it is written.
     pub header: Header,
-    /// The samples.
     pub columns: Vec<Column>,
 }
 

@@ -5,7 +5,6 @@ use crate::error::ReplayError;
 /// A column: its values are multiples of `scale`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
-    /// What it holds.
     pub name: String,
     /// SI unit of the values.
     pub unit: String,
@@ -25,7 +24,6 @@ pub struct Column {
 const LIMIT: f64 = 1e15;
 
 impl Column {
-    /// An empty one.
     pub(crate) fn new(name: impl Into<String>, unit: &str, scale: f64, order: u8) -> Self {
         Self {
             name: name.into(),
@@ -53,7 +51,6 @@ impl Column {
         self.counts.push(rounded);
     }
 
-    /// The values.
     #[expect(clippy::cast_precision_loss, reason = "counts are at most 1e15")]
     pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
         self.counts.iter().map(|count| *count as f64 * self.scale)

@@ -27,7 +27,6 @@ pub struct GameClipRecorder<W> {
     gzip: Gzip,
 }
 
-/// Clips under way.
 #[derive(Debug)]
 struct Chunk {
     number: u32,

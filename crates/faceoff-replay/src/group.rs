@@ -19,7 +19,6 @@ pub enum Group {
 }
 
 impl Group {
-    /// All of them.
     pub const ALL: [Self; 4] = [Self::Ee, Self::Link, Self::JointPos, Self::JointVel];
 
     /// Its name in files.

@@ -22,7 +22,6 @@ pub enum ClipKind {
 pub struct Header {
     /// `faceoff-clip/1`.
     pub format: String,
-    /// What it shows.
     pub kind: ClipKind,
     /// `hit`, `defend`, `prepare` or `game`.
     pub contest: String,
@@ -66,9 +65,7 @@ pub struct Header {
 /// A column of the payload; [`crate::Column`] tells what its fields mean.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ColumnHeader {
-    /// What it holds.
     pub name: String,
-    /// SI unit.
     pub unit: String,
     /// What one counts for.
     pub scale: f64,
@@ -77,7 +74,6 @@ pub struct ColumnHeader {
     /// Samples of the clip before the column's first.
     #[serde(default)]
     pub first: u32,
-    /// Values.
     pub count: u32,
     /// Length in the payload.
     pub bytes: u32,
@@ -88,7 +84,6 @@ pub struct ColumnHeader {
 pub struct Contact {
     /// Time since sample 0 of the episode or game, s.
     pub t: f64,
-    /// What it touches.
     pub what: ContactWith,
     /// The puck's true place then, m, table frame.
     pub x: f64,
@@ -113,11 +108,9 @@ pub enum ContactWith {
 pub struct ViolationTold {
     /// 0 or 1: whose.
     pub side: u32,
-    /// Which.
     pub group: Group,
     /// The first sample.
     pub from: u32,
-    /// The last.
     pub to: u32,
     /// By how much at most: rad, rad/s or m.
     pub worst: f64,
@@ -128,11 +121,9 @@ pub struct ViolationTold {
 pub struct Break {
     /// The rally's last sample.
     pub sample: u32,
-    /// Why.
     pub what: BreakKind,
     /// Who scored or fouled, 0 or 1.
     pub by: Option<u32>,
-    /// The count afterwards.
     pub score: [u32; 2],
 }
 
@@ -140,9 +131,7 @@ pub struct Break {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BreakKind {
-    /// A goal.
     Goal,
-    /// A foul.
     Foul,
     /// The puck lay out of reach.
     Stuck,
@@ -159,19 +148,14 @@ pub enum BreakKind {
 pub struct Lost {
     /// The first sample.
     pub from: u32,
-    /// The last.
     pub to: u32,
 }
 
 /// How an episode ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EndTold {
-    /// By what.
     pub end: EpisodeEnd,
-    /// Did it count?
     pub success: bool,
-    /// In words.
     pub why: String,
-    /// Control steps played.
     pub steps: u32,
 }

@@ -92,7 +92,6 @@ impl Motion {
         }
     }
 
-    /// The next sample.
     pub fn push(&mut self, state: &EpisodeState) {
         let [x, y, yaw, vx, vy, _] = state.puck;
         let own = [x, y, yaw, vx, vy]
@@ -129,7 +128,6 @@ impl Motion {
         }
     }
 
-    /// What was recorded.
     pub fn take(self) -> (Vec<Column>, Vec<Contact>) {
         (self.columns, self.contacts)
     }

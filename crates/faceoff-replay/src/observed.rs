@@ -6,12 +6,10 @@ use faceoff_sim::{JOINTS, model::CONTROL_STEP_S, table::geometry::TABLE};
 use faceoff_types::Interpolation;
 use std::f64::consts::PI;
 
-/// m.
 const PLACE: f64 = 1e-4;
 /// rad.
 const ANGLE: f64 = 1e-3;
 const COMMAND: f64 = 1e-4;
-/// s.
 const TIME: f64 = 1e-5;
 
 /// Where each column is.

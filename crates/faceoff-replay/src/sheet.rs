@@ -17,7 +17,6 @@ const MAX_BYTES: u64 = 256 << 20;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Sheet {
     format: String,
-    /// The episodes.
     pub episodes: Vec<EpisodeLine>,
     /// Computation times of all answered steps.
     pub times: BTreeMap<Task, TimeBins>,
@@ -111,7 +110,6 @@ pub struct TimeBins(Vec<u64>);
 const FIRST_BIN_S: f64 = 1e-5;
 
 impl TimeBins {
-    /// Counts a step.
     pub fn add(&mut self, time_s: f64) {
         let tenths = 10.0 * (time_s / FIRST_BIN_S).log10();
         #[expect(
@@ -147,7 +145,6 @@ impl TimeBins {
 }
 
 impl Sheet {
-    /// An episode's line.
     #[must_use]
     pub fn line(&self, task: Task, episode: u32) -> Option<&EpisodeLine> {
         let found = self

@@ -139,7 +139,6 @@ pub(crate) fn of_board(board: &BoardView) -> Vec<u8> {
     table.into_bytes()
 }
 
-/// Row by row.
 pub(crate) fn of_history(history: &HistoryView) -> Vec<u8> {
     let mut table = with_tasks(&[
         "day",

@@ -25,7 +25,6 @@ const FURTHEST: i64 = 5000;
 /// After so many events of which nothing was told, the id is told by itself: who comes again does not go through them.
 const UNTOLD: i64 = 1000;
 
-/// Who follows what.
 #[derive(Debug)]
 pub(crate) struct Follower {
     pub(crate) reader: Reader,
@@ -34,7 +33,6 @@ pub(crate) struct Follower {
     pub(crate) about: About,
 }
 
-/// One stream.
 #[derive(Debug)]
 pub(crate) struct EventReader {
     app: App,
@@ -112,10 +110,12 @@ impl EventReader {
         }
         loop {
             sleep_until(self.not_before).await;
+            let page = self.app.feed.after(self.seen).await?;
+            // After the log is read: a token that was revoked with the newest of it gets nothing of it.
             if !self.is_welcome().await? {
                 return Ok(None);
             }
-            let Some(page) = self.app.feed.after(self.seen).await? else {
+            let Some(page) = page else {
                 self.wait().await;
                 continue;
             };

@@ -221,7 +221,6 @@ enum Which {
 #[derive(Debug)]
 struct Recorded {
     game: GameId,
-    /// Among the artifacts.
     key: String,
     blake3: String,
     /// To be stored as.

@@ -23,13 +23,11 @@ const WAITING: Duration = Duration::from_secs(1);
 /// Nobody holds a connection for longer; who wants more comes again and loses nothing.
 const LONGEST: Duration = Duration::from_secs(3600);
 
-/// One stream.
 #[derive(Debug)]
 pub(crate) struct LiveReader {
     app: App,
     game: GameId,
     watch: Option<LiveWatch>,
-    /// Told so far.
     seen: Option<LiveMark>,
     /// The attempt of which a snapshot was told on this stream.
     shown_attempt: Option<u32>,

@@ -320,7 +320,6 @@ fn play_unrecorded(agent: &InstantAgent, env: &AgentEnvironment, spec: &ShardSpe
     outcomes.iter().map(|outcome| outcome.steps).sum()
 }
 
-/// Watches nothing.
 struct Nobody;
 
 impl Observer for Nobody {

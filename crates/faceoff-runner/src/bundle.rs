@@ -31,7 +31,6 @@ use tree::Tree;
 /// Name of the file that makes a folder a bundle.
 const MANIFEST_NAME: &str = "agent.toml";
 
-/// An unpacked bundle.
 #[derive(Debug, Clone)]
 pub struct Bundle {
     /// The folder that holds `agent.toml`.

@@ -25,7 +25,6 @@ use std::{
 /// nothing: to sleep and be woken takes about as long as such an answer, an interpreter's included.
 const QUICK: Duration = Duration::from_micros(100);
 
-/// The running process.
 #[derive(Debug)]
 pub(crate) struct Exchange<'w> {
     process: AgentProcess,

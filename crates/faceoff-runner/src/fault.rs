@@ -10,14 +10,12 @@ use std::io;
 pub enum Trouble {
     /// The agent broke the protocol or a limit.
     Agent {
-        /// How.
         fault: AgentFaultKind,
         /// The offending line, cut, where there was one.
         line: Option<String>,
     },
     /// No answer came within a hard limit, and the host does not explain that.
     Late {
-        /// What it is.
         fault: AgentFaultKind,
         /// Whose time it was.
         waited: Box<Waited>,
@@ -30,7 +28,6 @@ pub enum Trouble {
         /// Whose time it was.
         waited: Box<Waited>,
     },
-    /// The platform failed.
     Platform(PlatformFault),
 }
 
@@ -67,9 +64,7 @@ pub enum PlatformFault {
     /// A file could not be read or written.
     #[error("{what}: {source}")]
     Io {
-        /// What was attempted.
         what: String,
-        /// Why it failed.
         source: io::Error,
     },
     /// There was no room for a recording; the text says for what.

@@ -37,7 +37,6 @@ impl Log {
         }
     }
 
-    /// What is kept.
     pub fn into_text(self) -> String {
         self.text
     }

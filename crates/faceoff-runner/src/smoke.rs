@@ -34,14 +34,12 @@ pub struct SmokeReport {
 pub enum SmokeDefect {
     /// The agent broke the protocol or a limit.
     Fault {
-        /// How.
         fault: AgentFault,
         /// If by an answer that did not come: whose time that was.
         waited: Option<Waited>,
     },
     /// It answers, but not in real time.
     TooSlow {
-        /// How slowly.
         timing: SmokeTiming,
         /// What the mean may be, in seconds.
         limit_s: f64,

@@ -79,7 +79,6 @@ pub(crate) struct Supervised(Arc<Agent>);
 struct Agent {
     killer: Killer,
     supervision: Supervision,
-    /// The evaluator's.
     thread: String,
     /// Until when the evaluator may be busy with the agent, in nanoseconds since [`EPOCH`]; 0 while it is not.
     due_ns: AtomicU64,

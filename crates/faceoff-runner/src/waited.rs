@@ -14,7 +14,6 @@ pub struct Waited {
 }
 
 impl Waited {
-    /// What counts.
     pub(crate) fn of_the_agent(&self) -> Duration {
         self.wall.saturating_sub(self.host) + self.head_start
     }

@@ -28,7 +28,6 @@ const LAG: Duration = Duration::from_millis(10);
 /// What is read right before a question, in some microseconds.
 #[derive(Debug, Clone)]
 pub struct Glance {
-    /// When that was.
     pub at: Instant,
     /// The counters of the agent's CPUs, without what its threads want; `None` without a cgroup, and where the kernel
     /// counts in ticks alone.
@@ -47,7 +46,6 @@ pub(crate) struct CpuEvidence {
     pub throttled: Option<File>,
 }
 
-/// Who ran.
 #[derive(Debug)]
 pub(crate) enum RunTime {
     /// `cpuacct.usage_percpu` of everything and of the agent.

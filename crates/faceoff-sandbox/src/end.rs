@@ -11,7 +11,6 @@ pub(crate) enum End {
     Agent(AgentFaultKind),
     /// Something of ours failed under it.
     Platform(String),
-    /// We ended it.
     Killed,
 }
 

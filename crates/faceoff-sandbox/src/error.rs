@@ -10,7 +10,6 @@ pub enum SandboxError {
     Io {
         /// What was being done, lower-case, without the reason.
         what: String,
-        /// The reason.
         source: io::Error,
     },
     /// The host lacks a layer that the organiser has not given up.

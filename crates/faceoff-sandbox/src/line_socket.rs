@@ -23,7 +23,6 @@ const HEAD_BYTES: usize = 1024;
 /// Outcome of waiting for a line.
 #[derive(Debug)]
 pub enum ReadLine {
-    /// A whole line.
     Line {
         /// Without the newline.
         bytes: Vec<u8>,

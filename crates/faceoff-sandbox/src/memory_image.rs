@@ -27,7 +27,6 @@ const PAGE_BYTES: u64 = 4096;
 #[derive(Debug)]
 pub struct MemoryImage {
     folder: tempfile::TempDir,
-    /// What it takes.
     pub bytes: u64,
 }
 
@@ -37,15 +36,12 @@ pub enum NoImage {
     /// The files are larger than was allowed.
     #[error("the runtimes' files are larger than {limit_bytes} bytes")]
     TooLarge {
-        /// What was allowed.
         limit_bytes: u64,
     },
     /// The host's memory is smaller.
     #[error("the runtimes' files have {bytes} bytes, and {MEMORY} has room for {free_bytes}")]
     NoRoom {
-        /// What they need.
         bytes: u64,
-        /// What is free.
         free_bytes: u64,
     },
     /// The files could not be read or written.
@@ -104,7 +100,6 @@ impl MemoryImage {
         }
     }
 
-    /// Where it is.
     #[must_use]
     pub fn folder(&self) -> &Path {
         self.folder.path()

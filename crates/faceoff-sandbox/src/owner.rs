@@ -12,7 +12,6 @@ pub(crate) struct Owner {
 }
 
 impl Owner {
-    /// This process.
     pub(crate) fn this_process() -> Self {
         let pid = std::process::id();
         Self {

@@ -17,7 +17,6 @@ pub struct SpawnSpec {
     pub runtime: Runtime,
     /// What the tree may use.
     pub limits: Limits,
-    /// Which layers apply.
     pub isolation: Isolation,
     /// CPU numbers the agent may run on; empty = those of the service.
     pub cpus: Vec<usize>,

@@ -7,6 +7,8 @@
 //! This crate reads no file, no clock and no random numbers (bootstraps draw from a hash of what they are given,
 //! schedules from a seed that they are given), and it knows neither the simulator nor the database.
 
+#![warn(missing_docs)]
+
 mod ablation;
 mod binomial;
 mod board;

@@ -21,7 +21,6 @@ pub struct AppState {
     pub store: Store,
     /// As the server was configured.
     pub config: HttpConfig,
-    /// Uploads under way.
     pub uploads: Arc<Uploads>,
     /// One permit per upload that is copied to where it stays.
     pub storing: Semaphore,
@@ -31,9 +30,7 @@ pub struct AppState {
     pub summaries: Summaries,
     /// Rows of boards that are chosen among many days.
     pub rows: KeptRows,
-    /// Answers to visitors.
     pub kept_answers: KeptAnswers,
-    /// Ratings of tournaments.
     pub ratings: Kept<Ratings>,
     pub(crate) kept_analyses: KeptAnalyses,
     pub(crate) certainties: Kept<CertaintyView>,

@@ -22,7 +22,6 @@ use std::sync::Arc;
 pub struct Caller {
     /// What they called with.
     pub token: Token,
-    /// Whose it is.
     pub who: Who,
 }
 

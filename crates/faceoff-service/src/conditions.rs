@@ -65,9 +65,7 @@ pub struct Conditions {
 /// Which bytes are to be sent.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Wanted {
-    /// All of them.
     All,
-    /// These.
     Some(Range<u64>),
     /// A range that begins behind the end.
     Nothing,

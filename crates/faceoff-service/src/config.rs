@@ -69,7 +69,6 @@ pub struct HttpConfig {
     pub upload_dir: PathBuf,
     /// Stamps what is written, and tells which day it is.
     pub clock: Clock,
-    /// Concurrency and patience.
     pub limits: HttpLimits,
     /// Where webhooks may be.
     pub webhooks: WebhookRules,
@@ -81,7 +80,6 @@ pub struct HttpConfig {
     pub rates: RateLimits,
     /// What links are signed with.
     pub link_key: LinkKey,
-    /// The server's numbers.
     pub metrics: Metrics,
     /// What the operating system counts of this process.
     pub process: fn() -> Process,

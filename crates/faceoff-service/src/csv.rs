@@ -19,7 +19,6 @@ impl Table {
         table
     }
 
-    /// Adds a line.
     pub fn row(&mut self, fields: impl IntoIterator<Item = String>) {
         for (number, field) in fields.into_iter().enumerate() {
             if number > 0 {
@@ -48,7 +47,6 @@ impl Table {
         (headers, self.into_bytes()).into_response()
     }
 
-    /// The whole table.
     pub fn into_bytes(self) -> Vec<u8> {
         self.0.into_bytes()
     }

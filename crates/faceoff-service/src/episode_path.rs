@@ -11,9 +11,7 @@ use std::{fmt::Display, str::FromStr};
 /// An episode of an evaluation: the parameters `{id}`, `{task}` and `{episode}` of the path.
 #[derive(Debug, Clone, Copy)]
 pub struct EpisodePath {
-    /// Whose episode.
     pub id: EvaluationId,
-    /// Of which task.
     pub task: Task,
     /// Its number, from 0.
     pub episode: u32,
@@ -36,11 +34,9 @@ impl<S: Send + Sync> FromRequestParts<S> for EpisodePath {
 /// An episode of a submission's ablation: the parameters `{id}`, `{profile}`, `{task}` and `{episode}` of the path.
 #[derive(Debug, Clone, Copy)]
 pub struct AblationPath {
-    /// Whose ablation.
     pub submission: SubmissionId,
     /// Of which of the ablation's profiles.
     pub profile: Profile,
-    /// Of which task.
     pub task: Task,
     /// Its number, from 0.
     pub episode: u32,

@@ -21,7 +21,6 @@ use std::{fmt::Display, str::FromStr};
 /// Largest JSON body; the largest legitimate one has some hundred bytes.
 pub const MAX_JSON_BYTES: usize = 64 * 1024;
 
-/// A JSON body.
 #[derive(Debug)]
 pub struct Json<T>(pub T);
 
@@ -203,7 +202,6 @@ where
     }
 }
 
-/// The query string.
 #[derive(Debug)]
 pub struct QueryParams<T>(pub T);
 

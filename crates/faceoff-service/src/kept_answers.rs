@@ -49,7 +49,6 @@ const OF_ONES_OWN: [HeaderName; 7] = [
 /// What an answer depends on.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Asked {
-    /// Path and query.
     what: String,
     accepts: Option<Vec<u8>>,
     encodings: Option<Vec<u8>>,

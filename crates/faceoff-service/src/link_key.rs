@@ -39,7 +39,6 @@ impl LinkKey {
         GrantKey::of(&self.0)
     }
 
-    /// The key itself.
     pub const fn bytes(&self) -> &[u8; 32] {
         &self.0
     }

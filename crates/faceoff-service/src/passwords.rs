@@ -31,7 +31,6 @@ const WAITING: usize = 16;
 const FREE: u32 = 5;
 /// The wait after one more, which doubles with each.
 const FIRST_WAIT: SignedDuration = SignedDuration::from_secs(2);
-/// The longest wait.
 const LONGEST_WAIT: SignedDuration = SignedDuration::from_mins(5);
 
 /// The places for hashing, and who has guessed how often.

@@ -21,12 +21,10 @@ pub struct Standing {
     pub record: BoardRecord,
     /// All of them, the earlier day first.
     pub evaluations: Vec<EvaluationId>,
-    /// Their runs.
     pub runs: Vec<RunId>,
 }
 
 impl Standing {
-    /// Of one evaluation.
     pub fn alone(record: BoardRecord) -> Self {
         Self {
             evaluations: vec![record.evaluation],
@@ -58,7 +56,6 @@ impl Standing {
     }
 }
 
-/// Whose rows.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct RowsOf {
     pub stage: StageId,

@@ -12,11 +12,9 @@ use faceoff_types::TeamId;
 /// A caller, with or without a token.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Viewer {
-    /// Who sees everything.
     Organiser,
     /// Who speaks for a team.
     Team(TeamId),
-    /// Everybody else.
     Anybody,
 }
 

@@ -18,7 +18,6 @@ pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 enum Kind {
     /// Asked for again and again by what watches the server, and files that never change.
     Probe,
-    /// Changes nothing.
     Read,
     Change,
 }

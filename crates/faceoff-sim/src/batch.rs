@@ -20,13 +20,10 @@ const WORLDS_AT_A_TIME: usize = 4;
 /// What is played in a batch.
 #[derive(Debug, Clone)]
 pub struct BatchSetup {
-    /// The task.
     pub task: Task,
     /// How actions become trajectories.
     pub interpolation: Interpolation,
-    /// Perturbations.
     pub factors: Factors,
-    /// Their magnitudes.
     pub settings: PerturbationSettings,
     /// The arms; nominal unless the factors contain the model mismatch.
     pub plant: Plant,

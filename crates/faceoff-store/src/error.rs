@@ -13,7 +13,6 @@ pub enum StoreError {
     /// The outcomes of a run that has long been over; its summary and its dataset have what is asked for.
     #[error("the run's single outcomes were removed at {at}; its dataset has them")]
     Cleared {
-        /// When.
         at: Timestamp,
     },
     /// Names that differ only in case count as the same.
@@ -24,7 +23,6 @@ pub enum StoreError {
     DayHasCut {
         /// The day, or a later one.
         day: Date,
-        /// When it started.
         cut_at: Timestamp,
     },
     /// Names that differ only in case count as the same.
@@ -36,9 +34,7 @@ pub enum StoreError {
     /// The team has asked for as many games that do not count as it may on one UTC day.
     #[error("{used} of {limit} games that do not count were asked for today")]
     FreeGamesSpent {
-        /// Of a day.
         limit: u32,
-        /// Asked for today.
         used: u32,
     },
     /// The stage's days do not start yet, or no longer.
@@ -47,7 +43,6 @@ pub enum StoreError {
         None => format!("opens at {opens_at}"),
     })]
     StageNotOpen {
-        /// Which.
         name: String,
         /// From when on they start.
         opens_at: Timestamp,
@@ -57,7 +52,6 @@ pub enum StoreError {
     /// The team neither uploads nor plays.
     #[error("the team was disqualified at {at}: {reason}")]
     Disqualified {
-        /// When.
         at: Timestamp,
         /// As everybody may read it.
         reason: String,
@@ -65,13 +59,11 @@ pub enum StoreError {
     /// The team takes no part any more, by its own wish.
     #[error("the team retired at {at}")]
     Retired {
-        /// When.
         at: Timestamp,
     },
     /// Nobody of the team has accepted the terms as they are now.
     #[error("nobody of the team has accepted version {version} of the terms")]
     TermsOwed {
-        /// The newest.
         version: u32,
     },
     /// Names that differ only in case count as the same.
@@ -83,7 +75,6 @@ pub enum StoreError {
     /// The season is over: nothing more is uploaded or evaluated.
     #[error("the season was closed at {closed_at}")]
     SeasonClosed {
-        /// When.
         closed_at: Timestamp,
     },
     /// The season is an archive's: nothing of it changes.
@@ -99,21 +90,15 @@ pub enum StoreError {
         "{used_bytes} of {limit_bytes} bytes of the day are used; the bundle has {bundle_bytes}"
     )]
     DayQuotaSpent {
-        /// Of a day.
         limit_bytes: u64,
-        /// Used today.
         used_bytes: u64,
-        /// Asked for.
         bundle_bytes: u64,
     },
     /// The team's bundles fill the room that it has.
     #[error("{used_bytes} of {limit_bytes} bytes are stored; the bundle has {bundle_bytes}")]
     StoredQuotaSpent {
-        /// At a time.
         limit_bytes: u64,
-        /// Stored by now.
         used_bytes: u64,
-        /// Asked for.
         bundle_bytes: u64,
     },
     /// What was asked does not fit the entity's state; the text says what does.
@@ -129,14 +114,11 @@ pub enum StoreError {
         program.as_deref().unwrap_or("another"), this.version, this.schema
     )]
     NewerDatabase {
-        /// Its newest migration.
         schema: i64,
         /// What opened it last.
         program: Option<String>,
-        /// This one.
         this: Program,
     },
-    /// SQLite failed.
     #[error("database: {0}")]
     Database(#[source] sqlx::Error),
     /// The object store failed.

@@ -32,7 +32,6 @@ pub enum Event {
     TokenReplaced,
     /// The subject has another token.
     TokenCreated {
-        /// Which.
         token: TokenId,
         /// What its owner calls it.
         name: String,
@@ -41,32 +40,27 @@ pub enum Event {
     },
     /// A token has another secret; the old one is void.
     TokenRotated {
-        /// Which.
         token: TokenId,
         /// What its owner calls it.
         name: String,
     },
     /// A token is worth nothing any more.
     TokenRevoked {
-        /// Which.
         token: TokenId,
         /// What its owner calls it.
         name: String,
     },
     /// Somebody may join by a link.
     Invited {
-        /// Which.
         invitation: InvitationId,
         /// `organiser`, `member`, `founder` or `return`.
         role: String,
-        /// For whom.
         note: String,
         /// From then on it is worth nothing.
         expires_at: Timestamp,
     },
     /// The link is worth nothing any more.
     InvitationRevoked {
-        /// Which.
         invitation: InvitationId,
     },
     /// They followed a link.
@@ -87,7 +81,6 @@ pub enum Event {
     PasswordSet,
     /// They accepted the terms.
     TermsAccepted {
-        /// Which.
         version: u32,
     },
     /// There are other terms.
@@ -109,28 +102,22 @@ pub enum Event {
         /// What it wants to be called.
         name: TeamName,
     },
-    /// It does.
     RegistrationApproved {
-        /// Which.
         team: TeamId,
     },
-    /// It does not.
     RegistrationRefused {
         /// As who registered may read it.
         reason: String,
     },
     /// The team has another name.
     TeamRenamed {
-        /// The old one.
         from: TeamName,
-        /// The new one.
         to: TeamName,
     },
     /// The team tells something else of itself.
     TeamDescribed {
         /// Where it is from.
         affiliation: Option<String>,
-        /// Its page.
         link: Option<String>,
         /// The division that it is in.
         division: Option<DivisionName>,
@@ -148,9 +135,7 @@ pub enum Event {
         /// What it is called.
         title: String,
     },
-    /// The team asks.
     Asked {
-        /// Which.
         team: TeamId,
     },
     /// The organisers have answered.
@@ -160,7 +145,6 @@ pub enum Event {
     },
     /// A bundle came, and its smoke run is queued.
     SubmissionUploaded {
-        /// Whose it is.
         team: TeamId,
         /// BLAKE3 of the archive.
         bundle_blake3: String,
@@ -177,16 +161,13 @@ pub enum Event {
     },
     /// The smoke run could not be done, by our fault.
     SubmissionNotValidated {
-        /// What failed.
         reason: String,
     },
     /// It is what its team enters at the next cut: the newest that is valid, or the team's choice.
     SubmissionActivated,
     /// It does not play a day, since the stage does not take its runtime.
     SubmissionNotTaken {
-        /// Whose day.
         stage: StageId,
-        /// Its date.
         day: Date,
         /// What the stage takes, and what came.
         reason: String,
@@ -200,7 +181,6 @@ pub enum Event {
     },
     /// Nobody plays it any more, and its archive is removed.
     ArchiveRemoved {
-        /// By which retention.
         reason: String,
     },
     /// Its team calls it so.
@@ -212,16 +192,12 @@ pub enum Event {
     SubmissionNoted,
     /// A submission is to play a day.
     EvaluationQueued {
-        /// Whose it is.
         team: TeamId,
-        /// What plays.
         submission: SubmissionId,
         /// Whose day; unknown of those from before there were stages.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         stage: Option<StageId>,
-        /// Its date.
         day: Date,
-        /// What is played.
         run: RunId,
         /// The evaluation that is played again.
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -233,7 +209,6 @@ pub enum Event {
     EvaluationFinalising,
     /// Score and dataset are there.
     EvaluationFinished {
-        /// In percent.
         score: f64,
         /// BLAKE3 of the dataset's archive.
         dataset_blake3: String,
@@ -242,10 +217,8 @@ pub enum Event {
     EvaluationAgentFailed,
     /// Our fault, given up.
     EvaluationPlatformFailed {
-        /// What went wrong.
         reason: String,
     },
-    /// Stopped by hand.
     EvaluationCancelled {
         /// As it was told to the team.
         reason: String,
@@ -264,7 +237,6 @@ pub enum Event {
     EvaluationPublished,
     /// Its dataset is removed; its result stays.
     DatasetRemoved {
-        /// By which retention.
         reason: String,
     },
     /// All of a day does not count any more; each of its evaluations has an event of its own.
@@ -279,12 +251,10 @@ pub enum Event {
     },
     /// It plays and is ranked again.
     TeamReinstated {
-        /// Why.
         reason: String,
     },
     /// A submission is to be taken apart, profile by profile.
     AblationOrdered {
-        /// What plays.
         submission: SubmissionId,
         /// Of each task in each profile.
         episodes_per_task: u32,
@@ -298,11 +268,8 @@ pub enum Event {
     },
     /// Evaluations are to be played without counting.
     ProposalMade {
-        /// By whose rules.
         stage: StageId,
-        /// How many.
         evaluations: u32,
-        /// The organiser's words.
         reason: String,
     },
     /// All of its evaluations are over.
@@ -313,16 +280,13 @@ pub enum Event {
     ProposalDropped,
     /// It was played as a part of a proposal, and counts from now on.
     EvaluationApplied {
-        /// Which.
         proposal: ProposalId,
     },
     /// Episodes were played and their outcomes stored.
     ShardCommitted {
         /// What they are a part of.
         run: RunId,
-        /// The range's id.
         shard: ShardId,
-        /// What was played.
         task: Task,
         /// The first one.
         first_episode: u32,
@@ -337,12 +301,10 @@ pub enum Event {
         unit: Uuid,
         /// Reported failures of this unit so far.
         failures: u32,
-        /// What failed.
         reason: String,
     },
     /// The cut of a day: its evaluations were queued, each with an event of its own.
     DayStarted {
-        /// How many.
         evaluations: u32,
     },
     /// The day's deadline has come: what was left of it is ended, each with an event of its own.
@@ -387,7 +349,6 @@ pub enum Event {
     },
     /// The stage's name, times or settings are others: all of them as they are now.
     StageChanged {
-        /// The name.
         name: StageName,
         /// From when on its days start.
         opens_at: Timestamp,
@@ -407,12 +368,10 @@ pub enum Event {
     StageRulesChanged {
         /// From 1; before the opening, the one that there was.
         revision: u32,
-        /// The new ones.
         rules: StageRules,
     },
     /// Its one day after the close has had its cut; the day has an event of its own.
     StageFinalStarted {
-        /// Its date.
         day: Date,
     },
     /// Its result is signed off: nothing of it changes any more.
@@ -430,7 +389,6 @@ pub enum Event {
     },
     /// It is otherwise: all of it as it is now.
     TournamentChanged {
-        /// The name.
         name: StageName,
         /// What results depend on.
         rules: Box<TournamentRules>,
@@ -450,21 +408,17 @@ pub enum Event {
     TournamentClosed,
     /// Teams are in it from now on.
     TeamsEntered {
-        /// Which.
         teams: Vec<TeamId>,
     },
     /// A team is not in it any more, before anything was played.
     TeamOut {
-        /// Which.
         team: TeamId,
         /// As everybody may read it.
         reason: String,
     },
     /// A team plays no more in it; each of its games that is called off has an event of its own.
     TeamLeftTournament {
-        /// Which.
         team: TeamId,
-        /// How.
         left_as: LeftAs,
         /// The first round whose games with it do not count.
         from_round: RoundNumber,
@@ -473,31 +427,24 @@ pub enum Event {
     },
     /// What its teams have active is fixed, and its games are queued.
     RoundStarted {
-        /// Which.
         round: RoundNumber,
-        /// How many.
         games: u32,
     },
     /// The last of its games has ended.
     RoundOver {
-        /// Which.
         round: RoundNumber,
     },
     /// The schedule is to be played again, without counting.
     ReplaysOrdered {
-        /// How often.
         times: u32,
-        /// So many games.
         games: u32,
     },
     /// What was not played of it is called off.
     ReplaysCancelled {
-        /// So many games.
         games: u32,
     },
     /// A game that does not count waits.
     FreeGameQueued {
-        /// Who plays.
         team: TeamId,
         /// Against whom; none: the baseline.
         opponent: Option<TeamId>,
@@ -509,12 +456,10 @@ pub enum Event {
     },
     /// It has a result.
     GamePlayed {
-        /// Of which attempt.
         attempt: u32,
     },
     /// Our fault, given up: it has no result.
     GameBroken {
-        /// What went wrong.
         reason: String,
     },
     /// Its result counts no more.
@@ -536,37 +481,31 @@ pub enum Event {
     },
     /// A program is told of what happens.
     WebhookCreated {
-        /// Which.
         webhook: WebhookId,
         /// What its owner calls it.
         name: String,
     },
     /// It is somewhere else, told of something else, called otherwise, or told again.
     WebhookChanged {
-        /// Which.
         webhook: WebhookId,
         /// What its owner calls it.
         name: String,
     },
     /// It has another secret.
     WebhookRotated {
-        /// Which.
         webhook: WebhookId,
         /// What its owner calls it.
         name: String,
     },
     /// It is told nothing any more, by its owner's wish.
     WebhookRemoved {
-        /// Which.
         webhook: WebhookId,
         /// What its owner called it.
         name: String,
     },
     /// It is told nothing any more, since it takes nothing.
     WebhookDied {
-        /// Which.
         webhook: WebhookId,
-        /// What was wrong.
         reason: String,
     },
     /// Nothing of the queue is begun from now on.
@@ -580,7 +519,6 @@ pub enum Event {
     WorkerBanned {
         /// What it is called.
         worker: String,
-        /// Why.
         reason: String,
         /// How many shards that it played are played again.
         again: u32,
@@ -592,7 +530,6 @@ pub enum Event {
     },
     /// The season has another name.
     SeasonNamed {
-        /// The new one.
         name: String,
     },
     /// The secret is public and nothing more is evaluated.
@@ -606,11 +543,9 @@ pub struct EventRecord {
     pub id: i64,
     /// By the clock of whoever wrote it.
     pub at: Timestamp,
-    /// Who caused it.
     pub actor: Actor,
     /// What it is about.
     pub subject: Subject,
-    /// What happened.
     pub event: Event,
 }
 

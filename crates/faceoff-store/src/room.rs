@@ -82,7 +82,6 @@ impl Room {
 pub struct DiskSpace {
     /// Bytes that this process may still write.
     pub free_bytes: u64,
-    /// Bytes in all.
     pub size_bytes: u64,
 }
 

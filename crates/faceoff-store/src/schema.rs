@@ -16,7 +16,6 @@ pub struct Upgrade {
     pub from: Option<String>,
     /// Its newest migration before.
     pub from_schema: i64,
-    /// This program.
     pub to: Program,
 }
 

@@ -32,7 +32,6 @@ pub struct WorkerName(String);
 pub struct NoWorkerName;
 
 impl WorkerName {
-    /// The name.
     #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0
@@ -158,7 +157,6 @@ pub struct WorkerHeard {
 /// What a slot elsewhere does.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WorkerBusy {
-    /// The unit.
     pub unit: Uuid,
     /// What it is, in words; none if it was begun before this process.
     pub what: Option<String>,

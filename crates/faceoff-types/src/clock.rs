@@ -12,7 +12,6 @@ impl Clock {
         Self(Arc::new(now))
     }
 
-    /// What it shows.
     #[must_use]
     pub fn now(&self) -> Timestamp {
         (self.0)()

@@ -20,12 +20,9 @@ pub enum Constraint {
 /// judged from [`ComputationTime`](crate::ComputationTime), not here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 pub struct Violations {
-    /// End-effector position.
     pub ee: bool,
     /// Elbow and wrist height.
     pub link: bool,
-    /// Joint position.
     pub joint_pos: bool,
-    /// Joint velocity.
     pub joint_vel: bool,
 }

@@ -56,7 +56,6 @@ impl Side {
     /// Both, in the order of pairs.
     pub const BOTH: [Self; 2] = [Self::First, Self::Second];
 
-    /// The opponent's.
     #[must_use]
     pub const fn other(self) -> Self {
         match self {

@@ -9,14 +9,12 @@ use std::fmt;
 pub enum AgentFaultKind {
     /// A line that is not a JSON object.
     NotJson {
-        /// The parser's words.
         detail: String,
     },
     /// Another message than the one expected.
     WrongMessage {
         /// What the protocol asked for, e.g. `ready with episode 3`.
         expected: String,
-        /// What came.
         got: String,
     },
     /// An action of another shape than the agreed interpolation needs.
@@ -32,7 +30,6 @@ pub enum AgentFaultKind {
     TooLarge {
         /// Where, e.g. `action[1][3]`.
         place: String,
-        /// What came.
         value: f64,
         /// The largest magnitude allowed.
         limit: f64,
@@ -67,12 +64,10 @@ pub enum AgentFaultKind {
     ClosedOutput,
     /// The process ended while an answer was due.
     Exited {
-        /// Its exit code.
         code: i32,
     },
     /// The process was ended by a signal that the evaluator did not send.
     Signalled {
-        /// The signal's number.
         signal: i32,
     },
     /// The process was ended because it used more than it may.
@@ -86,7 +81,6 @@ pub enum AgentFaultKind {
     },
     /// The program could not be started: the command is missing or not executable.
     CannotStart {
-        /// Why.
         detail: String,
     },
 }
@@ -181,7 +175,6 @@ pub enum Phase {
     StartUp,
     /// To get ready for an episode.
     Reset,
-    /// To act.
     Step,
 }
 
@@ -198,7 +191,6 @@ impl fmt::Display for Phase {
 /// One fault of an agent: what, where, and the offending line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AgentFault {
-    /// What it did.
     #[serde(flatten)]
     pub fault: AgentFaultKind,
     /// What it was playing.

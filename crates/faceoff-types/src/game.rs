@@ -7,11 +7,8 @@ use std::fmt;
 /// What happened in a game. Pairs are the first side's first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GameOutcome {
-    /// Control steps played.
     pub steps: u32,
-    /// Rallies begun.
     pub rallies: u32,
-    /// How it ended.
     pub end: GameEnd,
     /// What each side did.
     pub sides: [SideOutcome; 2],
@@ -25,7 +22,6 @@ pub enum GameEnd {
     Played,
     /// A side used up its faults or its time.
     Forfeit {
-        /// Which.
         by: Side,
         /// What it used up.
         cause: ForfeitCause,
@@ -38,7 +34,6 @@ pub enum GameEnd {
 }
 
 impl GameEnd {
-    /// As in files.
     #[must_use]
     pub const fn as_str(&self) -> &'static str {
         match self {
@@ -104,7 +99,6 @@ impl fmt::Display for ForfeitCause {
 pub struct SideOutcome {
     /// Goals scored, without points for the opponent's fouls.
     pub goals: u32,
-    /// Fouls.
     pub fouls: u32,
     /// Windows of 500 control steps, in order; the last may be shorter.
     pub windows: Vec<GameWindow>,
@@ -121,13 +115,11 @@ pub struct SideOutcome {
 /// What a side did in one window: the game's equivalent of an episode.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct GameWindow {
-    /// Control steps.
     pub steps: u32,
     /// Constraints broken at least once.
     pub violations: Violations,
     /// Of its answers, those that came too late included.
     pub computation_time: ComputationTime,
-    /// Faults in it.
     pub faults: u32,
 }
 

@@ -10,7 +10,6 @@ pub enum GameSeed {
     Meeting {
         /// The number of the tournament in its season, from 1.
         tournament: u32,
-        /// The round.
         round: RoundNumber,
         /// From 1, in the order in which the round was drawn.
         meeting: u32,
@@ -21,7 +20,6 @@ pub enum GameSeed {
         tournament: u32,
         /// Which time, from 1.
         replay: u32,
-        /// The round.
         round: RoundNumber,
         /// From 1.
         meeting: u32,

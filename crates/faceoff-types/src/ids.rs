@@ -25,7 +25,6 @@ macro_rules! id {
                 Self(Uuid::now_v7())
             }
 
-            /// The UUID.
             #[must_use]
             pub const fn as_uuid(self) -> Uuid {
                 self.0
@@ -62,7 +61,6 @@ macro_rules! id {
 }
 
 id!(
-    /// A team.
     TeamId,
     "team"
 );
@@ -72,7 +70,6 @@ id!(
     "stage"
 );
 id!(
-    /// One uploaded agent.
     SubmissionId,
     "submission"
 );
@@ -132,7 +129,6 @@ id!(
     "proposal"
 );
 id!(
-    /// Rounds of games.
     TournamentId,
     "tournament"
 );

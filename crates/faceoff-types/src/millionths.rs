@@ -27,7 +27,6 @@ impl Millionths {
         self.0
     }
 
-    /// As a number.
     #[must_use]
     pub fn as_f64(self) -> f64 {
         f64::from(self.0) / ONE

@@ -50,7 +50,6 @@ macro_rules! name {
         pub struct $name(String);
 
         impl $name {
-            /// The name.
             #[must_use]
             pub fn as_str(&self) -> &str {
                 &self.0

@@ -38,13 +38,10 @@ impl EpisodeEnd {
 /// What happened in one episode: all that scoring needs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EpisodeOutcome {
-    /// The task.
     pub task: Task,
     /// Index of the episode within the evaluation, from 0.
     pub episode: u32,
-    /// Control steps played.
     pub steps: u32,
-    /// Why it ended.
     pub end: EpisodeEnd,
     /// Success, tested on the last true state; always false after an agent fault.
     pub success: bool,

@@ -146,7 +146,6 @@ impl Default for DelaySettings {
 pub struct InvalidPerturbation {
     /// Factor and magnitude, as JSON has them.
     pub field: &'static str,
-    /// Which there are.
     pub expected: String,
     /// As it was given.
     pub got: String,

@@ -55,7 +55,6 @@ impl Factors {
     /// All four factors of the `evaluation` profile.
     pub const ALL: Self = Self(0b1111);
 
-    /// One factor alone.
     #[must_use]
     pub const fn only(factor: Factor) -> Self {
         Self(1 << factor as u8)
@@ -108,7 +107,6 @@ impl Profile {
         Self::Evaluation,
     ];
 
-    /// All profiles.
     pub const ALL: [Self; 7] = [
         Self::Ideal,
         Self::ModelMismatch,

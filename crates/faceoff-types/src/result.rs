@@ -58,16 +58,13 @@ pub struct TaskResult {
 /// The score of one evaluation; the layout of `results.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EvaluationResult {
-    /// The ruleset's name.
     pub ruleset: String,
-    /// The perturbation profile.
     pub profile: Profile,
     /// What it was played and scored by otherwise than the ruleset has it.
     #[serde(flatten)]
     pub variation: Variation,
     /// The evaluation's seed, 64 hexadecimal digits.
     pub seed: Seed,
-    /// The tasks played.
     pub tasks: BTreeMap<Task, TaskResult>,
     /// Overall score in percent; tasks not played count as 0.
     pub score: f64,

@@ -35,13 +35,11 @@ pub enum InvalidRetention {
     /// Too soon for anybody to object, or later than anybody plans.
     #[error("days_after_sign_off: expected 1 to {MAX_DAYS_AFTER_SIGN_OFF}, got {0}")]
     Days(u32),
-    /// Two ends.
     #[error("until and days_after_sign_off: expected one of them at most, got both")]
     TwoEnds,
 }
 
 impl Retention {
-    /// Is everything kept?
     #[must_use]
     pub fn keeps_all(&self) -> bool {
         *self == Self::default()

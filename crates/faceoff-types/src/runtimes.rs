@@ -17,7 +17,6 @@ pub struct Runtimes(BTreeSet<String>);
 /// Runtimes that no agent can have.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidRuntimes {
-    /// None of them.
     #[error("expected one runtime at least, or null for all that the server offers, got none")]
     None,
     /// No name that `agent.toml` could give.
@@ -78,7 +77,6 @@ impl fmt::Display for Runtimes {
 pub struct StageRuntimes {
     /// As the organiser named it.
     pub stage: StageName,
-    /// What it takes.
     pub runtimes: Runtimes,
 }
 

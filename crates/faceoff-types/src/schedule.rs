@@ -68,7 +68,6 @@ pub enum InvalidSchedule {
     Cron {
         /// As it was given.
         pattern: String,
-        /// What is wrong.
         why: String,
     },
 }

@@ -16,7 +16,6 @@ pub enum SmokeOutcome {
         /// Tail of its standard error.
         log: String,
     },
-    /// The team's fault.
     Invalid {
         /// As its manifest names it, if that could be read.
         runtime: Option<String>,

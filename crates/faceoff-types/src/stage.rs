@@ -9,7 +9,6 @@ use std::{fmt, str::FromStr};
 /// A day of a stage. Its text is the stage's id, a slash and the ISO date.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct StageDay {
-    /// Whose.
     pub stage: StageId,
     /// In the stage's zone, of the day's cut.
     pub date: Date,

@@ -59,21 +59,16 @@ pub enum InvalidTournament {
     /// A format that nobody could play.
     #[error("format.{field}: expected at least {least}, got {got}")]
     Format {
-        /// Which.
         field: &'static str,
-        /// What it needs.
         least: u32,
-        /// What came.
         got: u32,
     },
     /// A budget that nobody could keep.
     #[error("game_limits.{field}: expected {expected}, got {got}")]
     GameLimits {
-        /// Which.
         field: &'static str,
         /// What it may be.
         expected: &'static str,
-        /// What came.
         got: f64,
     },
     /// Magnitudes that no world has.

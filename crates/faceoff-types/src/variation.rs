@@ -66,9 +66,7 @@ pub enum InvalidVariation {
     /// A number too many, or too few.
     #[error("expected {expected} numbers with commas between them, as in {example}, got {got:?}")]
     Count {
-        /// How many.
         expected: usize,
-        /// The ruleset's.
         example: &'static str,
         /// As it was given.
         got: String,
@@ -124,7 +122,6 @@ impl TaskWeights {
         }
     }
 
-    /// A task's.
     #[must_use]
     pub const fn of(&self, task: Task) -> Millionths {
         match task {

@@ -9,7 +9,6 @@ use std::{fmt, str::FromStr};
 pub struct Zone(TimeZone);
 
 impl Zone {
-    /// Coordinated Universal Time.
     pub const UTC: Self = Self(TimeZone::UTC);
 
     /// Its offsets and their changes.

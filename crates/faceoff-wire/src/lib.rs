@@ -14,6 +14,8 @@
 //! * [`work`]: what a worker slot is told to do and reports back;
 //! * [`remote`]: what passes between the server and workers on other machines, and [`grant`]: what they may read and write.
 
+#![warn(missing_docs)]
+
 pub mod answer;
 pub mod dataset;
 pub mod game;

@@ -52,7 +52,6 @@ impl Default for Intervals {
 /// How this process works.
 #[derive(Debug, Clone)]
 pub struct WorkerConfig {
-    /// Its own slots.
     pub slots: SlotsConfig,
     /// Which work they do.
     pub lot: Lot,

@@ -57,7 +57,6 @@ const PATIENCE: Duration = Duration::from_secs(60);
 #[derive(Debug, Clone, thiserror::Error)]
 #[error("the server refused ({status}, {title}): {detail}")]
 pub struct ApiError {
-    /// HTTP status.
     pub status: StatusCode,
     /// The kind of problem in words.
     pub title: String,
@@ -150,7 +149,6 @@ impl Client {
         read(self.send(request).await?).await
     }
 
-    /// The season.
     pub async fn season(&self) -> anyhow::Result<SeasonView> {
         self.get("/season").await
     }

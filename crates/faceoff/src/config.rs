@@ -28,7 +28,6 @@ pub const DEFAULT_FILE: &str = "faceoff.toml";
 /// The defaults, with units and meanings: what `faceoff init` writes.
 pub const COMMENTED: &str = include_str!("config/faceoff.toml");
 
-/// The whole file.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
@@ -36,7 +35,6 @@ pub struct Config {
     pub server: ServerConfig,
     /// What the season is called.
     pub season: SeasonConfig,
-    /// The daily evaluation.
     pub evaluation: EvaluationConfig,
     /// How this machine evaluates.
     pub workers: WorkersConfig,
@@ -106,9 +104,7 @@ pub struct SeasonConfig {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct EvaluationConfig {
-    /// The perturbation profile.
     pub profile: Profile,
-    /// The tasks.
     pub tasks: Vec<Task>,
     /// Episodes of each task.
     pub episodes_per_task: u32,

@@ -28,7 +28,6 @@ pub struct Descriptors {
     pub reserved: u64,
     /// Connections at the same time.
     pub connections: usize,
-    /// Of one address.
     pub per_address: usize,
 }
 

@@ -10,13 +10,11 @@ use uuid::Uuid;
 /// All of them, by id.
 #[derive(Debug)]
 pub(crate) struct Evaluations {
-    /// Of each.
     shards: u32,
     all: Mutex<HashMap<Uuid, Shards>>,
     changed: Notify,
 }
 
-/// Of one evaluation.
 #[derive(Debug, Default)]
 struct Shards {
     played: u32,

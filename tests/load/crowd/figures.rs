@@ -78,7 +78,6 @@ impl Phase {
         })
     }
 
-    /// Sorted.
     fn series(&self) -> [Vec<f64>; 4] {
         let tally = &self.tally;
         [

@@ -48,7 +48,6 @@ const MOST_FAILURES: u32 = 100;
 /// Of each but the largest.
 const SMALL_BYTES: usize = 1024;
 
-/// A connected worker.
 pub(crate) struct Stub {
     number: usize,
     name: String,
@@ -73,7 +72,6 @@ pub(crate) struct Plan {
 
 /// Which shards a worker plays.
 pub(crate) enum Share {
-    /// So many each.
     Each(u32),
     /// Whoever is free takes the next of so many.
     Common(AtomicI64),

@@ -6,7 +6,6 @@ use striker::Agent as Striker;
 
 use crate::support::game::{Player, Tally, game, play};
 
-/// Two minutes.
 const STEPS: u32 = 6000;
 /// *Deployable*: half a point per window of 500 steps.
 const POINTS_MAX: u32 = STEPS / 1000;

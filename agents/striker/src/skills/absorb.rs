@@ -31,18 +31,15 @@ const AS_PLANNED: f64 = 0.2;
 /// A running plan is given up only for one that is cheaper by this much.
 const LOYALTY: f64 = 2.0;
 
-/// A planned contact.
 #[derive(Debug, Clone, Copy)]
 struct Meeting {
     /// Seconds since the episode's start.
     time: f64,
-    /// Mallet at contact.
     mallet: Vec2,
     /// Velocity of the mallet at contact.
     velocity: Vec2,
 }
 
-/// The behaviour's memory.
 #[derive(Debug, Clone)]
 pub struct Absorb {
     meeting: Option<Meeting>,

@@ -14,14 +14,12 @@ const SAFE_X: (f64, f64) = (-0.74, -0.27);
 /// Speed at which a puck counts as stopped, m/s.
 const STOPPED: f64 = 0.1;
 
-/// The skill's memory.
 #[derive(Debug, Clone)]
 pub struct Defend {
     absorb: Absorb,
 }
 
 impl Defend {
-    /// Nothing planned yet.
     pub fn new() -> Self {
         Self {
             absorb: Absorb::new(0.0),

@@ -63,18 +63,15 @@ enum Phase {
     },
 }
 
-/// The skill's memory.
 #[derive(Debug, Clone)]
 pub struct Hit {
     phase: Phase,
     /// Frees a puck that cannot be struck where it lies.
     rescue: Option<Prepare>,
-    /// Nudges so far.
     nudges: u32,
 }
 
 impl Hit {
-    /// Nothing planned yet.
     pub fn new() -> Self {
         Self {
             phase: Phase::Seek(None),

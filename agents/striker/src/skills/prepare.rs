@@ -33,7 +33,6 @@ enum Phase {
     Retreat { until: f64 },
 }
 
-/// The skill's memory.
 #[derive(Debug, Clone)]
 pub struct Prepare {
     phase: Phase,
@@ -42,7 +41,6 @@ pub struct Prepare {
 }
 
 impl Prepare {
-    /// Nothing planned yet.
     pub fn new() -> Self {
         Self {
             phase: Phase::Search {

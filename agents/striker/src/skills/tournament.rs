@@ -29,7 +29,6 @@ pub struct Tournament {
 }
 
 impl Tournament {
-    /// A fresh rally.
     pub fn new() -> Self {
         Self {
             mode: Mode::Wait,

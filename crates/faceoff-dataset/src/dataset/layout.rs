@@ -9,7 +9,6 @@ pub enum Layout {
     /// What the host took of an answer's time is not told apart. Mean computation times are summed up in
     /// order of play, as in all that follow.
     Three,
-    /// Today's.
     Four,
 }
 
@@ -32,7 +31,6 @@ impl Layout {
             .find(|layout| layout.schema() == schema)
     }
 
-    /// For messages.
     pub(super) fn all() -> String {
         Self::ALL.map(Self::schema).join(", ")
     }

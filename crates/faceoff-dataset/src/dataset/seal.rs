@@ -14,7 +14,6 @@ const DIGITS: u64 = 64;
 pub(super) enum Seal {
     /// The bytes are those that were sealed.
     Intact,
-    /// They are not.
     Broken,
     /// The file does not end with a seal.
     Absent,

@@ -36,7 +36,6 @@ pub struct RecordedGame<'a> {
     pub spec: &'a GameSpec,
     /// The agents' names, the first side's first.
     pub agents: &'a [String; 2],
-    /// What was played.
     pub played: FinishedGame<GameRecorder>,
     /// How evenly the slot kept time.
     pub calibration: GameCalibration,
@@ -49,7 +48,6 @@ pub struct RecordedGame<'a> {
 pub struct GameArchives {
     /// The score, which is also the recording's `results.json`.
     pub score: GameScore,
-    /// What happened.
     pub outcome: GameOutcome,
     /// Size and hash of `game.zip`.
     pub game: FileDigest,

@@ -6,9 +6,7 @@ use faceoff_types::Side;
 pub const GAME_FILE: &str = "game.zip";
 /// What replays of the game are drawn from.
 pub(super) const CLIPS_FILE: &str = "clips";
-/// The true motion.
 pub(super) const MOTION_FILE: &str = "motion.parquet";
-/// The rallies.
 pub(super) const RALLIES_FILE: &str = "rallies.parquet";
 /// What happened: all that scoring needs but the times.
 pub(super) const OUTCOME_FILE: &str = "outcome.json";

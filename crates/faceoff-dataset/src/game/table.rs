@@ -44,7 +44,6 @@ impl GameTable {
         })
     }
 
-    /// Its file's name.
     pub const fn name(&self) -> &'static str {
         self.name
     }

@@ -12,7 +12,6 @@ use faceoff_types::Ruleset;
 /// What was found to be identical.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VerifiedGame {
-    /// Rallies simulated again.
     pub rallies: u32,
     /// Control steps simulated again.
     pub steps: u32,

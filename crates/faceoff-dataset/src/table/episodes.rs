@@ -107,7 +107,6 @@ impl EpisodeRows {
         &self.schema
     }
 
-    /// Rows so far.
     pub fn len(&self) -> usize {
         self.episodes.len()
     }

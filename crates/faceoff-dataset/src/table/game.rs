@@ -77,7 +77,6 @@ impl MotionRows {
         &self.schema
     }
 
-    /// Rows so far.
     pub fn len(&self) -> usize {
         self.numbers.steps.len()
     }

@@ -5,7 +5,6 @@ use std::fmt;
 /// A recorded value that is not what the simulation gives.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Difference {
-    /// The file.
     pub file: &'static str,
     /// The task, where it is about one.
     pub task: Option<Task>,
@@ -18,7 +17,6 @@ pub struct Difference {
     pub step: Option<u32>,
     /// The column, or the place in a JSON file.
     pub field: String,
-    /// What is recorded.
     pub recorded: String,
     /// What it should be.
     pub expected: String,

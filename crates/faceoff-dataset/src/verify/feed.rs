@@ -13,7 +13,6 @@ use std::{collections::BTreeMap, path::Path};
 pub(super) struct Recorded {
     pub task: Task,
     pub episode: u32,
-    /// One row.
     pub row: RecordBatch,
     /// Its steps, as many as the row says.
     pub steps: Vec<RecordBatch>,

@@ -26,7 +26,6 @@ pub(super) struct Replayed {
     pub outcome: EpisodeOutcome,
     /// What scoring needs of its steps.
     pub steps: Vec<Measured>,
-    /// As recorded.
     pub host_noise_reruns: u32,
 }
 

@@ -20,7 +20,6 @@ pub struct SeasonClaim {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{what} does not follow from the season's secret: stated {stated}, derived {derived}")]
 pub struct SeasonMismatch {
-    /// Which.
     pub what: &'static str,
     /// What the dataset or the organiser states.
     pub stated: String,

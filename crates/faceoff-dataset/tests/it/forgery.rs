@@ -35,7 +35,6 @@ impl Forgery {
         self.dir.path().join(name)
     }
 
-    /// Rewrites a table.
     pub fn table(&self, name: &str, change: impl FnOnce(RecordBatch) -> RecordBatch) {
         let path = self.path(name);
         let batch = change(table(&path));

@@ -13,7 +13,6 @@ use serde_json::{Value, json};
 
 const SHARDS: [(Task, std::ops::Range<u32>); 2] = [(Task::Hit, 0..2), (Task::Defend, 0..2)];
 
-/// Everything is another.
 fn wild() -> Variation {
     serde_json::from_value(json!({
         "weights": { "hit": 0.125, "defend": 0.875, "prepare": 0.0 },

@@ -21,9 +21,7 @@ struct Recorded {
     site: Site,
     alpha: TestTeam,
     beta: TestTeam,
-    /// In the API.
     path: String,
-    /// Pages.
     page: String,
 }
 

@@ -17,7 +17,6 @@ use std::{
 };
 use tokio::{net::TcpListener, sync::watch, task::JoinHandle};
 
-/// What came.
 #[derive(Debug, Clone)]
 pub struct Got {
     pub id: String,
@@ -49,7 +48,6 @@ pub enum Behaves {
     Answers(u16),
     /// With a redirect to itself.
     Redirects,
-    /// It answers nothing.
     Hangs,
 }
 

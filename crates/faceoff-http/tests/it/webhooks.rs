@@ -33,7 +33,6 @@ async fn deliver(site: &Site) {
     deliverer(site, here()).deliver_due().await.unwrap();
 }
 
-/// A member's token.
 async fn member(site: &Site, team: &TestTeam, name: &str) -> String {
     let invited = json!({ "role": "member", "team": team.id, "note": name });
     let path = "/api/v1/invitations";

@@ -48,7 +48,6 @@ pub(super) struct Heading {
     pub(super) blind: Option<&'static str>,
     /// Is it hidden from the viewer?
     pub(super) is_hidden: bool,
-    /// May it change?
     pub(super) result: String,
     pub(super) is_provisional: bool,
     /// The overall board and those of the tasks.

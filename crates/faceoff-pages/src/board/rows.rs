@@ -43,7 +43,6 @@ pub(super) struct Moved {
     /// For the eye; empty of who stands where they stood.
     pub(super) sign: String,
     pub(super) class: &'static str,
-    /// For the ear.
     pub(super) told: String,
     /// By how many percentage points its score has changed; `None` of a new one, and of one that did not.
     pub(super) score: Option<String>,

@@ -26,7 +26,6 @@ pub(crate) struct Bars {
     pub(crate) told: String,
 }
 
-/// A bar.
 #[derive(Debug)]
 pub(crate) struct Bar {
     pub(crate) class: &'static str,

@@ -16,7 +16,6 @@ pub(crate) struct Course {
     pub(crate) fouls: [String; 2],
     /// Where the rows of fouls lie.
     pub(crate) foul_rows: [String; 2],
-    /// Minutes.
     pub(crate) minutes: Vec<Tick>,
     pub(crate) grid: Vec<Tick>,
     /// What it shows in a sentence, for whoever does not see it.

@@ -36,7 +36,6 @@ pub(crate) struct Panel {
     pub(crate) path: String,
 }
 
-/// A value's place.
 #[derive(Debug)]
 pub(crate) struct Point {
     pub(crate) x: String,

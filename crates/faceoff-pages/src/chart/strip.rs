@@ -40,7 +40,6 @@ pub(crate) struct Counted {
 #[derive(Debug)]
 pub(crate) struct Strip {
     pub(crate) rows: Vec<StripRow>,
-    /// Powers of ten.
     pub(crate) grid: Vec<Tick>,
     /// Are there distributions above the rows?
     pub(crate) has_shapes: bool,

@@ -15,7 +15,6 @@ pub(super) struct Played {
     pub(super) id: EvaluationId,
     pub(super) day: String,
     pub(super) state: String,
-    /// In percent.
     pub(super) score: Option<String>,
     /// Episodes played and to play, while it is under way.
     pub(super) progress: Option<(u32, u32)>,

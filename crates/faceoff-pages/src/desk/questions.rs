@@ -57,7 +57,6 @@ pub(super) async fn page(
     page_with(&app, &member, Said::Done(&said), String::new()).await
 }
 
-/// Asks.
 pub(super) async fn ask(
     member: Member,
     State(app): State<App>,

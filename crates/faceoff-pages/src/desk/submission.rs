@@ -129,7 +129,6 @@ pub(super) async fn activate(
     }
 }
 
-/// Takes it back.
 pub(super) async fn withdraw(
     member: Member,
     State(app): State<App>,
@@ -150,7 +149,6 @@ pub(super) struct Words {
     note: String,
 }
 
-/// Changes that.
 pub(super) async fn describe(
     member: Member,
     State(app): State<App>,

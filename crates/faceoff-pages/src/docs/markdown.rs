@@ -67,7 +67,6 @@ pub(super) fn document(markdown: &str, path: &str, title: &str, site: &impl Site
 #[derive(Debug, Default)]
 pub(super) struct Prose {
     pub(super) html: String,
-    /// In one line.
     pub(super) plain: String,
 }
 

@@ -10,11 +10,9 @@ use serde_json::{Map, Value};
 pub(super) use shape::{Field, Part};
 use shape::{about, fields, shape};
 
-/// Where it begins.
 pub(super) const PATH: &str = "/docs/api-reference";
 const SCHEMAS_PATH: &str = "/docs/api-reference/schemas";
 
-/// All of it.
 #[derive(Debug)]
 pub(super) struct Reference {
     pub(super) about: Prose,
@@ -49,7 +47,6 @@ pub(super) struct Operation {
     pub(super) shared: Vec<(String, String)>,
 }
 
-/// Who may ask.
 #[derive(Debug)]
 pub(super) enum Tokens {
     None,

@@ -5,10 +5,8 @@ use pulldown_cmark::{Event, TagEnd};
 /// What stands below a heading of the second or third level, or above the first of them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Section {
-    /// The page's title.
     pub(super) page: String,
     pub(super) heading: String,
-    /// Where it is.
     pub(super) href: String,
     /// Its words, in one line.
     pub(super) text: String,

@@ -4,7 +4,6 @@ use super::live::{at, before};
 use crate::{chart::Course, table_drawing::way};
 use faceoff_replay::{Break, BreakKind, GameAnalysis};
 
-/// The time line.
 pub(super) struct TimeLine {
     pub(super) chart: Course,
     pub(super) rows: Vec<Row>,

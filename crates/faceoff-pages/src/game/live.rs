@@ -6,7 +6,6 @@ use faceoff_service::views::game_live::GameLive;
 use faceoff_types::{GameHappening, Side};
 use jiff::{SignedDuration, Timestamp};
 
-/// How it stands.
 pub(super) struct Live {
     pub(super) score: [u32; 2],
     pub(super) fouls: [u32; 2],

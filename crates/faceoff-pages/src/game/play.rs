@@ -16,11 +16,9 @@ pub(super) struct Possession {
     pub(super) halves: [String; 2],
     /// That each side had touched it last in the rally.
     pub(super) touched: [String; 2],
-    /// That neither had.
     pub(super) untouched: String,
 }
 
-/// A side's shots.
 pub(super) struct Shots {
     pub(super) team: String,
     pub(super) count: usize,

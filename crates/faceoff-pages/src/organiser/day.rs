@@ -48,7 +48,6 @@ struct Page {
     /// Slots; units under way and waiting, if the queue tells.
     slots: u32,
     queue: Option<(u32, u32)>,
-    /// Whether it fits.
     load: Option<String>,
     rows: Vec<Row>,
     over: usize,

@@ -104,7 +104,6 @@ pub(super) async fn page(
     page_with(&app, &organising, Said::Done(&said), Typed::default()).await
 }
 
-/// Tells everybody.
 pub(super) async fn announce(
     organising: Organising,
     State(app): State<App>,
@@ -132,7 +131,6 @@ pub(super) struct AnswerForm {
     public: String,
 }
 
-/// Answers a question.
 pub(super) async fn answer(
     organising: Organising,
     State(app): State<App>,

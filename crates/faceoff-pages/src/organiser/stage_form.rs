@@ -27,7 +27,6 @@ pub(super) struct StageForm {
     pub(super) max_faults: String,
     /// A time, five fields of a cron expression, or nothing.
     pub(super) schedule: String,
-    /// Dates.
     pub(super) days_off: String,
     pub(super) day_deadline: String,
     pub(super) standings: String,

@@ -78,7 +78,6 @@ pub(super) async fn page(
     page_with(&app, &organising, Said::Done(&said), None).await
 }
 
-/// Makes a stage.
 pub(super) async fn create(
     organising: Organising,
     State(app): State<App>,

@@ -32,7 +32,6 @@ struct Page {
 struct Disk {
     free: String,
     size: String,
-    /// Of a hundred.
     used: u64,
 }
 

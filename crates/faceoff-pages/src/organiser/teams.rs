@@ -126,7 +126,6 @@ pub(super) async fn change(
     }
 }
 
-/// Who may come.
 #[derive(Deserialize)]
 pub(super) struct SeasonForm {
     #[serde(default)]

@@ -7,7 +7,6 @@ use faceoff_service::{app::AppState, problem::Problem};
 use faceoff_types::{RoundNumber, SubmissionId, TeamId, TeamName};
 use std::collections::BTreeMap;
 
-/// A team.
 pub(super) struct Entrant {
     pub(super) team: TeamName,
     pub(super) team_id: TeamId,

@@ -30,7 +30,6 @@ pub(super) struct Row {
     pub(super) goals: [u64; 2],
     pub(super) difference: String,
     pub(super) penalty_points: String,
-    /// How it left.
     pub(super) left: Option<&'static str>,
 }
 

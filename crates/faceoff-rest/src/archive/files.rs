@@ -25,7 +25,6 @@ impl Files {
         }
     }
 
-    /// Makes a file.
     pub(super) async fn put(&mut self, path: &str, content: Vec<u8>) -> Result<(), Problem> {
         let place = self.fresh();
         let (bytes, blake3) = (content.len() as u64, blake3::hash(&content).to_string());

@@ -76,7 +76,6 @@ impl InstantAgent {
     }
 }
 
-/// The default limits.
 pub fn environment(isolation: Isolation) -> AgentEnvironment {
     AgentEnvironment {
         limits: Limits::default(),

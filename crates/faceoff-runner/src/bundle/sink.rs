@@ -3,11 +3,9 @@ use std::io::Read;
 
 /// What an archive's entries become.
 pub(super) trait Sink {
-    /// A folder.
     fn folder(&mut self, entry: &str, mode: u32) -> Result<(), BundleError>;
     /// A file, its content streamed.
     fn file(&mut self, entry: &str, mode: u32, content: &mut dyn Read) -> Result<(), BundleError>;
-    /// A symbolic link.
     fn link(&mut self, entry: &str, target: &str) -> Result<(), BundleError>;
     /// Another name of a file.
     fn hard_link(&mut self, entry: &str, target: &str) -> Result<(), BundleError>;

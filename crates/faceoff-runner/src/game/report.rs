@@ -20,7 +20,6 @@ use std::{fs, path::Path};
 
 /// Follows a game as it runs, and can stop it.
 pub trait GameObserver {
-    /// A rally begins.
     fn rally_begun(&mut self, _start: &RallyStart<'_>) {}
     /// A control step was played. Called as often as the game has steps, so it must be cheap.
     fn stepped(&mut self, _row: &GameStepRow<'_>) {}
@@ -44,7 +43,6 @@ pub struct GameReport {
     pub logs: [String; 2],
 }
 
-/// Tables under way.
 const TABLES: &str = "tables.partial";
 
 /// Plays a game and records it in the folder `out`, which is created: `game.zip`, and `side-1.zip` and

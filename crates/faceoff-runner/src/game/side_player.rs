@@ -273,7 +273,6 @@ impl<'a> SidePlayer<'a> {
         }
     }
 
-    /// Says goodbye.
     pub fn finish(&mut self) -> Result<(), PlatformFault> {
         if let Some(session) = self.session.take() {
             let stderr = session.finish()?;

@@ -155,7 +155,6 @@ pub fn layout() -> Tar {
     Tar::new().file("oci-layout", 0o644, b"{\"imageLayoutVersion\":\"1.0.0\"}")
 }
 
-/// A layout's list.
 pub fn index(tar: Tar, images: &[Value]) -> Tar {
     tar.file(
         "index.json",

@@ -24,7 +24,6 @@ const SHOWN_BYTES: usize = 4;
 /// A bundle on disk; the file goes when this is dropped.
 #[derive(Debug)]
 pub struct Uploaded {
-    /// Where it is.
     pub file: NamedTempFile,
     /// Its size in bytes.
     pub bytes: u64,

@@ -55,7 +55,6 @@ pub async fn questions(
     Ok(shown.collect())
 }
 
-/// Asks the organisers.
 #[boxed]
 pub async fn ask(
     app: &AppState,

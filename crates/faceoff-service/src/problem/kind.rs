@@ -162,7 +162,6 @@ impl ProblemKind {
         self.row().0
     }
 
-    /// HTTP status.
     #[must_use]
     pub const fn status(self) -> StatusCode {
         self.row().1

@@ -26,7 +26,6 @@ pub struct AblationClips {
 pub struct Differing {
     /// In the ideal simulator.
     pub ideal: EpisodeLine,
-    /// With the perturbation.
     pub perturbed: EpisodeLine,
 }
 

@@ -3,7 +3,6 @@
 use faceoff_api::views::announcement::{AnnouncementView, QuestionView, TermsView};
 use faceoff_store::{Announcement, Question, Terms};
 
-/// An announcement.
 pub fn of(announcement: Announcement) -> AnnouncementView {
     AnnouncementView {
         id: announcement.id,

@@ -13,7 +13,6 @@ pub struct Episode {
     pub has_before: bool,
     /// Is there one after it?
     pub has_after: bool,
-    /// What moved.
     pub motion: Clip,
     /// For whoever gets the dataset.
     pub observed: Option<Clip>,

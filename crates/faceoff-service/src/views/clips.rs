@@ -20,11 +20,9 @@ use std::collections::BTreeMap;
 /// The recorded clips of an evaluation, for a viewer.
 #[derive(Debug)]
 pub struct Clips {
-    /// Whose clips.
     pub evaluation: Evaluation,
     /// Does the viewer see what was observed, commanded and timed, and the agent's faults?
     pub sees_observed: bool,
-    /// Where they are.
     pub file: ClipFile,
 }
 

@@ -20,9 +20,7 @@ const TOURNAMENTS: usize = 10;
 pub struct NewsItem {
     /// Stays, however often the feed is made.
     pub id: Uuid,
-    /// When.
     pub at: Timestamp,
-    /// In a line.
     pub title: String,
     /// What more there is to say; plain text.
     pub text: Option<String>,

@@ -16,7 +16,6 @@ use std::sync::Arc;
 /// The recorded clips of a game.
 #[derive(Debug)]
 pub struct GameClips {
-    /// Where they are.
     pub file: ClipFile,
     /// Of each side: does the viewer see what it was told and commanded?
     pub sees: [bool; 2],

@@ -7,7 +7,6 @@ use faceoff_types::{GameId, LiveGame, LiveHappening};
 /// How a game stands that is being played, and all that happened in it.
 #[derive(Debug)]
 pub struct GameLive {
-    /// How it stands.
     pub stands: LiveGame,
     /// In the order in which it was told.
     pub happenings: Vec<LiveHappening>,

@@ -34,7 +34,6 @@ pub fn of(invitation: Invitation, now: Timestamp) -> InvitationView {
     }
 }
 
-/// A registration.
 pub fn registration(registration: Registration) -> RegistrationView {
     let (state, decided_at, reason, team) = match registration.state {
         RegistrationState::Waiting => ("waiting", None, None, None),

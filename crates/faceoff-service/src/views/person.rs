@@ -7,7 +7,6 @@ use faceoff_api::views::{
 };
 use faceoff_store::{Person, Who};
 
-/// A person.
 pub fn of(person: Person) -> PersonView {
     PersonView {
         id: person.id,

@@ -74,7 +74,6 @@ impl Sight {
         })
     }
 
-    /// All of everything.
     #[boxed]
     pub async fn of_organiser(app: &AppState) -> Result<Self, Problem> {
         Self::of(app, Viewer::Organiser).await

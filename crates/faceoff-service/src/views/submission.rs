@@ -23,7 +23,6 @@ pub async fn find(app: &AppState, id: SubmissionId) -> Result<SubmissionView, Pr
     of(app, app.store.submission(id).await?).await
 }
 
-/// With its log.
 #[boxed]
 pub async fn of(app: &AppState, submission: Submission) -> Result<SubmissionView, Problem> {
     let log = app.store.submission_log(submission.id).await?;

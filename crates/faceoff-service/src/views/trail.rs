@@ -25,7 +25,6 @@ pub struct Trail {
 /// A board of an earlier day.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Before {
-    /// Its newest day.
     pub day: Date,
     teams: BTreeMap<TeamId, Stood>,
 }

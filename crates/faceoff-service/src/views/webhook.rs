@@ -28,7 +28,6 @@ pub fn of(webhook: Webhook, now: Timestamp) -> WebhookView {
     }
 }
 
-/// A delivery.
 pub fn delivery(delivery: Delivery) -> DeliveryView {
     DeliveryView {
         id: delivery.id,

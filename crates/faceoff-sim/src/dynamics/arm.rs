@@ -99,7 +99,6 @@ pub struct Bodies<T> {
 }
 
 impl<T: Lanes> Bodies<T> {
-    /// The nominal bodies.
     #[inline(always)]
     pub fn new(kinematics: &Kinematics<T>) -> Self {
         let links = std::array::from_fn(|i| {

@@ -49,7 +49,6 @@ pub trait Lanes:
     /// The nearest integer, ties to even, of a number below 2⁵¹ in size.
     fn nearest(self) -> Self;
 
-    /// The size.
     fn abs(self) -> Self;
 
     /// The size of `self` with the sign of `other`, the sign of a zero included.

@@ -30,19 +30,16 @@ impl<T: Lanes> Vec3<T> {
         Self::new(T::splat(v[0]), T::splat(v[1]), T::splat(v[2]))
     }
 
-    /// The zero vector.
     #[inline(always)]
     pub fn zero() -> Self {
         Self::splat([0.0; 3])
     }
 
-    /// Scalar product.
     #[inline(always)]
     pub fn dot(self, o: Self) -> T {
         self.x * o.x + self.y * o.y + self.z * o.z
     }
 
-    /// Vector product.
     #[inline(always)]
     pub fn cross(self, o: Self) -> Self {
         Self::new(
@@ -52,7 +49,6 @@ impl<T: Lanes> Vec3<T> {
         )
     }
 
-    /// Times a number.
     #[inline(always)]
     pub fn scale(self, s: T) -> Self {
         Self::new(self.x * s, self.y * s, self.z * s)
@@ -135,7 +131,6 @@ pub struct Motion<T> {
 }
 
 impl<T: Lanes> Motion<T> {
-    /// No motion.
     #[inline(always)]
     pub fn zero() -> Self {
         Self {
@@ -159,7 +154,6 @@ impl<T: Lanes> Motion<T> {
         self.linear + self.angular.cross(point)
     }
 
-    /// Times a rate.
     #[inline(always)]
     pub fn scale(self, s: T) -> Self {
         Self {
@@ -214,7 +208,6 @@ pub struct Force<T> {
 }
 
 impl<T: Lanes> Force<T> {
-    /// No force.
     #[inline(always)]
     pub fn zero() -> Self {
         Self {
@@ -238,17 +231,11 @@ impl<T: Lanes> Add for Force<T> {
 /// A symmetric 3×3 matrix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Symmetric<T> {
-    /// Diagonal entries.
     pub xx: T,
-    /// Diagonal entry.
     pub yy: T,
-    /// Diagonal entry.
     pub zz: T,
-    /// Off-diagonal entry.
     pub xy: T,
-    /// Off-diagonal entry.
     pub xz: T,
-    /// Off-diagonal entry.
     pub yz: T,
 }
 
@@ -267,7 +254,6 @@ impl<T: Lanes> Symmetric<T> {
         }
     }
 
-    /// Matrix times vector.
     #[inline(always)]
     pub fn times(self, v: Vec3<T>) -> Vec3<T> {
         Vec3::new(

@@ -29,7 +29,6 @@ pub struct ConstraintValues {
 }
 
 impl ConstraintValues {
-    /// Of no instant.
     pub(crate) const ZERO: Self = Self {
         joint_pos: 0.0,
         joint_vel: 0.0,
@@ -47,7 +46,6 @@ impl ConstraintValues {
         )
     }
 
-    /// At one instant.
     #[must_use]
     pub fn new(
         q: &[f64; JOINTS],

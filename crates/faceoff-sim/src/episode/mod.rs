@@ -143,7 +143,6 @@ impl Episode {
         self.puck_lost
     }
 
-    /// Control steps played.
     #[must_use]
     pub fn steps(&self) -> u32 {
         self.steps
@@ -185,7 +184,6 @@ impl Episode {
         }
     }
 
-    /// The physical world.
     #[must_use]
     pub fn world(&self) -> &World {
         &self.world
@@ -202,7 +200,6 @@ pub struct StepOutcome {
 }
 
 impl StepOutcome {
-    /// Of no step.
     pub(crate) const NONE: Self = Self {
         end: None,
         constraints: ConstraintValues::ZERO,
@@ -214,13 +211,10 @@ impl StepOutcome {
 pub struct EpisodeState {
     /// x, y, yaw, vx, vy, yaw rate.
     pub puck: [f64; 6],
-    /// Joint positions.
     pub q: [f64; JOINTS],
-    /// Joint velocities.
     pub dq: [f64; JOINTS],
     /// Low-pass filtered joint velocities.
     pub dq_filtered: [f64; JOINTS],
-    /// Universal joint angles.
     pub universal: [f64; 2],
     /// End effector in the robot's own base frame.
     pub ee: [f64; 3],

@@ -53,7 +53,6 @@ pub struct TaskRules {
     pub lost_speed_m_s: f64,
 }
 
-/// The ruleset's numbers.
 pub const TASK_RULES: TaskRules = TaskRules {
     hit_x_m: [-0.7, -0.2],
     hit_speed_m_s: [0.0, 0.5],

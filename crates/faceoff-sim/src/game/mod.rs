@@ -26,7 +26,6 @@ pub struct GameSetup {
     /// Perturbations. The table, the puck's tracking and the plant are the same for both robots, noise and
     /// delays each robot's own.
     pub factors: Factors,
-    /// Their magnitudes.
     pub settings: PerturbationSettings,
     /// Both arms; nominal unless the factors contain the model mismatch.
     pub plant: Plant,
@@ -169,7 +168,6 @@ impl Game {
         GameState::with_constraints(&self.rally.world).0
     }
 
-    /// Control steps played.
     #[must_use]
     pub fn steps(&self) -> u32 {
         self.steps

@@ -21,7 +21,6 @@ pub struct GameRules {
     pub lost_speed_m_s: f64,
 }
 
-/// The ruleset's numbers.
 pub const GAME_RULES: GameRules = GameRules {
     start_x_m: [0.2, 0.7],
     foul_after_s: 15.0,

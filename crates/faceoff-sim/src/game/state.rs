@@ -6,11 +6,8 @@ use crate::{episode::constraints::ConstraintValues, model::JOINTS, world::World}
 pub struct GameState {
     /// x, y, yaw, vx, vy, yaw rate.
     pub puck: [f64; 6],
-    /// Joint positions.
     pub q: [[f64; JOINTS]; 2],
-    /// Joint velocities.
     pub dq: [[f64; JOINTS]; 2],
-    /// Universal joint angles.
     pub universal: [[f64; 2]; 2],
     /// End effectors, each in its robot's own base frame.
     pub ee: [[f64; 3]; 2],

@@ -14,7 +14,6 @@ pub struct RehearsalTable {
 }
 
 impl RehearsalTable {
-    /// Draws a table.
     #[must_use]
     pub fn draw(settings: &DelaySettings, mut stream: Stream) -> Self {
         let [low, high] = settings.puck_damping_per_s;

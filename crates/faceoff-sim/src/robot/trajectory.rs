@@ -30,7 +30,6 @@ impl<L: Lanes> Setpoint<L> {
 }
 
 impl Setpoint {
-    /// At rest.
     #[must_use]
     pub fn at_rest(position: [f64; JOINTS]) -> Self {
         Self {

@@ -26,7 +26,6 @@ pub struct UniversalJoint<T = f64> {
 }
 
 impl<T: Lanes> UniversalJoint<T> {
-    /// At rest.
     pub fn at_rest() -> Self {
         Self {
             velocity_filtered: [T::splat(0.0); 2],

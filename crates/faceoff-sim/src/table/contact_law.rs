@@ -13,7 +13,6 @@ pub struct Material {
     pub stiffness_per_s2: f64,
     /// Inverse inertia that scales the regularisation, 1/kg.
     pub inverse_inertia: f64,
-    /// Coefficient of friction.
     pub friction: f64,
 }
 

@@ -47,7 +47,6 @@ pub const TABLE: Table = Table {
 /// The puck: a disc, free in x, y and yaw.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disc {
-    /// m.
     pub radius_m: f64,
     /// kg.
     pub mass_kg: f64,
@@ -61,7 +60,6 @@ pub struct Disc {
     pub height_m: f64,
 }
 
-/// The challenge's puck.
 pub const PUCK: Disc = Disc {
     radius_m: 0.03165,
     mass_kg: 0.01,

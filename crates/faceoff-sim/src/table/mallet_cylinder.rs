@@ -9,7 +9,6 @@ use crate::model::TOOL;
 /// A leaning cylinder in the table frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MalletCylinder {
-    /// Its centre, m.
     pub centre: [f64; 3],
     /// How far the axis moves in x and y per metre of height.
     pub lean: [f64; 2],
@@ -23,7 +22,6 @@ const STEEPEST_LEAN: f64 = 1.0;
 pub const FARTHEST_M: f64 = 1.415 * TOOL.cylinder_half_height_m + 1.733 * TOOL.cylinder_radius_m;
 
 impl MalletCylinder {
-    /// Upright.
     #[must_use]
     pub fn upright(centre: [f64; 3]) -> Self {
         Self {

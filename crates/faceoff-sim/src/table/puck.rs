@@ -24,7 +24,6 @@ pub const INVERSE_INERTIA: [f64; 3] = [
 pub struct Damping([f64; 3]);
 
 impl Damping {
-    /// The reference's.
     pub const NOMINAL: Self = Self([PUCK.damping, PUCK.damping, PUCK.yaw_damping]);
 
     /// With another decay rate of the velocity, 1/s.

@@ -58,7 +58,6 @@ struct Solved {
 }
 
 impl Apart {
-    /// No arm.
     pub fn none() -> Self {
         let nothing = Solved {
             acceleration: [0.0; DOFS],

@@ -26,7 +26,6 @@ pub struct ArmLanes<T: Lanes> {
     pub plant: PlantLanes<T>,
 }
 
-/// Positions and velocities.
 #[derive(Debug, Clone, Copy)]
 pub struct MotionLanes<T> {
     pub q: [T; DOFS],

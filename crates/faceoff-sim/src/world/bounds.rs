@@ -134,7 +134,6 @@ pub enum Runaway {
         /// From 0.
         joint: usize,
     },
-    /// The puck.
     Puck,
 }
 

@@ -67,16 +67,13 @@ pub struct Contacts {
 pub enum Pair<'a> {
     /// A rim and the puck.
     Rim {
-        /// Puck's velocity.
         puck: &'a [f64; 3],
     },
     /// A mallet and the puck.
     Mallet {
         /// The mallet's robot, 0 or 1.
         robot: usize,
-        /// The mallet.
         mallet: &'a MalletMotion,
-        /// Puck's velocity.
         puck: &'a [f64; 3],
     },
     /// Robot 1's mallet and robot 2's.
@@ -87,7 +84,6 @@ pub enum Pair<'a> {
 }
 
 impl Contacts {
-    /// No contact.
     pub fn none() -> Self {
         let row = Row {
             puck: [0.0; 3],

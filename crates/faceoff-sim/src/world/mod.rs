@@ -35,7 +35,6 @@ pub use impacts::{Impact, Impacts, Met};
 /// A mallet's striking cylinder: centre x, y, z (m) and velocity vx, vy (m/s), table frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MalletState {
-    /// m.
     pub position: [f64; 3],
     /// m/s.
     pub velocity: [f64; 2],
@@ -197,7 +196,6 @@ impl World {
         self.arms[robot].ee_before
     }
 
-    /// A robot's mallet.
     #[must_use]
     pub fn mallet(&self, robot: usize) -> MalletState {
         if let (0, Some(mallet)) = (robot, self.imposed) {

@@ -66,7 +66,6 @@ pub fn substep<T: Lanes, A>(arms: &mut ArmLanes<T>, seats: &mut [Seat<'_, A>], a
     }
 }
 
-/// Controllers and inertias.
 #[inline(always)]
 fn prepare<T: Lanes, A>(arms: &mut ArmLanes<T>, seats: &[Seat<'_, A>]) -> Prepared<T> {
     let desired = Setpoint::gather(|lane| {

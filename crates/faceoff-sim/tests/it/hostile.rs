@@ -10,7 +10,6 @@ use faceoff_types::{ACTION_LIMIT, EpisodeEnd, Factors, Seed, Task};
 /// How an agent chooses its numbers.
 #[derive(Debug, Clone, Copy)]
 enum Habit {
-    /// The same everywhere.
     Constant,
     /// The sign changes with each step.
     Swinging,

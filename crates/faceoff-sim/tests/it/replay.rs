@@ -65,7 +65,6 @@ impl Bounce {
     }
 }
 
-/// Replays the bounces.
 pub fn bounces() -> Vec<Bounce> {
     let replay = |case: &serde_json::Value| {
         let recorded: Vec<[f64; 6]> = rows(&case["state"]);
@@ -89,7 +88,6 @@ pub struct Impact {
     pub kind: String,
     /// Velocity over the peak speed.
     pub velocity: f64,
-    /// m.
     pub position_m: f64,
 }
 
@@ -100,7 +98,6 @@ impl Impact {
     }
 }
 
-/// Replays the impacts.
 pub fn impacts() -> Vec<Impact> {
     let replay = |case: &serde_json::Value| {
         let recorded: Vec<[f64; 11]> = rows(&case["rows"]);
@@ -163,7 +160,6 @@ pub struct StepDifferences {
     /// rad.
     pub joints_rad: f64,
     pub constraints: f64,
-    /// m.
     pub puck_m: f64,
 }
 

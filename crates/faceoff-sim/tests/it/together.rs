@@ -23,7 +23,6 @@ const NARROW: Bounds = Bounds {
 /// What an agent does.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Habit {
-    /// Meets the puck.
     Strikes,
     Holds,
     /// Drives its joints against their stops.

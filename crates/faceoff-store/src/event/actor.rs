@@ -13,7 +13,6 @@ pub enum Actor {
     Person(PersonId),
     /// Somebody without an account.
     Visitor,
-    /// The daily start.
     Schedule,
     /// A worker's slot, by the name under which it claims.
     Worker(String),

@@ -3,7 +3,6 @@
 use super::Event;
 
 impl Event {
-    /// Its name.
     #[must_use]
     pub fn kind(&self) -> String {
         let told = serde_json::to_value(self).unwrap_or_default();

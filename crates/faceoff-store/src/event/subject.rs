@@ -11,13 +11,11 @@ use std::{fmt, str::FromStr};
 pub enum Subject {
     /// The season, of which a data folder has one.
     Season,
-    /// A stage.
     Stage(StageId),
     /// A day of a stage.
     Day(StageDay),
     /// A day from before there were stages.
     DayOfNone(Date),
-    /// A team.
     Team(TeamId),
     /// An upload and its smoke run.
     Submission(SubmissionId),
@@ -35,7 +33,6 @@ pub enum Subject {
     Question(QuestionId),
     /// A trial or a re-evaluation with its runs.
     Proposal(ProposalId),
-    /// Rounds of games.
     Tournament(TournamentId),
     /// One game with its attempts.
     Game(GameId),

@@ -17,7 +17,6 @@ use jiff::Timestamp;
 pub const MAX_OPEN_QUESTIONS: i64 = 10;
 
 impl Store {
-    /// Tells everybody.
     #[boxed]
     pub async fn announce(
         &self,

@@ -20,9 +20,7 @@ use std::path::Path;
 /// A database that was found to be whole.
 #[derive(Debug)]
 pub struct CheckedDatabase {
-    /// The season's name.
     pub season: String,
-    /// Its newest migration.
     pub schema: i64,
     /// Artifacts without which something would be missing.
     pub needed: Vec<Needed>,

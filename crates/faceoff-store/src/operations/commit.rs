@@ -22,7 +22,6 @@ use jiff::Timestamp;
 /// database's ([`StoreError::Database`]); after any other nothing was.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Committed {
-    /// It is stored.
     Now,
     /// This very lease has committed before; nothing was changed.
     Before,

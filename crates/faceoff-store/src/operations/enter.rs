@@ -17,7 +17,6 @@ use faceoff_types::{EvaluationId, Ruleset, RunId, SeedLabel, StageDay, Submissio
 
 /// Who plays a day.
 pub(crate) struct Entrant {
-    /// Of its evaluation.
     pub(crate) id: EvaluationId,
     pub(crate) submission: SubmissionId,
     pub(crate) team: TeamId,

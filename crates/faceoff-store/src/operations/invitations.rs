@@ -31,7 +31,6 @@ pub struct NewInvitation {
     pub code_hash: [u8; 32],
     /// What it makes of whoever follows the link.
     pub invited_as: InvitedAs,
-    /// For whom.
     pub note: String,
     /// From then on it is worth nothing.
     pub expires_at: Timestamp,
@@ -60,10 +59,8 @@ pub struct Joining {
     pub token_expires_at: Option<Timestamp>,
 }
 
-/// Who has joined.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joined {
-    /// They.
     pub person: Person,
     /// Their team, unless they are an organiser.
     pub team: Option<Team>,

@@ -65,7 +65,6 @@ pub(crate) const PROPOSAL_SHARD: NewUnit = Kind::Shard.waiting_in(lane("proposal
 /// Which work is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Lot {
-    /// Whatever there is.
     All,
     /// What is played: shards and games.
     Plays,

@@ -26,7 +26,6 @@ pub const FILES_KEPT: SignedDuration = RECORDINGS_KEPT;
 /// How much goes, or has gone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Removed {
-    /// Datasets of evaluations.
     pub datasets: u32,
     /// Of so many teams.
     pub teams: u32,
@@ -41,7 +40,6 @@ pub struct Removed {
 }
 
 impl Removed {
-    /// Is it nothing?
     #[must_use]
     pub const fn is_nothing(&self) -> bool {
         self.datasets == 0 && self.archives == 0

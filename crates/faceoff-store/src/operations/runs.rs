@@ -17,7 +17,6 @@ use sqlx::SqliteConnection;
 /// What a run is a part of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RunOwner {
-    /// All of it.
     Evaluation(EvaluationId),
     /// One profile of it.
     Ablation(AblationId),

@@ -35,7 +35,6 @@ pub struct NewStage {
 /// What is to be another; `None` stays as it is.
 #[derive(Debug, Clone, Default)]
 pub struct StageChange {
-    /// Its name.
     pub name: Option<StageName>,
     /// While it has not opened.
     pub opens_at: Option<Timestamp>,

@@ -35,7 +35,6 @@ async fn give_token(tx: &mut Tx, team: TeamId, hash: [u8; 32]) -> Result<()> {
 /// What of a team is to be another; `None` stays as it is.
 #[derive(Debug, Clone, Default)]
 pub struct TeamChange {
-    /// Its name.
     pub name: Option<TeamName>,
     /// What it tells of itself, all of it.
     pub profile: Option<TeamProfile>,

@@ -28,9 +28,7 @@ const SESSION_SHOWN: SignedDuration = SignedDuration::from_hours(30 * 24);
 /// Who calls with a token.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Holder {
-    /// With what.
     pub token: Token,
-    /// Who that is.
     pub who: Who,
 }
 
@@ -39,9 +37,7 @@ pub struct Holder {
 pub enum Who {
     /// Whoever may read the data folder.
     Host,
-    /// A team's program.
     Team(Team),
-    /// An organiser.
     Organiser(Person),
     /// A member of a team.
     Member(Person, Team),
@@ -52,7 +48,6 @@ pub enum Who {
 pub struct NewToken {
     /// Of the token's text.
     pub hash: [u8; 32],
-    /// Key or session.
     pub kind: TokenKind,
     /// By whom it speaks.
     pub owner: TokenOwner,

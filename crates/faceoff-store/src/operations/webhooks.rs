@@ -48,7 +48,6 @@ pub struct NewWebhook {
 pub struct WebhookChange {
     /// What its owner calls it.
     pub name: Option<String>,
-    /// Where it is.
     pub url: Option<String>,
     /// What it is told of.
     pub about: Option<Vec<String>>,
@@ -59,7 +58,6 @@ pub struct WebhookChange {
 /// What events have become, for one webhook.
 #[derive(Debug, Clone)]
 pub struct PlannedDeliveries {
-    /// Whose.
     pub webhook: WebhookId,
     /// Where it stood when they were planned.
     pub after: i64,
@@ -72,11 +70,9 @@ pub struct PlannedDeliveries {
 /// What an attempt means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AttemptMeans {
-    /// It was taken.
     Taken,
     /// It is sent again then; never again, if there is no time.
     Failed {
-        /// When.
         again_at: Option<Timestamp>,
     },
     /// The receiver wants nothing any more.

@@ -14,7 +14,6 @@ use faceoff_types::{
 pub struct Claimed {
     /// Proof of the lease.
     pub claim: Claim,
-    /// What to do.
     pub work: Work,
 }
 
@@ -23,7 +22,6 @@ pub struct Claimed {
 pub enum Work {
     /// Check that an uploaded bundle starts, answers and keeps time.
     Smoke {
-        /// What to check.
         submission: Submission,
         /// Of the episodes that it plays, its own.
         seeds: RunSeeds,
@@ -39,24 +37,18 @@ pub enum Work {
         owner: RunOwner,
         /// What the range is a part of.
         run: Run,
-        /// The range.
         shard: Shard,
-        /// The agent.
         bundle: BundleRef,
         /// Of the run's episodes.
         seeds: RunSeeds,
         /// How often it was begun before and broken by us.
         platform_retries: u32,
     },
-    /// Play a game.
     Game {
-        /// Which.
         game: GameId,
-        /// By which rules.
         rules: Box<TournamentRules>,
         /// The agents, the home side's first.
         bundles: [BundleRef; 2],
-        /// Of the game.
         seeds: RunSeeds,
         /// Which attempt this is, from 1.
         attempt: u32,
@@ -67,9 +59,7 @@ pub enum Work {
     },
     /// Join the recordings of an evaluation whose shards are all committed, and score it, whether it counts or not.
     Finalise {
-        /// What is scored.
         evaluation: EvaluationId,
-        /// What was played.
         run: Run,
         /// Artifact key prefixes of the shards' recordings, in order of play.
         recordings: Vec<String>,

@@ -8,7 +8,6 @@ use uuid::Uuid;
 /// Proof of a lease.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Claim {
-    /// What is leased.
     pub unit: Uuid,
     /// Drawn for this lease alone.
     pub nonce: Uuid,
@@ -23,7 +22,6 @@ pub(crate) enum Hold {
     /// It is the unit's lease. Its time may be over: as long as nobody else took the unit, its
     /// holder's work is as good as ever.
     Held {
-        /// The unit's label.
         kind: String,
     },
     /// Under this lease the unit was done.

@@ -15,7 +15,6 @@ use uuid::Uuid;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct NewUnit {
     pub(crate) kind: &'static str,
-    /// Where it waits.
     pub(crate) lane: Lane,
     /// Of a lane, units of a smaller batch are claimed first, whoever they are of.
     pub(crate) batch: i64,
@@ -51,7 +50,6 @@ pub(crate) const fn goes_on(tx: &mut Tx) {
 pub(crate) struct Leased {
     pub(crate) id: Text<Uuid>,
     pub(crate) kind: String,
-    /// This lease counted.
     pub(crate) attempts: u32,
 }
 

@@ -19,7 +19,6 @@ use sqlx::types::Text;
 pub struct BoardRecord {
     /// Whose row it is.
     pub team: Team,
-    /// What was evaluated.
     pub submission: SubmissionId,
     /// When it was uploaded.
     pub submitted_at: Timestamp,
@@ -27,7 +26,6 @@ pub struct BoardRecord {
     pub agent_name: Option<String>,
     /// The team's newest finished evaluation.
     pub evaluation: EvaluationId,
-    /// The evaluation's episodes.
     pub run: RunId,
     /// The date of the evaluation's day.
     pub day: Date,
@@ -37,7 +35,6 @@ pub struct BoardRecord {
     pub extra_for: Option<String>,
     /// When it was scored.
     pub finished_at: Timestamp,
-    /// The score.
     pub result: EvaluationResult,
 }
 

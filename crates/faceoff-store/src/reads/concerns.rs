@@ -15,54 +15,39 @@ pub enum Concern {
     Season,
     /// A stage, or a day of it.
     Stage {
-        /// Which.
         stage: StageId,
         /// Of it all, if there is none.
         day: Option<Date>,
     },
-    /// Rounds of games.
     Tournament(TournamentId),
-    /// A team.
     Team(TeamId),
     /// Somebody with an account.
     Person {
         /// Whose member; none: an organiser.
         team: Option<TeamId>,
     },
-    /// An upload.
     Submission {
-        /// Which.
         submission: SubmissionId,
-        /// Whose.
         team: TeamId,
     },
-    /// An ablation.
     Ablation {
-        /// Of what.
         submission: SubmissionId,
-        /// Whose.
         team: TeamId,
     },
     /// An evaluation that counts, or may.
     Evaluation {
         /// Whose day; none from before there were stages.
         stage: StageId,
-        /// Its date.
         day: Date,
-        /// What plays.
         submission: SubmissionId,
-        /// Whose.
         team: TeamId,
         /// When it ended, if it has.
         finished_at: Option<Timestamp>,
         /// Is all of the day out?
         is_released: bool,
     },
-    /// A game.
     Game {
-        /// Of which tournament.
         tournament: TournamentId,
-        /// Who plays.
         teams: [TeamId; 2],
         /// Is it of a round, or of the schedule played again? Others are their teams' own.
         is_public: bool,

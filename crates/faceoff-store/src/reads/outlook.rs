@@ -57,9 +57,7 @@ impl Outlook {
 /// What a day has left to play.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OpenWork {
-    /// Of which day.
     pub of: StageDay,
-    /// Whose evaluation.
     pub team: TeamId,
     /// Episodes that are not committed.
     pub episodes: u32,

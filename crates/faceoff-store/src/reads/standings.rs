@@ -14,11 +14,9 @@ use sqlx::types::Text;
 /// Of which days of a stage rows of its board are made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BoardDays {
-    /// All of them.
     All,
     /// The last so many on which a team has a result.
     Last(u32),
-    /// The final one.
     Final,
 }
 

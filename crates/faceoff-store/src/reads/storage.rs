@@ -9,13 +9,10 @@ use sqlx::types::Text;
 /// How much room the files of a team take.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TeamStorage {
-    /// Whose.
     pub team: TeamId,
-    /// Its name.
     pub name: TeamName,
     /// Archives of submissions that are kept; they count towards the quota.
     pub archives: u32,
-    /// Of these.
     pub archive_bytes: u64,
     /// Datasets of evaluations that are kept.
     pub datasets: u32,
@@ -30,7 +27,6 @@ pub struct TeamStorage {
 /// Which datasets are counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Counted {
-    /// All of them.
     All,
     /// Those that their team may have: of released days, and of no blind stage. How large others are would tell of
     /// their episodes.

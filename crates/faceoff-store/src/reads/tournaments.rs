@@ -27,7 +27,6 @@ pub enum GamesOf {
 /// A tournament with all that counts, as it was at one moment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TournamentRecord {
-    /// Itself.
     pub tournament: Tournament,
     /// Its teams, by name.
     pub entrants: Vec<Entrant>,
@@ -44,7 +43,6 @@ impl Store {
         tournaments::all(&mut *self.database.read.acquire().await?).await
     }
 
-    /// One.
     #[boxed]
     pub async fn tournament(&self, id: TournamentId) -> Result<Tournament> {
         tournaments::find(&mut *self.database.read.acquire().await?, id).await
@@ -62,7 +60,6 @@ impl Store {
         })
     }
 
-    /// Its games.
     #[boxed]
     pub async fn games(&self, id: TournamentId, of: GamesOf) -> Result<Vec<Game>> {
         let mut connection = self.database.read.acquire().await?;
@@ -73,7 +70,6 @@ impl Store {
         }
     }
 
-    /// One.
     #[boxed]
     pub async fn game(&self, id: GameId) -> Result<Game> {
         games::find(&mut *self.database.read.acquire().await?, id).await

@@ -12,7 +12,6 @@ use std::collections::BTreeMap;
 pub struct Ablation {
     /// Drawn when it was ordered.
     pub id: AblationId,
-    /// What is played.
     pub submission: SubmissionId,
     /// One for each of [`Profile::ABLATION`], all of the same plan otherwise.
     pub runs: BTreeMap<Profile, RunId>,
@@ -24,7 +23,6 @@ pub struct Ablation {
     pub state: AblationState,
 }
 
-/// An ablation's way.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AblationState {
     /// It waits, or is being played.

@@ -6,13 +6,9 @@ use sqlx::{SqliteConnection, types::Text};
 /// What the organisers tell everybody.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Announcement {
-    /// Names it.
     pub id: AnnouncementId,
-    /// When.
     pub at: Timestamp,
-    /// One line.
     pub title: String,
-    /// Plain text.
     pub text: String,
 }
 

@@ -132,11 +132,9 @@ pub(crate) async fn put_seed(
 /// An artifact that an archive for the organiser takes along.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct KeptArtifact {
-    /// Among the artifacts.
     pub key: String,
     /// BLAKE3, 64 hexadecimal digits.
     pub blake3: String,
-    /// What it is.
     pub of: KeptOf,
 }
 

@@ -13,13 +13,11 @@ use sqlx::{SqliteConnection, types::Text};
 pub struct Delivery {
     /// As the receiver reads it, however often it is sent.
     pub id: DeliveryId,
-    /// To whom.
     pub webhook: WebhookId,
     /// Of which event; none: a test.
     pub event: Option<i64>,
     /// What happened, by name.
     pub kind: String,
-    /// What is sent.
     pub body: String,
     /// When it was noted.
     pub created_at: Timestamp,
@@ -27,7 +25,6 @@ pub struct Delivery {
     pub attempts: u32,
     /// What came of the last time.
     pub last: Option<DeliveryAttempt>,
-    /// How it stands.
     pub state: DeliveryState,
 }
 
@@ -36,17 +33,13 @@ pub struct Delivery {
 pub enum DeliveryState {
     /// It is sent, again.
     Waiting {
-        /// When.
         next_at: Timestamp,
     },
-    /// It was taken.
     Delivered {
-        /// When.
         at: Timestamp,
     },
     /// It is not sent any more.
     GivenUp {
-        /// Since when.
         at: Timestamp,
     },
 }
@@ -54,7 +47,6 @@ pub enum DeliveryState {
 /// What came of an attempt.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DeliveryAttempt {
-    /// When.
     pub at: Timestamp,
     /// The status that was answered, if there was an answer.
     pub status: Option<u16>,

@@ -20,9 +20,7 @@ pub struct Draft {
     pub id: EvaluationId,
     /// What it is a part of.
     pub proposal: ProposalId,
-    /// What plays.
     pub submission: SubmissionId,
-    /// Whose it is.
     pub team: TeamId,
     /// The evaluation that it plays again; `None` in a trial.
     pub replaces: Option<EvaluationId>,

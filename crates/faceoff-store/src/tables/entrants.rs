@@ -11,7 +11,6 @@ use sqlx::{SqliteConnection, types::Text};
 /// A team of a tournament.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entrant {
-    /// Which.
     pub team: TeamId,
     /// As it is called now.
     pub name: TeamName,
@@ -24,11 +23,9 @@ pub struct Entrant {
 /// A team left in the middle.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Leave {
-    /// How.
     pub left_as: LeftAs,
     /// The first round whose games with it do not count.
     pub from_round: RoundNumber,
-    /// When.
     pub at: Timestamp,
     /// As everybody may read it.
     pub reason: String,
@@ -110,7 +107,6 @@ pub(crate) async fn remove(
     Ok(())
 }
 
-/// Adds a team.
 pub(crate) async fn put(
     connection: &mut SqliteConnection,
     tournament: TournamentId,

@@ -15,9 +15,7 @@ use sqlx::{SqliteConnection, types::Text};
 pub struct Evaluation {
     /// Part of its URLs.
     pub id: EvaluationId,
-    /// What is evaluated.
     pub submission: SubmissionId,
-    /// Whose it is.
     pub team: TeamId,
     /// The day whose seed it takes.
     pub of: StageDay,
@@ -52,20 +50,16 @@ pub struct Evaluation {
 pub enum EvaluationState {
     /// No shard was begun.
     Queued,
-    /// Shards are played.
     Running {
         /// As far as the workers have told.
         episodes_done: u32,
-        /// Of all tasks.
         episodes_total: u32,
     },
     /// All shards are in, the score is being computed.
     Finalising,
-    /// Scored.
     Finished {
         /// When score and dataset were stored.
         finished_at: Timestamp,
-        /// The score.
         result: Box<EvaluationResult>,
         /// Artifact key of the dataset archive.
         dataset: String,
@@ -82,7 +76,6 @@ pub enum EvaluationState {
     PlatformFailed {
         /// When it was given up.
         finished_at: Timestamp,
-        /// What went wrong.
         reason: String,
     },
     /// Its day's deadline came before it was played: our capacity. The turn is given back.
@@ -445,7 +438,6 @@ pub(crate) enum Failure<'a> {
     Agent,
     /// With what went wrong.
     Platform(&'a str),
-    /// With why.
     Cancelled(&'a str),
     /// By its day's deadline, in words for the team.
     NotPlayed(&'a str),

@@ -12,9 +12,7 @@ use sqlx::{SqliteConnection, types::Text};
 /// The organiser has signed a stage's result off.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Finalised {
-    /// When.
     pub at: Timestamp,
-    /// Who.
     pub by: Actor,
     /// The teams that were disqualified then: its boards are without them for good, and with all others.
     pub without: Vec<TeamId>,

@@ -9,26 +9,21 @@ use serde_json::Value;
 pub struct Game {
     /// Part of its URLs.
     pub id: GameId,
-    /// By whose rules.
     pub tournament: TournamentId,
     /// What it is for.
     pub purpose: GamePurpose,
-    /// Who plays.
     pub teams: [TeamId; 2],
-    /// With what.
     pub submissions: [SubmissionId; 2],
     /// What its seed follows from.
     pub seed: GameSeed,
     /// When it was queued first.
     pub created_at: Timestamp,
-    /// How it stands.
     pub state: GameState,
 }
 
 /// What a game is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GamePurpose {
-    /// It counts.
     Round(Meeting),
     /// Against the organisers' baseline, which is away.
     Test {
@@ -52,7 +47,6 @@ pub enum GamePurpose {
 /// The place of a game in its tournament.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Meeting {
-    /// The round.
     pub round: RoundNumber,
     /// From 1.
     pub matchday: u32,
@@ -71,28 +65,23 @@ pub enum GameState {
     Running {
         /// Which attempt, from 1.
         attempt: u32,
-        /// Since when.
         since: Timestamp,
     },
     /// It has a result.
     Played(Box<GameResultRow>),
     /// Our fault, given up: it has no result until it is played again.
     Broken {
-        /// When.
         at: Timestamp,
-        /// What went wrong.
         reason: String,
     },
     /// It had a result that counts no more: it has none until it is played again.
     Void {
-        /// When.
         at: Timestamp,
         /// As everybody may read it.
         reason: String,
     },
     /// It is not played: a side left, or it does not count and was called off.
     Cancelled {
-        /// When.
         at: Timestamp,
         /// As everybody may read it.
         reason: String,

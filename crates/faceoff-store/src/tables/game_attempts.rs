@@ -14,9 +14,7 @@ use sqlx::{SqliteConnection, types::Text};
 pub struct GameAttempt {
     /// From 1.
     pub number: u32,
-    /// The slot.
     pub worker: String,
-    /// When it began.
     pub begun_at: Timestamp,
     /// What came of it; none: it is under way.
     pub end: Option<AttemptEnd>,
@@ -25,9 +23,7 @@ pub struct GameAttempt {
 /// What came of an attempt.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AttemptEnd {
-    /// When.
     pub at: Timestamp,
-    /// What.
     pub how: AttemptOutcome,
     /// What went wrong, or why it was called off or its result voided; in words for the teams.
     pub reason: Option<String>,

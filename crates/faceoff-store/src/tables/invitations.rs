@@ -43,18 +43,14 @@ impl InvitedAs {
 /// Where an invitation stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InvitationState {
-    /// Until it expires.
     Open,
     /// Somebody has followed it.
     Accepted {
-        /// Who.
         by: PersonId,
-        /// When.
         at: Timestamp,
     },
     /// It was taken back.
     Revoked {
-        /// When.
         at: Timestamp,
     },
 }

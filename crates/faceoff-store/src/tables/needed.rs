@@ -6,16 +6,13 @@ use sqlx::SqliteConnection;
 /// An artifact that the database needs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Needed {
-    /// A file.
     File {
-        /// Its key.
         key: String,
         /// BLAKE3, 64 hexadecimal digits; unknown of what older programs made.
         blake3: Option<String>,
     },
     /// At least a file below a prefix: the recording of a shard that an evaluation under way will be made of.
     Folder {
-        /// The prefix.
         key: String,
     },
 }

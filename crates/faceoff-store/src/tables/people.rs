@@ -9,7 +9,6 @@ use sqlx::{SqliteConnection, types::Text};
 /// Somebody with an account: an organiser, or a member of one team for the whole season.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Person {
-    /// Stays.
     pub id: PersonId,
     /// By which they sign in; unique whatever the case of its letters.
     pub name: PersonName,

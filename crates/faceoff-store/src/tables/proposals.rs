@@ -17,9 +17,7 @@ pub struct Proposal {
     pub stage: StageId,
     /// By which of these.
     pub revision: u32,
-    /// What is played.
     pub kind: ProposalKind,
-    /// The organiser's words.
     pub reason: String,
     /// When it was queued.
     pub created_at: Timestamp,

@@ -9,9 +9,7 @@ use sqlx::{SqliteConnection, types::Text};
 /// What the organisers have answered.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reply {
-    /// When.
     pub at: Timestamp,
-    /// Plain text.
     pub text: String,
     /// May everybody read question and answer? Not who asked.
     pub is_public: bool,
@@ -20,15 +18,11 @@ pub struct Reply {
 /// What a team asks the organisers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Question {
-    /// Names it.
     pub id: QuestionId,
     /// Who asks; a public archive does not tell.
     pub team: Option<TeamId>,
-    /// When.
     pub at: Timestamp,
-    /// Plain text.
     pub text: String,
-    /// None yet.
     pub answer: Option<Reply>,
 }
 

@@ -13,14 +13,11 @@ pub enum RegistrationState {
     Waiting,
     /// There is a team, and its code is an invitation of its first member's.
     Approved {
-        /// When.
         at: Timestamp,
-        /// Which.
         team: TeamId,
     },
     /// It takes no part.
     Refused {
-        /// When.
         at: Timestamp,
         /// As who registered may read it.
         reason: String,
@@ -36,7 +33,6 @@ pub struct Registration {
     pub team_name: TeamName,
     /// Where it is from.
     pub affiliation: Option<String>,
-    /// Its page.
     pub link: Option<String>,
     /// The division that it wants to be in.
     pub division: Option<DivisionName>,
@@ -44,7 +40,6 @@ pub struct Registration {
     pub contact: String,
     /// Which terms were accepted.
     pub accepted_terms: Option<u32>,
-    /// When it came.
     pub created_at: Timestamp,
     /// What became of it.
     pub state: RegistrationState,

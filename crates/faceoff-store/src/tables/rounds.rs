@@ -31,7 +31,6 @@ pub struct TournamentRound {
 pub struct RoundBye {
     /// From 1.
     pub matchday: u32,
-    /// Which.
     pub team: TeamId,
 }
 
@@ -49,7 +48,6 @@ pub struct DrawnRound {
 /// Games that can be played side by side.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct DrawnMatchday {
-    /// The games.
     pub games: Vec<[TeamId; 2]>,
     /// Who has nobody to play.
     pub byes: Vec<TeamId>,

@@ -4,7 +4,6 @@ use jiff::Timestamp;
 /// What the organiser has decided against a result or a team.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Ruling {
-    /// When.
     pub at: Timestamp,
     /// Everybody may read it.
     pub reason: String,

@@ -12,7 +12,6 @@ use sqlx::{SqliteConnection, types::Text};
 /// A run that is over and may be cleared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Clearable {
-    /// Which.
     pub run: RunId,
     /// Every shard was played, and no episode summary of the version that was asked for is kept: it has to be made
     /// from the outcomes before they go.
@@ -24,11 +23,8 @@ pub struct Clearable {
 pub struct Run {
     /// Part of the artifact keys of its recordings.
     pub id: RunId,
-    /// By which rules.
     pub ruleset: Ruleset,
-    /// What is played.
     pub plan: RunPlan,
-    /// On which episodes.
     pub seed: SeedLabel,
     /// Are its shards recorded? If not, their outcomes are all that is kept.
     pub keeps_recordings: bool,

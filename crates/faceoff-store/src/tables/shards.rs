@@ -12,7 +12,6 @@ use uuid::Uuid;
 pub struct Shard {
     /// Drawn when the run was cut.
     pub id: ShardId,
-    /// What is played.
     pub task: Task,
     /// Its index within the run's task, from 0.
     pub first_episode: u32,

@@ -42,18 +42,14 @@ pub struct Revision {
     pub number: u32,
     /// When they became the stage's.
     pub since: Timestamp,
-    /// Themselves.
     pub rules: StageRules,
 }
 
 /// Where a stage is by an instant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StagePhase {
-    /// It opens later.
     Upcoming,
-    /// Its days start.
     Open,
-    /// It is over.
     Closed,
 }
 

@@ -8,14 +8,11 @@ use faceoff_types::{BundleRef, SmokeTiming, SubmissionId, TeamId};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
-/// One uploaded agent.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Submission {
     /// Drawn at the upload.
     pub id: SubmissionId,
-    /// Whose it is.
     pub team: TeamId,
-    /// What was uploaded.
     pub bundle: BundleRef,
     /// When its upload was complete.
     pub created_at: Timestamp,
@@ -46,9 +43,7 @@ pub struct Submission {
 /// Somebody has had the archive of a submission removed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Deletion {
-    /// When.
     pub at: Timestamp,
-    /// Who.
     pub by: Actor,
 }
 
@@ -60,14 +55,12 @@ pub enum SubmissionState {
     Validating,
     /// It starts, answers and keeps time.
     Valid,
-    /// The team's fault.
     Invalid {
         /// What is wrong and where.
         reason: String,
     },
     /// Our fault, after several attempts; the team may upload again.
     ValidationError {
-        /// What went wrong.
         reason: String,
     },
 }

@@ -7,7 +7,6 @@ use faceoff_types::{DivisionName, TeamId, TeamName};
 use jiff::Timestamp;
 use sqlx::{SqliteConnection, types::Text};
 
-/// Who takes part.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Team {
     /// Stays when the team is renamed or gets another token.

@@ -9,7 +9,6 @@ pub struct Terms {
     pub version: u32,
     /// When it was published.
     pub since: Timestamp,
-    /// Plain text.
     pub text: String,
 }
 

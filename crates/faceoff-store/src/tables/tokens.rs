@@ -72,7 +72,6 @@ impl TokenKind {
 pub struct Token {
     /// Names it; tells nothing of the token.
     pub id: TokenId,
-    /// Key or session.
     pub kind: TokenKind,
     /// By whom it speaks.
     pub owner: TokenOwner,
@@ -82,7 +81,6 @@ pub struct Token {
     pub created_at: Timestamp,
     /// From then on it is worth nothing; none: it has no end.
     pub expires_at: Option<Timestamp>,
-    /// To the minute.
     pub last_used_at: Option<Timestamp>,
     /// Since when it is worth nothing.
     pub revoked_at: Option<Timestamp>,

@@ -11,13 +11,11 @@ use sqlx::{SqliteConnection, types::Text};
 /// An address that is told of what happens.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Webhook {
-    /// Names it.
     pub id: WebhookId,
     /// Whose; none: the organisers'.
     pub team: Option<TeamId>,
     /// What its owner calls it.
     pub name: String,
-    /// Where it is.
     pub url: String,
     /// What it is told of; empty: everything that its owner may know.
     pub about: Vec<String>,
@@ -36,9 +34,7 @@ pub struct Webhook {
 /// Why a webhook is told nothing any more.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DeadWebhook {
-    /// Since when.
     pub at: Timestamp,
-    /// In words.
     pub reason: String,
 }
 

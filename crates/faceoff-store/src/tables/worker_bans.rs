@@ -9,7 +9,6 @@ use sqlx::SqliteConnection;
 pub struct WorkerBan {
     /// What it is called.
     pub worker: String,
-    /// Since when.
     pub at: Timestamp,
     /// Why, as organisers read it.
     pub reason: String,
@@ -53,7 +52,6 @@ pub(crate) async fn delete(connection: &mut SqliteConnection, worker: &str) -> R
     Ok(deleted.rows_affected() == 1)
 }
 
-/// By name.
 pub(crate) async fn all(connection: &mut SqliteConnection) -> Result<Vec<WorkerBan>> {
     let rows = sqlx::query_as!(
         BanRow,

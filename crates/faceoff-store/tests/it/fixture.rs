@@ -33,7 +33,6 @@ impl Fixture {
         Store::open(self.folder.path()).await.unwrap()
     }
 
-    /// Past the store.
     pub async fn connection(&self) -> SqliteConnection {
         let file = self.folder.path().join("faceoff.sqlite3");
         let url = format!("sqlite://{}", file.display());

@@ -48,7 +48,6 @@ pub struct BucketConfig {
     pub folder: PathBuf,
 }
 
-/// A bucket.
 pub(super) struct Bucket {
     objects: AmazonS3,
     prefix: Key,
@@ -73,7 +72,6 @@ impl HttpConnector for Connector {
 }
 
 impl Bucket {
-    /// Asks nobody.
     pub(super) fn open(config: BucketConfig) -> anyhow::Result<Self> {
         let named = config.url.strip_prefix("s3://").unwrap_or_default();
         let (bucket, prefix) = named.split_once('/').unwrap_or((named, ""));

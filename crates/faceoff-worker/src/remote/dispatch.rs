@@ -51,7 +51,6 @@ const REACHES_NATS: &str = "reach NATS";
 /// How a server gives work to other machines.
 #[derive(Debug, Clone)]
 pub struct RemoteConfig {
-    /// Where NATS is.
     pub nats: NatsConfig,
     /// Where workers reach this server's files: an address of http or https, without a slash at its end.
     pub files: String,

@@ -54,7 +54,6 @@ pub(super) fn grant_of(order: &WorkOrder, program: &str) -> Grant {
 
 /// What became of an outcome.
 pub(super) enum Taken {
-    /// It counts.
     Held,
     /// It is of no order that is its worker's.
     Lost,

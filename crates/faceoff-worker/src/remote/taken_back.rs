@@ -15,7 +15,6 @@ const BEGINS_WITHIN: Duration = Duration::from_secs(5);
 #[derive(Debug, Clone)]
 pub(super) struct GivenOut {
     pub(super) lease: Lease,
-    /// In words.
     pub(super) what: String,
     /// Its place in the stream, once that is known.
     pub(super) sequence: Option<u64>,
@@ -47,7 +46,6 @@ impl AllGivenOut {
         }
     }
 
-    /// It is begun.
     pub(super) fn take(&self, nonce: Uuid) -> Option<GivenOut> {
         self.all().remove(&nonce)
     }

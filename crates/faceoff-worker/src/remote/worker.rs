@@ -23,20 +23,16 @@ use std::{
 use tokio::runtime::Handle;
 use tokio_util::sync::CancellationToken;
 
-/// A worker.
 #[derive(Debug, Clone)]
 pub struct RemoteWorker {
-    /// Where NATS is.
     pub nats: NatsConfig,
     /// What it is called; no two of a server's are called alike.
     pub name: String,
-    /// What it is.
     pub own: Introduction,
     /// Fetches and stores files. How long nothing may move is watched here: it has no such limit of its own.
     pub http: reqwest::Client,
     /// It ends once no slot has had anything to do for so long; none: it goes on.
     pub ends_after: Option<Duration>,
-    /// How it works.
     pub slots: SlotsConfig,
 }
 

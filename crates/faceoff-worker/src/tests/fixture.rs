@@ -273,7 +273,6 @@ pub(super) struct Server {
     /// About the real time, by which files are dated.
     begun: Timestamp,
     pub(super) ahead_s: Arc<AtomicI64>,
-    /// Of its slots.
     pub(super) intervals: Intervals,
 }
 

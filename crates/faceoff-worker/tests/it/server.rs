@@ -194,7 +194,6 @@ impl Server {
         }
     }
 
-    /// The evaluation's end.
     pub async fn over(&self, id: EvaluationId) -> EvaluationState {
         let mut events = self.store.events();
         loop {

@@ -47,7 +47,6 @@ pub async fn start(server: &Server, rules: TournamentRules, pairs: &[[TeamId; 2]
     store.games(id, GamesOf::Rounds).await.unwrap()
 }
 
-/// Everybody against everybody.
 pub fn pairs(teams: &[TeamId]) -> Vec<[TeamId; 2]> {
     let with = |(at, home): (usize, &TeamId)| {
         let home = *home;

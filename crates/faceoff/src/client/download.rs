@@ -18,13 +18,10 @@ const HASH: &str = "x-content-blake3";
 /// A file that is there, whole.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Downloaded {
-    /// Where.
     pub file: PathBuf,
-    /// Its size.
     pub bytes: u64,
     /// How much of it was there from a download that had broken off.
     pub resumed_at: u64,
-    /// Its hash.
     pub blake3: String,
     /// Is that the hash that the server tells? `false`: it tells none.
     pub checked: bool,

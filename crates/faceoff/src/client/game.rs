@@ -17,7 +17,6 @@ use reqwest::{Method, header};
 use std::path::Path;
 
 impl Client {
-    /// One game.
     pub async fn game(&self, id: GameId) -> anyhow::Result<GameView> {
         self.get(&format!("/games/{id}")).await
     }

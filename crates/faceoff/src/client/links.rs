@@ -8,7 +8,6 @@ use reqwest::Method;
 /// What a link downloads.
 #[derive(Debug, Clone, Copy)]
 pub enum Linked {
-    /// Of an evaluation.
     Dataset(EvaluationId),
     /// As it was uploaded.
     Submission(SubmissionId),

@@ -19,7 +19,6 @@ use faceoff_types::{InvitationId, PersonId, QuestionId, RegistrationId, TeamId, 
 use reqwest::Method;
 
 impl Client {
-    /// Who we are.
     pub async fn whoami(&self) -> anyhow::Result<WhoView> {
         self.get("/whoami").await
     }
@@ -40,7 +39,6 @@ impl Client {
             .await
     }
 
-    /// Ends a token.
     pub async fn revoke_token(&self, id: TokenId) -> anyhow::Result<TokenView> {
         self.act(Method::DELETE, &format!("/tokens/{id}")).await
     }
@@ -97,7 +95,6 @@ impl Client {
         self.tell(Method::POST, "/invitations/accept", join).await
     }
 
-    /// One team.
     pub async fn team(&self, id: TeamId) -> anyhow::Result<TeamView> {
         self.get(&format!("/teams/{id}")).await
     }
@@ -145,7 +142,6 @@ impl Client {
         self.list(self.request(Method::GET, "/announcements")).await
     }
 
-    /// Organiser: tells everybody.
     pub async fn announce(&self, title: String, text: String) -> anyhow::Result<AnnouncementView> {
         let new = NewAnnouncement { title, text };
         self.tell(Method::POST, "/announcements", &new).await

@@ -8,12 +8,9 @@ use std::collections::VecDeque;
 /// No event of ours is nearly as long; a server that sends more is none of ours.
 const LONGEST_EVENT_BYTES: usize = 1 << 20;
 
-/// One event.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ServerEvent {
-    /// Its kind.
     pub name: String,
-    /// Its text.
     pub data: String,
     /// By which a stream can be resumed after it.
     pub id: Option<String>,

@@ -52,12 +52,10 @@ impl Client {
         self.get(&of(id, "/certainty")).await
     }
 
-    /// Organiser: opens one.
     pub async fn open_tournament(&self, new: &NewTournament) -> anyhow::Result<TournamentView> {
         self.tell(Method::POST, "/tournaments", new).await
     }
 
-    /// Organiser: changes one.
     pub async fn change_tournament(
         &self,
         id: TournamentId,
@@ -86,7 +84,6 @@ impl Client {
             .await
     }
 
-    /// Team: withdraws itself.
     pub async fn withdraw_from_tournament(
         &self,
         id: TournamentId,

@@ -19,7 +19,6 @@ impl Client {
         self.tell(Method::POST, "/webhooks", new).await
     }
 
-    /// Changes one.
     pub async fn change_webhook(
         &self,
         id: WebhookId,

@@ -45,7 +45,6 @@ struct LocalView<'a> {
     profile: Profile,
     #[serde(flatten)]
     comparison: &'a Comparison,
-    /// With --episodes.
     #[serde(skip_serializing_if = "Option::is_none")]
     episodes: Option<BTreeMap<Task, WhoSolved>>,
 }

@@ -52,7 +52,6 @@ pub(super) fn invited(made: &NewInvitationView) -> String {
     )
 }
 
-/// All invitations.
 pub(super) fn invitation_lines(invitations: &[InvitationView]) -> String {
     let lines = invitations.iter().map(invitation_line).collect();
     or_none(lines, "nobody was invited yet")

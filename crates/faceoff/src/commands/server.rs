@@ -36,7 +36,6 @@ pub enum Source {
     Option,
     Environment,
     Login,
-    /// Nobody said anything.
     Default,
 }
 
@@ -61,7 +60,6 @@ impl Source {
     }
 }
 
-/// What was found.
 #[derive(Debug)]
 pub struct Found {
     pub server: String,

@@ -61,7 +61,6 @@ impl BundleFile {
         }
     }
 
-    /// Where it is.
     pub fn path(&self) -> &Path {
         match &self.place {
             Place::Given(path) => path,
@@ -74,7 +73,6 @@ impl BundleFile {
         &self.name
     }
 
-    /// Its size.
     pub const fn bytes(&self) -> u64 {
         self.bytes
     }

@@ -18,9 +18,7 @@ pub struct Selection {
 /// One name in the archive.
 #[derive(Debug)]
 pub struct Entry {
-    /// Within the folder.
     pub path: PathBuf,
-    /// What it is.
     pub kind: Kind,
 }
 
@@ -29,14 +27,11 @@ pub struct Entry {
 pub enum Kind {
     /// A folder, perhaps an empty one.
     Folder,
-    /// A file.
     File {
-        /// Its size.
         bytes: u64,
         /// May its owner run it?
         executable: bool,
     },
-    /// A symbolic link.
     Link {
         /// Where to, as it says.
         target: PathBuf,

@@ -35,7 +35,6 @@ pub struct Plan {
     pub contact_time: f64,
     /// Where on the goal line the puck shall arrive, and by which way.
     pub aim: Aim,
-    /// Mallet at contact.
     pub mallet: Vec2,
     /// Direction of the mallet's motion and of the contact.
     pub normal: Vec2,

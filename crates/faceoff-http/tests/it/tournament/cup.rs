@@ -12,7 +12,6 @@ use std::collections::BTreeMap;
 pub struct Cup {
     pub site: Site,
     pub teams: BTreeMap<String, TestTeam>,
-    /// In the API.
     pub path: String,
 }
 

@@ -10,7 +10,6 @@ use faceoff_types::{GameHappening, GameId, LiveHappening, LivePosition, Side};
 use reqwest::Method;
 use serde_json::json;
 
-/// Follows a game.
 async fn open(cup: &Cup, game: GameId, last: Option<&str>) -> Stream {
     let path = format!("/api/v1/games/{game}/live");
     Stream::open(&cup.site, &path, None, last).await

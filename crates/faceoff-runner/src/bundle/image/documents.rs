@@ -30,7 +30,6 @@ pub(super) struct Parts {
     pub layers: Vec<LayerPart>,
 }
 
-/// One layer.
 pub(super) struct LayerPart {
     /// Its file in the archive.
     pub name: String,
@@ -73,7 +72,6 @@ struct OciList {
     manifests: Option<Vec<Descriptor>>,
 }
 
-/// One image there.
 #[derive(Debug, Deserialize)]
 struct OciImage {
     config: Descriptor,

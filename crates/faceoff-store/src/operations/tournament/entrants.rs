@@ -19,9 +19,7 @@ use std::collections::BTreeSet;
 /// A team that leaves.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Leaving {
-    /// Which.
     pub team: TeamId,
-    /// How.
     pub left_as: LeftAs,
     /// The first round whose games with it do not count, if it is another than the one that is under way or next.
     pub from_round: Option<RoundNumber>,

@@ -23,7 +23,6 @@ use jiff::Timestamp;
 /// A tournament to be opened.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NewTournament {
-    /// Its name.
     pub name: StageName,
     /// The stage whose tiers its entrants come from, if they do.
     pub stage: Option<StageId>,
@@ -38,7 +37,6 @@ pub struct NewTournament {
 /// What of a tournament is to be otherwise; what is none stays.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TournamentChange {
-    /// Its name.
     pub name: Option<StageName>,
     /// What results depend on; not once a round was started.
     pub rules: Option<TournamentRules>,

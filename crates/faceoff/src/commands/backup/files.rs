@@ -16,7 +16,6 @@ const PIECE_BYTES: usize = 1 << 20;
 /// A file that was copied.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Copied {
-    /// Its length.
     pub bytes: u64,
     /// BLAKE3, 64 hexadecimal digits.
     pub blake3: String,

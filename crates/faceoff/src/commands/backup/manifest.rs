@@ -22,20 +22,17 @@ pub const FORMAT: u32 = 1;
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
-    /// Of this list.
     pub format: u32,
     /// Version that made it.
     pub program: String,
     /// Newest migration of the database.
     pub schema: i64,
-    /// The season's name.
     pub season: String,
     /// When it was begun.
     pub made_at: Timestamp,
     /// What the database names and the data folder did not have.
     #[serde(default)]
     pub missing: Vec<Missing>,
-    /// Every file.
     pub files: Vec<Part>,
 }
 
@@ -45,7 +42,6 @@ pub struct Manifest {
 pub struct Part {
     /// From the backup's folder.
     pub path: String,
-    /// Its length.
     pub bytes: u64,
     /// BLAKE3, 64 hexadecimal digits.
     pub blake3: String,
@@ -135,7 +131,6 @@ impl Manifest {
         Ok(manifest)
     }
 
-    /// Of all files.
     #[must_use]
     pub fn total_bytes(&self) -> u64 {
         self.files

@@ -15,7 +15,6 @@ impl Feature {
 }
 
 impl Findings {
-    /// As a table.
     pub(super) fn print(&self, out: &mut impl Write) -> std::io::Result<()> {
         writeln!(out, "Sandbox")?;
         let mut features = self.features.iter().peekable();

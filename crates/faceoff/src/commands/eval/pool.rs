@@ -31,7 +31,6 @@ pub(super) enum Verdict {
         outcomes: Vec<EpisodeOutcome>,
         logs: Logs,
     },
-    /// Too many faults.
     Failed { faults: Vec<AgentFault>, logs: Logs },
 }
 

@@ -25,7 +25,6 @@ pub(super) struct EvalSetup {
     /// One per worker.
     pub envs: Vec<AgentEnvironment>,
     pub tasks: Vec<Task>,
-    /// Of each task.
     pub episodes: u32,
     pub seed: Seed,
     pub mismatch_seed: Seed,
@@ -43,7 +42,6 @@ pub(super) struct Played {
     pub result: EvaluationResult,
     pub outcomes: Vec<EpisodeOutcome>,
     pub archive_blake3: String,
-    /// The agent's.
     pub faults: Vec<AgentFault>,
 }
 

@@ -21,7 +21,6 @@ macro_rules! of_crate {
     };
 }
 
-/// A bundle.
 pub fn python(example: Example) -> Files {
     let agent = match example {
         Example::Defender => template!("python/defender.py"),

@@ -15,7 +15,6 @@ pub fn write(out: &mut impl Write, scored: &ScoredTournament) -> anyhow::Result<
     out.write_all(text.as_bytes()).context("standard output")
 }
 
-/// Standings alone.
 pub(in crate::commands) fn of_standings(rows: &[Standing]) -> String {
     let mut out = String::new();
     standings(&mut out, rows).expect("writing to memory cannot fail");

@@ -63,7 +63,6 @@ impl Played {
     }
 }
 
-/// What was measured.
 #[derive(Debug, Serialize)]
 struct Report {
     task: Played,

@@ -33,7 +33,6 @@ struct Raw {
     every_ms: Option<u64>,
 }
 
-/// A checked scenario.
 #[derive(Debug)]
 pub struct Scenario {
     /// Adds its opponent, terminations and success.
@@ -59,7 +58,6 @@ pub struct Scenario {
 }
 
 impl Scenario {
-    /// Reads one scenario.
     pub fn read(input: impl Read) -> Result<Self> {
         let mut text = String::new();
         let length = input

@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Serialize)]
 pub(super) struct Contents {
     file_name: String,
-    /// Of the archive.
     bytes: u64,
     /// Of an archive nobody has looked: null.
     files: Option<Vec<Packed>>,
@@ -37,7 +36,6 @@ impl Contents {
         }
     }
 
-    /// All of it.
     pub(super) fn listed(&self) -> String {
         let mut lines = vec![format!(
             "{}: {}, not uploaded",
