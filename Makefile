@@ -188,7 +188,7 @@ load:
 # A slot of a worker against one of the server's own; nothing else should run.
 elsewhere: setup-test
 	$(CARGO) build --release --locked --package faceoff
-	python3 tests/load/elsewhere.py "$(RELEASE)/faceoff"
+	python3 tests/load/remote_slot.py "$(RELEASE)/faceoff"
 
 # Many workers that sleep in place of playing, for one server; nothing else should run. TMPDIR=FOLDER: on that disk.
 crowd: setup-test
@@ -222,7 +222,7 @@ pictures: setup-test
 # Of the replay's script: so many milliseconds are the machine's, which is why no other test asks.
 frames: setup-test
 	$(CARGO) build --locked --workspace --bins --tests
-	$(CARGO) test --locked --workspace --test e2e replay::a_frame -- --include-ignored --nocapture
+	$(CARGO) test --locked --workspace --test e2e replay::frames_need_little_script_time -- --include-ignored --nocapture
 
 lint:
 	$(CARGO) fmt --all --check
